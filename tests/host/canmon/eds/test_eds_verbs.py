@@ -293,6 +293,5 @@ def test_what_is_left_is_told_with_the_lines_of_where_it_is_written(tmp_path: Pa
     assert at > line
     assert left.replace(f"{out}:{at}", f"{file}:{at + 1}") == shown[-1]
     assert (
-        f"{file}:30: mended: [doubled-key] [DeviceInfo] NrOfRXPDO is there twice: 4"
-        in (written[0])
+        f"{file}:30: mended: [doubled-key] [DeviceInfo] NrOfRXPDO is there twice: 4" in (written[0])
     )

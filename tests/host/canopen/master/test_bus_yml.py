@@ -72,9 +72,7 @@ def test_every_mode_moves_its_own_joint_at_once(tmp_path: Path) -> None:
 
 def test_joints_home_to_their_limit_switches_at_once(tmp_path: Path) -> None:
     nodes = "  left: {node_id: 2}\n  right: {node_id: 3}\n"
-    more = SYSTEM.replace(
-        "value: 35}", "value: 18}\n    - {index: 0x6099, sub_index: 1, value: 1000}"
-    )
+    more = SYSTEM.replace("{index: 0x6098, value: 35}", HOMING)
     with system(tmp_path, nodes, more) as (_, master):
         master.perform(*(joint.init() for joint in master.joints.values()))
         for joint in master.joints.values():
