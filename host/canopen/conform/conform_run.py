@@ -212,7 +212,7 @@ class ConformRun:
     def _report(self, aborted: str) -> Report:
         subject = self._subject
         findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
-        findings = (*self._crashes, *findings)
+        findings = tuple(dict.fromkeys((*self._crashes, *findings)))
         return Report(
             self._source,
             self._node_id,

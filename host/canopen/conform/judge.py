@@ -70,7 +70,7 @@ class Judge:
         try:
             bound = bind_check(check, subject.names)
             if (missing := subject.missing(bound.used)) is not None:
-                return f"the node has no {missing}"
+                return missing
             for index, _ in sorted(bound.changed):
                 self._permission.check_write(index)
             for index, _ in sorted(bound.written - bound.changed):

@@ -144,7 +144,7 @@ def _bind_object(search: _Search, wanted: Wanted) -> None:
     """Take the best object that fits, may be used so and can be read."""
     fitting = [entry for entry in search.device.entries if wanted.fits(entry)]
     if not fitting:
-        where = "the EDS has no" if search.known else "without an EDS nobody knows of a"
+        where = "the EDS has no" if search.known else "without an EDS nobody knows of any"
         search.reasons[wanted.name] = f"{where} {wanted.what}"
         return
     free = [entry for entry in fitting if wanted.use is not Use.WRITE or _is_free(search, entry)]

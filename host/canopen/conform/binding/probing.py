@@ -50,7 +50,8 @@ ARRAYS: Final[tuple[tuple[int, str, DataType, Access], ...]] = (
     (0x1029, "Error behaviour", U8, RW),
 )
 ERROR_FIELD: Final = 0x1003
-SDO_SERVER: Final = 0x1201
+SDO_SERVERS: Final = ((0x1200, RO), (0x1201, RW))
+"""The default server, which nobody may move, and the first beside it."""
 SDO_COB_IDS: Final = ((1, "client to server"), (2, "server to client"))
 COMMUNICATION: Final = ((1, "COB-ID", U32), (2, "Transmission type", U8))
 TIMING: Final = ((3, "Inhibit time", U16), (5, "Event timer", U16), (6, "SYNC start value", U8))
@@ -81,9 +82,10 @@ def _add_records(table: ObjectTable, reader: ObjectReader) -> None:
     if _has(reader, ERROR_FIELD):
         rows = [Element(1, "Standard error field", U32, RO)]
         table.record(ERROR_FIELD, "Pre-defined error field", rows, count_access=RW, count=0)
-    if _has(reader, SDO_SERVER, 1):
-        rows = [Element(sub, f"COB-ID {way}", U32, RW) for sub, way in SDO_COB_IDS]
-        table.record(SDO_SERVER, "SDO server parameter", rows)
+    for index, access in SDO_SERVERS:
+        if _has(reader, index, 1):
+            rows = [Element(sub, f"COB-ID {way}", U32, access) for sub, way in SDO_COB_IDS]
+            table.record(index, "SDO server parameter", rows)
     for first, kind in PDOS:
         for number in range(MOST_PDOS):
             if _has(reader, first + number, 1):

@@ -51,7 +51,7 @@ def text_report(
     parts += [_failure(result, show, again) for result in begun[:MOST_SHOWN]]
     parts.append([_title(result) for result in begun[MOST_SHOWN:]])
     parts.append(_never_begun([result for result in found if not result.outcome.evidence]))
-    parts += [_list("EDS and node", report.findings), _list("not restored", report.unrestored)]
+    parts += [_list("findings", report.findings), _list("not restored", report.unrestored)]
     parts.append(list(_ending(report, baseline)))
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
 

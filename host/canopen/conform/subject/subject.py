@@ -43,12 +43,19 @@ class Subject:
     about: dict[str, str]
 
     def missing(self, addresses: Collection[Address]) -> str | None:
-        """Return the first object of these that the node does not have, for people."""
+        """Return why not all of these can be used: the first that is not there; None if all are."""
         has = {(entry.index, entry.sub) for entry in self.binding.device.entries}
         for index, sub in sorted(addresses):
             if (index, sub) not in has and index not in MANDATORY:
-                return f"{index:04X}h:{sub:02X}"
+                return f"{self._where(index)} {index:04X}h:{sub:02X}"
         return None
+
+    def _where(self, index: int) -> str:
+        """Say who has no such object: without an EDS only those of CiA 301 were asked for."""
+        if self.binding.known:
+            return "the EDS has no"
+        asked = COMMUNICATION <= index < MANUFACTURER
+        return "the node has no" if asked else "without an EDS nobody knows of any"
 
     def restorable(self, level: Level) -> Iterator[Address]:
         """Yield objects that a run may change, be it by a reset: read before, written after."""

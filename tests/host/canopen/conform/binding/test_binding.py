@@ -129,7 +129,7 @@ def test_without_an_eds_only_what_cia_301_knows_is_bound() -> None:
     assert place(binding, "rw_u16") == "1015.00"
     assert place(binding, "sdo_server_2") == "1201.01"
     assert place(binding, "tpdo_async") == "1800.00"
-    assert binding.reasons["domain"].startswith("without an EDS nobody knows of a domain")
+    assert binding.reasons["domain"].startswith("without an EDS nobody knows of any domain")
     written = [bound for bound in binding.bound.values() if isinstance(bound, BoundObject)]
     assert all(0x1000 <= bound.index < 0x2000 for bound in written)
 

@@ -41,7 +41,7 @@ def test_the_text_has_a_line_a_group_and_failures_with_frames_and_what_to_look_a
     ]
     assert "    2  1016h is not there" in text
     assert "not restored:\n  1017h: 100 was written" in text
-    assert "EDS and node:\n  1800h" in text
+    assert "findings:\n  1800h" in text
 
 
 def test_the_worst_is_told_last_where_a_terminal_ends() -> None:
