@@ -13,33 +13,31 @@ EXTRA: Final = "tickrig"
 """Of each section: what is for us alone."""
 
 OPTIONS: Final = ("dcf_path", "heartbeat_multiplier", "retry_factor", EXTRA)
+ROS: Final = ("driver", "package", "namespace", "remappings", "diagnostics", "non_transmit_timeout")
+"""What ros2_canopen reads of the master and of nodes."""
 BOTH: Final = (
-    *("vendor_id", "product_code"),
-    *("node_id", "revision_number", "serial_number", "time_cob_id"),
-    *("heartbeat_multiplier", "heartbeat_consumer", "heartbeat_producer", "error_behavior"),
-    *("driver", "package", "namespace", "dcf", "dcf_path", "remappings", "diagnostics", EXTRA),
-    *("non_transmit_timeout", "container_name", "master_dcf", "master_bin", "can_interface_name"),
+    *("node_id", "dcf_path", "vendor_id", "product_code", "revision_number", "serial_number"),
+    *("heartbeat_producer", "heartbeat_consumer", "heartbeat_multiplier", "error_behavior"),
+    *("time_cob_id", EXTRA, *ROS),
 )
 MASTER: Final = (
-    *BOTH,
-    *("baudrate", "emcy_inhibit_time", "nmt_inhibit_time"),
-    *("sync_period", "sync_window", "sync_overflow", "start", "start_nodes", "start_all_nodes"),
-    *("reset_all_nodes", "stop_all_nodes", "boot_time", "boot_timeout"),
+    *(*BOTH, "baudrate", "sync_period", "sync_window", "sync_overflow", "emcy_inhibit_time"),
+    *("nmt_inhibit_time", "start", "start_nodes", "start_all_nodes", "reset_all_nodes"),
+    *("stop_all_nodes", "boot_time", "boot_timeout"),
 )
 SCALES: Final = (
     *("scale_pos_to_dev", "scale_pos_from_dev", "scale_vel_to_dev", "scale_vel_from_dev"),
     *("scale_eff_to_dev", "scale_eff_from_dev", "offset_pos_to_dev", "offset_pos_from_dev"),
 )
 DRIVER: Final = (
-    *("enable_lazy_load", "polling", "period", "switching_state", "homing_timeout_seconds"),
-    *("position_mode", "velocity_mode", "effort_mode", "torque_mode", "channel"),
-    *("num_channels", "channel_names", "channels", "sdo_timeout_ms", "boot_timeout_ms", *SCALES),
+    *("num_channels", "channel_names", "channels", *SCALES, "position_mode", "velocity_mode"),
+    *("effort_mode", "torque_mode", "channel", "switching_state", "homing_timeout_seconds"),
+    *("boot_timeout_ms", "sdo_timeout_ms", "enable_lazy_load", "polling", "period"),
 )
-"""What ros2_canopen's drivers read of a node."""
+"""What the drivers of ros2_canopen read of a node, and its hardware interfaces."""
 SLAVE: Final = (
-    *BOTH,
-    *("rpdo", "tpdo", "sdo", "boot", "mandatory", "reset_communication", "retry_factor"),
-    *("guard_time", "life_time_factor", "software_file", "software_version"),
+    *(*BOTH, "dcf", "guard_time", "life_time_factor", "retry_factor", "rpdo", "tpdo", "sdo"),
+    *("boot", "mandatory", "reset_communication", "software_file", "software_version"),
     *("configuration_file", "restore_configuration", *DRIVER),
 )
 PDO: Final = (

@@ -28,7 +28,7 @@ def read_options(section: Section | None) -> BusOptions:
     """Read what holds for all nodes."""
     if section is None:
         return BusOptions()
-    check_keys(section, OPTIONS)
+    check_keys(section, OPTIONS, open_to_others=True)
     return BusOptions(
         dcf_path=section.text("dcf_path"),
         heartbeat_multiplier=section.real("heartbeat_multiplier", 3.0),

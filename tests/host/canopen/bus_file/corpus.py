@@ -93,7 +93,7 @@ CORPUS: Final = (
     Case("not-whole", NODE + "  heartbeat_producer: 10.5\n", 5, "10.5 is cut off: 10"),
     Case("flag-text", NODE + "  boot: 'no'\n", 5, "'no' is not true or false: true is taken"),
     Case("unknown-key", NODE + "  heartbeat_prodcer: 5\n", 5, "did you mean 'heartbeat_producer'?"),
-    Case("unknown-key", MASTER + "options: {x: 1}\n", 2, "known: dcf_path, "),
+    Case("unknown-key", SLEEPY + "  sdo: [{index: 0x2000, xyz: 1}]\n", 5, "known: index, "),
     Case("own-key", NODE + "  colour: red\n", 5, "'colour' is no key that is known"),
     Case("section-lost", MASTER + "nodes: {}\naxis: {dcf: a}\n", 3, "'axis' stands beside nodes"),
     Case(
