@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from tickrig.host.canopen.conform.binding.absent_places import (
+    AbsentPlaces,
+    Place,
+    absent_places,
+)
 from tickrig.host.canopen.conform.binding.object_reader import ObjectReader, Upload
 from tickrig.host.canopen.conform.binding.pdo_binding import PDO_NAMES, BoundPdo, bind_pdos
 from tickrig.host.canopen.conform.binding.probing import probe_device
@@ -25,9 +30,6 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 DEVICE_TYPE: Final = 0x1000
-ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
-ABSENT_SUBS: Final = (0x1018, 0x1016, 0x1010, 0x1200)
-LAST_SUB: Final = 0xFE
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +134,8 @@ def bind(
     search = _Search(found, reader, allow, never, device is not None)
     for wanted in WANTED:
         _bind_object(search, wanted)
-    _bind_absent(search)
+    for places in absent_places(found, reader):
+        _bind_absent(search, places)
     pdos, missing = bind_pdos(found, reader, lambda index: _may_write(search, index))
     search.bound.update(pdos)
     search.reasons.update(missing)
@@ -204,27 +207,34 @@ def _room(wanted: Wanted, entry: EntryDescription) -> int:
     return len(entry.default) if wanted.use is Use.WRITE and entry.data_type in TEXTS else 0
 
 
-def _bind_absent(search: _Search) -> None:
-    """Find places at which there is nothing; where the node has something, that is a finding."""
-    subs: dict[int, int] = {}
-    for entry in search.device.entries:
-        subs[entry.index] = max(entry.sub, subs.get(entry.index, 0))
-    indices = ((index, 0) for index in ABSENT_OBJECTS if index not in subs)
-    _first(search, "absent_object", "index free", indices)
-    records = [*(index for index in ABSENT_SUBS if index in subs), *subs]
-    gaps = ((i, subs[i] + 1) for i in records if 0 < subs[i] < LAST_SUB)
-    _first(search, "absent_sub", "record with a sub-index free", gaps)
-    variables = ((index, 1) for index, last in subs.items() if not last)
-    _first(search, "sub_of_variable", "variable", variables)
+def _bind_absent(search: _Search, places: AbsentPlaces) -> None:
+    """Take a place at which there can be nothing and is something: the checks tell it.
 
-
-def _first(search: _Search, name: str, what: str, places: Iterable[tuple[int, int]]) -> None:
-    for index, sub in (place for place in places if _may_write(search, place[0])):
-        if search.reader.has_nothing(index, sub):
-            search.bound[name] = BoundPlace(index, sub)
+    Else the first at which the node has nothing, else, as it has something everywhere, any.
+    """
+    certain, likely = (
+        [place for place in some if _may_write(search, place[0])]
+        for some in (places.certain, places.likely)
+    )
+    there = [place for place in certain if _has_something(search, place)]
+    for place in [*there, *certain, *likely]:
+        if place in there or search.reader.has_nothing(*place):
+            search.bound[places.name] = BoundPlace(*place)
             return
-        search.findings.append(f"{index:04X}h:{sub:02X} is not described, and the node has it")
-    search.reasons[name] = f"the node has no {what}"
+        if place not in certain and _has_something(search, place):
+            there.append(place)
+    if there:
+        search.bound[places.name] = BoundPlace(*there[0])
+    else:
+        search.reasons[places.name] = f"the node has no {places.what}"
+
+
+def _has_something(search: _Search, place: Place) -> bool:
+    """Read a place at which there should be nothing; what it has is a finding."""
+    if not isinstance(search.reader.try_read(*place), bytes):
+        return False
+    search.findings.append(f"{place[0]:04X}h:{place[1]:02X} is not described, and the node has it")
+    return True
 
 
 ABSENT_NAMES: Final = ("absent_object", "absent_sub", "sub_of_variable")
