@@ -39,8 +39,6 @@ from tickrig.wire.rtc_canopen.objects import device_info
 if TYPE_CHECKING:
     from tickrig.emulators.canopen.bus_file.bus_nodes import BusNodes
 
-NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[rtc]'"
-
 
 @dataclass(frozen=True, slots=True)
 class Described:
@@ -146,17 +144,13 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
 
 
 def _read_bus(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
-    try:
-        from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - YAML
-    except ModuleNotFoundError as error:
-        if error.name != "yaml":
-            raise
-        raise Refused(NEEDS_YAML) from None
+    from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - slow
+
     try:
         return read_bus(file, urdf, cache, profile)
     except OSError as error:
         refuse_path("file", error)
-    except ValueError as error:  # all mistakes
+    except (ImportError, ValueError) as error:  # no YAML; all mistakes
         raise Refused(str(error)) from None
 
 

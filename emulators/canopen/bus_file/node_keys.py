@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Final, NamedTuple
@@ -258,3 +258,11 @@ def read_keys(
         found.get("start", {}),
         places,
     )
+
+
+def rows() -> Iterator[str]:
+    """Yield the lines of the table of the page."""
+    yield "| key | value | unless given | meaning |"
+    yield "|---|---|---|---|"
+    for name, key in KEYS.items():
+        yield f"| `{name}` | {key.values} | {key.default} | {key.text} |"

@@ -51,8 +51,6 @@ def read_rig_file(path: Path) -> RigPlan:
         OSError: it cannot be read.
         RigFileError: all that is wrong with it.
     """
-    if is_bus_yml(path):
-        return _plan(bus_as_rig(path), path)
     try:
         with path.open("rb") as file:
             data = file.read((MAX_MB << 20) + 1)
@@ -74,6 +72,8 @@ def _is_device(text: str) -> bool:
 
 def decode_rig_file(data: bytes, path: Path) -> RigPlan:
     """Read the bytes of a rig file; see `read_rig_file`."""
+    if is_bus_yml(path, data):
+        return _plan(bus_as_rig(path), path)
     if len(data) > MAX_MB << 20:
         head = data[:1_000].decode("utf-8", "replace")
         reason = no_rig_file(head) or f"more than {MAX_MB} MB: this is no rig file"

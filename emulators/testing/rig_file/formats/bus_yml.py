@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, Final
 
+from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus
+from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError
 from tickrig.emulators.testing.rig_file.fields import shown
 from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.rig_file.section import Notes, Section
+from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.text.toml_document import Mistake, TomlDocument, TomlPath
 
 BUS: Final = "bus"
 """The key of a rig file that names a bus.yml."""
 
-NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[rtc]'"
+MISNAMED: Final = "it is a bus.yml: its name has to end in .yml or .yaml"
+_TOML: Final = re.compile(rb"^\s*\[", re.MULTILINE)
 
 
-def is_bus_yml(path: Path) -> bool:
-    """Return whether a file is a bus.yml by its name."""
+def is_bus_yml(path: Path, data: bytes) -> bool:
+    """Return whether a file is a bus.yml, a good or a bad one; not what only its name says."""
+    return is_bus_file(data) or (_is_named(path) and not _TOML.search(data))
+
+
+def _is_named(path: Path) -> bool:
     return path.suffix.lower() in (".yml", ".yaml")
 
 
@@ -28,6 +37,8 @@ def bus_as_rig(path: Path) -> Section:
         OSError: it cannot be read.
     """
     document = TomlDocument({BUS: path.name}, {(BUS,): 1})
+    if not _is_named(path):
+        return Section(Notes(document, [Mistake(1, MISNAMED)]), (), {"device": {}})
     return with_nodes(Section(Notes(document), (), document.values), path.parent, alone=True)
 
 
@@ -60,15 +71,10 @@ def with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
 def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
     """Return the lines of the nodes by their names; what is wrong is noted."""
     try:
-        from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - YAML
-        from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        if error.name != "yaml":
-            raise
-        top.wrong(NEEDS_YAML, BUS)
-        return {}
-    try:
         bus = read_bus(path, cache=eds_cache())
+    except ImportError as error:
+        top.wrong(str(error), BUS)
+        return {}
     except BusMistakesError as error:
         for place, text in error.mistakes:
             own = alone and place.file == str(path)

@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 
 from tests.emulators.canopen.bus_file.system import ONE_JOINT, write_system
 from tickrig.emulators.canopen.cli import main
+from tickrig.emulators.testing.commands.check_cli import check
 
 TWO = f"""{ONE_JOINT}
 joint_2:
@@ -149,3 +150,10 @@ def test_a_node_without_drive_has_no_motor(tmp_path: Path) -> None:
 def test_a_drive_of_several_axes_can_be_plain_objects(tmp_path: Path) -> None:
     text = f"{ONE_JOINT}  num_channels: 2\n  tickrig: {{profile: none}}\n"
     assert play("--bus", write_system(tmp_path, text), scenario="5ms end\n").exit_code == 0
+
+
+def test_the_check_tells_what_is_wrong_with_our_keys(tmp_path: Path) -> None:
+    path = write_system(tmp_path, f"{ONE_JOINT}  tickrig: {{gear_ratio: -1}}\n")
+    done = CliRunner().invoke(check, [str(path)])
+    line = f"{path}:7: joint_1.tickrig.gear_ratio: '-1' is no number 0.01..1e+06"
+    assert (done.exit_code, done.stdout.splitlines()[-1]) == (1, line)

@@ -4,6 +4,7 @@ import os
 
 import pytest
 
+from tests.emulators.canopen.bus_file.system import write_system
 from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
 from tests.emulators.testing.plugin.test_bench_fixture import RRC
 
@@ -140,3 +141,19 @@ def test_hardware_stands_in_a_rig_file(pytester: pytest.Pytester, run: Run) -> N
 def test_who_asks_for_nothing_sees_nothing(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makepyfile("def test_one():\n    pass\n")
     assert not [line for line in run().outlines if "bench" in line or "tickrig" in line]
+
+
+def test_a_bus_yml_is_a_bench_too(pytester: pytest.Pytester, run: Run) -> None:
+    write_system(pytester.path)
+    pytester.makepyfile("""
+        def test_a_joint(bench):
+            bench.run_for("10ms")
+            assert bench.devices == ("joint_1",)
+            assert bench.get("drive_state") == "Switch on disabled"
+    """)
+    result = run("--bench", "bus.yml")
+    result.assert_outcomes(passed=1)
+    result.stdout.fnmatch_lines(["bench: */bus.yml, virtual"])
+    (pytester.path / "joint.eds").unlink()
+    missing = run("--bench", "bus.yml")
+    missing.stdout.fnmatch_lines(["*bus.yml:*joint_1: dcf: no file 'joint.eds'*"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from tests.emulators.canopen.bus_file.system import ONE_JOINT, Joint, joints, wr
 from tickrig import Bench, RigFileError, open_bench
 from tickrig.emulators.testing.commands.replay_cli import replay_command
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
+from tickrig.testing import open_master
 
 TWO = f"""{ONE_JOINT}  tickrig: {{start: {{load_nm: 0.5}}, supply_v: 48, upper: 0.5}}
 
@@ -125,3 +127,38 @@ def test_a_recorded_run_is_replayed(tmp_path: Path) -> None:
     path.write_text(path.read_text().replace("0.5", "0.6"))
     other = CliRunner().invoke(replay_command, [str(trace)])
     assert "is another file than the one that was recorded" in other.output
+
+
+@pytest.mark.realtime
+def test_in_real_time_a_joint_of_a_bus_yml_turns(tmp_path: Path) -> None:
+    path = write_system(tmp_path, TWO)
+    with open_bench(path, mode="real") as bench, open_master(bench.link, path) as master:
+        master.boot()
+        joint = master.joints["joint_2"]
+        master.perform(joint.choose("pv"))
+        joint.set_target(0.5)
+        turns = lambda: float(bench["joint_2"].get("shaft_deg_s")) > 20  # noqa: E731
+        assert master.wait_until(turns, "10s")
+
+
+def test_a_bus_yml_is_known_by_what_it_says(tmp_path: Path) -> None:
+    bus = write_system(tmp_path)
+    rig = tmp_path / "rig.yml"
+    rig.write_text('[device.rrc]\ntype = "rrc"\n')
+    assert set(read_rig_file(rig).devices) == {"rrc"}
+    with pytest.raises(RigFileError, match=r"it is a bus.yml: its name has to end in .yml"):
+        read_rig_file(bus.rename(tmp_path / "bus.toml"))
+    broken = tmp_path / "broken.yml"
+    broken.write_text("joint_1: {node_id: 2")
+    with pytest.raises(RigFileError, match=r"broken.yml:1: .*not YAML"):
+        read_rig_file(broken)
+
+
+def test_without_yaml_it_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_system(tmp_path)
+    monkeypatch.delitem(sys.modules, "tickrig.host.canopen.bus_file.yaml_tree", raising=False)
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    with pytest.raises(RigFileError, match=r"a bus.yml needs PyYAML: pip install 'tickrig\[bus\]'"):
+        read_rig_file(path)
