@@ -9,6 +9,8 @@ from click.testing import CliRunner
 
 from tests.host.canopen.bus_file.bench import NODE, write_bus
 from tests.host.canopen.bus_file.shapes import COGEN, PLAIN
+from tickrig.emulators.canopen.cli import main as emulator
+from tickrig.emulators.commands.cli import main
 from tickrig.emulators.testing.commands.check_cli import check
 
 
@@ -57,10 +59,10 @@ def test_warnings_count_where_that_is_wanted(folder: Path) -> None:
 
 def test_it_is_known_by_its_content_and_a_rig_file_by_its_own(folder: Path) -> None:
     write_bus(folder, NODE).rename("bench.toml")
-    (folder / "rig.yml").write_text('[device.rrc]\ntype = "rrc"\n# master: 1\n')
-    status, out, _ = run("bench.toml", "rig.yml")
+    (folder / "bus.toml").write_text('[device.rrc]\ntype = "rrc"\n# master: 1\n')
+    status, out, _ = run("bench.toml", "bus.toml")
     assert (status, out[0]) == (0, "bench.toml: ok: 1 slave, master 1")
-    assert out[2] == "rig.yml: ok: 1 device, 1 wire"
+    assert out[2] == "bus.toml: ok: 1 device, 1 wire"
 
 
 def test_a_pipe_is_read_but_once(folder: Path) -> None:
@@ -72,10 +74,25 @@ def test_a_pipe_is_read_but_once(folder: Path) -> None:
     assert (status, out[0]) == (0, f"/dev/fd/{read}: ok: 1 device, 1 wire")
 
 
-def test_without_pyyaml_the_extra_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        ("tickrig", "check bus.yml"),
+        ("tickrig", "run bus.yml"),
+        ("tickrig", "run rig.toml"),
+        ("canopen-slave-emu", "--bus bus.yml --scenario -"),
+    ],
+)
+def test_without_pyyaml_the_extra_is_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, script: str, words: str
+) -> None:
     write_bus(folder, NODE)
+    (folder / "rig.toml").write_text('bus = "bus.yml"\n')
     monkeypatch.setitem(sys.modules, "yaml", None)
     monkeypatch.delitem(sys.modules, "tickrig.host.canopen.bus_file.yaml_tree", raising=False)
-    status, out, err = run("bus.yml")
-    said = "Error: bus.yml: a bus.yml needs PyYAML: pip install 'tickrig[bus]'\n"
-    assert (status, out, err) == (2, [], said)
+    command = {"tickrig": main, "canopen-slave-emu": emulator}[script]
+    result = CliRunner().invoke(command, words.split())
+    assert result.exit_code == 2, result.output
+    said = (result.stdout + result.stderr).splitlines()
+    assert "a bus.yml needs PyYAML: pip install 'tickrig[bus]'" in said[0]
+    assert "Traceback" not in result.output
