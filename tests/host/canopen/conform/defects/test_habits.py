@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 import pytest
 
 from tests.device.canopen.reference import NODE_ID
-from tests.host.canopen.conform.defects.defect import Defect, hears, make_defective, tolerant
+from tests.host.canopen.conform.defects.defect import Bends, Defect, hears, make_defective, tolerant
 from tests.host.canopen.conform.defects.of_sdo import TEXT, clings_to_transfer, row
 from tests.host.canopen.conform.defects.test_found import judge
 from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.under_test import Judged, not_harmless
+from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.nmt.error_control import HeartbeatProducer
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
@@ -30,6 +33,32 @@ CLEARED: Final = ("5000", "3100")
 ZEROS: Final = tolerant(AbortCode.NO_OBJECT, "1A00:00", "1A00:01")
 
 
+class Prompt(HeartbeatProducer):
+    """Sends a first heartbeat 2 ms after its time was written."""
+
+    def schedule(self, due_us: int) -> None:
+        super().schedule(due_us or self.node.now_us + 2_000)
+
+    def tick(self, now_us: int) -> None:
+        self._begins, self._due_us = False, now_us
+        if self.node.dictionary[0x1017, 0].number:
+            super().tick(now_us)
+
+
+def clears_by_an_rpdo(slave: CanopenSlave) -> Bends:
+    """Tell with the next RPDO that an earlier one was too short, which is in no register."""
+
+    def hear(text: str) -> Iterable[str]:
+        if text.startswith("205#"):
+            slave.send(0x085, bytes(8))
+        return (text,)
+
+    return Bends(hear)
+
+
+PROMPT: Final = {HeartbeatProducer: Prompt}
+
+
 @pytest.mark.parametrize(
     ("habit", "checks"),
     [
@@ -37,6 +66,8 @@ ZEROS: Final = tolerant(AbortCode.NO_OBJECT, "1A00:00", "1A00:01")
         (Defect("no new transfer while one runs", (), clings_to_transfer), ("US-07",)),
         (Defect("no other bit rate", (), hears("7E5#13.*")), ("LS-06", "LS-07")),
         (Defect("zeros for dummies", (), ZEROS), ("PC-29",)),
+        (Defect("a heartbeat at once", (), services=PROMPT), ("NMT-10", "NMT-11", "ST-05")),
+        (Defect("EMCY 0000h with an RPDO", (), clears_by_an_rpdo), ("PR-16",)),
     ],
     ids=lambda value: value.name if isinstance(value, Defect) else "",
 )
