@@ -161,11 +161,14 @@ class NodeCare:
             self._state.tidy(None)
 
     def _has_errors(self) -> bool:
-        """Say whether a check left an error behind; the history of errors is emptied."""
+        """Say whether a check left an error behind: those of before the run may have gone."""
         number = self._client.number(*ERROR_REGISTER)
         if number is None:
             self._client.upload(*DEVICE_TYPE)  # absent, or is the node gone?
-        return number not in (None, self._errors)
+            return False
+        new = number & ~self._errors
+        self._errors &= number
+        return bool(new)
 
     def _recover(self) -> None:
         """Try to get a node back that does not answer."""

@@ -7,13 +7,15 @@ from typing import Final
 
 import pytest
 
+from tests.device.canopen.actions import SlaveActions
 from tests.device.canopen.reference import NODE_ID
 from tests.host.canopen.conform.defects.defect import Bends, Defect, hears, make_defective, tolerant
 from tests.host.canopen.conform.defects.of_sdo import TEXT, clings_to_transfer, row
 from tests.host.canopen.conform.defects.test_found import judge
-from tests.host.canopen.conform.r1 import yes
+from tests.host.canopen.conform.r1 import R1, Stimulus, yes
+from tests.host.canopen.conform.test_safety import SpyLink
 from tests.host.canopen.conform.under_test import Judged, not_harmless
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.nmt.error_control import HeartbeatProducer
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
@@ -56,7 +58,9 @@ def clears_by_an_rpdo(slave: CanopenSlave) -> Bends:
     return Bends(hear)
 
 
-PROMPT: Final = {HeartbeatProducer: Prompt}
+RESET: Final = 0x82
+"""Reset communication; one is told to learn whether the error goes."""
+PROMPT: Final[dict[ServiceMaker, ServiceMaker]] = {HeartbeatProducer: Prompt}
 
 
 @pytest.mark.parametrize(
@@ -96,3 +100,13 @@ def test_what_the_inhibit_time_holds_back_does_not_come_in_the_next_check() -> N
     outcome = judge(Defect("none", ()), "EM-08").results[0].outcome
     assert outcome.verdict is Verdict.PASS
     assert sum(line.text.startswith("085#0000") for line in outcome.evidence) == len(CLEARED)
+
+
+def test_an_error_of_before_the_run_that_is_gone_brings_no_reset() -> None:
+    r1 = R1()
+    Stimulus(r1, SlaveActions(r1.slave))("emergency", "5000", "01")
+    r1.rig.run_for(10_000)
+    link = SpyLink(r1)
+    report = r1.judge(Plan(Level.INTRUSIVE, ("NMT-11", "HB"), confirm=yes), link=link)
+    assert not_harmless(report) == []
+    assert sum(frame.can_id == 0 and frame.data[0] == RESET for frame in link.sent) <= 1
