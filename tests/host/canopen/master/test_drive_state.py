@@ -1,0 +1,52 @@
+"""States by the statusword, and the ways between them (CiA 402-2)."""
+
+from __future__ import annotations
+
+import pytest
+
+from tickrig.device.canopen.ds402.state import automaton
+from tickrig.host.canopen.master.cia402.drive_state import (
+    TRANSITIONS,
+    DriveState,
+    lead,
+    next_state,
+    state_of,
+)
+
+
+@pytest.mark.parametrize("state", automaton.DriveState)
+@pytest.mark.parametrize("other_bits", [0x0000, 0x1610, 0xFF90])
+def test_a_state_is_known_by_its_bits_whatever_the_others_are(
+    state: automaton.DriveState, other_bits: int
+) -> None:
+    assert state_of(state | other_bits).name == state.name
+
+
+def test_bits_of_no_state_are_unknown() -> None:
+    assert state_of(0x0002) is DriveState.UNKNOWN
+
+
+@pytest.mark.parametrize(("before", "after"), list(TRANSITIONS), ids=str)
+def test_a_controlword_asks_the_drive_for_the_transition(
+    before: DriveState, after: DriveState
+) -> None:
+    word = lead(0x0100, before, after)
+    assert word is not None
+    command = automaton.command_of(word)
+    reached = automaton.NEXT_STATE.get((automaton.DriveState[before.name], command))  # type: ignore[arg-type]
+    if before in {DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE}:
+        assert (word & 0x80 != 0) == (before is DriveState.FAULT)
+    elif before is not DriveState.NOT_READY_TO_SWITCH_ON:
+        assert reached is not None
+        assert reached.name == after.name
+
+
+@pytest.mark.parametrize("state", [state for state in DriveState if state.value != "unknown"])
+def test_every_state_leads_to_operation_enabled(state: DriveState) -> None:
+    for _ in range(6):
+        if state is DriveState.OPERATION_ENABLED:
+            return
+        following = next_state(state, DriveState.OPERATION_ENABLED)
+        assert lead(0, state, following) is not None
+        state = following
+    raise AssertionError("it takes too many steps")

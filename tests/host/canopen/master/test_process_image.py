@@ -1,0 +1,78 @@
+"""When a master sends the RPDOs of a slave, and what it takes of its TPDOs."""
+
+from __future__ import annotations
+
+from tickrig.host.canopen.bus_file.bus_values import BusPdo, Channel
+from tickrig.host.canopen.dialogue import QueuedScript, SdoRequest
+from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver, DriveSettings
+from tickrig.host.canopen.master.process_image import ProcessImage
+from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.wire.canopen.pdo import MappedObject
+
+CONTROLWORD, TARGET, STATUSWORD = (0x6040, 0), (0x607A, 0), (0x6041, 0)
+
+
+class Slave:
+    """An image of a slave with one RPDO, and what was sent to it."""
+
+    def __init__(self, transmission: int, cob_id: int = 0x202) -> None:
+        rpdo = (MappedObject(0x6040, 0, 16), MappedObject(0x607A, 0, 32))
+        tpdo = (MappedObject(0x6041, 0, 16), MappedObject(0x6061, 0, 8))
+        pdos = (
+            BusPdo(1, False, cob_id, transmission, mapping=rpdo),
+            BusPdo(1, True, 0x182, 1, mapping=tpdo),
+        )
+        self.sent: list[str] = []
+        self.image = ProcessImage(pdos, self._send)
+
+    def _send(self, can_id: int, data: bytes) -> None:
+        self.sent.append(f"{can_id:03X}#{data.hex().upper()}")
+
+
+def test_an_event_driven_pdo_goes_out_with_each_write_of_an_object_in_it() -> None:
+    slave = Slave(255)
+    slave.image.sync()
+    slave.image.write(TARGET, 0x0102)
+    slave.image.write(CONTROLWORD, 0x000F)
+    assert slave.sent == ["202#000002010000", "202#0F0002010000"]
+
+
+def test_a_synchronous_pdo_goes_out_with_each_nth_sync() -> None:
+    slave = Slave(3)
+    slave.image.write(CONTROLWORD, 0x000F)
+    for _ in range(7):
+        slave.image.sync()
+    assert slave.sent == ["202#0F0000000000"] * 2
+
+
+def test_an_acyclic_synchronous_pdo_waits_for_the_sync_after_a_write() -> None:
+    slave = Slave(0)
+    slave.image.sync()
+    slave.image.write(CONTROLWORD, 0x0006)
+    assert slave.sent == []
+    slave.image.sync()
+    slave.image.sync()
+    assert slave.sent == ["202#060000000000"]
+
+
+def test_a_pdo_that_is_not_there_carries_nothing() -> None:
+    slave = Slave(255, INVALID | 0x202)
+    assert not slave.image.sends(CONTROLWORD)
+    slave.image.write(CONTROLWORD, 0x000F)
+    assert slave.sent == []
+
+
+def test_a_tpdo_is_taken_and_one_that_is_too_short_is_not() -> None:
+    slave = Slave(255)
+    slave.image.receive(0x182, bytes.fromhex("370608"))
+    slave.image.receive(0x182, bytes.fromhex("0000"))
+    assert (slave.image.read(STATUSWORD), slave.image.read((0x6061, 0))) == (0x0637, 8)
+
+
+def test_the_objects_of_a_further_axis_are_800h_above() -> None:
+    scripts: list[QueuedScript] = []
+    settings = DriveSettings(Channel("second"), axis=1)
+    driver = DriveDriver(settings, Slave(255).image, scripts.append)
+    step = next(driver.cycle())
+    assert isinstance(step, SdoRequest)
+    assert (step.index, step.sub) == (0x6841, 0)
