@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import suppress
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary, DictionaryDescription
 from tickrig.device.canopen.ds402.modes.modes import MODES
 from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.objects.parameters import clamped
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.canopen.bus_file.joint_drive import Defaults
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-from tickrig.wire.errors import FieldError
 
 PROFILE_AREA: Final = range(0x6000, 0xA000)
 """Indices of device profiles (CiA 301)."""
@@ -55,6 +54,19 @@ NEEDED: Final = {
     10: _TORQUE,
 }
 """Objects without which a master cannot use a mode, by its number."""
+
+
+NEVER_ZERO: Final = frozenset(
+    {
+        *(indices.FOLLOWING_ERROR_WINDOW, indices.MAX_TORQUE, indices.MAX_CURRENT),
+        *(indices.RATED_CURRENT, indices.RATED_TORQUE, indices.MAX_PROFILE_VELOCITY),
+        *(indices.MAX_MOTOR_SPEED, indices.PROFILE_VELOCITY, indices.PROFILE_ACCELERATION),
+        *(indices.PROFILE_DECELERATION, indices.QUICK_STOP_DECELERATION, indices.TORQUE_SLOPE),
+        *(indices.HOMING_SPEEDS, indices.HOMING_ACCELERATION, indices.MAX_ACCELERATION),
+        *(indices.MAX_DECELERATION, indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
+    }
+)
+"""Objects in which 0 lets nothing move: a file that has it there leaves the value open."""
 
 
 def modes_listed(dictionary: Dictionary) -> frozenset[int]:
@@ -110,14 +122,20 @@ def _of(own: DictionaryDescription, wanted: Collection[int]) -> Iterator[EntryDe
 def _with_default(
     entry: EntryDescription, defaults: Defaults, *, anew: bool = False
 ) -> EntryDescription:
-    """Return an entry with the default of a drive, if it has none of its own."""
+    """Return an entry with the default of a drive, if it has none of its own; see `NEVER_ZERO`.
+
+    It is cut to the type and the limits that the EDS gives the object.
+    """
     value = defaults.get((entry.index, entry.sub))
-    own = entry.has_default and not anew
+    open_zero = entry.index in NEVER_ZERO and not any(entry.default)
+    own = entry.has_default and not (anew or open_zero)
     if own or value is None or entry.index not in PROFILE_AREA or not entry.data_type.is_integer:
         return entry
-    with suppress(FieldError):  # the EDS gives the object another type
-        return _replaced(entry, value)
-    return entry
+    fitting = clamped(value, 8 * entry.size, signed=entry.signed)
+    low, high = entry.low, entry.high
+    if low is not None and high is not None:
+        fitting = round(max(low, min(high, fitting)))
+    return _replaced(entry, fitting)
 
 
 def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescription:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, tau
 from typing import Final
 
 from tickrig.device.canopen.ds402.objects import indices
@@ -21,6 +21,9 @@ REVOLUTIONS: Final = 0xB4
 PER_MINUTE: Final = 0x47
 """Numerator and denominator of a velocity in an SI unit object (CiA 303-2)."""
 
+ANGLES: Final = {0x10: tau, 0x41: 360.0, REVOLUTIONS: 1.0}
+"""How many radians, degrees and revolutions a turn has, by their number there."""
+
 RPM_DIMENSION: Final = 0xA4
 """Dimension index of revolutions per minute in 608Ch."""
 
@@ -33,7 +36,8 @@ CONFIGURATION: Final = (
     *range(indices.HOME_OFFSET, indices.TORQUE_SLOPE + 1),
     *(indices.VELOCITY_NOTATION, indices.VELOCITY_DIMENSION, indices.ENCODER_RESOLUTION),
     *(indices.GEAR_RATIO, indices.FEED_CONSTANT, indices.HOMING_SPEEDS),
-    *(indices.HOMING_ACCELERATION, indices.SI_UNIT_VELOCITY, indices.INTERPOLATION_PERIOD),
+    *(indices.HOMING_ACCELERATION, indices.SI_UNIT_POSITION, indices.SI_UNIT_VELOCITY),
+    indices.INTERPOLATION_PERIOD,
     *(indices.MAX_ACCELERATION, indices.MAX_DECELERATION),
     *(indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
 )
@@ -44,7 +48,8 @@ class Units(Part):
     """Converts between objects and the counts of the motor's encoder.
 
     A position unit is one count, or what 6091h and 6092h make of a revolution of
-    the motor, which has as many counts as 608Fh says. A velocity unit is a
+    the motor, which has as many counts as 608Fh says; or an angle behind the gear of 6091h
+    if 60A8h says so, with the power of ten that it gives. A velocity unit is a
     position unit per second, or revolutions of the motor per minute if 60A9h or
     608Ch says so, with the power of ten that they give; an acceleration unit is a
     velocity unit per second. 607Eh turns the signs.
@@ -64,7 +69,7 @@ class Units(Part):
     def __init__(self, parameters: Parameters, counts_per_turn: int) -> None:
         polarity = parameters.number(indices.POLARITY)
         per_turn = _ratio(parameters, indices.ENCODER_RESOLUTION) or float(counts_per_turn)
-        position = _counts_per_unit(parameters, per_turn)
+        position = _angle_unit(parameters, per_turn) or _counts_per_unit(parameters, per_turn)
         velocity = _velocity_unit(parameters, per_turn) or position
         self.per_position = -position if polarity & POSITION_REVERSED else position
         self.per_velocity = -velocity if polarity & VELOCITY_REVERSED else velocity
@@ -153,7 +158,7 @@ def read_settings(parameters: Parameters, counts_per_turn: int) -> Settings:
         ),
         homing_acceleration=rate(indices.HOMING_ACCELERATION, max_acceleration),
         software_limits=_software_limits(parameters, units),
-        position_range=(read(indices.POSITION_RANGE, 1), read(indices.POSITION_RANGE, 2)),
+        position_range=_position_range(parameters),
         following_error_window=_limit(read(indices.FOLLOWING_ERROR_WINDOW), position),
         following_error_us=read(indices.FOLLOWING_ERROR_TIME_OUT) * 1_000,
         position_window=_limit(read(indices.POSITION_WINDOW), position),
@@ -193,6 +198,12 @@ def _software_limits(parameters: Parameters, units: Units) -> tuple[float, float
     return (-inf if first <= -widest else first), (inf if second >= widest else second)
 
 
+def _position_range(parameters: Parameters) -> tuple[int, int]:
+    """Return 607Bh; the whole INTEGER32 if its ends are not apart."""
+    low, high = (parameters.number(indices.POSITION_RANGE, sub) for sub in (1, 2))
+    return (low, high) if low < high else (indices.I32_MIN, indices.I32_MAX)
+
+
 def _period_us(parameters: Parameters) -> int:
     """Return 60C2h, at least one tick."""
     value = parameters.number(indices.INTERPOLATION_PERIOD, 1)
@@ -214,6 +225,16 @@ def _counts_per_unit(parameters: Parameters, per_turn: float) -> float:
     return per_turn * gear / feed if feed and gear else 1.0
 
 
+def _angle_unit(parameters: Parameters, per_turn: float) -> float:
+    """Return the counts of a unit that is an angle, 0 if the unit is none."""
+    unit = parameters.number(indices.SI_UNIT_POSITION)
+    angle = ANGLES.get(unit >> 16 & 0xFF, 0.0)
+    if not angle:
+        return 0.0
+    gear = _ratio(parameters, indices.GEAR_RATIO) or 1.0
+    return per_turn * gear / angle * _power_of_ten(unit >> 24)
+
+
 def _velocity_unit(parameters: Parameters, per_turn: float) -> float:
     """Return the counts per second of a unit in rpm, 0 if the unit is another one."""
     unit = parameters.number(indices.SI_UNIT_VELOCITY)
@@ -223,5 +244,10 @@ def _velocity_unit(parameters: Parameters, per_turn: float) -> float:
         exponent = parameters.number(indices.VELOCITY_NOTATION) & 0xFF
     else:
         return 0.0
+    return per_turn / 60 * _power_of_ten(exponent)
+
+
+def _power_of_ten(exponent: int) -> float:
+    """Return the power of ten of an INTEGER8, as a byte."""
     power: float = 10.0 ** ((exponent ^ 0x80) - 0x80)
-    return per_turn / 60 * power
+    return power

@@ -138,3 +138,25 @@ def test_a_carriage_moves_by_metres(tmp_path: Path) -> None:
         joint.write(0x6040, 0x1F, 2)
         assert bench.wait_until(lambda: bool(joint.statusword & 0x0400), within="5s")
         assert bench.get("shaft_deg") == pytest.approx(0.05 / 0.02 * 360, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("DefaultValue=\n", "DefaultValue=0x0\n"),
+        ("DataType=0x0007\nAccessType=rw\n", "DataType=0x0004\nAccessType=rw\n"),
+        ("AccessType=rw\n", "AccessType=rw\nLowLimit=1\nHighLimit=500000\n"),
+    ],
+    ids=["zeros", "signed", "limits"],
+)
+def test_files_of_other_drives_leave_values_open_too(tmp_path: Path, old: str, new: str) -> None:
+    """Seen in files of makers: zeros where none can be, INTEGER32 for 6065h, limits."""
+    path = write_system(tmp_path)
+    sheet = tmp_path / "joint.eds"
+    head, objects = sheet.read_text().split("[6040]")
+    sheet.write_text(f"{head}[6040]{objects.replace(old, new)}")
+    with joints(path, 2) as (bench, [joint]):
+        joint.enable(1)
+        profile_position(joint)
+        assert bench.wait_until(lambda: bool(joint.statusword & 0x0400), within="5s")
+        assert bench.get("shaft_deg") == pytest.approx(degrees(1.0), abs=1.0)

@@ -55,6 +55,23 @@ def test_a_velocity_may_be_in_revolutions_per_minute(objects: dict[str, int], rp
     assert units(**objects).per_velocity == pytest.approx(rpm * TURN / 60)
 
 
+@pytest.mark.parametrize(
+    ("unit", "per_turn"),
+    [(0xFF41_0000, 3_600), (0x0041_0000, 360), (0xFD10_0000, 6_283.185), (0x00B4_0000, 1)],
+    ids=["0.1 degree", "degree", "milliradian", "revolution"],
+)
+def test_a_position_may_be_an_angle_of_the_shaft(unit: int, per_turn: float) -> None:
+    plain = units(x60A8=unit)
+    assert plain.per_position == pytest.approx(TURN / per_turn)
+    assert plain.per_velocity == plain.per_position
+    geared = units(x60A8=unit, x608F_1=4_096, x608F_2=1, x6091_1=50, x6091_2=1, x6092_1=1)
+    assert geared.per_position == pytest.approx(4_096 * 50 / per_turn)
+
+
+def test_a_position_in_increments_has_its_factors() -> None:
+    assert units(x60A8=0x00B5_0000).per_position == 1
+
+
 @pytest.mark.parametrize(("polarity", "signs"), [(0x80, (-1, 1)), (0x40, (1, -1)), (0, (1, 1))])
 def test_polarity_turns_position_and_velocity_apart(polarity: int, signs: tuple[int, int]) -> None:
     turned = units(x607E=polarity)
@@ -83,3 +100,9 @@ def test_software_limits_that_are_not_apart_are_none() -> None:
 def test_software_limits_change_sides_with_the_polarity() -> None:
     settings = read_settings(parameters(x607D_1=-5, x607D_2=20, x607E=0x80), TURN)
     assert settings.software_limits == (-20, 5)
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 0), (1, 0), (5, -5)])
+def test_a_position_range_that_is_none_leaves_positions_as_they_are(low: int, high: int) -> None:
+    settings = read_settings(parameters(x607B_1=low, x607B_2=high), TURN)
+    assert settings.position_range == (-(1 << 31), (1 << 31) - 1)
