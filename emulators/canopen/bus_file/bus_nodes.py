@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +59,22 @@ def read_bus(
     return found
 
 
+def check_nodes(bus: BusFile) -> tuple[Mistake, ...]:
+    """Return what keeps slaves from being made beside the errors of the file: in `tickrig:`, ...
+
+    Args:
+        bus: the file; one without slaves has nothing to be made.
+    """
+    if not bus.slaves:
+        return ()
+    told = {Place(one.file, one.line) for one in bus.errors}
+    try:
+        _nodes_of(replace(bus, findings=()), None, EdsCache(), AUTO)
+    except BusMistakesError as error:
+        return tuple(one for one in error.mistakes if one.place not in told)
+    return ()
+
+
 def _is_same(file: Path, version: Version) -> bool:
     try:
         return version_of(file) == version
@@ -80,7 +96,7 @@ def _nodes_of(
     nodes = tuple(reader.nodes())
     if mistakes:
         raise BusMistakesError(mistakes)
-    if not nodes:
+    if not bus.slaves:
         raise BusMistakesError([Mistake(Place(str(bus.path), 1), "no node with a dcf")])
     remarks = (*map(str, bus.warnings), *reader.remarks)
     return BusNodes(nodes, remarks), (Path(robot.name),) if robot else ()

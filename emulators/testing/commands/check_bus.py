@@ -8,8 +8,7 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus
-from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
+from tickrig.emulators.canopen.bus_file.bus_nodes import check_nodes
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
 
@@ -30,24 +29,13 @@ def check_bus(file: Path, *, strict: bool) -> int:
     bus = read_bus_file(file)
     for finding in bus.findings:
         click.echo(str(finding))
-    ours = () if bus.errors else _ours(bus)
-    for mistake in ours:
-        click.echo(str(mistake))
+    ours = check_nodes(bus)
+    for place, text in ours:
+        click.echo(f"{place}: error: {text}")
     if bus.errors or ours or (strict and bus.warnings):
         return MISTAKES
     click.echo("\n".join([f"{file}: ok: {_head(bus)}", *_slaves(bus)]))
     return 0
-
-
-def _ours(bus: BusFile) -> tuple[Mistake, ...]:
-    """Return what is wrong with what a file says for us alone, and with the URDF that it names."""
-    if not (bus.options.extra or any(slave.extra for slave in bus.slaves.values())):
-        return ()
-    try:
-        read_bus(bus.path)
-    except BusMistakesError as error:
-        return error.mistakes
-    return ()
 
 
 def _head(bus: BusFile) -> str:

@@ -51,6 +51,22 @@ def test_a_mistake_is_told_with_both_places(folder: Path) -> None:
     assert len(out) == 2
 
 
+def test_what_is_for_the_slaves_alone_is_told_with_all_else(folder: Path) -> None:
+    write_bus(folder, NODE + "  tickrig: {motr: {}}\n  boot: soon\n  sdo: [{index: 0x9999}]\n")
+    status, out, _ = run("bus.yml")
+    assert status == 1
+    assert out[0].startswith("bus.yml:6: warning: [flag-text]")
+    assert out[1].startswith("bus.yml:7: error: [object-missing]")
+    assert out[2:] == ["bus.yml:5: error: axis.tickrig: no key 'motr'; did you mean 'motor'?"]
+
+
+def test_a_finding_of_the_eds_is_told_once(folder: Path) -> None:
+    write_bus(folder, NODE.replace("epos", "broken"))
+    status, out, _ = run("bus.yml")
+    assert (status, len(out)) == (1, 1)
+    assert out[0].startswith("broken.eds:172: error: [eds] [axis] [1018sub1] DefaultValue=ten")
+
+
 def test_warnings_count_where_that_is_wanted(folder: Path) -> None:
     write_bus(folder, COGEN)
     assert run("bus.yml")[0] == 0
