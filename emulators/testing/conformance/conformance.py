@@ -6,14 +6,15 @@ from collections.abc import Callable, Iterable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_device import BenchDevice
 from tickrig.emulators.testing.conformance.bench_source import bench_source
+from tickrig.emulators.testing.conformance.called_slave import CalledSlave
 from tickrig.emulators.testing.conformance.crash import guarded
-from tickrig.emulators.testing.conformance.slave import CalledSlave, Slave, SlaveCall
+from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.conform.chosen import patterns, unknown
 from tickrig.host.canmon.conform.conform_source import ConformSource
@@ -30,7 +31,8 @@ BIT_RATE: Final = 1_000_000
 NODE_IDS: Final = range(1, 128)
 LEVELS: Final = tuple(level.word for level in Level)
 
-Node = Slave | CanopenSlave | BenchDevice | Callable[[], SlaveCall]
+Called = Callable[[], SlaveCall]
+Node = Slave | CanopenSlave | BenchDevice | Called
 """What can be judged."""
 
 
@@ -76,15 +78,11 @@ def conformance(  # noqa: PLR0913 - by keyword
     >>> conformance(make_epos(5), only="NMT-03").exit_status
     0
     """
-    if level not in LEVELS:
-        raise ValueError(f"level {level!r} is none of {', '.join(LEVELS)}")
-    names = patterns(only)
-    for text in unknown(names):
-        raise ValueError(f"only {text}")
+    chosen_level, names = level_of(level), names_of(only)
     with closing(_source(node, bit_rate, stimulus)) as source:
-        number = _node_id(node, source, node_id)
+        number = node_id_of(node, node_id)
         plan = Plan(
-            level=Level(LEVELS.index(level)),
+            level=chosen_level,
             only=names,
             allow=frozenset(allow),
             never=frozenset(never),
@@ -108,11 +106,28 @@ def _source(node: Node, bit_rate: int, stimulus: Stimulus | None) -> ConformSour
     if isinstance(node, BenchDevice):
         source = bench_source(node._mode)
         return replace(source, stimulus=lambda number: guarded(stimulus)) if stimulus else source
-    slave = node if isinstance(node, Slave) else CalledSlave(node)
-    return SlaveBench(slave, bit_rate, stimulus).source
+    if isinstance(node, Slave) and not isinstance(node, type):
+        return SlaveBench(node, bit_rate, stimulus).source
+    return SlaveBench(CalledSlave(cast("Called", node)), bit_rate, stimulus).source
 
 
-def _node_id(node: Node, source: ConformSource, node_id: int | None) -> int:
+def level_of(word: str) -> Level:
+    """Return a level; ValueError if it is none."""
+    if word not in LEVELS:
+        raise ValueError(f"level {word!r} is none of {', '.join(LEVELS)}")
+    return Level(LEVELS.index(word))
+
+
+def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
+    """Return groups and ids, each for itself; ValueError if one names no check."""
+    names = patterns(only)
+    for text in unknown(names):
+        raise ValueError(f"only {text}")
+    return names
+
+
+def node_id_of(node: Node, node_id: int | None) -> int:
+    """Return the node-ID that was given, or that of the slave; ValueError if there is none."""
     if node_id is None and isinstance(node, BenchDevice):
         node_id = int(node.get("node_id"))
     if node_id is None:

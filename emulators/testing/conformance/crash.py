@@ -8,6 +8,7 @@ from pathlib import Path
 from traceback import walk_tb
 from typing import Final
 
+from tickrig.emulators.testing.conformance.called_slave import NoFrames
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.conform_run import Crash
 from tickrig.host.canopen.conform.plan import Stimulus
@@ -57,6 +58,8 @@ def crash_text(error: Exception, who: str) -> str:
     >>> crash_text(KeyError("x"), "your slave")
     "your slave raised KeyError: 'x'"
     """
+    if isinstance(error, NoFrames):
+        return f"{who} {error}"
     kind = type(error)
     name = kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
     text = " ".join(str(error).split())
@@ -65,6 +68,8 @@ def crash_text(error: Exception, who: str) -> str:
 
 def crash_lines(error: Exception) -> list[str]:
     """Return the lines at which it was raised, outermost first, but for ours before its own."""
+    if isinstance(error, NoFrames):
+        return []
     return list(_lines(error, OURS)) or list(_lines(error, "no module"))
 
 

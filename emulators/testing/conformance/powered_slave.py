@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from tickrig.emulators.testing.conformance.called_slave import checked_frames
 from tickrig.emulators.testing.conformance.slave import Slave
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
@@ -49,7 +50,8 @@ class PoweredSlave:
         if not self._on or self._dead:
             return ()
         try:
-            return self.slave.tick(now_us, rx)
+            sent = self.slave.tick(now_us, rx)
+            return checked_frames(sent) if sent != () else sent
         except Exception as error:
             self._begin_anew(error)
             return ()

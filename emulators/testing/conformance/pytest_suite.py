@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from traceback import format_exception_only
+from typing import Any, Final, cast
 
 import pytest
 
@@ -12,9 +14,14 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked
 from tickrig.emulators.testing.conformance.bench_source import eds_of
-from tickrig.emulators.testing.conformance.conformance import Node, conformance
-from tickrig.host.canmon.conform.chosen import patterns, unknown
-from tickrig.host.canopen.conform.check import Level
+from tickrig.emulators.testing.conformance.called_slave import is_step
+from tickrig.emulators.testing.conformance.conformance import (
+    Node,
+    conformance,
+    level_of,
+    names_of,
+    node_id_of,
+)
 from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.plan import Plan
@@ -48,26 +55,30 @@ def conformance_tests(
     could not be judged is blocked, which is no failure of the device.
 
     Args:
-        node: makes what is judged, as `conformance` takes it; or the name of a device of the
-            fixture `bench`, which then is judged check by check, each on a fresh bench.
+        node: makes what is judged, as `conformance` takes it, or is what `conformance` calls at
+            each power-on; or the name of a device of the fixture `bench`, which then is judged
+            check by check, each on a fresh bench.
         eds: its EDS, DCF or XDD; its objects have tests of their own.
         level: `read-only`, `communication` or `intrusive`, as `conformance` has it.
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
         options: further arguments of `conformance`.
 
     Raises:
-        ValueError: the level is none, or a word of `only` names no check.
+        ValueError: the level is none, a word of `only` names no check, or nobody says the node-ID.
         OSError: the EDS cannot be read.
 
     >>> from tickrig.device import make_epos
     >>> test_drive = conformance_tests(lambda: make_epos(5), only="NMT")
     """
+    __tracebackhide__ = True
+    plan = Plan(level_of(level), names_of(only))
+    known = open_eds(Path(eds)) if eds is not None else None
+    given = options.get("node_id")
+    if not isinstance(node, str) and (known is None or given is None):
+        made = _judged_of(node)
+        node_id_of(made, given)
+        known = known or _told_by(made)
     options |= {"eds": eds, "level": level}
-    words = patterns(only)
-    for text in unknown(words):
-        raise ValueError(f"only {text}")
-    plan = Plan(Level[level.upper().replace("-", "_")], words)
-    known = _eds(node, eds)
     objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
     suite = [check for group in read_suite() for check in group.checks]
     names = [check.id for check in (*suite, *objects) if plan.chooses(check)]
@@ -77,11 +88,14 @@ def conformance_tests(
     return parametrised(_Run(node, options).test())
 
 
-def _eds(node: str | Callable[[], Node], eds: Path | str | None) -> EdsFile | None:
-    """Return what is known of a node before it is asked."""
-    if eds is not None:
-        return open_eds(Path(eds))
-    made = None if isinstance(node, str) else node()
+def _judged_of(make: Callable[[], Node]) -> Node:
+    """Return what `conformance` takes: what is made, or what makes a callable at each power-on."""
+    made = make()
+    return cast("Node", make) if is_step(made) else made
+
+
+def _told_by(made: Node) -> EdsFile | None:
+    """Return what a slave of ours tells of itself."""
     return eds_of(made, "slave.eds") if isinstance(made, CanopenSlave) else None
 
 
@@ -94,12 +108,20 @@ def _test_on_bench(name: str, options: dict[str, Any]) -> Test:
     return test
 
 
+@dataclass
+class _Unmade:
+    """A run that could not be: raised once, as each raise makes its traceback longer."""
+
+    error: Exception
+    raised: bool = False
+
+
 class _Run:
     """The run of the selected checks, made when the first one asks for it."""
 
     def __init__(self, make: Callable[[], Node], options: dict[str, Any]) -> None:
         self._make, self._options = make, options
-        self._reports: dict[frozenset[str], Report | Exception] = {}
+        self._reports: dict[frozenset[str], Report | _Unmade] = {}
 
     def test(self) -> Test:
         """Return the test function."""
@@ -115,16 +137,20 @@ class _Run:
         if wanted not in self._reports:
             self._reports[wanted] = self._judged(wanted)
         report = self._reports[wanted]
-        if isinstance(report, Exception):
-            raise report
+        if not isinstance(report, Report):
+            if report.raised:
+                text = format_exception_only(report.error)[-1].strip()
+                pytest.fail(f"as before: {text}", pytrace=False)
+            report.raised = True
+            raise report.error
         return report
 
-    def _judged(self, wanted: Iterable[str]) -> Report | Exception:
+    def _judged(self, wanted: Iterable[str]) -> Report | _Unmade:
         """Judge once; what cannot be made is not tried again for each test."""
         try:
-            return conformance(self._make(), only=sorted(wanted), **self._options)
+            return conformance(_judged_of(self._make), only=sorted(wanted), **self._options)
         except Exception as error:
-            return error
+            return _Unmade(error)
 
 
 def _selected(item: pytest.Function) -> Iterable[str]:
@@ -146,7 +172,7 @@ def _judge(report: Report, check_id: str) -> None:
         case Verdict.NOT_APPLICABLE:
             pytest.skip(reason)
         case Verdict.INCONCLUSIVE | Verdict.BLOCKED:
-            raise BenchBlocked(f"{verdict}: {reason}")
+            raise BenchBlocked(reason if verdict is Verdict.BLOCKED else f"{verdict}: {reason}")
         case _:
             return
 

@@ -50,26 +50,3 @@ class Slave(Protocol):
 
 SlaveCall = Callable[[int, Frames], Frames]
 """The `tick` of a slave alone, called each millisecond."""
-
-
-class CalledSlave:
-    """A slave of a callable: it is called each millisecond.
-
-    Args:
-        make: makes the callable, fresh from power-on; called once more at each power-on.
-    """
-
-    tick_us: int = TICK_US
-
-    def __init__(self, make: Callable[[], SlaveCall]) -> None:
-        self._make, self._call = make, make()
-        self.due_us = 0
-
-    def reset(self) -> None:
-        """Make it anew."""
-        self._call, self.due_us = self._make(), 0
-
-    def tick(self, now_us: int, rx: Frames, /) -> Frames:
-        """Call it."""
-        self.due_us = now_us + self.tick_us
-        return tuple(self._call(now_us, rx))

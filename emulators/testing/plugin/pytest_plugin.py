@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import pytest
 
 from tickrig.emulators.testing.plugin.settings import OPTIONS, RANDOM, SETTINGS, Settings
-from tickrig.emulators.testing.plugin.stash import BENCHED, skipped_where_it_cannot
+from tickrig.emulators.testing.plugin.stash import BENCHED, is_blocked, skipped_where_it_cannot
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
@@ -179,9 +179,17 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Complete the reports of tests that have a bench."""
+    """Complete the reports of tests that have a bench, or are blocked without one."""
     if (test := item.stash.get(BENCHED, None)) is None:
-        return (yield)
+        report = yield
+        if call.excinfo is not None and is_blocked(call.excinfo.value):
+            from tickrig.emulators.testing.plugin.verdict import (  # noqa: PLC0415 - it is
+                blocked,
+                make_error,
+            )
+
+            make_error(report, blocked(report, call, None))
+        return report
     if call.excinfo is not None and not item.config.getoption("fulltrace", False):
         from tickrig.emulators.testing.plugin.traceback_end import end_at_caller  # noqa: PLC0415
 

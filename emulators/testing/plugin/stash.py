@@ -18,6 +18,12 @@ BENCHED: Final[pytest.StashKey[BenchedTest]] = pytest.StashKey()
 ERRORS: Final = "tickrig.emulators.testing.bench.errors"
 
 
+def is_blocked(error: BaseException) -> bool:
+    """Say whether a test came to no verdict about its device."""
+    errors = sys.modules.get(ERRORS)
+    return errors is not None and isinstance(error, errors.BenchBlocked)
+
+
 @contextmanager
 def skipped_where_it_cannot() -> Iterator[None]:
     """Skip the test if it asks for what this bench cannot do."""

@@ -3,6 +3,8 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
+from fnmatch import fnmatchcase
+from typing import Any
 
 import pytest
 
@@ -183,6 +185,62 @@ def test_a_slave_that_cannot_begin_anew_is_dead() -> None:
 
     report = conformance(make, node_id=3, only="NMT-03")
     assert report.findings[1] == "your slave raised ValueError: no second time"
+
+
+class Machine:
+    """A slave as somebody writes one: called with time and frames, made anew at power-on."""
+
+    def step(self, now_us: int, frames: Frames) -> Frames:
+        return ()
+
+
+@pytest.mark.parametrize(
+    ("node", "why"),
+    [
+        (Machine().step, r"Machine\.step takes a time and frames: give what makes the slave"),
+        (Machine, "Machine makes Machine, which takes no time and frames: give what makes"),
+        (lambda: Machine, "Machine, which takes no time and frames"),
+        (Machine(), "Machine is no slave: it has no tick, due_us, tick_us, reset; give what"),
+        (Fragile, "Fragile makes a slave: give the slave itself"),
+        (lambda: make_epos(5), "makes a slave: give the slave itself"),
+    ],
+)
+def test_what_is_no_slave_is_told_with_what_to_give(node: Any, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        conformance(node, node_id=5)
+
+
+@pytest.mark.parametrize(
+    ("sent", "said"),
+    [
+        (None, "returned None, not a list of CanFrame"),
+        (CanFrame(0x705), "returned CanFrame(can_id=1797, *), not a list of CanFrame"),
+        ([1], "returned 1 where a CanFrame should be"),
+        ([b"\0"], r"returned b'\x00' where a CanFrame should be"),
+        ([CanFrame(0x705, "7F")], "returned CanFrame(*): can_id is an int, data are bytes"),  # type: ignore[arg-type]
+        ([CanFrame(0x905)], "returned CanFrame(*): CAN-ID 0x905 is not 11-bit"),
+        ([CanFrame(0x705, bytes(9))], "returned CanFrame(*): a frame of 9 bytes, at most 8 fit"),
+    ],
+)
+def test_what_is_no_frame_is_told_as_what_the_slave_returned(sent: Any, said: str) -> None:
+    def make() -> SlaveCall:
+        return lambda now_us, frames: sent
+
+    report = conformance(make, node_id=5, only="UE-01")
+    assert fnmatchcase(report.findings[0], f"your slave {said}")
+    lines = [line.text for each in report.results for line in each.outcome.evidence]
+    assert not any("called_slave.py" in text for text in lines)
+
+
+def test_frames_may_come_from_a_generator() -> None:
+    def make() -> SlaveCall:
+        def call(now_us: int, frames: Frames) -> Any:
+            yield from (CanFrame(0x705, bytearray(1)) for frame in frames)  # type: ignore[arg-type]
+
+        return call
+
+    report = conformance(make, node_id=5, only="NMT-03")
+    assert report.findings == ()
 
 
 def test_the_same_slave_gives_the_same_bytes() -> None:

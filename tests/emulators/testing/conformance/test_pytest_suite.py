@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from xml.etree.ElementTree import parse
+
 import pytest
 
 from tests.emulators.testing.conformance.stacks import R1_EDS
@@ -79,11 +81,53 @@ def test_a_device_of_the_bench_is_judged_check_by_check(
     assert outcomes["passed"] > 2
 
 
-def test_a_run_that_cannot_be_is_not_repeated_for_each_test(
-    pytester: pytest.Pytester, run: Run
+MINE = """
+from tickrig import CanFrame
+from tickrig.testing import conformance_tests
+
+def power_on():
+    waiting = [CanFrame(0x705, b"\\0")]
+    def step(now_us, frames):
+        asked = [frame for frame in frames if (frame.can_id, frame.extended) == (0x605, False)]
+        refused = [b"\\x80" + frame.data[1:4] + b"\\0\\0\\2\\6" for frame in asked]
+        waiting.extend(CanFrame(0x585, data) for data in refused)
+        sent = waiting[:]
+        waiting.clear()
+        return sent
+    return step
+"""
+
+
+@pytest.mark.parametrize("node", ["power_on", "lambda: power_on"])
+def test_a_callable_of_yours_is_given_as_it_is_or_made(
+    pytester: pytest.Pytester, run: Run, node: str
 ) -> None:
+    pytester.makepyfile(f"{MINE}\ntest_mine = conformance_tests({node}, node_id=5, only='UE-13')")
+    run().assert_outcomes(passed=1)
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        ("power_on, node_id=5, level='read_only'", "level 'read_only' is none of read-only, *"),
+        ("power_on", "node_id is 1..127, not None; this slave does not tell it itself"),
+        ("lambda: power_on, eds='r1.eds'", "node_id is 1..127, not None; *"),
+    ],
+)
+def test_what_cannot_be_is_told_once_before_all_tests(
+    pytester: pytest.Pytester, run: Run, given: str, why: str
+) -> None:
+    (pytester.path / "r1.eds").write_bytes(R1_EDS.read_bytes())
+    pytester.makepyfile(f"{MINE}\ntest_mine = conformance_tests({given})")
+    result = run()
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines([f"E   ValueError: {why}"])
+
+
+def test_a_run_that_cannot_be_is_told_once(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makepyfile(
         """
+        from tickrig.device import make_epos
         from tickrig.testing import conformance_tests
 
         made = []
@@ -92,26 +136,41 @@ def test_a_run_that_cannot_be_is_not_repeated_for_each_test(
             made.append(1)
             if len(made) > 1:
                 raise RuntimeError(f"made {len(made)} times")
+            return make_epos(5)
 
-        test_broken = conformance_tests(make, node_id=5, only="NMT-0[345]")
+        test_broken = conformance_tests(make, only="NMT-0[3456]")
         """
     )
     result = run()
-    result.assert_outcomes(failed=3)
+    result.assert_outcomes(failed=4)
+    said = result.stdout.str()
+    assert said.count("raise RuntimeError(") == 1, "one traceback, however many tests"
+    assert said.count("as before: RuntimeError: made 2 times") == 6
     result.stdout.no_fnmatch_line("*made 3 times*")
 
 
-def test_a_dead_node_is_blocked_not_failed(pytester: pytest.Pytester, run: Run) -> None:
+@pytest.mark.parametrize(
+    ("sent", "reason"),
+    [("()", "node 5 does not answer; heard here: nobody"), ("[CanFrame(0x706)]", "*here: 6")],
+)
+def test_a_dead_node_is_an_error_in_a_line(
+    pytester: pytest.Pytester, run: Run, sent: str, reason: str
+) -> None:
     pytester.makepyfile(
-        """
+        f"""
+        from tickrig import CanFrame
         from tickrig.testing import conformance_tests
 
         def make():
-            return lambda now_us, frames: ()
+            return lambda now_us, frames: {sent}
 
-        test_dead = conformance_tests(lambda: make, node_id=5, only="NMT-03")
+        test_dead = conformance_tests(make, node_id=5, only="NMT-0[34]")
         """
     )
-    result = run()
-    result.stdout.fnmatch_lines(["*BenchBlocked: blocked: *"])
-    result.stdout.no_fnmatch_line("*--full-trace*")
+    result = run("--junitxml=x.xml")
+    result.assert_outcomes(errors=2)
+    result.stdout.fnmatch_lines([f"ERROR *test_dead[[]NMT-04] - blocked: {reason}"])
+    for line in ("*--full-trace*", "*Report(*", "*pytest_suite.py*"):
+        result.stdout.no_fnmatch_line(line)
+    suite = parse("x.xml").getroot()[0]
+    assert (suite.get("errors"), suite.get("failures")) == ("2", "0")
