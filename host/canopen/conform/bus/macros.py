@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from binascii import crc_hqx
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sized
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
@@ -45,8 +45,10 @@ def sync(sdo: SdoFrames, can_id: str, count: str) -> None:
 def sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
     """SYNC until the first TPDO, then one TPDO must come with every n-th SYNC."""
     every, seen = int(period), sdo.exchange.unread(tpdo)
-    for _ in range(every):
+    for number in range(1, every + 1):
         _sync_and_wait(sdo, can_id)
+        if not seen and (every <= FEW or number == every):
+            _wait_for(sdo, seen)
         if seen:
             break
     if len(seen) != 1:
@@ -55,6 +57,8 @@ def sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
     for number in range(1, 3 * every + 1):
         _sync_and_wait(sdo, can_id)
         want = number % every == 0
+        if want:
+            _wait_for(sdo, seen)
         if len(seen) != want:
             raise StepFailed(
                 f"{len(seen)} x {tpdo} at SYNC {number} after the first, want {want:d}"
@@ -67,8 +71,19 @@ def _sync_and_wait(sdo: SdoFrames, can_id: str) -> None:
     sdo.exchange.wait(PDO_MS)
 
 
+def _wait_for(sdo: SdoFrames, seen: Sized) -> None:
+    """Wait for a TPDO that is late: CiA 301 does not say how soon it has to follow the SYNC."""
+    for _ in range(LATE_MS // PDO_MS):
+        if not seen:
+            sdo.exchange.wait(PDO_MS)
+
+
 PDO_MS: Final = 5
-"""So long after a SYNC its TPDO is waited for."""
+"""So long after a SYNC its TPDO is waited for, where none has to come."""
+LATE_MS: Final = 100
+"""So long, where one has to come."""
+FEW: Final = 10
+"""Of so many SYNCs each is waited for: which of them brings the first TPDO is not known."""
 
 
 def download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:

@@ -45,7 +45,7 @@ def _transfer(words: Sequence[Any]) -> int:
 
 _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
     "sync": lambda words: 20 * int(words[1]),
-    "syncperiod": lambda words: 100 * int(words[2]),
+    "syncperiod": lambda words: 1_000 + 100 * int(words[2]),
     "segdn": _transfer,
     "segup": _transfer,
     "blkdn": _transfer,

@@ -107,6 +107,17 @@ def test_two_nodes_of_one_id_are_told_and_neither_has_failed(level: Level) -> No
     assert (settings(first), settings(second)) == before
 
 
+def test_a_tpdo_that_comes_late_after_its_sync_is_no_failure() -> None:
+    r1, wire = R1(), CanWire()
+    rig = Rig(Station(late(r1, 15_000), wire.end()))
+    link = CanHost(rig, wire.end())
+    rig.run_for(100_000)
+    plan = Plan(Level.INTRUSIVE, ("PR-04", "PR-05", "PR-06"), confirm=yes)
+    report = r1.judge(plan, link=link)
+    assert failing(report) == []
+    assert report.count(Verdict.PASS) == 3
+
+
 def test_a_node_that_answers_by_chance() -> None:
     chance = random.Random(16)
 
