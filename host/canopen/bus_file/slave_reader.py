@@ -215,7 +215,7 @@ def read_channels(node: Section) -> tuple[Channel, ...]:
     names = node.fields.get("channel_names")
     own = node.sections("channels")
     given = [item.text for item in names.items] if names else []
-    usual = {key: node.real(key, getattr(Channel, key, 0.0)) for key in SCALES if key in node}
+    usual = {key: node.real(key, getattr(Channel(""), key)) for key in SCALES if key in node}
     channels = []
     for at in range(count):
         default = node.name if count == 1 else f"{node.name}/{at}"
