@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_file import BusFile
@@ -26,12 +27,17 @@ SWITCHING_STATES: Final = {
 
 
 def plan_of(bus: BusFile) -> MasterPlan:
-    """Return what the master of a bus.yml does; ValueError if it has none."""
+    """Return what the master of a bus.yml does.
+
+    Raises:
+        ValueError: it has no master.
+        OSError: software that it names cannot be read.
+    """
     master = bus.master
     if master is None:
         raise ValueError(f"{bus.path}: it has no section master")
     return MasterPlan(
-        tuple(_assignment(slave, master) for slave in bus.slaves.values()),
+        tuple(_assignment(slave, master, bus.path.parent) for slave in bus.slaves.values()),
         node_id=master.node_id,
         starts=master.start,
         starts_nodes=master.start_nodes,
@@ -45,7 +51,7 @@ def plan_of(bus: BusFile) -> MasterPlan:
     )
 
 
-def _assignment(slave: BusSlave, master: BusMaster) -> SlaveAssignment:
+def _assignment(slave: BusSlave, master: BusMaster, folder: Path) -> SlaveAssignment:
     identity = slave.identity
     wait_ms = int(slave.heartbeat_producer_ms * slave.heartbeat_multiplier)
     return SlaveAssignment(
@@ -60,12 +66,20 @@ def _assignment(slave: BusSlave, master: BusMaster) -> SlaveAssignment:
         revision=identity.revision_number,
         serial=identity.serial_number,
         software_version=slave.software_version,
+        program=_program(slave, folder),
         restore_sub=slave.restore_configuration,
         writes=tuple(ObjectWrite(one.index, one.sub_index, one.data) for one in slave.writes),
         heartbeat_us=1_000 * wait_ms if master.heartbeat_consumer else 0,
         guard_us=1_000 * slave.guard_time_ms,
         life_time_factor=slave.retry_factor,
     )
+
+
+def _program(slave: BusSlave, folder: Path) -> bytes:
+    """Return the software of a slave, nothing where it is not compared."""
+    if not (slave.software_file and slave.software_version):
+        return b""
+    return (folder / slave.software_file).read_bytes()
 
 
 def is_drive(slave: BusSlave) -> bool:

@@ -7,8 +7,9 @@ from typing import Final
 
 from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Send
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.boot_slave import BootOutcome, BootStep, SlaveBoot
+from tickrig.host.canopen.master.boot_slave import BootOutcome, SlaveBoot
 from tickrig.host.canopen.master.boot_status import BootStatus
+from tickrig.host.canopen.master.boot_talk import BootStep
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 

@@ -32,7 +32,7 @@ def open_master(
         A master; close it, or use it in a `with` block.
 
     Raises:
-        OSError: the file cannot be read.
+        OSError: the file cannot be read, or software that it names.
         ImportError: PyYAML is not installed.
         ValueError: all that is wrong with the file, each with its line.
         TypeError: a link to a serial line.

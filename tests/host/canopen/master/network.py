@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from tickrig import Bench
+from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.host.canopen.master.assignment import MasterPlan, ObjectWrite, SlaveAssignment
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
@@ -23,8 +24,8 @@ VENDOR, PRODUCT, REVISION, SERIAL = 0x7469, 0x6210, 0x0001_0000, 77
 HEARTBEAT = ObjectWrite(0x1017, 0, (50).to_bytes(2, "little"))
 
 
-def plain_slave(node_id: int = NODE_ID) -> CanopenSlave:
-    """A slave with what a boot-up may ask for, and no application."""
+def plain_slave(node_id: int = NODE_ID, application: ServiceMaker = Application) -> CanopenSlave:
+    """A slave with what a boot-up may ask for."""
     u16, u32 = DataType.UNSIGNED16, DataType.UNSIGNED32
     objects = ObjectTable()
     objects.variable(0x1000, "Device type", u32, RO, DEVICE_TYPE)
@@ -41,7 +42,10 @@ def plain_slave(node_id: int = NODE_ID) -> CanopenSlave:
     objects.record(0x1018, "Identity object", rows)
     objects.array(0x1020, "Verify configuration", 2, u32, RW)
     objects.array(0x1F56, "Program software identification", 1, u32, RO, SOFTWARE)
-    return make_slave(Dictionary(objects, objects.objects), node_id)
+    objects.array(0x1F50, "Program data", 1, DataType.DOMAIN, RW)
+    objects.array(0x1F51, "Program control", 1, DataType.UNSIGNED8, RW)
+    objects.array(0x1F57, "Flash status identification", 1, u32, RO)
+    return make_slave(Dictionary(objects, objects.objects), node_id, application=application)
 
 
 @dataclass
