@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from random import Random
 from typing import Final
@@ -13,14 +14,15 @@ from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
 from tickrig.host.canopen.conform.bus.steps import Player
 from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
-from tickrig.host.canopen.conform.check import Check
+from tickrig.host.canopen.conform.check import Check, Level
 from tickrig.host.canopen.conform.judge import Judge
 from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.objects.object_steps import play_object_step
 from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.safety.node_care import NodeCare
+from tickrig.host.canopen.conform.safety.node_care import HEARTBEAT, NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
+from tickrig.host.canopen.conform.safety.stray_heartbeat import StrayHeartbeat
 from tickrig.host.canopen.conform.settings import describe_settings
 from tickrig.host.canopen.conform.subject.other_device import other_device
 from tickrig.host.canopen.conform.subject.subject import Subject, examine
@@ -81,6 +83,7 @@ class ConformRun:
         )
         self._client = SdoClient(self._exchange, node_id)
         self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
+        self._stray = StrayHeartbeat(self._exchange, node_id)
         more = partial(play_object_step, self._client)
         player = Player(self._exchange, node_id, plan.stimulus, more)
         self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
@@ -126,6 +129,7 @@ class ConformRun:
         """Judge; return why nothing could be, empty if it could."""
         self._exchange.begin(min(EXAMINE_US, self._longest_us))
         self._exchange.wait(LISTEN_MS)
+        self._stray.hear()
         self._permission.others = frozenset(self._exchange.others)
         self._exchange.end_listening()
         try:
@@ -164,6 +168,8 @@ class ConformRun:
         )
         if self._exchange.presence is Presence.TWO:
             raise Disturbed("two nodes answer")
+        if self._stray.stamps:
+            self._stray.compare(self._client.number(*HEARTBEAT))
         self._care.prepare(self._subject.restorable(self._plan.level))
 
     def _object_checks(self) -> list[Check]:
@@ -208,11 +214,19 @@ class ConformRun:
                 self._care.give_up()
         except LinkClosed:
             self._care.give_up()
+        with suppress(KeyboardInterrupt, LinkClosed, StepFailed):
+            self._look_again()
+
+    def _look_again(self) -> None:
+        if self._plan.level > Level.READ_ONLY:
+            self._stray.look_again()
 
     def _report(self, aborted: str) -> Report:
         subject = self._subject
         findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
-        findings = tuple(dict.fromkeys((*self._crashes, *findings)))
+        stray = [self._stray.finding] if self._stray.finding else []
+        findings = tuple(dict.fromkeys((*self._crashes, *stray, *findings)))
+        gone = (self._stray.unrestored,) if self._stray.unrestored else ()
         return Report(
             self._source,
             self._node_id,
@@ -221,7 +235,7 @@ class ConformRun:
             node=subject.about if subject else {},
             settings=describe_settings(self._plan, self._exchange.others),
             findings=findings,
-            unrestored=self._care.unrestored,
+            unrestored=(*self._care.unrestored, *gone),
             duration_us=self._exchange.now_us - self._exchange.start_us,
             aborted=aborted,
             absent=self._absent,
