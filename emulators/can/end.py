@@ -127,6 +127,8 @@ class CanEnd(Copyable):
     def poll_stamped(self, now_us: int) -> tuple[tuple[int, CanFrame], ...]:
         """Take the same frames, each with the time at which it had ended."""
         self.wire.advance(now_us)
+        if not self._first and not self.unfiltered:  # mostly: a fifth of what a host's wait costs
+            return ()
         stamps = self.arrived_us, *(at_us for at_us, _ in self._more or ())
         return tuple(zip(stamps, self.poll(now_us), strict=False))
 

@@ -98,14 +98,15 @@ class CanHost:
             LinkTimeout: there is no timeout, and nothing will ever happen.
         """
         self._check_open()
-        deadline_us = NEVER if timeout_us is None else self.now_us + max(0, timeout_us)
-        while not self._inbox:
-            self._inbox += self._end.poll_stamped(self.now_us)
-            if not self._inbox:
-                if self.now_us >= deadline_us:
+        rig, inbox = self._rig, self._inbox
+        deadline_us = NEVER if timeout_us is None else rig.now_us + max(0, timeout_us)
+        while not inbox:
+            inbox += self._end.poll_stamped(rig.now_us)
+            if not inbox:
+                if rig.now_us >= deadline_us:
                     return None
                 self._step(deadline_us)
-        return self._inbox.popleft()
+        return inbox.popleft()
 
     def close(self) -> None:
         """Close the link; the rig stays as it is."""

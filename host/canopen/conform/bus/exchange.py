@@ -258,12 +258,13 @@ class Exchange:
 
     def _listen(self, until_us: int) -> StampedFrames:
         """Take what arrives, at most until a time, and see whether the host was late."""
-        before_us = self.now_us
+        link = self._link
+        before_us = link.now_us
         if before_us > self.deadline_us:
             raise StepFailed("the node kept the check going beyond its time")
         wait_us = max(0, min(until_us - before_us, SLICE_US))
-        self._known_us, received = self._link.receive_stamped(wait_us)
-        after_us = self.now_us
+        self._known_us, received = link.receive_stamped(wait_us)
+        after_us = link.now_us
         gap_us = max(before_us - self._busy_us, after_us - before_us - wait_us)
         self._busy_us = after_us
         if gap_us > HOST_GAP_US:

@@ -35,18 +35,19 @@ class Subject:
         features: what it can do.
         names: what stands for names in checks.
         about: what it says of itself, by name, for people.
+        has: its objects by index and sub-index; made once, a tenth of a run.
     """
 
     binding: Binding
     features: Features
     names: NodeNames
     about: dict[str, str]
+    has: frozenset[Address]
 
     def missing(self, addresses: Collection[Address]) -> str | None:
         """Return why not all of these can be used: the first that is not there; None if all are."""
-        has = {(entry.index, entry.sub) for entry in self.binding.device.entries}
         for index, sub in sorted(addresses):
-            if (index, sub) not in has and index not in MANDATORY:
+            if (index, sub) not in self.has and index not in MANDATORY:
                 return f"{self._where(index)} {index:04X}h:{sub:02X}"
         return None
 
@@ -84,7 +85,8 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     binding = bind(device, client.upload, allow=plan.allow, never=plan.never)
     features = find_features(binding, client, eds)
     names = NodeNames(node_id, binding, client.number, others)
-    return Subject(binding, features, names, dict(_about(client)))
+    has = frozenset((entry.index, entry.sub) for entry in binding.device.entries)
+    return Subject(binding, features, names, dict(_about(client)), has)
 
 
 def _sizes(device: EdsDevice) -> SizeOf:

@@ -21,6 +21,7 @@ from tickrig.host.canopen.conform.verdict import Report, Verdict
 from tickrig.wire.can import CanFrame, Frames
 
 NMT = "NMT-0[345]"
+REASON = "your slave raised struct.error: unpack requires a buffer of 2 bytes"
 
 
 @pytest.mark.parametrize("make", [ours, local_node, durand])
@@ -88,7 +89,7 @@ def test_what_a_slave_raises_is_the_verdict_and_the_others_go_on() -> None:
     failed = [result for result in report.results if result.outcome.verdict is Verdict.FAIL]
     assert failed
     for result in failed:
-        reason = r"step \d+: your slave raised struct.error: unpack requires a buffer of 2 bytes"
+        reason = rf"step \d+: {REASON}"
         assert re.fullmatch(reason, result.outcome.reason)
         remarks = [line.text for line in result.outcome.evidence if line.direction == "#"]
         assert any("in tick: struct.unpack" in text for text in remarks), remarks
@@ -123,9 +124,12 @@ def test_what_a_slave_of_ours_raises_is_the_verdict_too() -> None:
     assert raised(report) == {"NMT-09"}
     reasons = [result.outcome for result in report.results if result.check.id == "NMT-09"]
     assert [(each.verdict, each.reason) for each in reasons] == [
-        (Verdict.FAIL, "step 4: node5 raised struct.error: unpack requires a buffer of 2 bytes")
+        (
+            Verdict.FAIL,
+            "step 4: your slave raised struct.error: unpack requires a buffer of 2 bytes",
+        )
     ]
-    assert report.findings[0].startswith("node5 raised struct.error")
+    assert report.findings[0].startswith("your slave raised struct.error")
     assert report.count(Verdict.PASS) > 3
     assert (report.exit_status, report.unrestored) == (1, ())
 
