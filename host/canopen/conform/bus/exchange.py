@@ -140,9 +140,11 @@ class Exchange:
     def send(self, frame: CanFrame) -> None:
         """Send a frame, when the load allows it; NotAllowed if the level does not."""
         self._permit(frame)
-        self._listen(self.now_us)
-        held_us = self._allowance.wait_us(self.now_us)
-        self._listen_until(self.now_us + held_us)
+        now_us = self._link.now_us
+        if now_us > self._known_us:  # never in virtual time: half of all looks at the bus
+            self._listen(now_us)
+        held_us = self._allowance.wait_us(self._link.now_us)
+        self._listen_until(self._link.now_us + held_us)
         if held_us > HELD_US and self._allowance.slowness > 1:
             self.disturb(TOO_LOW)
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
