@@ -73,7 +73,7 @@ def _pdos(
                 yield f"{kind} {pdo.number}", pdo.cob_id & CAN_ID_MASK, place, slave, transmit
 
 
-def check_container(layout: Layout) -> None:
+def check_container(notes: Notes, layout: Layout) -> None:
     """Note what the container of ros2_canopen refuses, in a file that is for it."""
     sections = [*layout.slaves.values()]
     if layout.master is not None:
@@ -89,9 +89,9 @@ def check_container(layout: Layout) -> None:
             section.note("no-node-id", "node_id", text)
     for section in layout.slaves.values():
         _check_name(section)
-    for section in layout.hidden:
+    for name, place in layout.hidden.items():
         text = "the container takes it for a node, too, and finds no driver"
-        section.note("hidden", "", text)
+        notes.note("hidden", place, name, text)
 
 
 def _check_name(section: Section) -> None:

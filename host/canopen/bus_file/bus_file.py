@@ -140,7 +140,7 @@ class _Reader:
                 slaves[name] = slave
         check_node_ids(self._layout, master, slaves)
         check_cob_ids(self._notes, master, slaves)
-        check_container(self._layout)
+        check_container(self._notes, self._layout)
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
     def _slave(self, node: Section, master: BusMaster | None) -> BusSlave | None:

@@ -212,6 +212,7 @@ class BusMaster:
         emcy_inhibit_time_100us: 1015h.
         nmt_inhibit_time_100us: 102Ah.
         error_behavior: 1029h by sub-index.
+        time_cob_id: 1012h.
         start: it goes operational by itself.
         start_nodes: it starts the slaves.
         start_all_nodes: all at once.
@@ -237,6 +238,7 @@ class BusMaster:
     emcy_inhibit_time_100us: int = 0
     nmt_inhibit_time_100us: int = 0
     error_behavior: Mapping[int, int] = field(default_factory=lambda: {1: 0})
+    time_cob_id: int = 0x100
     start: bool = True
     start_nodes: bool = True
     start_all_nodes: bool = False

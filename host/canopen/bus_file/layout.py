@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator
 from typing import Any, Final, NamedTuple, cast
 
 from tickrig.host.canopen.bus_file.item import Item, Key, Place
@@ -23,13 +23,13 @@ class Layout(NamedTuple):
         options: None where there are none.
         master: None where there is none.
         slaves: by name, in the order of dcfgen.
-        hidden: what begins with a dot, where dcfgen reads the file as it is.
+        hidden: where something begins with a dot, by its name, if dcfgen reads the file as it is.
     """
 
     options: Section | None
     master: Section | None
     slaves: dict[str, Section]
-    hidden: tuple[Section, ...]
+    hidden: dict[str, Place]
 
 
 def read_layout(tree: Item, notes: Notes) -> Layout:
@@ -41,14 +41,14 @@ def read_layout(tree: Item, notes: Notes) -> Layout:
     top = Section(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)
     if NODES in top or DEFAULTS in top:
-        return Layout(*ends, _cogen_nodes(top), ())
-    nodes = {
-        name: Section(notes, shorten(name), item, top.place_of(key))
-        for key, name, item in _named(top, top.fields)
-        if name not in {OPTIONS, MASTER}
+        return Layout(*ends, _cogen_nodes(top), {})
+    names = list(_named(top))
+    hidden = {key: top.place_of(key) for key in names if key.startswith(".")}
+    nodes = (key for key in names if key not in {OPTIONS, MASTER, *hidden})
+    slaves = {
+        key: Section(notes, shorten(key), top.fields[key], top.place_of(key)) for key in nodes
     }
-    hidden = [name for name in nodes if name.startswith(".")]
-    return Layout(*ends, nodes, tuple(nodes.pop(name) for name in hidden))
+    return Layout(*ends, slaves, hidden)
 
 
 def _optional(top: Section, key: str) -> Section | None:
@@ -66,47 +66,53 @@ def _cogen_nodes(top: Section) -> dict[str, Section]:
         return {}
     nodes = Section(top.notes, NODES, top.fields[NODES], top.place_of(NODES))
     defaults = _optional(top, DEFAULTS)
-    return {
-        name: Section(
-            top.notes, shorten(name), _with_defaults(top.notes, name, item, defaults), place
-        )
-        for key, name, item in sorted(_named(nodes, nodes.fields), key=lambda row: row[1])
-        for place in (nodes.place_of(key),)
-    }
+    found = {}
+    for name in sorted(_named(nodes)):
+        item = _sorted(_with_defaults(top.notes, name, nodes.fields[name], defaults), {})
+        found[name] = Section(top.notes, shorten(name), item, nodes.place_of(name))
+    return found
 
 
-def _named(section: Section, fields: Mapping[Key, Item]) -> Iterable[tuple[Key, str, Item]]:
-    """Give the nodes; one whose name is no text is noted."""
-    for key, item in fields.items():
+def _named(section: Section) -> Iterator[str]:
+    """Give the names of nodes; one that is no text is noted."""
+    for key in section.fields:
         if isinstance(key, str):
-            yield key, key, item
+            yield key
         else:
             section.note("kind", key, f"{key}: the name of a node is a text")
 
 
 def _with_defaults(notes: Notes, name: str, item: Item, defaults: Section | None) -> Item:
-    """Return a node as cogen writes it."""
+    """Return a node with all that defaults say."""
     if defaults is None or not item.is_mapping:
-        return _sorted(item)
-    for key in defaults.fields.keys() & item.fields.keys():
-        if item.fields[key] is not defaults.fields[key]:
-            text = f"{key} is that of defaults: {defaults.fields[key].place}"
+        return item
+    for key, own in item.fields.items():
+        usual = defaults.fields.get(key, own)
+        if usual is not own:
+            text = f"{key} is that of defaults: {usual.place}"
             notes.note("defaults-win", item.keys[key], shorten(name), text)
-    fields = {**item.fields, **defaults.fields}
     keys: dict[Key, Place] = {
         **item.keys,
         **{key: defaults.place_of(key) for key in defaults.fields},
     }
-    return _sorted(Item(fields, item.place, keys=keys))
+    return Item({**item.fields, **defaults.fields}, item.place, keys=keys)
 
 
-def _sorted(item: Item) -> Item:
-    """Return a mapping with sorted keys, also in its mappings, as PyYAML writes it."""
+def _sorted(item: Item, done: dict[int, Item]) -> Item:
+    """Return a mapping with sorted keys, also in its mappings, as PyYAML writes it.
+
+    Args:
+        item: that, or something else.
+        done: those that are sorted by the identity of what they were: an anchor is sorted once.
+    """
     if not item.is_mapping:
         return item
+    if (made := done.get(id(item))) is not None:
+        return made
     try:
         keys: list[Any] = sorted(cast(Any, item.fields))  # keys of two kinds raise
     except TypeError:
         keys = list(item.fields)
-    fields = {key: _sorted(item.fields[key]) for key in keys}
-    return Item(fields, item.place, item.text, item.keys)
+    fields = {key: _sorted(item.fields[key], done) for key in keys}
+    made = done[id(item)] = Item(fields, item.place, item.text, item.keys)
+    return made

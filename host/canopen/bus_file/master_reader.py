@@ -14,14 +14,15 @@ from tickrig.host.canopen.bus_file.writes import Writes
 UNSET: Final = 255
 HIGHEST_NODE_ID: Final = 127
 CONSUMER: Final = 0x1016
+TIME: Final = 0x100
 FLAGS: Final = {
-    "heartbeat_consumer": True,
     "start": True,
     "start_nodes": True,
     "start_all_nodes": False,
     "reset_all_nodes": False,
     "stop_all_nodes": False,
 }
+"""Those that dcfgen takes for numbers, with what they are if they are left out."""
 
 
 def read_options(section: Section | None) -> BusOptions:
@@ -59,7 +60,9 @@ def read_master(section: Section, options: BusOptions) -> BusMaster:
         emcy_inhibit_time_100us=whole("emcy_inhibit_time", 0, 0, UNSIGNED16),
         nmt_inhibit_time_100us=whole("nmt_inhibit_time", 0, 0, UNSIGNED16),
         error_behavior=_error_behavior(section),
-        **{key: section.flag(key, default) for key, default in FLAGS.items()},
+        heartbeat_consumer=section.flag("heartbeat_consumer", default=True),
+        time_cob_id=whole("time_cob_id", TIME),
+        **{key: bool(whole(key, default, -UNSIGNED16)) for key, default in FLAGS.items()},
         boot_time_ms=whole("boot_time"),
         boot_timeout_ms=whole("boot_timeout") if "boot_timeout" in section else None,
         driver=section.text("driver"),

@@ -57,6 +57,8 @@ CORPUS: Final = (
     Case("no-number", NODE + "  heartbeat_producer: soon\n", 5, "'soon' is no number"),
     Case("no-number", NODE + "  heartbeat_producer: '0x10'\n", 5, "'0x10' is no number"),
     Case("no-number", NODE + "  heartbeat_multiplier: .nan\n", 5, "'.nan' is no number"),
+    Case("no-number", "master: {start: 'false'}\n", 1, "start: 'false' is no number"),
+    Case("no-number", "master: {time_cob_id: x}\n", 1, "'x' is no number"),
     Case("number-range", NODE + "  guard_time: 65536\n", 5, "65536 is not in 0..65535"),
     Case("no-dcf", MASTER + "axis:\n  node_id: 5\n", 2, "no dcf"),
     Case("no-file", NODE.replace("epos", "epso"), 4, "did you mean 'epos.eds'?"),

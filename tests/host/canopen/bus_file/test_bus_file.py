@@ -75,6 +75,23 @@ def test_defaults_count_more_than_what_a_node_says(tmp_path: Path) -> None:
     assert "bus.yml:9" in bus.warnings[0].text
 
 
+def test_what_is_hidden_may_be_anything(tmp_path: Path) -> None:
+    text = f".pdo: &pdo [{{index: 0x6041}}]\n.five: &five 5\n{NODE}  heartbeat_producer: *five\n"
+    bus = read_bus_file(write_bus(tmp_path, f"{text}  tpdo: {{1: {{mapping: *pdo}}}}\n"))
+    assert bus.findings == ()
+    assert bus.slaves["axis"].heartbeat_producer_ms == 5
+
+
+def test_findings_of_one_line_come_in_its_order(tmp_path: Path) -> None:
+    keys = ["vendor_id", "boot", "dcf", "mandatory", "sdo", "rpdo", "retry_factor"]
+    defaults = ", ".join(f"{key}: {value}" for key, value in zip(keys, [0] * 7, strict=True))
+    own = ", ".join(f"{key}: 1" for key in keys)
+    text = f"master: {{node_id: 1}}\ndefaults: {{{defaults}}}\nnodes: {{a: {{{own}}}}}\n"
+    bus = read_bus_file(write_bus(tmp_path, text))
+    told = [one.text.split()[0] for one in bus.findings if one.rule.name == "defaults-win"]
+    assert told == keys
+
+
 def test_what_is_for_us_is_handed_on_with_its_lines(tmp_path: Path) -> None:
     text = NODE + "  tickrig:\n    motor:\n      inertia_kg_m2: 1e-4\n"
     slave = read_bus_file(write_bus(tmp_path, text)).slaves["axis"]

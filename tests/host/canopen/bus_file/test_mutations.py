@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from tests.host.canopen.bus_file.bench import NODE, ROOT
+from tests.host.canopen.bus_file.bench import MASTER, NODE, ROOT
 from tests.host.canopen.bus_file.mutations import NAME, judge, mutated
 
 
@@ -35,6 +35,16 @@ def test_anchors_that_double_sixty_times_are_read_at_once() -> None:
     lines = ["a0: &a0 [x]", *(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]" for n in range(1, 60))]
     extra = "  tickrig:\n" + "".join(f"    {line}\n" for line in lines)
     assert judge(NAME, (NODE + extra).encode()) == "good"
+
+
+def test_mappings_that_double_sixty_times_are_sorted_at_once() -> None:
+    lines = [
+        "a0: &a0 {x: 1}",
+        *(f"a{n}: &a{n} {{p: *a{n - 1}, q: *a{n - 1}}}" for n in range(1, 60)),
+    ]
+    extra = "nodes:\n  a:\n    node_id: 5\n    dcf: epos.eds\n    tickrig:\n"
+    text = MASTER + extra + "".join(f"      {line}\n" for line in lines)
+    assert judge(NAME, text.encode()) == "good"
 
 
 def test_a_megabyte_is_no_bus() -> None:
