@@ -29,6 +29,7 @@ _ERRORS: Final = (
     ("object-missing", DCFGEN, "dcfgen refuses the file", "write to what is there"),
     ("value-range", DCFGEN, "dcfgen refuses the file", "give a value of its data type"),
     ("value-type", DCFGEN, "dcfgen cannot write such a type", "write it by the driver"),
+    ("odd-size", DCFGEN, "all writes behind it are lost", "write it by the driver"),
     ("pdo-missing", DCFGEN, "dcfgen refuses the file", "configure a PDO that is there"),
     ("cob-id-none", DCFGEN, "dcfgen refuses the file", "give COB-IDs of your own"),
     ("event-deadline", DCFGEN, "dcfgen fails, or writes the event timer", "write 14xxh:05 as sdo"),

@@ -10,7 +10,7 @@ from tickrig.host.canopen.bus_file.bus_values import (
     Channel,
     Identity,
 )
-from tickrig.host.canopen.bus_file.item import Item
+from tickrig.host.canopen.bus_file.item import Item, Place
 from tickrig.host.canopen.bus_file.known_keys import (
     DRIVER,
     EXTRA,
@@ -105,6 +105,7 @@ class SlaveReader:
             if sheet.row(index, sub) is None:
                 text = f"{index:04X}h:{sub:02X} is not in {sheet.path.name}"
                 node.note("no-identity", "dcf", text)
+        self._check_head()
         product = sheet.identity("ProductNumber", 2) if sheet.row(IDENTITY, 2) else 0
         return Identity(
             sheet.value(0x1000, 0),
@@ -113,6 +114,17 @@ class SlaveReader:
             self._identity_number("revision_number", "RevisionNumber", 3),
             self._identity_number("serial_number", "LSS_SerialNumber", 4),
         )
+
+    def _check_head(self) -> None:
+        """Note where the head of the EDS has other numbers than its 1018h."""
+        sheet = self._sheet
+        for sub, key in ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber")):
+            head, number = sheet.head_number("DeviceInfo", key), sheet.value(IDENTITY, sub)
+            if head and number and head != number:
+                place = Place(str(sheet.path), sheet.file.line("DeviceInfo", key))
+                where = sheet.place(IDENTITY, sub)
+                text = f"{key}=0x{head:08X} is expected, but 1018h has 0x{number:08X}: {where}"
+                self._node.notes.note("identity", place, self._node.name, text)
 
     def _identity_number(self, key: str, head: str, sub: int) -> int:
         """Return a number that the file may give; without an entry in the EDS none is checked."""

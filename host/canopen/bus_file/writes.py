@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusWrite
 from tickrig.host.canopen.bus_file.item import Place
@@ -11,7 +12,8 @@ from tickrig.host.canopen.bus_file.sheet import Sheet
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-FLOATS = (DataType.REAL32, DataType.REAL64)
+FLOATS: Final = (DataType.REAL32, DataType.REAL64)
+ODD_SIZES: Final = (3, 5, 6, 7)
 
 
 class Writes:
@@ -76,6 +78,11 @@ class Writes:
             text = f"{what} is a {kind.name}, of which dcfgen writes none"
             self._notes.note("value-type", place, self._name, text)
             return None
+        if kind.size in ODD_SIZES:
+            text = f"{what} is a {kind.name}: dcfgen writes more bytes than it says"
+            self._notes.note("odd-size", place, self._name, text)
+        if kind is DataType.BOOLEAN:  # a byte for dcfgen, whatever is in it
+            kind = DataType.UNSIGNED8
         try:
             return kind.encode(float(value) if kind in FLOATS else value)
         except (ValueError, OverflowError):

@@ -25,6 +25,7 @@ SHEETS = {
     "lamp.eds": LAMP,
     "lamp.dcf": f"{LAMP}[DeviceComissioning]\nNodeID=9\n",
     "broken.eds": LAMP.replace("DefaultValue=0x0000000A", "DefaultValue=ten"),
+    "other.eds": LAMP.replace("VendorNumber=0x0000000A", "VendorNumber=0x0000000B"),
     "bare.eds": LAMP.replace("1018", "2018"),
 }
 """The EDS and DCF files beside a bus.yml, by name."""

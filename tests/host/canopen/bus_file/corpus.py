@@ -70,6 +70,8 @@ CORPUS: Final = (
     Case("object-missing", MAPPED + "{index: 0x5555}\n", 8, "5555h:00 is not there"),
     Case("value-range", NODE + "  sdo: [{index: 0x6060, value: 200}]\n", 5, "200 is no INTEGER8"),
     Case("value-type", NODE + "  sdo: [{index: 0x1008}]\n", 5, "VISIBLE_STRING", alone=False),
+    Case("value-range", SLEEPY + "  sdo: [{index: 0x2003, value: -1}]\n", 5, "-1 is no"),
+    Case("odd-size", SLEEPY + "  sdo: [{index: 0x2002, value: 5}]\n", 5, "is a UNSIGNED24"),
     Case("pdo-missing", NODE + "  tpdo: {99: {}}\n", 5, "tpdo 99 is not in epos.eds, which has 1,"),
     Case("pdo-missing", NODE + "  tpdo: {'1': {}}\n", 5, "tpdo 1 is not in epos.eds"),
     Case(
@@ -104,6 +106,7 @@ CORPUS: Final = (
         *(3, "dcf is that of defaults: "),
     ),
     Case("identity", NODE + "  revision_number: 5\n", 5, "0x00000005, but the EDS has 0x"),
+    Case("identity", NODE.replace("epos", "other"), 18, "VendorNumber=0x0000000B is expected"),
     Case("identity-key", NODE + "  vendor_id: 0\n", 5, "vendor_id of a node is not read: 0x"),
     Case("no-object", SLEEPY + "  time_cob_id: 5\n", 5, "lamp.eds has no 1012h"),
     Case("no-object", SLEEPY + "  software_version: 5\n", 5, "lamp.eds has no 1F56h:01"),

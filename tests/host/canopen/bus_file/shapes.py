@@ -129,6 +129,7 @@ one:
     - {index: 0x2000, value: '7'}
     - {index: 0x2001, value: 2}
     - {index: 0x2003, value: true}
+    - {index: 0x2003, value: 5}
     - {index: 0x1016, sub_index: 1}
   tpdo:
     5: {cob_id: auto, sync_start: 3, transmission: 1, mapping: [{index: 0x2000}, {index: 0x2003}]}
