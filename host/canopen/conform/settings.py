@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from tickrig.host.canopen.conform.bus.exchange import HOST_GAP_US, MS_US, PERIOD_TOLERANCE
+from tickrig.host.canopen.conform.bus.exchange import HOST_GAP_US
+from tickrig.host.canopen.conform.bus.periods import MS_US, PERIOD_TOLERANCE
 from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
 from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS
 from tickrig.host.canopen.conform.plan import Plan

@@ -8,6 +8,7 @@ from typing import Final
 
 from tickrig.host.canopen.conform.bus.evidence import Evidence
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches
+from tickrig.host.canopen.conform.bus.periods import MS_US, off_period
 from tickrig.host.canopen.conform.bus.presence import Answers, Presence
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
@@ -18,8 +19,6 @@ from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID, index_sub
 from tickrig.wire.instant import NEVER
 
-MS_US: Final = 1_000
-
 SLICE_US: Final = 20_000
 """So long a wait at most: a host that was stopped meanwhile sees that it lasted longer."""
 
@@ -29,9 +28,6 @@ HOST_GAP_US: Final = 10_000
 HELD_US: Final = 20_000
 """A frame that is sent so much later than its check wants it may change what the node does."""
 TOO_LOW: Final = "your --max-load is too low for this check"
-
-PERIOD_TOLERANCE: Final = 0.05
-"""By this share may the mean of periods be off: CiA 301 says nothing; crystals are far better."""
 
 NODE_ID_MASK: Final = 0x7F
 """These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
@@ -198,15 +194,11 @@ class Exchange:
         Args:
             pattern: of the frames.
             each_ms: their period.
-            times: how many periods are measured: their mean may be `PERIOD_TOLERANCE` off.
+            times: how many periods are measured.
         """
-        stamps = self.collect(pattern, each_ms * (times + 2))[: times + 1]
-        if len(stamps) <= times:
-            raise StepFailed(f"{len(stamps)} x {pattern}, want {times + 1}, each {each_ms} ms")
-        mean_ms = (stamps[-1] - stamps[0]) / times / MS_US
-        allowed_ms = each_ms * PERIOD_TOLERANCE + self.resolution_us / times / MS_US
-        if abs(mean_ms - each_ms) > allowed_ms:
-            raise StepFailed(f"{pattern} each {mean_ms:.1f} ms, want {each_ms} ms")
+        stamps = self.collect(pattern, each_ms * (times + 2))
+        if wrong := off_period(stamps, each_ms, times, self.resolution_us):
+            raise StepFailed(f"{pattern} {wrong}")
 
     def collect(self, pattern: str, for_ms: int) -> list[int]:
         """Wait; return the times of the frames that match and come meanwhile."""

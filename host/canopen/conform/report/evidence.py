@@ -68,8 +68,19 @@ def cut(lines: list[str], most: int) -> list[str]:
 
 
 def all_goes(outcome: Outcome, first: Outcome | None, show: ShowFrames) -> list[str]:
-    """Return the lines of a check, those of its first go before them."""
+    """Return the lines of a check, those of its first go before them if they differ."""
     if first is None:
         return show(outcome.evidence)
+    if same_go(first, outcome):
+        return [SAME, *show(outcome.evidence)]
     again = f"first: {first.verdict}" + (f": {one_line(first.reason)}" if first.reason else "")
     return [again, *show(first.evidence), "and again:", *show(outcome.evidence)]
+
+
+SAME: Final = "first: the same"
+
+
+def same_go(first: Outcome, again: Outcome) -> bool:
+    """Say whether two goes differ in nothing but their times."""
+    one, other = ([line[1:] for line in each.evidence] for each in (first, again))
+    return (first.verdict, first.reason, one) == (again.verdict, again.reason, other)

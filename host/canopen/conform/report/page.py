@@ -17,9 +17,11 @@ from markupsafe import Markup
 
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.evidence import (
+    SAME,
     ShowFrames,
     cut,
     plain_frames,
+    same_go,
 )
 from tickrig.host.canopen.conform.report.hints import hint
 from tickrig.host.canopen.conform.report.overview import (
@@ -93,7 +95,7 @@ def _environment() -> Environment:
         "slug": _slug,
         "hint": hint,
     }
-    environment.globals |= {"Verdict": Verdict, "UNWELL": UNWELL}
+    environment.globals |= {"Verdict": Verdict, "UNWELL": UNWELL, "same_go": same_go, "SAME": SAME}
     return environment
 
 

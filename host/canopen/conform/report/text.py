@@ -25,7 +25,8 @@ from tickrig.host.text.page_text import duration, one_line
 from tickrig.host.text.values import counted
 
 MOST_SHOWN: Final = 20
-"""So many failures are shown with their frames; the others have a line each."""
+"""So many failures are shown with their frames; the others without."""
+ELSEWHERE: Final = "more, without their frames, which --html FILE and --json have:"
 MOST_LINES: Final = 40
 """Of frames of one failure."""
 MOST_REASONS: Final = 12
@@ -47,10 +48,11 @@ def text_report(
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in unwell(report) if not baseline.knows(result)]
-    begun = [result for result in found if result.outcome.evidence]
+    begun = [result for result in found if _was_begun(result)]
     parts += [_failure(result, show, again) for result in begun[:MOST_SHOWN]]
-    parts.append([_title(result) for result in begun[MOST_SHOWN:]])
-    parts.append(_never_begun([result for result in found if not result.outcome.evidence]))
+    if more := begun[MOST_SHOWN:]:
+        parts += [[f"{len(more)} {ELSEWHERE}"], *(_failure(result, None, again) for result in more)]
+    parts.append(_never_begun([result for result in found if not _was_begun(result)]))
     parts += [_list("findings", report.findings), _list("not restored", report.unrestored)]
     parts.append(list(_ending(report, baseline)))
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
@@ -90,6 +92,11 @@ def _not_applicable(report: Report) -> list[str]:
     return ["not applicable:", *rows, *([f"       and {more} reasons more"] if more > 0 else [])]
 
 
+def _was_begun(result: Result) -> bool:
+    """Say whether a check has something of its own to tell."""
+    return result.outcome.verdict is Verdict.FAIL or bool(result.outcome.evidence)
+
+
 def _never_begun(results: list[Result]) -> list[str]:
     """Count checks of which nothing was seen on the bus, with the reason that they share."""
     counts = Counter((each.outcome.verdict, one_line(each.outcome.reason)) for each in results)
@@ -99,11 +106,14 @@ def _never_begun(results: list[Result]) -> list[str]:
     ]
 
 
-def _failure(result: Result, show: ShowFrames, again: str) -> list[str]:
-    frames = cut(all_goes(result.outcome, result.first, show), MOST_LINES)
+def _failure(result: Result, show: ShowFrames | None, again: str) -> list[str]:
+    """Tell a failure; without what writes frames, without where to look too."""
     clause = f"  {one_line(result.check.source)}"
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
-    next_to = [f"  look at {text}"] if (text := hint(result)) else []
+    frames, next_to = list[str](), list[str]()
+    if show is not None:
+        frames = cut(all_goes(result.outcome, result.first, show), MOST_LINES)
+        next_to = [f"  look at {text}"] if (text := hint(result)) else []
     alone = [f"  alone: {again} --only {result.check.id}"] if again else []
     return [_title(result), clause, *reason, *frames, *next_to, *alone]
 

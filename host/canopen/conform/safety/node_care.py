@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from tickrig.host.canopen.conform.bus.exchange import MS_US, Exchange
+from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.periods import MS_US
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
 from tickrig.host.canopen.conform.check import Level

@@ -16,7 +16,7 @@ from tickrig.host.canopen.conform.report.page import html_page
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.report.text import text_report
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import Outcome, Report, Verdict
 
 KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
 MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", Verdict.FAIL, "no") for n in range(30)))
@@ -51,10 +51,38 @@ def test_the_worst_is_told_last_where_a_terminal_ends() -> None:
     )
 
 
-def test_many_failures_have_a_line_each_behind_the_first_ones() -> None:
-    text = text_report(MANY)
+def test_of_many_failures_the_last_ones_are_told_without_their_frames() -> None:
+    text = text_report(MANY, again="canmon conform can0 --node 5")
     assert text.count("FAIL UE-") == 30
     assert text.count("look at") == 20
+    assert "\n\n10 more, without their frames, which --html FILE and --json have:\n\n" in text
+    last = text[text.index("FAIL UE-29") :].split("\n\n")[0]
+    assert last.splitlines() == [
+        "FAIL UE-29: what UE-29 wants",
+        "  CiA 301 v4.2, 7.2.2.9",
+        "  no",
+        "  alone: canmon conform can0 --node 5 --only UE-29",
+    ]
+
+
+def test_a_failure_without_a_frame_is_told_by_its_name() -> None:
+    silent = result("HB-01", Verdict.FAIL, "no 705#7F within 220 ms", evidence=())
+    assert "FAIL HB-01: what HB-01 wants" in text_report(replace(SAMPLE, results=(silent,)))
+
+
+def test_a_second_go_like_the_first_is_told_once() -> None:
+    later = tuple(line._replace(at_us=line.at_us + 50_000) for line in EVIDENCE)
+    first = Outcome(Verdict.FAIL, "no", EVIDENCE)
+    again = result("UE-01", Verdict.FAIL, "no", first=first, evidence=later)
+    report = replace(SAMPLE, results=(again,))
+    for write in (text_report, report_junit, html_page):
+        assert write(report).count("40 01 20 00") == 1
+        assert "first: the same" in write(report)
+    other = replace(first, reason="late")
+    report = replace(SAMPLE, results=(replace(again, first=other),))
+    for write in (text_report, report_junit, html_page):
+        assert write(report).count("40 01 20 00") == 2
+    assert "first: fail: late" in text_report(report)
 
 
 def test_checks_that_nobody_began_are_counted_in_a_line() -> None:

@@ -1,0 +1,56 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from tickrig import CanFrame
+from tickrig.testing import conformance
+from tickrig.wire.can import Frames
+
+OBJECTS = {"001000": "43", "011000": "4F", "171000": "4B"}
+
+
+def heart(share: float, beats: int = 1_000) -> Callable[[], Callable[[int, Frames], Frames]]:
+    """Make a node 3 whose heartbeat has a share of its period, and stops after some beats."""
+
+    def power_on() -> Callable[[int, Frames], Frames]:
+        period_us = due_us = left = 0
+
+        def answer(data: bytes) -> str:
+            nonlocal period_us, due_us, left
+            at = data[1:4].hex()
+            if data[0] == 0x2B:
+                period_us = due_us = round(int.from_bytes(data[4:6], "little") * 1_000 * share)
+                left = beats
+                return f"583#60{at}00000000"
+            return f"583#{OBJECTS[at]}{at}00000000" if at in OBJECTS else f"583#80{at}00000206"
+
+        def step(now_us: int, frames: Frames) -> Frames:
+            nonlocal due_us, left
+            asked = [frame.data for frame in frames if frame.can_id == 0x603]
+            said = [answer(data) for data in asked if data[0] != 0x80]
+            if asked and period_us and asked[-1][0] == 0x2B:
+                due_us = now_us + period_us
+            if left and due_us and now_us >= due_us:
+                due_us, left = due_us + period_us, left - 1
+                said.append("703#7F")
+            return tuple(map(CanFrame.parse, said))
+
+        return step
+
+    return power_on
+
+
+@pytest.mark.parametrize(("share", "mean_ms"), [(1.2, 120), (1.06, 106), (0.8, 80), (2.5, 250)])
+def test_a_heartbeat_that_is_off_is_told_with_its_period(share: float, mean_ms: int) -> None:
+    report = conformance(heart(share), node_id=3, only="HB-01")
+    (reason,) = [result.outcome.reason for result in report.results]
+    assert reason.endswith(f"703#7F each {mean_ms}.0 ms, want 100 ms, 5 % off at most")
+
+
+@pytest.mark.parametrize("beats", [1, 7])
+def test_a_heartbeat_that_ends_is_told_with_its_number(beats: int) -> None:
+    report = conformance(heart(1, beats), node_id=3, only="HB-01")
+    (reason,) = [result.outcome.reason for result in report.results]
+    assert reason.endswith(f"703#7F came {beats} times, want 20 periods of 100 ms")
