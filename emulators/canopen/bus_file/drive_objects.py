@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary, DictionaryDescription
@@ -11,6 +11,7 @@ from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.parameters import clamped
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.canopen.bus_file.joint_drive import Defaults
+from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 PROFILE_AREA: Final = range(0x6000, 0xA000)
@@ -97,13 +98,13 @@ def complete(
     return Dictionary((_listing(each, modes) for each in entries), objects)
 
 
-def with_values(dictionary: Dictionary, values: Defaults) -> Dictionary:
-    """Return a dictionary with other power-on values of entries that it has."""
+def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value]) -> Dictionary:
+    """Return a dictionary with other power-on values, or their bytes, of entries that it has."""
     if not any(at in dictionary for at in values):
         return dictionary
     given = dictionary.description
     entries = (
-        _replaced(each, value) if (value := values.get((each.index, each.sub))) else each
+        each if (value := values.get((each.index, each.sub))) is None else _replaced(each, value)
         for each in given
     )
     return Dictionary(entries, given.objects)
@@ -147,7 +148,7 @@ def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescriptio
     return _replaced(entry, more | sum(1 << number - 1 for number in modes))
 
 
-def _replaced(entry: EntryDescription, value: int) -> EntryDescription:
+def _replaced(entry: EntryDescription, value: Value) -> EntryDescription:
     return EntryDescription(
         *(entry.index, entry.sub, entry.name, entry.data_type, entry.access),
         default=value,

@@ -52,6 +52,7 @@ class NodeKeys:
         joint: of `JointDrive`, by name.
         modes: numbers of its modes of operation; None for those that its files ask for.
         profile: of `choices.PROFILES`, None for `auto`.
+        configured: it begins with what its master would write to it.
         start: inputs at the start, by name.
         places: where each key and each input stands.
     """
@@ -59,6 +60,7 @@ class NodeKeys:
     joint: Mapping[str, Any] = field(default_factory=dict)
     modes: frozenset[int] | None = None
     profile: str | None = None
+    configured: bool = False
     start: Mapping[str, Setting] = field(default_factory=dict)
     places: Mapping[str, Place] = field(default_factory=dict)
 
@@ -95,6 +97,12 @@ def _one_of(*names: str) -> Callable[[Item], str]:
         raise ValueError(f"{item} is none of {', '.join(names)}{_hint(text, names)}")
 
     return take
+
+
+def _flag(item: Item) -> bool:
+    if isinstance(item.value, bool):
+        return item.value
+    raise ValueError(f"{item} is neither true nor false")
 
 
 def _hint(text: str, names: tuple[str, ...]) -> str:
@@ -212,6 +220,12 @@ KEYS: Final[Mapping[str, Key]] = {
         "`auto`",
         "what the node does with its objects: [profiles](canopen-slave-emu.md#profiles)",
     ),
+    "configured": Key(
+        _flag,
+        "`true`, `false`",
+        "`false`",
+        "it begins with all that the master would write to it at boot-up",
+    ),
     "start": Key(_settings, "a mapping", "as usual", "physical inputs and objects at the start"),
 }
 """All of a node."""
@@ -255,6 +269,7 @@ def read_keys(
         {_ARGUMENTS.get(name, name): found[name] for name in JOINT_KEYS if name in found},
         found.get("modes"),
         found.get("profile"),
+        found.get("configured", False),
         found.get("start", {}),
         places,
     )

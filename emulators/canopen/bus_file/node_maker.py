@@ -122,6 +122,9 @@ class NodeMaker:
             about, start = joint.about, {**joint.start, **start}
         else:
             self._check_no_joint(slave, keys)
+        if keys.configured:
+            written = {(each.index, each.sub_index): each.data for each in slave.writes}
+            sheet = replace(sheet, template=with_values(sheet.template, written))
         description = replace(sheet, application=application, start=start)
         self._check_start(slave, keys, description)
         return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
@@ -139,13 +142,15 @@ class NodeMaker:
         return with_values(dictionary, {at: value for at, value in wanted.items() if value})
 
     def _check_axes(self, slave: BusSlave, dictionary: Dictionary) -> None:
-        """Note a drive of several axes: the profile has one."""
+        """Note a drive of several axes: the profile has one. Of others that nobody uses, tell."""
         second = indices.CONTROLWORD + SECOND_AXIS
-        if slave.num_channels > 1 or dictionary.find(second) is not None:
-            text = (
-                "a drive of several axes (CiA 402-1) is not emulated; profile: none for its objects"
-            )
-            self._mistakes.append(Mistake(slave.place, f"{slave.name}: {text}"))
+        if slave.num_channels > 1:
+            text = "a drive of several axes (CiA 402-1) is not emulated"
+            text = f"{slave.name}: {text}; profile: none for its objects"
+            self._mistakes.append(Mistake(slave.place, text))
+        elif dictionary.find(second) is not None:
+            text = f"{slave.name}: of its axes (CiA 402-1) the first one is emulated"
+            self.remarks.append(str(Mistake(slave.place, text)))
 
     def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
         """Note keys of a motor in a node that has none."""

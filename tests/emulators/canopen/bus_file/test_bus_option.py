@@ -157,3 +157,34 @@ def test_the_check_tells_what_is_wrong_with_our_keys(tmp_path: Path) -> None:
     done = CliRunner().invoke(check, [str(path)])
     line = f"{path}:7: error: joint_1.tickrig.gear_ratio: '-1' is no number 0.01..1e+06"
     assert (done.exit_code, done.stdout.splitlines()[-1]) == (1, line)
+
+
+def test_a_node_may_begin_as_its_master_leaves_it(tmp_path: Path) -> None:
+    text = (
+        f"{ONE_JOINT}  heartbeat_producer: 50\n  sdo: [{{index: 0x6081, value: 0}}]\n"
+        "  tpdo: {1: {enabled: true, cob_id: 0x190, transmission: 1, mapping: [{index: 0x6064}]}}\n"
+        "  tickrig: {configured: true}\n"
+    )
+    result = play(
+        "--bus",
+        write_system(tmp_path, text),
+        scenario="10ms send 000#0102\n20ms send 080#\n30ms send 602#4081600000000000\n60ms end\n",
+    )
+    heard = frames(result)
+    assert {"190#00000000", "702#05", "582#4381600000000000"} <= set(heard)
+
+
+def test_a_further_axis_that_nobody_uses_is_told(tmp_path: Path) -> None:
+    path = write_system(tmp_path)
+    sheet = tmp_path / "joint.eds"
+    entry = "[6840]\nParameterName=Controlword 2\nObjectType=7\nDataType=6\nAccessType=rw\n"
+    text = sheet.read_text()
+    count = int(re.findall(r"\[OptionalObjects\]\nSupportedObjects=(\d+)", text)[0])
+    text = text.replace(f"SupportedObjects={count}\n", f"SupportedObjects={count + 1}\n")
+    text = text.replace("[ManufacturerObjects]", f"{count + 1}=0x6840\n\n[ManufacturerObjects]", 1)
+    sheet.write_text(f"{text}\n{entry}")
+    result = play("--bus", path, scenario="5ms end\n")
+    assert result.exit_code == 0
+    assert (
+        f"{path}:4: joint_1: of its axes (CiA 402-1) the first one is emulated\n" in result.stderr
+    )
