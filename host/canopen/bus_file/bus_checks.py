@@ -73,8 +73,9 @@ def _pdos(
                 yield f"{kind} {pdo.number}", pdo.cob_id & CAN_ID_MASK, place, slave, transmit
 
 
-def check_container(notes: Notes, layout: Layout) -> None:
+def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
     """Note what the container of ros2_canopen refuses, in a file that is for it."""
+    unmade = layout.slaves.keys() - slaves.keys()
     sections = [*layout.slaves.values()]
     if layout.master is not None:
         sections.append(layout.master)
@@ -84,7 +85,7 @@ def check_container(notes: Notes, layout: Layout) -> None:
         missing = [key for key in DRIVER_KEYS if key not in section]
         if missing:
             section.note("no-driver", missing[0], f"no {' and no '.join(missing)}")
-        if "node_id" not in section:
+        if "node_id" not in section and section.name not in unmade:
             text = "no node_id, which the container looks for here, not in the EDS"
             section.note("no-node-id", "node_id", text)
     for section in layout.slaves.values():

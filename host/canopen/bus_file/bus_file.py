@@ -136,14 +136,14 @@ class _Reader:
             master = read_master(self._layout.master, self._options)
         slaves: dict[str, BusSlave] = {}
         for name, node in self._layout.slaves.items():
-            if (slave := self._slave(node, master)) is not None:
+            if (slave := self._slave(name, node, master)) is not None:
                 slaves[name] = slave
         check_node_ids(self._layout, master, slaves)
         check_cob_ids(self._notes, master, slaves)
-        check_container(self._notes, self._layout)
+        check_container(self._notes, self._layout, slaves)
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
-    def _slave(self, node: Section, master: BusMaster | None) -> BusSlave | None:
+    def _slave(self, name: str, node: Section, master: BusMaster | None) -> BusSlave | None:
         sheet = self._sheets.find(node)
         if sheet is None:
             return None
@@ -152,7 +152,7 @@ class _Reader:
                 text = f"no node_id, and none in {sheet.path.name}"
                 node.note("no-node-id", "node_id", text)
             return None
-        reader = SlaveReader(node, sheet, self._options, self._cob_ids)
+        reader = SlaveReader(name, node, sheet, self._options, self._cob_ids)
         slave = reader.read()
         if master is not None:
             watch_master(node, sheet, reader.writes, master)

@@ -111,7 +111,8 @@ class Sheets:
         name = node.text("dcf")
         if not name:
             if "dcf" not in node or node.fields["dcf"].value == "":
-                node.note("no-dcf", "dcf", "no dcf: which EDS is it?")
+                hint = "it is called dcf, not eds" if "eds" in node else "which EDS is it?"
+                node.note("no-dcf", "dcf", f"no dcf: {hint}")
             return None
         looked = list(dict.fromkeys(self._candidates(name, node.text("dcf_path", self._dcf_path))))
         try:

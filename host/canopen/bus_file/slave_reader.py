@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import (
@@ -35,14 +36,17 @@ class SlaveReader:
     """Reads one node.
 
     Args:
-        node: its section.
+        name: of its section.
+        node: that section.
         sheet: its EDS.
         options: of the file.
         cob_ids: of the whole bus.
     """
 
-    def __init__(self, node: Section, sheet: Sheet, options: BusOptions, cob_ids: CobIds) -> None:
-        self._node, self._sheet, self._options = node, sheet, options
+    def __init__(
+        self, name: str, node: Section, sheet: Sheet, options: BusOptions, cob_ids: CobIds
+    ) -> None:
+        self._name, self._node, self._sheet, self._options = name, node, sheet, options
         self._cob_ids = cob_ids
         self.writes = Writes(sheet, node.name, node.notes)
 
@@ -51,7 +55,28 @@ class SlaveReader:
         node, sheet = self._node, self._sheet
         check_keys(node, SLAVE, open_to_others=True)
         self._check_identity_keys()
-        identity = self._identity()
+        slave = BusSlave(
+            self._name, sheet.node_id, node.place, sheet.path, sheet.device, self._identity()
+        )
+        slave = self._with_error_control(slave)
+        pdo_reader = PdoReader(node, sheet, self.writes, self._cob_ids)
+        rpdos, tpdos = pdo_reader.read("rpdo", RPDO), pdo_reader.read("tpdo", TPDO)
+        slave = self._with_boot(replace(slave, master_pdos=(*tpdos, *rpdos)))
+        self._sdo()
+        return replace(
+            slave,
+            writes=self.writes.all,
+            pdos=pdos_after(sheet, self.writes),
+            driver=node.text("driver"),
+            package=node.text("package"),
+            channels=read_channels(node, self._name),
+            settings=self._settings(),
+            extra=read_extra(node),
+        )
+
+    def _with_error_control(self, slave: BusSlave) -> BusSlave:
+        """Read how each side notices that the other one is lost; write what differs."""
+        node = self._node
         self._changed("time_cob_id", TIME, 0x100)
         heartbeat = self._changed("heartbeat_producer", HEARTBEAT, 0, UNSIGNED16)
         guard_time = self._changed("guard_time", GUARD_TIME, 0, UNSIGNED16)
@@ -61,41 +86,30 @@ class SlaveReader:
             node.note("error-control", "guard_time", text)
             guard_time = life_time = 0
         self._error_behavior()
-        pdo_reader = PdoReader(node, sheet, self.writes, self._cob_ids)
-        rpdos, tpdos = pdo_reader.read("rpdo", RPDO), pdo_reader.read("tpdo", TPDO)
-        version, restore = self._software_version(), self._restore()
-        self._sdo()
-        return BusSlave(
-            name=node.name,
-            node_id=sheet.node_id,
-            place=node.place,
-            sheet=sheet.path,
-            device=sheet.device,
-            identity=identity,
-            writes=self.writes.all,
-            pdos=pdos_after(sheet, self.writes),
-            master_pdos=(*tpdos, *rpdos),
+        multiplier = self._options.heartbeat_multiplier
+        return replace(
+            slave,
             heartbeat_producer_ms=heartbeat,
             heartbeat_consumer=node.flag("heartbeat_consumer", default=False),
-            heartbeat_multiplier=node.real(
-                "heartbeat_multiplier", self._options.heartbeat_multiplier
-            ),
+            heartbeat_multiplier=node.real("heartbeat_multiplier", multiplier),
             guard_time_ms=guard_time,
             life_time_factor=life_time,
-            emcy_cob_id=sheet.value(EMCY, 0, INVALID),
+            retry_factor=node.whole("retry_factor", self._options.retry_factor, 0, UNSIGNED8),
+            emcy_cob_id=self._sheet.value(EMCY, 0, INVALID),
+        )
+
+    def _with_boot(self, slave: BusSlave) -> BusSlave:
+        """Read what the master does at boot-up."""
+        node = self._node
+        return replace(
+            slave,
             boot=node.flag("boot", default=True),
             mandatory=node.flag("mandatory", default=False),
             reset_communication=node.flag("reset_communication", default=True),
-            retry_factor=node.whole("retry_factor", self._options.retry_factor, 0, UNSIGNED8),
             software_file=node.text("software_file"),
-            software_version=version,
-            restore_configuration=restore,
+            software_version=self._software_version(),
+            restore_configuration=self._restore(),
             boot_timeout_ms=node.whole("boot_timeout_ms") if "boot_timeout_ms" in node else None,
-            driver=node.text("driver"),
-            package=node.text("package"),
-            channels=read_channels(node),
-            settings=self._settings(),
-            extra=read_extra(node),
         )
 
     def _identity(self) -> Identity:
@@ -221,7 +235,7 @@ def read_extra(section: Section) -> dict[str, Item]:
     return {str(key): item for key, item in section.section(EXTRA).fields.items()}
 
 
-def read_channels(node: Section) -> tuple[Channel, ...]:
+def read_channels(node: Section, name: str) -> tuple[Channel, ...]:
     """Read the axes of a node: their names and scales; without a number there is one."""
     count = node.whole("num_channels", 1, 1, MOST_CHANNELS)
     names = node.fields.get("channel_names")
@@ -230,11 +244,11 @@ def read_channels(node: Section) -> tuple[Channel, ...]:
     usual = {key: node.real(key, getattr(Channel(""), key)) for key in SCALES if key in node}
     channels = []
     for at in range(count):
-        default = node.name if count == 1 else f"{node.name}/{at}"
-        name = given[at] if at < len(given) and given[at] else default
+        default = name if count == 1 else f"{name}/{at}"
+        joint = given[at] if at < len(given) and given[at] else default
         scales = dict(usual)
         if at < len(own):
             check_keys(own[at], SCALES)
             scales |= {key: own[at].real(key, 0.0) for key in SCALES if key in own[at]}
-        channels.append(Channel(name, **scales))
+        channels.append(Channel(joint, **scales))
     return tuple(channels)

@@ -75,6 +75,22 @@ def test_defaults_count_more_than_what_a_node_says(tmp_path: Path) -> None:
     assert "bus.yml:9" in bus.warnings[0].text
 
 
+def test_a_long_name_stays_whole(tmp_path: Path) -> None:
+    name = "left_front_arm_of_the_second_robot_shoulder_pitch_joint"
+    bus = read_bus_file(write_bus(tmp_path, NODE.replace("axis", name)))
+    assert bus.slaves[name].name == name
+    assert bus.slaves[name].channel_names == (name,)
+
+
+def test_axes_have_names_and_scales_of_their_own(tmp_path: Path) -> None:
+    keys = "num_channels: 3\n  channel_names: [a, b]\n  scale_pos_to_dev: 5\n"
+    text = f"{NODE}  {keys}  channels: [{{}}, {{scale_pos_to_dev: 7}}]\n"
+    slave = read_bus_file(write_bus(tmp_path, text)).slaves["axis"]
+    assert slave.channel_names == ("a", "b", "axis/2")
+    assert [channel.scale_pos_to_dev for channel in slave.channels] == [5, 7, 5]
+    assert slave.num_channels == 3
+
+
 def test_what_is_hidden_may_be_anything(tmp_path: Path) -> None:
     text = f".pdo: &pdo [{{index: 0x6041}}]\n.five: &five 5\n{NODE}  heartbeat_producer: *five\n"
     bus = read_bus_file(write_bus(tmp_path, f"{text}  tpdo: {{1: {{mapping: *pdo}}}}\n"))
