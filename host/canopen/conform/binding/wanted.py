@@ -194,9 +194,9 @@ WANTED: Final[tuple[Wanted, ...]] = (
     ),
     Wanted(
         "rpdo_only",
-        "object that may be mapped into RPDOs and not into TPDOs",
+        "write-only object that may be mapped into RPDOs",
         Use.REFUSED,
-        lambda entry: _mapping(entry) is Access.RPDO,
+        lambda entry: not entry.readable and _mapping(entry) is Access.RPDO,
         _any,
     ),
     Wanted(

@@ -22,7 +22,15 @@ from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.object_table import RO, RW, WO, DeviceInfo, EntryDescription
+from tickrig.wire.canopen.eds.object_table import (
+    RO,
+    RW,
+    RWW,
+    WO,
+    Access,
+    DeviceInfo,
+    EntryDescription,
+)
 
 ROOT = Path(__file__).parents[5]
 R1 = ROOT / "tests/golden/canopen/r1.eds"
@@ -163,6 +171,15 @@ def test_an_object_that_must_never_be_written_is_not_bound() -> None:
     binding = bind(r1_device(), bench.upload, never={0x2003, 0x1018})
     assert binding.reasons["rw_u64"].endswith("and it must not be written")
     assert place(binding, "absent_sub") == "1016.05"
+
+
+def test_what_can_be_read_may_be_mapped_into_a_tpdo_whatever_its_eds_says() -> None:
+    pressure = EntryDescription(0x2000, 0, "Set pressure", DataType.INTEGER16, RWW)
+    secret = EntryDescription(0x2001, 0, "Secret", DataType.INTEGER16, WO | Access.RPDO)
+    assert bound_to(pressure).reasons["rpdo_only"] == (
+        "the EDS has no write-only object that may be mapped into RPDOs"
+    )
+    assert place(bound_to(pressure, secret), "rpdo_only") == "2001.00"
 
 
 def test_an_rpdo_is_ready_only_if_all_that_it_writes_is_harmless() -> None:
