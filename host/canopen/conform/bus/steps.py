@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.exchange import MS_US, Exchange
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
@@ -58,6 +58,8 @@ class Player:
                 bus.wait(for_ms)
             case {"forget": can_id}:
                 bus.forget(can_id)
+            case {"app": words, "in": within_ms}:
+                self._act_within(within_ms, *words)
             case {"app": words}:
                 self._act(*words)
             case _:
@@ -82,6 +84,15 @@ class Player:
                 pass
             case _:
                 self._play_more(step)
+
+    def _act_within(self, within_ms: int, *words: str) -> None:
+        """Act; Disturbed if that took longer than what is looked at then."""
+        start_us = self._exchange.now_us
+        self._act(*words)
+        took_ms = (self._exchange.now_us - start_us) // MS_US
+        if took_ms > within_ms:
+            text = " ".join(words)
+            raise Disturbed(f"{text} took {took_ms} ms, which is more than {within_ms} ms")
 
     def _act(self, verb: str, *words: str) -> None:
         """Let somebody move the inputs, or compare the outputs, of the device."""

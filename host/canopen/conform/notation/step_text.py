@@ -57,6 +57,10 @@ def _send(frame: str, extended: str | None) -> Step:
     return {"send": frame, "ext": True} if extended else {"send": frame}
 
 
+def _act(words: str, within_ms: str | None) -> Step:
+    return {"app": words.split()} | ({"in": int(within_ms)} if within_ms else {})
+
+
 def _refuse_write(target: str, data: str, codes: str) -> Step:
     return {"refuse write": target, "data": data, "codes": codes.split()}
 
@@ -84,7 +88,7 @@ _LINES: Final[tuple[tuple[str, Callable[..., Step]], ...]] = (
     (r"(\d+)\.\.(\d+) x (\S+) in (\d+) ms", _count),
     (r"(\d+) x (\S+) each (\d+) ms", _period),
     (r"power cycle", lambda: {"app": ["power-cycle"]}),
-    (r"app: (.+)", lambda words: {"app": words.split()}),
+    (r"app: (.+?)(?: within (\d+) ms)?", _act),
     (r"macro (\w+)((?: \S+)*)", _macro),
     (r"write (\S+) (\S+)", lambda target, data: {"write": target, "data": data}),
     (r"read (\S+) not (\S+)", lambda target, data: {"read": target, "not": data}),

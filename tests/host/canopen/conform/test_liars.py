@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.host.canopen.conform.r1 import R1, yes
+from tests.device.canopen.actions import SlaveActions
+from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tests.host.canopen.conform.test_safety import SpyLink, failing
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
@@ -105,6 +106,22 @@ def test_two_nodes_of_one_id_are_told_and_neither_has_failed(level: Level) -> No
     assert report.aborted == "each request is answered twice: two nodes have ID 5?"
     assert report.exit_status == 4
     assert (settings(first), settings(second)) == before
+
+
+def test_hands_that_are_slower_than_an_inhibit_time_accuse_nobody() -> None:
+    r1 = R1()
+    fast = Stimulus(r1, SlaveActions(r1.slave))
+
+    def slow(verb: str, *words: str) -> str:
+        r1.rig.run_for(120_000)
+        return fast(verb, *words)
+
+    report = r1.judge(Plan(Level.INTRUSIVE, ("EM-08", "PR-03"), stimulus=slow, confirm=yes))
+    assert {r.check.id: r.outcome.reason for r in report.results} == {
+        "EM-08": "emergency 3100 01 took 120 ms, which is more than 30 ms",
+        "PR-03": "input 6000:01 02 took 120 ms, which is more than 20 ms",
+    }
+    assert report.count(Verdict.INCONCLUSIVE) == 2
 
 
 def test_a_tpdo_that_comes_late_after_its_sync_is_no_failure() -> None:
