@@ -34,10 +34,10 @@ errors as the stack lets it, and does no more. What a stack leaves to the applic
 values after a reset, is a failure here, and need not be one in a device.
 
 """
-NOT_RUN: Final = """## Not run
+BY_HAND: Final = """## CANopenNode and Lely
 
-CANopenNode and lely-core are written in C and come by no registry of Python packages: they were
-not run for this page.
+They are written in C and come by no registry of Python packages: their verdicts are
+[by hand](conformance-by-hand.md).
 """
 MOST: Final = 110
 """Characters of what came: what else had been allowed is in a run of one's own."""
@@ -69,7 +69,7 @@ def page() -> str:
     parts = [HEAD + "\n".join(_table({**reports, **foreign}))]
     for stack, name, _ in FOREIGN:
         parts += ["\n".join(_section(stack, name, foreign[name]))]
-    return "\n\n".join([*parts, NOT_RUN])
+    return "\n\n".join([*parts, BY_HAND])
 
 
 def _subjects() -> Iterator[Subject]:
