@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.conform.bus.periods import MS_US
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
+from tickrig.host.canopen.conform.bus.periods import MS_US
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 
 SPARE_MS: Final = 1_000
