@@ -187,7 +187,7 @@ class CanopenRun(EmulatorRun):
         """Say which nodes there are, a line each."""
         say(f"{counted(len(self._described), 'CANopen slave')} of {file} on {bench.link}:")
         for item in self._described:
-            what = item.about or f"profile {profile_name(item.description.application)}"
+            what = item.about or PROFILE_TEXTS[profile_name(item.description.application)]
             sheet = Path(item.description.file).name
             say(f"  {item.name}  node-ID {item.node_id}  {sheet}  {what}")
         say("Ctrl-C ends.")
@@ -208,6 +208,7 @@ def parse_send(rest: str) -> Send:
     return Send(data, data)
 
 
+PROFILE_TEXTS: Final = {"401": "CiA 401", "402": "CiA 402", "none": "its objects alone"}
 BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
 DEVICES: Final = ("eds", "dcf", "model", "rtc")
 """Options that name the device of a node, one of them at a time."""

@@ -113,7 +113,7 @@ class JointDrive:
         else:
             turn = self.per_turn / (2 * pi)
             what = f"{torque / turn:.3g} N, {speed * turn:.3g} m/s"
-        return f"{self.motor}, gear {servo.gear.ratio:.4g}:1, {what}"
+        return f"CiA 402, {self.motor}, gear {servo.gear.ratio:.4g}:1, {what}"
 
     def defaults(self) -> Defaults:
         """Return what counts for objects of the drive to which its EDS gives no value."""

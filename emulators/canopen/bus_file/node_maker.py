@@ -32,6 +32,9 @@ from tickrig.wire.canopen.eds.eds_file import EdsError
 
 TRAVEL_M: Final = 0.01
 """What a turn of the shaft moves a carriage of which nobody says it."""
+BEYOND_RAD: Final = 0.01
+BEYOND_M: Final = 0.001
+"""How far beyond the limits of a URDF its switches are: at its limit a joint presses none."""
 SECOND_AXIS: Final = 0x800
 """How far the objects of a further axis are from those of the first one (CiA 402-1)."""
 IDENTITY: Final = 0x1018
@@ -164,9 +167,10 @@ class NodeMaker:
         scale = slave.channels[0].scale_pos_to_dev if slave.channels else UNITS
         found: dict[str, Any] = {"units": abs(scale) or UNITS}
         if robot := self._joints.get(slave.name):
+            beyond = BEYOND_M if robot.kind == PRISMATIC else BEYOND_RAD
             found |= {
-                "lower": robot.lower,
-                "upper": robot.upper,
+                "lower": None if robot.lower is None else robot.lower - beyond,
+                "upper": None if robot.upper is None else robot.upper + beyond,
                 "max_velocity": robot.velocity,
                 "max_torque": robot.effort,
                 "gear_ratio": robot.reduction,

@@ -138,9 +138,9 @@ def test_a_joint_of_a_bus_has_what_its_robot_says(tmp_path: Path) -> None:
     path = write_system(tmp_path, BUS)
     with joints(path, 2) as (bench, [joint]):
         one = bench["joint_1"]
-        assert one.get("positive_limit_at") == pytest.approx(degrees(0.5))
+        assert one.get("positive_limit_at") == pytest.approx(degrees(0.51))
         assert bench["wrist"].get("positive_limit_at") == 1e9
-        assert bench["joint_3"].get("positive_limit_at") == pytest.approx(0.4 / 0.01 * 360)
+        assert bench["joint_3"].get("positive_limit_at") == pytest.approx(0.401 / 0.01 * 360)
         joint.enable(3)
         joint.write(0x60FF, 9_000, 4)
         bench.run_for("230ms")
@@ -177,4 +177,20 @@ def test_a_robot_that_changed_is_read_again(tmp_path: Path) -> None:
     for upper in (0.5, 0.25):
         robot.write_text(ARM.replace('upper="0.5"', f'upper="{upper}"'))
         with open_bench(path) as bench:
-            assert bench["joint_1"].get("positive_limit_at") == pytest.approx(degrees(upper))
+            assert bench["joint_1"].get("positive_limit_at") == pytest.approx(degrees(upper + 0.01))
+
+
+def test_a_joint_at_its_limit_presses_no_switch(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM.replace('lower="-1.5"', 'lower="0"'))
+    with joints(write_system(tmp_path, BUS), 2) as (bench, [joint]):
+        joint.enable(1)
+        for target in (500, 0):
+            joint.write(0x607A, target, 4)
+            joint.write(0x6040, 0x0F, 2)
+            joint.write(0x6040, 0x1F, 2)
+            bench.run_for("2s")
+            assert joint.read(0x6064, signed=True) == pytest.approx(target, abs=1)
+            assert joint.read(0x60FD) == 0
+        bench["joint_1"].set("load_nm", -200.0)
+        bench.run_for("1s")
+        assert joint.read(0x60FD) == 1
