@@ -301,3 +301,26 @@ def test_a_master_that_may_not_start_nodes_leaves_them_pre_operational() -> None
         net.master.run_for(300_000)
         assert net.master.slave(5).state is NmtState.PRE_OPERATIONAL
         assert net.master.nmt.state is NmtState.OPERATIONAL
+
+
+def test_a_master_that_does_not_start_itself_stays_pre_operational() -> None:
+    with network(GUARDED, starts=False, starts_all=True) as net:
+        net.master.boot()
+        net.master.run_for("300ms")
+        assert net.master.nmt.state is NmtState.PRE_OPERATIONAL
+        assert net.master.slave(5).state is NmtState.PRE_OPERATIONAL
+
+
+def test_all_are_started_by_one_command_if_the_master_boots_none_of_them() -> None:
+    slave = SlaveAssignment(5, boots=False, mandatory=True)
+    with network(slave, slaves=(plain_slave(), plain_slave(6)), starts_all=True) as net:
+        net.master.boot()
+        assert [frame for frame in net.heard() if frame.startswith("000#01")] == ["000#0100"]
+        assert net.bench["node6"].get("state") == "Operational"
+
+
+def test_a_sync_has_a_counter_if_it_is_to_have_one() -> None:
+    with network(GUARDED, sync_us=10_000, sync_overflow=3) as net:
+        net.master.run_for("45ms")
+        syncs = [frame for frame in net.heard() if frame.startswith("080#")]
+    assert syncs == ["080#01", "080#02", "080#03", "080#01"]

@@ -7,7 +7,14 @@ from pathlib import Path
 import pytest
 
 from tests.host.canopen.master.joints import NO_PDOS, PDOS, Cell, cell
+from tests.host.canopen.master.network import NODE_ID, network
+from tickrig.host.canopen.bus_file.bus_values import Channel
+from tickrig.host.canopen.master.assignment import SlaveAssignment
+from tickrig.host.canopen.master.cia402.drive_driver import DriveSettings
+from tickrig.host.canopen.master.cia402.drive_node import DriveNode
 from tickrig.host.canopen.master.cia402.drive_state import DriveState
+from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed
 
 HOMING_35 = "  sdo: [{index: 0x6098, value: 35}]\n"
@@ -227,3 +234,34 @@ def test_a_drive_that_loses_its_supply_is_booted_and_initialised_anew(tmp_path: 
         drives.joint.set_target(0.3)
         drives.master.run_for("500ms")
         assert drives.joint.velocity == pytest.approx(0.3, abs=0.02)
+
+
+def test_an_error_of_homing_is_told(tmp_path: Path) -> None:
+    with cell(tmp_path, "  sdo: [{index: 0x6098, value: 17}]\n") as drives:
+        for name in ("negative_limit_switch", "positive_limit_switch"):
+            drives.bench["joint2"].set(name, 1)
+        with pytest.raises(DriveFailed, match="joint2: homing error"):
+            drives.master.perform(drives.joint.init())
+
+
+def test_a_drive_that_is_gone_ends_what_waits_for_it(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        ready(drives, "pp")
+        drives.bench["joint2"].switch_off()
+        with pytest.raises(DriveFailed, match=r"joint2: (6502h:00 was not answered|the node was)"):
+            drives.master.perform(drives.joint.choose("pv"))
+
+
+def test_a_node_that_is_no_drive_says_so_by_what_it_refuses() -> None:
+    with network(SlaveAssignment(NODE_ID)) as net:
+        slave = net.master.slave(NODE_ID)
+        image = ProcessImage((), net.master.nmt.send)
+        node = DriveNode(slave, image, (DriveSettings(Channel("none")),), 10_000)
+        net.master.attach(ProcessData({NODE_ID: image}, (node,)))
+        net.master.boot()
+        joint = net.master.joints["none"]
+        with pytest.raises(DriveFailed, match="Switch on disabled was not reached"):
+            net.master.perform(joint.init())
+        assert str(joint.refusals[0]) == "6040h:00 aborted: 06020000h NO_OBJECT"
+        assert joint.effort == 0.0
+        assert net.heard().count("605#4077600000000000") == 1  # once refused, never again

@@ -8,7 +8,10 @@ import pytest
 
 from tests.host.canopen.master.boot_loader import FLASHING_US, RUNS, BootLoader
 from tests.host.canopen.master.network import NODE_ID, network, plain_slave
-from tickrig.host.canopen.master.assignment import SlaveAssignment
+from tickrig.host.canopen.errors import SdoTimeout
+from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
+from tickrig.host.canopen.master.boot_status import BootStatus
+from tickrig.host.canopen.master.boot_talk import BootEnded, BootStep, BootTalk
 from tickrig.host.canopen.master.canopen_master import BootFailed
 from tickrig.wire.canopen.nmt import NmtState
 
@@ -96,3 +99,28 @@ def test_flashing_that_never_ends_is_given_up_after_a_minute() -> None:
         with pytest.raises(BootFailed, match="1F57h:01 flash status: not written after 600 looks"):
             net.master.boot("70s")
         assert net.status() == "I"
+
+
+STOP = ObjectWrite(0x1F51, 1, b"\0")
+LATE = SdoTimeout(0x1F51, 1)
+
+
+def test_a_program_that_stops_without_an_answer_is_no_failure() -> None:
+    steps: list[BootStep] = []
+    script = BootTalk(steps.append).write(STOP, BootStatus.UPDATE_FAILED, answered=False)
+    next(script)
+    with pytest.raises(StopIteration):
+        script.throw(LATE)
+    assert [step.answer for step in steps] == ["no answer"]
+
+
+def test_a_write_is_said_again_as_often_as_it_may_be() -> None:
+    steps: list[BootStep] = []
+    script = BootTalk(steps.append).write(STOP, BootStatus.UPDATE_FAILED, tries=3)
+    first = next(script)
+    assert [script.throw(LATE), script.throw(LATE)] == [first, first]
+    with pytest.raises(BootEnded) as end:
+        script.throw(LATE)
+    assert end.value.status is BootStatus.UPDATE_FAILED
+    said = ["no answer", "no answer", "1F51h:01 was not answered"]
+    assert [step.answer for step in steps] == said
