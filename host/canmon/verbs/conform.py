@@ -54,9 +54,9 @@ def _complete_only(
 
 
 _levels: Final[Decorator] = add_options(
-    click.option("--read-only", "level", flag_value=LEVELS[0], default=LEVELS[0], help="Default."),
-    click.option("--communication", "level", flag_value=LEVELS[1], help="NMT, SYNC, PDO, writes."),
-    click.option("--intrusive", "level", flag_value=LEVELS[2], help="Reset, LSS, store, restore."),
+    click.option(f"--{LEVELS[0]}", is_flag=True, help="Default."),
+    click.option(f"--{LEVELS[1]}", is_flag=True, help="NMT, SYNC, PDO, writes."),
+    click.option(f"--{LEVELS[2]}", is_flag=True, help="Reset, LSS, store, restore."),
 )
 _choice: Final[Decorator] = add_options(
     click.option("--node", type=click.IntRange(1, 127), metavar="N", help="Node-ID, 1 to 127."),
@@ -131,12 +131,22 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
                  2 usage         5 nothing was judged
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**{name: options.pop(name) for name in BusOptions.__dataclass_fields__})
+    options["level"] = _level(options)
     if options["lists"]:
         _list(options["only"])
         return
     from tickrig.host.canmon.conform.conformance import Conformance  # noqa: PLC0415 - slow
 
     context.exit(Conformance(source, bus, options).run())
+
+
+def _level(options: dict[str, Any]) -> str:
+    """Return the level that was chosen; two are refused: who only reads would write."""
+    given = [level for level in LEVELS if options.pop(level.replace("-", "_"))]
+    if len(given) > 1:
+        words = " and ".join(f"--{level}" for level in given)
+        raise click.UsageError(f"{words}: which level? give one")
+    return given[0] if given else LEVELS[0]
 
 
 def _list(only: Sequence[str]) -> None:

@@ -202,6 +202,10 @@ def test_what_eds_check_finds_in_the_eds_is_counted(rig: str, tmp_path: Path) ->
         (("--node", "5", "--max-load", "nan"), "nan is no number from 1 to 100"),
         (("--node", "5", "--max-load", "inf"), "inf is not in the range 1<=x<=100"),
         (("--node", "5", "--junit", "/tmp/a", "--html", "/tmp/a"), "cannot go into one file"),
+        (
+            ("--node", "5", "--read-only", "--intrusive", "--yes"),
+            "--read-only and --intrusive: which level? give one",
+        ),
         (("--json",), "--node is missing: without it nothing is judged"),
     ],
 )
