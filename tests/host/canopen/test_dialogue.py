@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 
 from tickrig.host.canopen.dialogue import (
     SDO_TIMEOUT_US,
+    AwaitReport,
     AwaitState,
     Command,
     Dialogue,
     Failure,
+    Guard,
     Pause,
     QueuedScript,
     Script,
@@ -341,3 +343,57 @@ def test_a_job_moves_the_node_unless_it_says_otherwise() -> None:
         dialogue.tick(now_us)
         moves.append(dialogue.moves)
     assert moves == [False, True, True, False]
+
+
+def report(timeout_us: int, *, boot_up: bool = True) -> Script[NmtState | None]:
+    usual = AwaitReport(timeout_us)
+    state: NmtState | None = yield usual if boot_up else AwaitReport(timeout_us, boot_up=False)
+    return state
+
+
+@pytest.mark.parametrize("state", NmtState)
+def test_any_report_is_given_to_who_awaits_one(state: NmtState) -> None:
+    talk = Talk(report(300))
+    talk.dialogue.receive_state(10, state)
+    assert talk.result is state
+    assert talk.dialogue.job is None
+
+
+def test_a_boot_up_is_no_report_where_it_does_not_count() -> None:
+    talk = Talk(report(300, boot_up=False))
+    talk.dialogue.receive_state(10, NmtState.INITIALISING)
+    assert (talk.dialogue.job is None, talk.dialogue.due_us) == (False, 300)
+    talk.dialogue.receive_state(20, NmtState.STOPPED)
+    assert talk.result is NmtState.STOPPED
+
+
+def test_without_a_report_who_awaits_one_is_given_nothing() -> None:
+    talk = Talk(report(300))
+    talk.result = "not yet"
+    talk.dialogue.tick(299)
+    assert talk.result == "not yet"
+    talk.dialogue.tick(300)
+    assert talk.result is None
+    assert talk.failure is None
+
+
+def test_a_guard_request_is_a_remote_frame_and_waits_for_nothing() -> None:
+    def guarding() -> Script[None]:
+        yield Guard()
+
+    guarded: list[int] = []
+    ended: list[str] = []
+    dialogue = Dialogue(5, lambda can_id, data: None, guarded.append)
+    dialogue.start(0, job(guarding(), ended))
+    assert (guarded, ended) == ([0x705], ["done"])
+    idle().start(0, job(guarding(), ended))
+    assert ended == ["done", "done"]
+
+
+def test_the_time_out_of_sdo_may_be_another() -> None:
+    failures: list[Failure] = []
+    dialogue = Dialogue(5, lambda can_id, data: None, sdo_timeout_us=100)
+    dialogue.start(0, QueuedScript("", upload(0x1000, 0), failures.append, failures.append))
+    assert dialogue.due_us == 100
+    dialogue.tick(100)
+    assert str(failures[0]) == "1000h:00 was not answered"
