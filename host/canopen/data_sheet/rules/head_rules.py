@@ -37,6 +37,7 @@ DUMMY_TYPES: Final = range(1, 0x20)
 DUMMIES: Final = tuple(f"Dummy{kind:04d}" for kind in range(1, 8))
 """Those that CiA 306 lists."""
 PDO_AREAS: Final = (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00)))
+IDENTITY_OBJECT: Final = 0x1018
 IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3))
 
 
@@ -87,7 +88,7 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
         return
     for key in DEVICE_INFO:
         if not file.has(title, key):
-            value = "" if key in NAMES else "0"
+            value = _missing(document, key)
             edit = document.add_to(title, [f"{key}={value}"])
             what = f"{key} is missing: {value or 'none'} is taken"
             if not file.is_xml:
@@ -109,6 +110,14 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
         yield document.found("bit-rate-none", "no BaudRate_... is 1", title)
 
 
+def _missing(document: Document, key: str) -> str:
+    """Return what a keyword of [DeviceInfo] stands for that is not there."""
+    row = document.rows.get((IDENTITY_OBJECT, dict(IDENTITY).get(key, 0)))
+    if key in dict(IDENTITY) and row is not None and row.has_default:
+        return f"0x{int.from_bytes(row.default, 'little'):08X}"
+    return "" if key in NAMES else "0"
+
+
 def counts(document: Document) -> Iterator[RuleFinding]:
     """Hold the numbers of [DeviceInfo] against the objects."""
     title = "DeviceInfo"
@@ -124,7 +133,7 @@ def counts(document: Document) -> Iterator[RuleFinding]:
             edits = (document.with_value(line, str(present)),) if sound else ()
             yield document.found("pdo-count", what, title, key, *edits)
     for key, sub in IDENTITY:
-        row, said = document.rows.get((0x1018, sub)), number(document, title, key)
+        row, said = document.rows.get((IDENTITY_OBJECT, sub)), number(document, title, key)
         if row is None or not row.has_default or not said:
             continue
         value = int.from_bytes(row.default, "little")

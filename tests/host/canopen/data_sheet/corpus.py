@@ -224,6 +224,11 @@ CORPUS: Final = (
     Deviation("file-name", put("FileName=reference-slave-r1.eds", "FileName=other.eds")),
     Deviation("device-info-missing", out("DeviceInfo", "OrderCode")),
     Deviation("device-info-missing", out("DeviceInfo", "GroupMessaging")),
+    Deviation(
+        "device-info-missing",
+        out("DeviceInfo", "ProductNumber"),
+        keeps=("ProductNumber=0x00000002",),
+    ),
     Deviation("bit-rate-none", lambda text: re.sub(r"(BaudRate_\d+)=1", r"\1=0", text), False),
     Deviation("granularity", put("Granularity=1", "Granularity=65"), False),
     Deviation("flag", put("SimpleBootUpSlave=1", "SimpleBootUpSlave=2"), False),
