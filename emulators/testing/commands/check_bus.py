@@ -9,6 +9,7 @@ from typing import Final
 import click
 
 from tickrig.emulators.canopen.bus_file.bus_nodes import check_nodes
+from tickrig.host.canopen.bus_file.bus_checks import check_sheets
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
 
@@ -27,12 +28,13 @@ def check_bus(file: Path, *, strict: bool) -> int:
         ImportError: PyYAML is not installed.
     """
     bus = read_bus_file(file)
-    for finding in bus.findings:
+    of_sheets = check_sheets(bus.slaves)
+    for finding in (*bus.findings, *of_sheets):
         click.echo(str(finding))
     ours = check_nodes(bus)
     for place, text in ours:
         click.echo(f"{place}: error: {text}")
-    if bus.errors or ours or (strict and bus.warnings):
+    if bus.errors or ours or (strict and (bus.warnings or of_sheets)):
         return MISTAKES
     click.echo("\n".join([f"{file}: ok: {_head(bus)}", *_slaves(bus)]))
     return 0

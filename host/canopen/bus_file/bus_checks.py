@@ -11,10 +11,23 @@ from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
 from tickrig.host.canopen.bus_file.notes import Notes, Section
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO
 from tickrig.host.canopen.bus_file.writes import final_places
+from tickrig.host.canopen.data_sheet.check import check, failing, severities
+from tickrig.host.canopen.data_sheet.document import Document
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.host.canopen.eds import read_eds_bytes
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID, is_restricted
 
 SYNC: Final = 0x080
 DRIVER_KEYS: Final = ("driver", "package")
+STOPS: Final = frozenset(
+    (
+        *("access-form", "access-missing", "bom", "data-type-missing", "doubled-key"),
+        *("doubled-section", "list-entry", "list-extra", "list-gap", "name-missing", "no-keyword"),
+        *("no-number", "no-objects", "number-form", "number-word", "object-index", "pdo-half"),
+        *("truncated", "utf-16", "xml"),
+    )
+)
+"""Rules for EDS files: dcfgen stops where one of them is broken."""
 
 
 def check_node_ids(
@@ -100,3 +113,21 @@ def _check_name(section: Section) -> None:
         if word in section.name:
             text = f"{word!r} is in its name: the container takes it for one"
             section.notes.note("node-name", section.place, section.name, text)
+
+
+def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
+    """Return how much `canmon eds check` finds in each EDS, and what of it stops dcfgen."""
+    notes = Notes()
+    for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):
+        document = Document(str(sheet), read_eds_bytes(sheet))
+        found = check(document)
+        stops = [one for one in found if one.rule.name in STOPS]
+        names = [one.rule.name for one in stops]
+        if document.encoding == "cp1252":
+            names.insert(0, "its encoding, which is not UTF-8")
+        counted = [*stops, *failing(found)]
+        if names or counted:
+            stopped = f"; dcfgen stops at {', '.join(dict.fromkeys(names))}" if names else ""
+            place = Place(str(sheet), min((one.line for one in counted), default=0))
+            notes.note("eds-check", place, "", f"it finds {severities(found)}{stopped}")
+    return notes.all

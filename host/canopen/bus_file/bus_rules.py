@@ -42,6 +42,12 @@ _ERRORS: Final = (
     ("no-nodes", COGEN, "cogen writes nothing", "nodes: NAME: ..."),
 )
 _WARNINGS: Final = (
+    (
+        "eds-check",
+        "canmon eds check",
+        "dcfgen stops, or misreads it",
+        "canmon eds fix mends a part",
+    ),
     ("no-master", DCFGEN, "dcfgen and the container refuse the file", "master: node_id: 1"),
     ("file-elsewhere", DCFGEN, "dcfgen, which runs beside bus.yml, fails", "put the EDS there"),
     ("not-whole", DCFGEN, "dcfgen cuts it off", "write a whole number"),

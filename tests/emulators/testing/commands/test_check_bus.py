@@ -63,8 +63,9 @@ def test_what_is_for_the_slaves_alone_is_told_with_all_else(folder: Path) -> Non
 def test_a_finding_of_the_eds_is_told_once(folder: Path) -> None:
     write_bus(folder, NODE.replace("epos", "broken"))
     status, out, _ = run("bus.yml")
-    assert (status, len(out)) == (1, 1)
+    assert (status, len(out)) == (1, 2)
     assert out[0].startswith("broken.eds:172: error: [eds] [axis] [1018sub1] DefaultValue=ten")
+    assert out[1].startswith("broken.eds:172: warning: [eds-check] it finds 1 error, ")
 
 
 def test_warnings_count_where_that_is_wanted(folder: Path) -> None:
