@@ -117,7 +117,7 @@ DEFECTS: Final = (
     drive("no EMCY of a fault", ("D4-09",), says("085#1023.*")),
     drive("fault is reset without an edge", ("D4-10",), resets_without_edge),
     drive("6061h does not follow", ("D4-11",), says("585#4F6160.*", "585#4F61600000000000")),
-    drive("velocity is not told", ("D4-12",), number("6C60", "00000000")),
+    drive("velocity is not told", ("D4-12",), number("6C60", "00000000"), left=True),
     drive("position is not told", ("D4-13", "D4-14"), number("6460", "05000000")),
     drive(
         "target reached is not told",
