@@ -156,11 +156,8 @@ class NetworkSlave:
             self._again_us = self._now_us + AGAIN_US
             return
         self.booting, self.outcome = False, outcome
-        if outcome.state is not None:
-            self.state = outcome.state
-        elif outcome.status.good and self.state is None:
-            self.state = NmtState.PRE_OPERATIONAL
         if outcome.status.good:
+            self.state = self.state or NmtState.PRE_OPERATIONAL
             self._begin_error_control()
         self._booted(self)
 
