@@ -25,6 +25,7 @@ from tickrig.emulators.testing.conformance.conformance import (
 from tickrig.host.canopen.conform.notation.suite import read_suite
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.evidence import cut
 from tickrig.host.canopen.conform.report.hints import hint
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
@@ -46,6 +47,7 @@ def conformance_tests(
     eds: Path | str | None = None,
     level: str = "intrusive",
     only: str | Iterable[str] = (),
+    baseline: Path | str | None = None,
     **options: Any,
 ) -> Test:
     """Return a test function for pytest, which has a parameter for each check.
@@ -61,11 +63,12 @@ def conformance_tests(
         eds: its EDS, DCF or XDD; its objects have tests of their own.
         level: `read-only`, `communication` or `intrusive`, as `conformance` has it.
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
+        baseline: a file of known failures, an id a line: these are expected to fail.
         options: further arguments of `conformance`.
 
     Raises:
         ValueError: the level is none, a word of `only` names no check, or nobody says the node-ID.
-        OSError: the EDS cannot be read.
+        OSError: the EDS or the baseline cannot be read.
 
     >>> from tickrig.device import make_epos
     >>> test_drive = conformance_tests(lambda: make_epos(5), only="NMT")
@@ -80,12 +83,13 @@ def conformance_tests(
         known = known or _told_by(made)
     options |= {"eds": eds, "level": level}
     objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
+    known_to_fail = NONE_KNOWN if baseline is None else Baseline.read(Path(baseline))
     suite = [check for group in read_suite() for check in group.checks]
     names = [check.id for check in (*suite, *objects) if plan.chooses(check)]
     parametrised = pytest.mark.parametrize("check_id", names)
     if isinstance(node, str):
-        return parametrised(_test_on_bench(node, options))
-    return parametrised(_Run(node, options).test())
+        return parametrised(_test_on_bench(node, options, known_to_fail))
+    return parametrised(_Run(node, options, known_to_fail).test())
 
 
 def _judged_of(make: Callable[[], Node]) -> Node:
@@ -99,11 +103,11 @@ def _told_by(made: Node) -> EdsFile | None:
     return eds_of(made, "slave.eds") if isinstance(made, CanopenSlave) else None
 
 
-def _test_on_bench(name: str, options: dict[str, Any]) -> Test:
+def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Test:
     def test(bench: Bench, check_id: str) -> None:
         __tracebackhide__ = True
         report = conformance(bench[name], only=check_id, **options)
-        _judge(report, check_id)
+        _judge(report, check_id, baseline)
 
     return test
 
@@ -119,8 +123,10 @@ class _Unmade:
 class _Run:
     """The run of the selected checks, made when the first one asks for it."""
 
-    def __init__(self, make: Callable[[], Node], options: dict[str, Any]) -> None:
-        self._make, self._options = make, options
+    def __init__(
+        self, make: Callable[[], Node], options: dict[str, Any], baseline: Baseline
+    ) -> None:
+        self._make, self._options, self._baseline = make, options, baseline
         self._reports: dict[frozenset[str], Report | _Unmade] = {}
 
     def test(self) -> Test:
@@ -128,7 +134,7 @@ class _Run:
 
         def test(request: pytest.FixtureRequest, check_id: str) -> None:
             __tracebackhide__ = True
-            _judge(self._report(request.node, check_id), check_id)
+            _judge(self._report(request.node, check_id), check_id, self._baseline)
 
         return test
 
@@ -160,13 +166,15 @@ def _selected(item: pytest.Function) -> Iterable[str]:
             yield str(each.callspec.params["check_id"])
 
 
-def _judge(report: Report, check_id: str) -> None:
+def _judge(report: Report, check_id: str, baseline: Baseline) -> None:
     """Pass, fail, skip or be blocked, as a check was."""
     result = next((one for one in report.results if one.check.id == check_id), None)
     if result is None:
         raise BenchBlocked(report.aborted or f"{check_id} was not judged")
     verdict, reason = result.outcome.verdict, result.outcome.reason
     match verdict:
+        case Verdict.FAIL if baseline.knows(result):
+            pytest.xfail(f"known: {reason}")
         case Verdict.FAIL:
             pytest.fail(_text(result, report.node_id), pytrace=False)
         case Verdict.NOT_APPLICABLE:

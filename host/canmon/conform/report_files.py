@@ -69,14 +69,22 @@ def write_files(
     written = True
     for option, path in files.items():
         try:
-            write_whole(path, _text(option, report, baseline, show))
+            write_whole(path, file_text(option, report, baseline, show))
         except OSError as error:
             say(f"Error: {option} {path}: {error.strerror}")
             written = False
     return written
 
 
-def _text(option: str, report: Report, baseline: Baseline, show: ShowFrames) -> str:
+def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames) -> str:
+    """Return what the file that an option names holds.
+
+    Args:
+        option: `--html`, `--junit`, `--badge`, else the failures as a baseline.
+        report: the run.
+        baseline: failures that are known.
+        show: writes frames.
+    """
     match option:
         case "--html":
             from tickrig.host.canopen.conform.report.page import (  # noqa: PLC0415 - an extra

@@ -101,9 +101,9 @@ class Report:
     source: str
     node_id: int
     level: Level
-    results: tuple[Result, ...]
+    results: tuple[Result, ...] = field(repr=False)
     node: Mapping[str, str] = field(default_factory=dict)
-    settings: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict, repr=False)
     findings: tuple[str, ...] = ()
     unrestored: tuple[str, ...] = ()
     duration_us: int = 0

@@ -8,6 +8,12 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.conformance.pytest_suite import (
         conformance_tests as conformance_tests,
     )
+    from tickrig.emulators.testing.conformance.written import (
+        conformance_text as conformance_text,
+    )
+    from tickrig.emulators.testing.conformance.written import (
+        write_conformance as write_conformance,
+    )
     from tickrig.emulators.testing.properties import strategies as strategies
     from tickrig.emulators.testing.properties.check_device import check_device as check_device
     from tickrig.host.canopen.master.open_master import open_master as open_master
@@ -17,6 +23,10 @@ else:
         {
             "tickrig.emulators.testing.conformance.conformance": ("conformance",),
             "tickrig.emulators.testing.conformance.pytest_suite": ("conformance_tests",),
+            "tickrig.emulators.testing.conformance.written": (
+                "conformance_text",
+                "write_conformance",
+            ),
             "tickrig.emulators.testing.properties": ("strategies",),
             "tickrig.emulators.testing.properties.check_device": ("check_device",),
             "tickrig.host.canopen.master.open_master": ("open_master",),

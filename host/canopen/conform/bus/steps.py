@@ -6,8 +6,9 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from tickrig.host.canopen.conform.bus.exchange import MS_US, Exchange
+from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.macros import MACROS
+from tickrig.host.canopen.conform.bus.periods import MS_US
 from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.check import Step

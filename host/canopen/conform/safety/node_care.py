@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
@@ -152,7 +153,7 @@ class NodeCare:
         self._client.abort()
         if self._level is Level.READ_ONLY:
             self._exchange.wait(SETTLE_MS)
-            self._client.upload(*DEVICE_TYPE)
+            self._probe()
             return
         self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
         self._state.tidy(addresses)
@@ -165,11 +166,16 @@ class NodeCare:
         """Say whether a check left an error behind: those of before the run may have gone."""
         number = self._client.number(*ERROR_REGISTER)
         if number is None:
-            self._client.upload(*DEVICE_TYPE)  # absent, or is the node gone?
+            self._probe()  # absent, or is the node gone?
             return False
         new = number & ~self._errors
         self._errors &= number
         return bool(new)
+
+    def _probe(self) -> None:
+        """Raise SdoTimeout if the node is gone; one without 1000h is there."""
+        with suppress(SdoAborted):
+            self._client.upload(*DEVICE_TYPE)
 
     def _recover(self) -> None:
         """Try to get a node back that does not answer."""

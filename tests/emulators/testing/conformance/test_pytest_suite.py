@@ -61,6 +61,15 @@ def test_a_failure_tells_clause_and_frames_and_no_traceback(
     result.stdout.no_fnmatch_line("*pytest_suite.py*")
 
 
+def test_a_known_failure_is_expected(pytester: pytest.Pytester, run: Run) -> None:
+    given = "power_on, node_id=5, only='UE-01,UE-02,UE-13', baseline='known.txt'"
+    (pytester.path / "known.txt").write_text("UE-01  # has no 1000h\nUE-13\n")
+    pytester.makepyfile(f"{MINE}\ntest_mine = conformance_tests({given})")
+    result = run()
+    result.assert_outcomes(passed=1, failed=1, xfailed=1)
+    result.stdout.fnmatch_lines(["XFAIL *test_mine[[]UE-01] - *known: step 1: *"])
+
+
 def test_a_device_of_the_bench_is_judged_check_by_check(
     pytester: pytest.Pytester, run: Run
 ) -> None:
