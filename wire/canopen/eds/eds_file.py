@@ -40,7 +40,7 @@ class Finding(NamedTuple):
     def __str__(self) -> str:
         """Say it in one line."""
         place = f"{self.file}:{self.line}" if self.line else self.file
-        where = f"[{self.section}] " if self.section else ""
+        where = f"[{shorten(self.section)}] " if self.section else ""
         return f"{place}: {where}{self.reason}" + (f" ({self.rule})" if self.rule else "")
 
 

@@ -124,9 +124,8 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
             text = _doubled_text(document, line)
         elif finding.rule in OF_ONE_ENTRY and _is_compact_record(document, finding.section):
             text += "; better than adding it, describe each entry of the RECORD"
-        yield RuleFinding(
-            RULES[finding.rule], document.name, finding.line, finding.section, text, edits
-        )
+        where = shorten(finding.section)
+        yield RuleFinding(RULES[finding.rule], document.name, finding.line, where, text, edits)
 
 
 def _is_compact_record(document: Document, section: str) -> bool:

@@ -11,6 +11,7 @@ import pytest
 
 from tests.host.canopen.data_sheet.corpus import ROOT
 from tests.host.canopen.data_sheet.mutations import LISTS, SMALL, judge, mutated
+from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig.host.canopen.data_sheet.check import check
 from tickrig.host.canopen.data_sheet.document import Document
 
@@ -49,6 +50,10 @@ def test_a_last_section_that_cannot_be_printed_is_told() -> None:
     data = f"{LISTS[0]}[1018\x1asub1]\nParameterName=vendor\n".encode()
     assert "ends in [1018?sub1]" in str(check(Document("a.eds", data)))
     judge("a.eds", data)
+
+
+def test_a_section_of_xml_that_cannot_be_printed_is_told() -> None:
+    assert judge("a.eds", XDD.replace('index="2002"', 'index="\xadE2002"').encode()) == "refused"
 
 
 def test_noise_is_no_eds() -> None:
