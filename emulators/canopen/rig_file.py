@@ -11,6 +11,7 @@ from typing import Any, Final
 from tickrig.emulators.canopen.body.body_spec import BodySpec, read_body
 from tickrig.emulators.canopen.choices import MODELS, PROFILES
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids
+from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.user_file import SUFFIX
 
@@ -39,7 +40,10 @@ def read_rig(path: Path) -> RigFile:
         Refused: the file cannot be used; the line says where and why.
     """
     try:
-        content = tomllib.loads(path.read_text("utf-8"))
+        text = path.read_text("utf-8")
+        if is_bus_file(text.encode()):
+            raise Refused(f"rig {path}: it is a bus.yml: --bus {path}")
+        content = tomllib.loads(text)
     except OSError as error:
         refuse_path("rig", error)
     except ValueError as error:

@@ -81,6 +81,14 @@ def test_bus_goes_alone(tmp_path: Path, words: list[str], error: str) -> None:
     assert (result.exit_code, result.stderr) == (2, f"Error: {error}\n")
 
 
+def test_a_bus_yml_is_no_rig_and_a_rig_no_bus_yml(tmp_path: Path) -> None:
+    path = write_system(tmp_path)
+    assert play("--rig", path).stderr == f"Error: rig {path}: it is a bus.yml: --bus {path}\n"
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[[node]]\nmodel = "epos"\n')
+    assert play("--bus", rig).stderr.startswith(f"Error: {rig}:")
+
+
 def test_urdf_belongs_to_bus() -> None:
     result = play("--urdf", "arm.urdf")
     assert (result.exit_code, result.stderr) == (

@@ -14,6 +14,8 @@ from tickrig.emulators.testing.commands.replay_cli import replay_command
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.testing import open_master
 
+IO_MODULE = Path(__file__).parents[4] / "examples/io_module.eds"
+
 TWO = f"""{ONE_JOINT}  tickrig: {{start: {{load_nm: 0.5}}, supply_v: 48, upper: 0.5}}
 
 joint_2:
@@ -162,3 +164,19 @@ def test_without_yaml_it_says_what_to_install(
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(RigFileError, match=r"a bus.yml needs PyYAML: pip install 'tickrig\[bus\]'"):
         read_rig_file(path)
+
+
+def test_modules_and_other_nodes_answer_with_their_signals(tmp_path: Path) -> None:
+    text = (
+        "master: {node_id: 1}\n"
+        f"io: {{node_id: 5, dcf: '{IO_MODULE}', tickrig: {{start: {{di1: 1}}}}}}\n"
+        f"plain: {{node_id: 6, dcf: '{IO_MODULE}', tickrig: {{profile: none}}}}\n"
+    )
+    with joints(write_system(tmp_path, text), 5, 6) as (bench, [io, plain]):
+        assert io.read(0x6000, 1) & 1 == 1
+        bench["io"].set("di2", 1)
+        bench["plain"].set("0x6000:1", 0x40)
+        bench.run_for("2ms")
+        assert (io.read(0x6000, 1) & 3, plain.read(0x6000, 1)) == (3, 0x40)
+        io.write(0x6200, 0x05, 1, sub=1)
+        assert (bench["io"].get("do1"), bench["io"].get("do3")) == (1, 1)
