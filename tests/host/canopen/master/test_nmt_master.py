@@ -1,0 +1,175 @@
+"""What the NMT master says of itself and to all, frame by frame (CiA 302-2)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
+from tickrig.host.canopen.master.nmt_master import NmtMaster
+from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.nmt import NmtState
+
+DEVICE_TYPE = "4300100092010200"
+
+
+class Desk:
+    """A master without a bus: it is told what was heard, and says what it sends."""
+
+    def __init__(self, *slaves: SlaveAssignment, **plan: Any) -> None:
+        self.nmt = NmtMaster(MasterPlan(slaves, node_id=1, **plan))
+        self.now_us = 0
+
+    def at(self, now_us: int, *heard: str) -> list[str]:
+        self.now_us = now_us
+        frames = tuple((now_us, CanFrame.parse(text)) for text in heard)
+        return [str(frame) for frame in self.nmt.tick(now_us, frames)]
+
+    def boot(self, node_id: int) -> list[str]:
+        """Let a slave of which nothing but its device type is expected boot."""
+        asked = self.at(self.now_us, f"{0x700 + node_id:03X}#00")
+        assert f"{0x600 + node_id:03X}#4000100000000000" in asked
+        return self.at(self.now_us, f"{0x580 + node_id:03X}#{DEVICE_TYPE}")
+
+
+class Spy(ProcessData):
+    """Notes what it is told."""
+
+    def __init__(self) -> None:
+        super().__init__({})
+        self.calls: list[str] = []
+
+    def receive(self, frame: CanFrame) -> None:
+        self.calls.append(str(frame))
+
+    def sync(self) -> None:
+        self.calls.append("sync")
+
+    def tick(self, now_us: int, *, sync: bool) -> None:
+        if sync:
+            self.calls.append("after sync")
+
+
+def test_a_master_boots_resets_all_and_tells_its_state() -> None:
+    desk = Desk(SlaveAssignment(2, mandatory=True), heartbeat_us=100_000)
+    assert desk.at(5) == ["701#00", "000#8200", "602#4000100000000000"]
+    assert desk.nmt.due_us == 100_005
+    desk.at(50_000, f"582#{DEVICE_TYPE}")
+    assert desk.at(100_004) == []
+    assert desk.at(100_005) == ["701#05"]
+
+
+def test_a_master_that_waits_for_a_slave_is_pre_operational() -> None:
+    desk = Desk(SlaveAssignment(2, mandatory=True), heartbeat_us=90_000)
+    desk.at(0)
+    assert "701#7F" in desk.at(90_000)
+
+
+def test_a_master_without_slaves_is_operational_at_once() -> None:
+    desk = Desk()
+    desk.at(0)
+    assert desk.nmt.state is NmtState.OPERATIONAL
+
+
+def test_slaves_that_are_optional_are_booted_when_they_report() -> None:
+    desk = Desk(SlaveAssignment(2), SlaveAssignment(3))
+    assert desk.at(0) == ["701#00", "000#8200"]
+    assert desk.boot(3) == ["000#0103"]
+
+
+def test_an_optional_slave_does_not_wait_for_a_mandatory_one() -> None:
+    desk = Desk(SlaveAssignment(2, mandatory=True), SlaveAssignment(3))
+    desk.at(0)
+    assert desk.boot(3) == ["000#0103"]
+    assert desk.nmt.state is NmtState.PRE_OPERATIONAL
+
+
+def test_together_means_those_that_have_booted_and_no_others() -> None:
+    slaves = (
+        SlaveAssignment(2, mandatory=True),
+        SlaveAssignment(3),
+        SlaveAssignment(4, device_type=1),
+        SlaveAssignment(5, boots=False),
+        SlaveAssignment(6),
+    )
+    desk = Desk(*slaves, starts_all=True)
+    desk.at(0)
+    for node_id in (3, 4):
+        assert desk.boot(node_id) == []
+    desk.at(desk.now_us, "705#00")
+    assert desk.at(desk.now_us, f"582#{DEVICE_TYPE}") == ["000#0102", "000#0103"]
+    assert desk.boot(6) == ["000#0106"]
+
+
+def test_a_heartbeat_of_a_stranger_or_of_oneself_is_no_boot_up() -> None:
+    desk = Desk()
+    desk.at(0)
+    desk.at(1, "709#05", "701#00", "708#00", "707#", "00000706#00")
+    assert desk.nmt.strangers == [8]
+
+
+def test_what_slaves_send_goes_where_it_belongs() -> None:
+    desk, spy = Desk(SlaveAssignment(2)), Spy()
+    desk.at(0)
+    desk.nmt.process_data = spy
+    desk.at(1, "082#3110010203040506", "182#3706", "702#R1", "00000182#AA", "583#00", "083#FF00")
+    assert desk.nmt.slaves[2].emergencies == [0x1031]
+    assert spy.calls == ["182#3706", "583#00", "083#FF00"]
+
+
+def test_sync_goes_out_from_the_start_and_pdos_with_it_once_operational() -> None:
+    desk, spy = Desk(SlaveAssignment(2, mandatory=True), sync_us=10_000), Spy()
+    desk.nmt.process_data = spy
+    desk.at(0)
+    assert desk.at(10_000) == ["080#"]
+    assert spy.calls == ["after sync"]
+    desk.at(11_000, f"582#{DEVICE_TYPE}")
+    assert desk.at(20_000) == ["080#"]
+    assert spy.calls == ["after sync", "sync", "after sync"]
+
+
+def lost(**plan: Any) -> tuple[Desk, list[str]]:
+    """Lose the mandatory one of two slaves."""
+    slaves = (
+        SlaveAssignment(2, mandatory=True, heartbeat_us=50_000),
+        SlaveAssignment(3, heartbeat_us=90_000),
+    )
+    desk = Desk(*slaves, heartbeat_us=1_000_000, **plan)
+    desk.at(0)
+    desk.boot(3)
+    desk.at(0, f"582#{DEVICE_TYPE}")
+    desk.at(1_000, "702#7F", "703#7F")
+    return desk, desk.at(51_000)
+
+
+def test_a_lost_slave_is_reset_alone() -> None:
+    desk, sent = lost()
+    assert sent == ["000#8102"]
+    assert desk.at(91_000) == ["000#8103"]
+    assert desk.nmt.state is NmtState.OPERATIONAL
+
+
+def test_an_optional_slave_that_is_lost_is_reset_alone_whatever_mandatory_ones_cause() -> None:
+    for plan in ({"resets_all": True}, {"stops_all": True}):
+        desk = Desk(SlaveAssignment(3, heartbeat_us=90_000), **plan)
+        desk.at(0)
+        desk.boot(3)
+        desk.at(1_000, "703#7F")
+        assert desk.at(91_000) == ["000#8103"]
+
+
+def test_a_lost_slave_may_stop_all_and_the_master() -> None:
+    desk, sent = lost(stops_all=True)
+    assert sent == ["000#0200"]
+    assert desk.nmt.slaves[3].state is NmtState.STOPPED
+    assert desk.at(1_000_000)[-1] == "701#04"
+
+
+def test_a_lost_slave_may_reset_all_and_the_master_which_begins_anew() -> None:
+    desk, sent = lost(resets_all=True)
+    assert sent == ["000#8100"]
+    assert desk.nmt.due_us == 51_000
+    assert desk.at(51_000) == ["701#00", "000#8200", "602#4000100000000000"]
+    assert desk.nmt.slaves[3].outcome is None
+    assert desk.at(91_000) == []  # nobody watches it now
+    assert not desk.nmt.halted
