@@ -59,6 +59,13 @@ def test_a_master_boots_resets_all_and_tells_its_state() -> None:
     assert desk.at(100_005) == ["701#05"]
 
 
+def test_one_slave_that_is_not_to_be_reset_has_all_others_reset_one_by_one() -> None:
+    slaves = (SlaveAssignment(2), SlaveAssignment(3, reset_communication=False))
+    sent = Desk(*slaves).at(0)
+    reset = [f"000#82{node_id:02X}" for node_id in range(2, 128) if node_id != 3]
+    assert sent == ["701#00", *reset, "603#4000100000000000"]
+
+
 def test_a_master_that_waits_for_a_slave_is_pre_operational() -> None:
     desk = Desk(SlaveAssignment(2, mandatory=True), heartbeat_us=90_000)
     desk.at(0)
