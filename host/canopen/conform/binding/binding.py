@@ -233,7 +233,8 @@ def _has_something(search: _Search, place: Place) -> bool:
     """Read a place at which there should be nothing; what it has is a finding."""
     if not isinstance(search.reader.try_read(*place), bytes):
         return False
-    search.findings.append(f"{place[0]:04X}h:{place[1]:02X} is not described, and the node has it")
+    why = "is not described" if search.known else "cannot be there"
+    search.findings.append(f"{place[0]:04X}h:{place[1]:02X} {why}, and the node has it")
     return True
 
 

@@ -88,3 +88,5 @@ def test_a_node_that_has_every_sub_index_fails(known: bool, anywhere: bool) -> N
     report = conformance(slave, node_id=5, eds=eds, only=("UE-07", "UE-08", "DE-10"))
     verdict = Verdict.FAIL if anywhere else Verdict.PASS
     assert [result.outcome.verdict for result in report.results] == [verdict] * 3
+    why = "is not described" if known else "cannot be there"
+    assert (f"1000h:01 {why}, and the node has it" in report.findings) == anywhere
