@@ -196,11 +196,17 @@ class NodeMaker:
         """Return the modes that the file writes to 6060h and the EDS does not list."""
         found = set()
         for write in slave.writes:
-            number = int.from_bytes(write.data, "little")
-            if write.index == indices.MODES_OF_OPERATION and number in NAMES.keys() - listed:
+            if write.index != indices.MODES_OF_OPERATION:
+                continue
+            number = int.from_bytes(write.data, "little", signed=True)
+            if number in NAMES.keys() - listed:
                 text = f"mode {number} ({NAMES[number]}) is not in 6502h of its EDS: it is added"
-                self.remarks.append(str(Mistake(write.place, f"{slave.name}: {text}")))
                 found.add(number)
+            elif number and number not in NAMES:
+                text = f"mode {number} is not emulated: 6060h refuses it, and so fails the boot-up"
+            else:
+                continue
+            self.remarks.append(str(Mistake(write.place, f"{slave.name}: {text}")))
         return frozenset(found)
 
     def _check_start(self, slave: BusSlave, keys: NodeKeys, description: DeviceDescription) -> None:

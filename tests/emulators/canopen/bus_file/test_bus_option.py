@@ -182,6 +182,23 @@ def test_a_node_may_begin_as_its_master_leaves_it(tmp_path: Path) -> None:
     assert {"190#00000000", "702#05", "582#4381600000000000"} <= set(heard)
 
 
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [
+        (7, "mode 7 (ip) is not in 6502h of its EDS: it is added"),
+        (-3, "mode -3 is not emulated: 6060h refuses it, and so fails the boot-up"),
+        (2, "mode 2 is not emulated: 6060h refuses it, and so fails the boot-up"),
+    ],
+)
+def test_a_mode_that_the_file_writes_and_the_eds_lacks_is_told(
+    tmp_path: Path, mode: int, told: str
+) -> None:
+    text = f"{ONE_JOINT}  sdo:\n    - {{index: 0x6060, value: {mode}}}\n"
+    path = write_system(tmp_path, text)
+    result = play("--bus", path, scenario="5ms end\n")
+    assert f"{path}:8: joint_1: {told}\n" in result.stderr
+
+
 def test_a_further_axis_that_nobody_uses_is_told(tmp_path: Path) -> None:
     path = write_system(tmp_path)
     sheet = tmp_path / "joint.eds"
