@@ -124,7 +124,12 @@ class CanopenMaster:
             DriveFailed: a drive did not do in time what was wanted of it.
             LinkClosed: the bus is gone.
         """
-        perform(operations, lambda: self.now_us, self.wait_until)
+        try:
+            self._step(self.now_us)  # so that no time-out counts from when this master last looked
+            perform(operations, lambda: self.now_us, self.wait_until)
+        finally:
+            for operation in operations:
+                operation.close()
 
     def explain(self, name: str | int) -> str:
         """Return what was asked and answered in the latest boot-up of a slave, line by line."""

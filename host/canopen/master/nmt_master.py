@@ -70,7 +70,7 @@ class NmtMaster:
     @property
     def due_us(self) -> int:
         """When `tick` has something to do."""
-        if self.state is NmtState.INITIALISING:
+        if self._out or self.state is NmtState.INITIALISING:
             return self.now_us
         slaves = min((slave.due_us for slave in self.slaves.values()), default=NEVER)
         return min(slaves, self._heartbeat.due_us, self._sync.due_us, self.process_data.due_us)

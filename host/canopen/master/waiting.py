@@ -79,13 +79,9 @@ def perform(
     Raises:
         DriveFailed: one did not get what it waited for; the others are left where they are.
     """
-    try:
-        waits = [_Wait(operation, now_us()) for operation in operations]
-        while waits := [wait for wait in waits if wait.step is not None]:
-            _wait(waits, now_us, wait_until)
-    finally:
-        for operation in operations:
-            operation.close()
+    waits = [_Wait(operation, now_us()) for operation in operations]
+    while waits := [wait for wait in waits if wait.step is not None]:
+        _wait(waits, now_us, wait_until)
 
 
 def _wait(

@@ -35,7 +35,7 @@ def plain_slave(node_id: int = NODE_ID, application: ServiceMaker = Application)
     objects.variable(0x100C, "Guard time", u16, RW)
     objects.variable(0x100D, "Life time factor", DataType.UNSIGNED8, RW)
     objects.array(0x1010, "Store parameters", 1, u32, RW, 1)
-    objects.array(0x1011, "Restore default parameters", 1, u32, RW, 1)
+    objects.array(0x1011, "Restore default parameters", 2, u32, RW, 1)
     objects.variable(0x1017, "Producer heartbeat time", u16, RW)
     identity = enumerate((VENDOR, PRODUCT, REVISION, SERIAL), 1)
     rows = [Element(sub, f"Identity {sub}", u32, RO, value) for sub, value in identity]

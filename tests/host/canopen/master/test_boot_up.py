@@ -235,18 +235,52 @@ def test_k_a_slave_without_its_first_heartbeat() -> None:
         assert "heartbeat: none within 150 ms" in net.master.explain(5)
 
 
-def test_parameters_are_restored_before_the_configuration() -> None:
-    with network(replace(LEFT, restore_sub=1, writes=(HEARTBEAT,))) as net:
+@pytest.mark.parametrize(
+    ("sub", "command"), [(1, NmtCommand.RESET_NODE), (2, NmtCommand.RESET_COMMUNICATION)]
+)
+def test_parameters_are_restored_before_the_configuration(sub: int, command: NmtCommand) -> None:
+    with network(replace(LEFT, restore_sub=sub, writes=(HEARTBEAT,))) as net:
         net.master.boot()
         heard = net.heard()
-    wanted = ["605#231110016C6F6164", "000#8105", "605#2B17100032000000", "000#0105"]
+    reset = f"000#{command:02X}05"
+    wanted = [f"605#2311100{sub}6C6F6164", reset, "605#2B17100032000000", "000#0105"]
     assert sorted(wanted, key=heard.index) == wanted
+
+
+def test_k_a_boot_up_is_no_first_heartbeat() -> None:
+    with network(GUARDED) as net:
+        written = net.bench.on_line("585#6017100000000000")
+        net.bench["node5"].fault("power_off", when=written, for_="50ms")
+        failed_boot(net)
+        assert net.status() == "K"
+        assert net.heard().count("705#00") == 3  # power-on, reset, and the one that was heard
+
+
+def test_a_configuration_that_is_dated_is_told_to_be_so() -> None:
+    dated = replace(LEFT, configuration_date=123, configuration_time=456)
+    stamps = (u32(0x1020, 1, 123), u32(0x1020, 2, 456), ObjectWrite(0x1010, 1, b"save"))
+    with network(replace(dated, writes=stamps)) as net:
+        net.master.boot()
+        first = net.master.explain("left")
+        net.master.nmt.command(NmtCommand.RESET_COMMUNICATION)
+        net.master.run_for("200ms")
+        second = net.master.explain("left")
+    assert "1020h:01 configuration date: 00000000h; not 0000007Bh: configured anew" in first
+    assert "1020h:01 configuration date: 0000007Bh; as expected" in second
+    assert "1020h:02 configuration time: 000001C8h; as expected" in second
+
+
+def test_a_date_without_a_time_is_not_asked_for() -> None:
+    with network(replace(LEFT, configuration_date=123)) as net:
+        net.master.boot()
+        assert "1020h" not in net.master.explain("left")
 
 
 def test_a_slave_that_another_boots_is_watched_and_not_started() -> None:
     with network(SlaveAssignment(5, boots=False)) as net:
         net.master.boot()
         assert not [frame for frame in net.heard() if frame.startswith(("605", "000#01"))]
+        assert "1F81h: bit 2 is 0; not booted by this master" in net.master.explain(5)
 
 
 def test_a_slave_that_falls_silent_is_reset_and_booted_anew() -> None:

@@ -16,6 +16,7 @@ from tickrig.host.canopen.master.cia402.drive_state import DriveState
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed
+from tickrig.host.links.errors import LinkClosed
 
 HOMING_35 = "  sdo: [{index: 0x6098, value: 35}]\n"
 """Home is where the motor is."""
@@ -242,6 +243,24 @@ def test_an_error_of_homing_is_told(tmp_path: Path) -> None:
             drives.bench["joint2"].set(name, 1)
         with pytest.raises(DriveFailed, match="joint2: homing error"):
             drives.master.perform(drives.joint.init())
+
+
+def test_a_program_that_did_something_else_meanwhile_goes_on(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35, pdos=NO_PDOS) as drives:
+        ready(drives, "pp")
+        drives.bench.run_for("2s")
+        drives.master.perform(drives.joint.choose("pv"))
+        drives.bench.run_for("2s")
+        drives.master.perform(drives.joint.recover())
+        assert drives.master.slave("joint2").lost == 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_operations_on_a_bus_that_is_gone_end(tmp_path: Path) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        drives.master.close()
+        with pytest.raises(LinkClosed):
+            drives.master.perform(drives.joint.init(), drives.joint.choose("pp"))
 
 
 def test_a_drive_that_is_gone_ends_what_waits_for_it(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.nmt_master import NmtMaster
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 DEVICE_TYPE = "4300100092010200"
 
@@ -113,6 +113,15 @@ def test_a_heartbeat_of_a_stranger_or_of_oneself_is_no_boot_up() -> None:
     desk.at(0)
     desk.at(1, "709#05", "701#00", "708#00", "707#", "00000706#00")
     assert desk.nmt.strangers == [8]
+
+
+def test_a_command_from_outside_is_sent_with_the_next_tick_which_is_due() -> None:
+    desk = Desk(SlaveAssignment(2))
+    desk.at(0)
+    assert desk.nmt.due_us > 1_000_000
+    desk.nmt.command(NmtCommand.STOP, 2)
+    assert desk.nmt.due_us == 0
+    assert desk.at(10) == ["000#0202"]
 
 
 def test_what_slaves_send_goes_where_it_belongs() -> None:
