@@ -120,6 +120,7 @@ class NodeMaker:
         if application is Ds402:
             self._check_axes(slave, sheet.template)
             joint = self._joint(slave, keys)
+            self._check_units(slave, sheet.template)
             template = self._completed(slave, keys, sheet.template, joint)
             sheet, application = replace(sheet, template=template), joint.application()
             about, start = joint.about, {**joint.start, **start}
@@ -154,6 +155,19 @@ class NodeMaker:
         elif dictionary.find(second) is not None:
             text = f"{slave.name}: of its axes (CiA 402-1) the first one is emulated"
             self.remarks.append(str(Mistake(slave.place, text)))
+
+    def _check_units(self, slave: BusSlave, dictionary: Dictionary) -> None:
+        """Tell of speeds that the driver believes in other units; an EDS may have its own."""
+        own = (indices.SI_UNIT_VELOCITY, indices.VELOCITY_DIMENSION, indices.FEED_CONSTANT)
+        if any(index in dictionary.objects for index in own):
+            return
+        for axis in slave.channels[:1]:
+            if abs(axis.scale_vel_to_dev) != abs(axis.scale_pos_to_dev):
+                text = (
+                    f"{slave.name}: scale_vel_to_dev is {axis.scale_vel_to_dev:g}, but the drive"
+                    f" counts speeds as positions: {axis.scale_pos_to_dev:g} a second"
+                )
+                self.remarks.append(str(Mistake(slave.place, text)))
 
     def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
         """Note keys of a motor in a node that has none."""

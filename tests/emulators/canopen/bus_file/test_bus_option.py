@@ -199,6 +199,16 @@ def test_a_mode_that_the_file_writes_and_the_eds_lacks_is_told(
     assert f"{path}:8: joint_1: {told}\n" in result.stderr
 
 
+def test_speeds_in_other_units_than_positions_are_told(tmp_path: Path) -> None:
+    text = f"{ONE_JOINT}  scale_pos_to_dev: 5000\n"
+    path = write_system(tmp_path, text)
+    said = "scale_vel_to_dev is 1000, but the drive counts speeds as positions: 5000 a second"
+    told = f"{path}:4: joint_1: {said}\n"
+    assert told in play("--bus", path, scenario="5ms end\n").stderr
+    path.write_text(f"{text}  scale_vel_to_dev: 5000\n")
+    assert said not in play("--bus", path, scenario="5ms end\n").stderr
+
+
 def test_a_further_axis_that_nobody_uses_is_told(tmp_path: Path) -> None:
     path = write_system(tmp_path)
     sheet = tmp_path / "joint.eds"
