@@ -227,8 +227,9 @@ def _of_sheet(sheet: Sheet, index: int) -> BusPdo:
 
 
 def _mapping(sheet: Sheet, index: int) -> Iterator[MappedObject]:
-    for sub in range(1, sheet.value(index, 0) + 1):
-        if value := sheet.value(index, sub):
+    count = sheet.value(index, 0)
+    for sub in sheet.subs(index):
+        if 1 <= sub <= count and (value := sheet.value(index, sub)):
             yield MappedObject.parse(value)
 
 
@@ -241,7 +242,8 @@ def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
         return sheet.value(index, sub, default) if data is None else int.from_bytes(data, "little")
 
     def pdo(index: int, number: int, transmit: bool) -> BusPdo:
-        subs = range(1, value(index + MAPPING, 0) + 1)
+        count = value(index + MAPPING, 0)
+        subs = (sub for sub in sheet.subs(index + MAPPING) if 1 <= sub <= count)
         mapping = (MappedObject.parse(value(index + MAPPING, sub)) for sub in subs)
         return BusPdo(
             *(number, transmit, value(index, 1, INVALID), value(index, 2)),

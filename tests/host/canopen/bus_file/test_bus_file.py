@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tests.host.canopen.bus_file.bench import NODE, Generated, Pdo, generate, write_bus
+from tests.host.canopen.bus_file.bench import LAMP, NODE, Generated, Pdo, generate, write_bus
 from tests.host.canopen.bus_file.shapes import COGEN, GOOD, PLAIN
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusPdo, BusSlave, concise_dcf
@@ -89,6 +89,16 @@ def test_axes_have_names_and_scales_of_their_own(tmp_path: Path) -> None:
     assert slave.channel_names == ("a", "b", "axis/2")
     assert [channel.scale_pos_to_dev for channel in slave.channels] == [5, 7, 5]
     assert slave.num_channels == 3
+
+
+def test_an_eds_that_counts_to_the_end_of_time_is_read_at_once(tmp_path: Path) -> None:
+    path = write_bus(tmp_path, NODE.replace("epos", "lamp"))
+    head, line, tail = LAMP.partition("[1A00sub0]\n")
+    tail = tail.replace("DataType=0x0005", "DataType=0x001B", 1)
+    tail = tail.replace("DefaultValue=0x01", "DefaultValue=0xFFFFFFFFFFFFFFFF", 1)
+    (tmp_path / "lamp.eds").write_text(head + line + tail, "utf-8")
+    pdo = next(pdo for pdo in read_bus_file(path).slaves["axis"].pdos if pdo.transmit)
+    assert [entry.index for entry in pdo.mapping] == [0x2000, 0, 0, 0]
 
 
 def test_what_is_hidden_may_be_anything(tmp_path: Path) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from random import Random
 
 import pytest
 
-from tests.host.canopen.bus_file.bench import MASTER, NODE, ROOT
+from tests.host.canopen.bus_file.bench import LAMP, MASTER, NODE, ROOT, write_bus
 from tests.host.canopen.bus_file.mutations import NAME, judge, mutated
+from tests.host.canopen.bus_file.shapes import LAMPS
+from tests.host.canopen.data_sheet.mutations import disturbed
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -17,6 +20,16 @@ def test_a_mutated_bus_file_is_told_well(seed: int) -> None:
     chance = Random(seed)
     for _ in range(12):
         judge(*mutated(chance))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_mutated_eds_beside_a_bus_file_is_told_well(seed: int, tmp_path: Path) -> None:
+    chance = Random(seed)
+    path = write_bus(tmp_path, LAMPS.replace("lamp.dcf", "lamp.eds\n  node_id: 7"))
+    for _ in range(15):
+        eds = disturbed(disturbed(LAMP, chance), chance)
+        (tmp_path / "lamp.eds").write_bytes(eds.encode("utf-8", "replace"))
+        judge(str(path), path.read_bytes())
 
 
 def test_the_tool_judges_files_by_several_processes() -> None:

@@ -88,11 +88,16 @@ _TITLE: Final = re.compile(r"\[[^\]\n]*\]|<[A-Za-z:]+")
 def mutated(chance: Random) -> tuple[str, bytes]:
     """Return a file with a few things done to it, and its name."""
     data = chance.choice(LARGE if chance.random() < 0.004 else SMALL_ONES)
-    text = data.decode("utf-8", "replace")
+    text = disturbed(data.decode("utf-8", "replace"), chance)
+    return chance.choice(NAMES), _bytes(text, chance)
+
+
+def disturbed(text: str, chance: Random) -> str:
+    """Return the text of a file with a few things done to it."""
     for _ in range(chance.choice([1, 1, 2, 3, 8])):
         change = chance.choice([_piece, _line, _value, _value, _key, _title, _section])
         text = change(text, chance)
-    return chance.choice(NAMES), _bytes(text, chance)
+    return text
 
 
 def _bytes(text: str, chance: Random) -> bytes:
