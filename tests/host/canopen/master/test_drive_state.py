@@ -26,16 +26,20 @@ def test_bits_of_no_state_are_unknown() -> None:
     assert state_of(0x0002) is DriveState.UNKNOWN
 
 
+@pytest.mark.parametrize("old", [0x0100, 0x018F])
 @pytest.mark.parametrize(("before", "after"), list(TRANSITIONS), ids=str)
-def test_a_controlword_asks_the_drive_for_the_transition(
-    before: DriveState, after: DriveState
+def test_a_controlword_asks_the_drive_for_the_transition_and_keeps_its_other_bits(
+    before: DriveState, after: DriveState, old: int
 ) -> None:
-    word = lead(0x0100, before, after)
+    word = lead(old, before, after)
     assert word is not None
+    assert word & 0x0170 == 0x0100
     command = automaton.command_of(word)
     reached = automaton.NEXT_STATE.get((automaton.DriveState[before.name], command))  # type: ignore[arg-type]
-    if before in {DriveState.FAULT, DriveState.FAULT_REACTION_ACTIVE}:
-        assert (word & 0x80 != 0) == (before is DriveState.FAULT)
+    if before is DriveState.FAULT:
+        assert word & 0x80
+    elif before is DriveState.FAULT_REACTION_ACTIVE:
+        assert word == old
     elif before is not DriveState.NOT_READY_TO_SWITCH_ON:
         assert reached is not None
         assert reached.name == after.name

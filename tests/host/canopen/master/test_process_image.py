@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tickrig.host.canopen.bus_file.bus_values import BusPdo, Channel
 from tickrig.host.canopen.dialogue import QueuedScript, SdoRequest
 from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver, DriveSettings
@@ -29,8 +31,11 @@ class Slave:
         self.sent.append(f"{can_id:03X}#{data.hex().upper()}")
 
 
-def test_an_event_driven_pdo_goes_out_with_each_write_of_an_object_in_it() -> None:
-    slave = Slave(255)
+@pytest.mark.parametrize("transmission", [254, 255])
+def test_an_event_driven_pdo_goes_out_with_each_write_of_an_object_in_it(
+    transmission: int,
+) -> None:
+    slave = Slave(transmission)
     slave.image.sync()
     slave.image.write(TARGET, 0x0102)
     slave.image.write(CONTROLWORD, 0x000F)
@@ -40,8 +45,11 @@ def test_an_event_driven_pdo_goes_out_with_each_write_of_an_object_in_it() -> No
 def test_a_synchronous_pdo_goes_out_with_each_nth_sync() -> None:
     slave = Slave(3)
     slave.image.write(CONTROLWORD, 0x000F)
+    counts = []
     for _ in range(7):
         slave.image.sync()
+        counts.append(len(slave.sent))
+    assert counts == [0, 0, 1, 1, 1, 2, 2]
     assert slave.sent == ["202#0F0000000000"] * 2
 
 
@@ -58,6 +66,8 @@ def test_an_acyclic_synchronous_pdo_waits_for_the_sync_after_a_write() -> None:
 def test_a_pdo_that_is_not_there_carries_nothing() -> None:
     slave = Slave(255, INVALID | 0x202)
     assert not slave.image.sends(CONTROLWORD)
+    assert slave.image.receives(STATUSWORD)
+    assert list(slave.image.cob_ids) == [0x182]
     slave.image.write(CONTROLWORD, 0x000F)
     assert slave.sent == []
 
@@ -67,6 +77,9 @@ def test_a_tpdo_is_taken_and_one_that_is_too_short_is_not() -> None:
     slave.image.receive(0x182, bytes.fromhex("370608"))
     slave.image.receive(0x182, bytes.fromhex("0000"))
     assert (slave.image.read(STATUSWORD), slave.image.read((0x6061, 0))) == (0x0637, 8)
+    slave.image.learn(TARGET, 7)
+    assert slave.image.read(TARGET) == 7
+    assert slave.sent == []
 
 
 def test_the_objects_of_a_further_axis_are_800h_above() -> None:
