@@ -40,8 +40,8 @@ def bus_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def master(bus: Bus, bus_file: Path) -> Iterator[CanopenMaster]:
-    """Boot a drive that runs in a process of its own."""
-    with running(bus, "--model", "epos", "--node-id", "2"):
+    """Boot the drive of a bus.yml, which runs in a process of its own."""
+    with running(bus, "--bus", str(bus_file)):
         link = CanLink(can.Bus(**bus.keywords), bus.interface)
         echo_free = EchoFreeLink(link) if bus.interface == INTERFACE else link
         with open_master(echo_free, bus_file, sdo_timeout_us=5_000_000) as master:
