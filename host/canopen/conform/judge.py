@@ -12,6 +12,7 @@ from tickrig.host.canopen.conform.bus.steps import Player
 from tickrig.host.canopen.conform.check import STIMULUS, Check
 from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
 from tickrig.host.canopen.conform.notation.names import Unbound
+from tickrig.host.canopen.conform.notation.step_words import step_head
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
@@ -104,10 +105,10 @@ class Judge:
         return Outcome(verdict, reason, lines, start_us - begun_us, end_us - begun_us)
 
     def _play(self, bound: BoundCheck) -> tuple[Verdict, str]:
-        number = 0
+        where = ""
         try:
-            for step in bound.steps:
-                number += 1
+            for number, step in enumerate(bound.steps, 1):
+                where = ", ".join(filter(None, [f"step {number}", step_head(step)]))
                 if "finally" not in step:
                     self._player.play(step)
                 if self._exchange.crashes:
@@ -118,8 +119,8 @@ class Judge:
             return Verdict.INCONCLUSIVE, str(error)
         except StepFailed as error:
             if self._exchange.crashes:
-                return Verdict.FAIL, f"step {number}: {self._crash()}"
-            return self._failed(bound, f"step {number}: {error}")
+                return Verdict.FAIL, f"{where}: {self._crash()}"
+            return self._failed(bound, f"{where}: {error}")
         return Verdict.PASS, ""
 
     def _end(self, bound: BoundCheck) -> None:

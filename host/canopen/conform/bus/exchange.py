@@ -12,6 +12,7 @@ from tickrig.host.canopen.conform.bus.periods import MS_US, off_period
 from tickrig.host.canopen.conform.bus.presence import Answers, Presence
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
+from tickrig.host.canopen.conform.bus.unlike import unlike, wanted_text
 from tickrig.host.canopen.conform.verdict import Direction
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
@@ -163,15 +164,14 @@ class Exchange:
         until_us = self.now_us + within_ms * MS_US + self.resolution_us
         while not queue and self._known_us < until_us:
             self._listen(until_us)
-        wanted = " or ".join(patterns)
         if not queue:
-            raise StepFailed(f"no {wanted} within {within_ms} ms")
+            raise StepFailed(f"no {wanted_text(patterns)} within {within_ms} ms")
         at_us, got = queue.popleft()
         if at_us > until_us:
             late_ms = (at_us - until_us + self.resolution_us) / MS_US
             raise StepFailed(f"{got} came {late_ms:.1f} ms after the {within_ms} ms allowed")
         if not any(matches(pattern, got) for pattern in patterns):
-            raise StepFailed(f"got {got}, want {wanted}")
+            raise StepFailed(unlike(got, patterns))
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:

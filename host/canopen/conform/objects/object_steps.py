@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.bus.unlike import codes_text
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.sdo.abort import describe_abort
@@ -80,7 +81,7 @@ def _check_limits(kind: DataType, data: bytes, step: Mapping[str, Any]) -> None:
 
 
 def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:
-    wanted = " or ".join(codes)
+    wanted = f"abort {codes_text(codes)}"
     try:
         data = client.upload(index, sub)
     except SdoAborted:
@@ -93,4 +94,4 @@ def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[st
             text = f"{len(data)} bytes refused with {describe_abort(error.code)}, want {wanted}"
             raise StepFailed(text) from error
     else:
-        raise StepFailed(f"{len(data)} bytes were taken, want abort {wanted}")
+        raise StepFailed(f"{len(data)} bytes were taken, want {wanted}")

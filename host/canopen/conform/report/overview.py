@@ -62,6 +62,22 @@ def unwell(report: Report) -> list[Result]:
     return sorted(found, key=lambda result: UNWELL.index(result.outcome.verdict))
 
 
+def causes(results: Iterable[Result]) -> list[list[Result]]:
+    """Put checks of objects together that fail alike: one of a kind stands for all."""
+    found: dict[tuple[str, ...], list[Result]] = {}
+    for number, each in enumerate(results):
+        kind = OF_OBJECT.fullmatch(each.check.id)
+        reason = PLACE.sub("", each.outcome.reason)
+        key = (each.outcome.verdict, kind[1], reason) if kind else (str(number),)
+        found.setdefault(key, []).append(each)
+    return list(found.values())
+
+
+OF_OBJECT: Final = re.compile(r"OD-.*-(\w+)")
+PLACE: Final = re.compile(r"step \d+|\b[0-9A-F]{4}h?:[0-9A-F]{2}\b|\b\d+ bytes")
+"""What differs in the reasons of objects that fail alike."""
+
+
 def _rows(report: Report, name_of: Callable[[Result], str]) -> list[Row]:
     rows: dict[str, list[Result]] = {}
     for result in report.results:

@@ -15,6 +15,7 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from tickrig.host.canopen.conform.notation.step_words import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.evidence import (
     SAME,
@@ -94,6 +95,7 @@ def _environment() -> Environment:
         "counts": counts_text,
         "slug": _slug,
         "hint": hint,
+        "words": step_words,
     }
     environment.globals |= {"Verdict": Verdict, "UNWELL": UNWELL, "same_go": same_go, "SAME": SAME}
     return environment

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Final
 
+from tickrig.host.canopen.conform.notation.step_words import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 
@@ -50,6 +51,7 @@ def _check(result: Result, baseline: Baseline) -> Object:
         "level": check.level.word,
         "needs": sorted(check.needs),
         "choice": check.choice,
+        "steps": list(map(step_words, check.steps)),
         "known": baseline.knows(result),
         **_outcome(result.outcome),
         "first": None if result.first is None else _outcome(result.first),

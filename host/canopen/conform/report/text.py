@@ -16,6 +16,7 @@ from tickrig.host.canopen.conform.report.evidence import (
 from tickrig.host.canopen.conform.report.hints import hint
 from tickrig.host.canopen.conform.report.overview import (
     by_group,
+    causes,
     counts_text,
     unwell,
     verdict_counts,
@@ -48,10 +49,10 @@ def text_report(
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in unwell(report) if not baseline.knows(result)]
-    begun = [result for result in found if _was_begun(result)]
-    parts += [_failure(result, show, again) for result in begun[:MOST_SHOWN]]
+    begun = causes(result for result in found if _was_begun(result))
+    parts += [_failure(alike, show, again) for alike in begun[:MOST_SHOWN]]
     if more := begun[MOST_SHOWN:]:
-        parts += [[f"{len(more)} {ELSEWHERE}"], *(_failure(result, None, again) for result in more)]
+        parts += [[f"{len(more)} {ELSEWHERE}"], *(_failure(alike, None, again) for alike in more)]
     parts.append(_never_begun([result for result in found if not _was_begun(result)]))
     parts += [_list("findings", report.findings), _list("not restored", report.unrestored)]
     parts.append(list(_ending(report, baseline)))
@@ -106,8 +107,9 @@ def _never_begun(results: list[Result]) -> list[str]:
     ]
 
 
-def _failure(result: Result, show: ShowFrames | None, again: str) -> list[str]:
-    """Tell a failure; without what writes frames, without where to look too."""
+def _failure(alike: list[Result], show: ShowFrames | None, again: str) -> list[str]:
+    """Tell a failure, and which are like it; without frames, without where to look too."""
+    result = alike[0]
     clause = f"  {one_line(result.check.source)}"
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
     frames, next_to = list[str](), list[str]()
@@ -115,7 +117,16 @@ def _failure(result: Result, show: ShowFrames | None, again: str) -> list[str]:
         frames = cut(all_goes(result.outcome, result.first, show), MOST_LINES)
         next_to = [f"  look at {text}"] if (text := hint(result)) else []
     alone = [f"  alone: {again} --only {result.check.id}"] if again else []
-    return [_title(result), clause, *reason, *frames, *next_to, *alone]
+    return [_title(result), clause, *reason, *frames, *next_to, *alone, *_like(alike[1:])]
+
+
+def _like(results: list[Result]) -> list[str]:
+    """Name what failed likewise."""
+    if not results:
+        return []
+    names = [one_line(result.check.id) for result in results[:MOST_REASONS]]
+    more = [f"and {len(results) - MOST_REASONS} more"] if results[MOST_REASONS:] else []
+    return [f"  the same in {counted(len(results), 'other')}: {', '.join([*names, *more])}"]
 
 
 def _title(result: Result) -> str:

@@ -54,3 +54,19 @@ def test_a_heartbeat_that_ends_is_told_with_its_number(beats: int) -> None:
     report = conformance(heart(1, beats), node_id=3, only="HB-01")
     (reason,) = [result.outcome.reason for result in report.results]
     assert reason.endswith(f"703#7F came {beats} times, want 20 periods of 100 ms")
+
+
+@pytest.mark.parametrize(
+    ("check_id", "reason"),
+    [
+        ("US-04", "step 2: got abort 0602 0000h (object does not exist), want abort 0504 0001h"),
+        ("DS-08", "step 2: got a value, want abort 0601 0002h"),
+        ("DE-02", "step 2, read 1017:00 A534: got 0000, want A534"),
+        ("DE-07", "step 1, refuse write 1000:00 00000000: got a value, want abort 0601 0002h"),
+        ("NMT-01", "step 2: no 703#00 within 5000 ms"),
+        ("NMT-03", "step 5: 0 x 703#05 in 400 ms, want 3..5"),
+    ],
+)
+def test_a_reason_is_in_words(check_id: str, reason: str) -> None:
+    (result,) = conformance(heart(1), node_id=3, only=check_id).results
+    assert result.outcome.reason == reason

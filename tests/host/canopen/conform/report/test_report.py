@@ -16,7 +16,7 @@ from tickrig.host.canopen.conform.report.page import html_page
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.report.text import text_report
-from tickrig.host.canopen.conform.verdict import Outcome, Report, Verdict
+from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 
 KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
 MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", Verdict.FAIL, "no") for n in range(30)))
@@ -83,6 +83,33 @@ def test_a_second_go_like_the_first_is_told_once() -> None:
     for write in (text_report, report_junit, html_page):
         assert write(report).count("40 01 20 00") == 2
     assert "first: fail: late" in text_report(report)
+
+
+def test_objects_that_fail_alike_are_one_cause() -> None:
+    def failed(index: int, suffix: str, got: str) -> Result:
+        reason = f"step {index % 7}, refuse read {index:04X}:01: got {got}, want abort 0609 0011h"
+        return result(f"OD-{index:04X}-{suffix}", Verdict.FAIL, reason)
+
+    alike = [failed(index, "subs", "a value") for index in range(0x1000, 0x1020)]
+    others = [failed(0x1000, "subs", "OK (60h)"), failed(0x1000, "long", "a value")]
+    text = text_report(replace(SAMPLE, results=(*alike, *others)))
+    assert text.count("FAIL OD-") == 3
+    assert text.count("look at") == 3
+    assert "  the same in 31 others: OD-1001-subs, OD-1002-subs, OD-1003-subs" in text
+    assert "OD-100C-subs, and 19 more\n" in text
+
+
+def test_steps_are_in_json_and_on_the_page_of_what_failed() -> None:
+    steps = ({"send": "605#40"}, {"refuse read": "$absent_object", "codes": ["06020000"]})
+    checks = [
+        replace(one, check=replace(one.check, steps=steps))
+        for one in (result("UE-01"), result("UE-02", Verdict.FAIL))
+    ]
+    report = replace(SAMPLE, results=tuple(checks))
+    said = json.loads(report_json(report))["checks"]
+    assert [one["steps"] for one in said] == [["> 605#40", "refuse read $absent_object 06020000"]] * 2
+    (told,) = parse_page(html_page(report)).all("ol")
+    assert [one.text for one in told.all("li")] == said[1]["steps"]
 
 
 def test_checks_that_nobody_began_are_counted_in_a_line() -> None:
