@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Final
 
 from tickrig.host.canopen.conform.check import Check, Level
-from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.notation.suite import OBJECTS, group_titles, read_suite
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.names import closest
-
-OBJECTS: Final = "OD"
-"""Checks that are made of an EDS, which nobody knows before it is read."""
 
 
 def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
@@ -35,7 +31,7 @@ def unknown(words: Iterable[str]) -> list[str]:
 
     def is_one(word: str) -> bool:
         plan = Plan(Level.INTRUSIVE, (word,))
-        return word.startswith(OBJECTS) or any(map(plan.chooses, suite))
+        return word.upper().startswith(OBJECTS) or any(map(plan.chooses, suite))
 
     none = (word for word in words if not is_one(word))
     return [f"{word}: no such group or check; {_near(word, suite)}" for word in none]
@@ -57,8 +53,8 @@ def chosen(only: Sequence[str]) -> list[Check]:
 
 def _near(word: str, suite: list[Check]) -> str:
     """Say which name could be meant, or which groups there are."""
-    groups = list(dict.fromkeys(check.group for check in suite))
-    if close := closest(word, sorted([*groups, *(check.id for check in suite)])):
+    groups = list(group_titles())
+    if close := closest(word.upper(), sorted([*groups, *(check.id for check in suite)])):
         return f"did you mean {close[0]!r}?"
     return f"groups: {', '.join(groups)}"
 

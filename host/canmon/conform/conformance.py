@@ -73,7 +73,7 @@ class Conformance:
         self._eds: Path | None = options["eds"]
         self._settings: dict[str, str] = {}
         if self._eds is not None:
-            _read_eds(self._eds)
+            read_eds(self._eds)
             self._settings["EDS findings"] = _findings(self._eds)
 
     def _inputs(self) -> Iterator[Path]:
@@ -110,7 +110,7 @@ class Conformance:
         )
         plan = self._plan(source, node_id, consent)
         progress = Progress(shown=sys.stderr.isatty())
-        eds = _read_eds(self._eds) if self._eds else source.eds.get(node_id)
+        eds = read_eds(self._eds) if self._eds else source.eds.get(node_id)
         judged: list[Report] = []
         with until_interrupted():
             if not source.virtual and self._level > Level.READ_ONLY:
@@ -200,7 +200,8 @@ def _read_baseline(path: Path | None) -> Baseline:
     return baseline
 
 
-def _read_eds(path: Path) -> EdsFile:
+def read_eds(path: Path) -> EdsFile:
+    """Read the file of `--eds`; Refused if it has no object."""
     try:
         file = open_eds(path)
         if not read_device(file).entries:

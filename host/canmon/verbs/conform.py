@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import isnan
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -133,7 +134,7 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
     bus = BusOptions(**{name: options.pop(name) for name in BusOptions.__dataclass_fields__})
     options["level"] = _level(options)
     if options["lists"]:
-        _list(options["only"])
+        _list(options["only"], options["eds"])
         return
     from tickrig.host.canmon.conform.conformance import Conformance  # noqa: PLC0415 - slow
 
@@ -149,9 +150,14 @@ def _level(options: dict[str, Any]) -> str:
     return given[0] if given else LEVELS[0]
 
 
-def _list(only: Sequence[str]) -> None:
-    from tickrig.host.canmon.conform.chosen import chosen, patterns  # noqa: PLC0415 - slow
+def _list(only: Sequence[str], eds: Path | None) -> None:
+    from tickrig.host.canmon.conform.chosen import patterns  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.conform.conformance import read_eds  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.conform.listing import listed_checks  # noqa: PLC0415 - slow
+    from tickrig.wire.canopen.eds.eds_device import read_device  # noqa: PLC0415 - slow
 
+    device = None if eds is None else read_device(read_eds(eds))
+    lines = list(listed_checks(patterns(only), device))
     with until_unread():
-        for check in chosen(patterns(only)):
-            click.echo(f"{check.id:<8}{check.level.word:<15}{check.title}")
+        for line in lines:
+            click.echo(line)

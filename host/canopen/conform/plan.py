@@ -21,7 +21,7 @@ class Plan:
 
     Attributes:
         level: what may be done to the node.
-        only: names of groups or checks, with * and ?; all if empty.
+        only: names of groups or checks, with * and ?, in any case; all if empty.
         allow: indices of profile objects (6000h to 9FFFh) that may be written.
         never: indices of objects that are never written, whatever else is allowed.
         bit_rate: of the bus in bit/s, None if nobody says it.
@@ -49,7 +49,7 @@ class Plan:
         """Say whether a check was chosen: by its level, and by its name or group."""
         if check.level > self.level:
             return False
-        named = (check.id, check.group)
+        named = (check.id.upper(), check.group)
         return not self.only or any(
-            fnmatchcase(name, pattern) for pattern in self.only for name in named
+            fnmatchcase(name, pattern.upper()) for pattern in self.only for name in named
         )

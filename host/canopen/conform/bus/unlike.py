@@ -59,7 +59,8 @@ def wanted_text(wanted: Sequence[str]) -> str:
     ('abort 0601 0002h', '705#00 or 705#7F')
     """
     others = [pattern for pattern in wanted if not ABORT.fullmatch(pattern)]
-    codes = [_code(match[2]) for pattern in wanted if (match := ABORT.fullmatch(pattern))]
+    aborts = [match for pattern in wanted if (match := ABORT.fullmatch(pattern))]
+    codes = dict.fromkeys(_code(match[2]) for match in aborts)
     return " or ".join([*others, *([f"abort {codes_text(codes)}"] if codes else [])])
 
 

@@ -19,6 +19,14 @@ def step_words(step: Mapping[str, Any]) -> str:
     return FINALLY * ("finally" in step) + (_of_bus(step) or _of_object(step))
 
 
+TEMPLATES: Final = {
+    "send": "> {send}",
+    "none": "none on {none} for {for} ms",
+    "count": "{min}..{max} x {count} in {for} ms",
+    "period": "{times} x {period} each {each} ms",
+    "wait": "wait {wait} ms",
+    "forget": "forget {forget}",
+}
 LONGEST: Final = 60
 FRAMES: Final = frozenset({"send", "expect", "none", "count", "period", "wait", "forget"})
 """Steps whose failure tells itself which frames were meant."""
@@ -33,21 +41,12 @@ def step_head(step: Mapping[str, Any]) -> str:
 
 
 def _of_bus(step: Mapping[str, Any]) -> str:
+    for word, text in TEMPLATES.items():
+        if word in step:
+            return text.format_map(step) + (" (29-bit)" if step.get("ext") else "")
     match step:
-        case {"send": frame}:
-            return f"> {frame}{' (29-bit)' if step.get('ext') else ''}"
         case {"expect": patterns, "in": ms}:
             return f"< {' or '.join(patterns)}" + (f" within {ms} ms" if ms != ANSWER_MS else "")
-        case {"none": can_id, "for": ms}:
-            return f"none on {can_id} for {ms} ms"
-        case {"count": pattern, "for": ms, "min": least, "max": most}:
-            return f"{least}..{most} x {pattern} in {ms} ms"
-        case {"period": pattern, "each": ms, "times": times}:
-            return f"{times} x {pattern} each {ms} ms"
-        case {"wait": ms}:
-            return f"wait {ms} ms"
-        case {"forget": can_id}:
-            return f"forget {can_id}"
         case {"app": ["power-cycle"]}:
             return "power cycle"
         case {"app": words}:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib.resources import files
 from typing import Final, NamedTuple
 
@@ -22,6 +23,11 @@ ORDER: Final = (
 """Groups in the order in which they are judged: what may disturb most comes last."""
 
 
+OBJECTS: Final = "OD"
+OF_EACH_OBJECT: Final = "each object of the EDS"
+"""The group of checks that are made of an EDS."""
+
+
 class Group(NamedTuple):
     """Checks that belong together."""
 
@@ -38,6 +44,13 @@ def read_suite() -> tuple[Group, ...]:
         if path.name.endswith(".txt")
     ]
     return tuple(sorted(found, key=lambda group: ORDER.index(group.name)))
+
+
+@cache
+def group_titles() -> Mapping[str, str]:
+    """Return what the groups are about, by name; the last one is that of objects."""
+    titles = {group.name: group.title for group in read_suite()}
+    return {**titles, OBJECTS: OF_EACH_OBJECT}
 
 
 def parse_group(text: str) -> Group:

@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from tickrig.host.canopen.conform.notation.step_words import step_words
+from tickrig.host.canopen.conform.notation.suite import group_titles
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.evidence import (
     SAME,
@@ -68,6 +69,7 @@ def html_page(
         mended=baseline.mended(report),
         counts=verdict_counts(report.results),
         groups=by_group(report),
+        titles=group_titles(),
         clauses=by_clause(report),
         unwell=found,
         opened=len(found) <= MOST_OPEN,

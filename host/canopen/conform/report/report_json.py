@@ -6,7 +6,9 @@ import json
 from typing import Final
 
 from tickrig.host.canopen.conform.notation.step_words import step_words
+from tickrig.host.canopen.conform.notation.suite import group_titles
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.report.overview import by_group
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 
 VERSION: Final = 1
@@ -32,6 +34,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
         "doubt": report.doubt,
         "duration_us": report.duration_us,
         "counts": {str(verdict): report.count(verdict) for verdict in Verdict},
+        "groups": {row.name: group_titles().get(row.name, "") for row in by_group(report)},
         "device": dict(report.node),
         "settings": dict(report.settings),
         "findings": list(report.findings),

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
+from tickrig.host.canopen.conform.notation.suite import group_titles
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.evidence import (
     ShowFrames,
@@ -71,10 +72,12 @@ def _head(report: Report) -> list[str]:
 
 def _groups(report: Report) -> list[str]:
     rows = by_group(report)
-    wide = max((len(row.name) for row in rows), default=0)
+    titles = group_titles()
+    names = [f"{one_line(row.name):<4} {titles.get(row.name, '')}" for row in rows]
+    wide = max(map(len, names), default=0)
     return [
-        f"{one_line(row.name):<{wide}}  {len(row.results):5}: {counts_text(row.counts)}"
-        for row in rows
+        f"{name:<{wide}}  {len(row.results):5}: {counts_text(row.counts)}"
+        for name, row in zip(names, rows, strict=True)
     ]
 
 

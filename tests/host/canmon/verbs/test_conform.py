@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from tickrig.device import make_epos
 from tickrig.host.canmon.cli import main
-from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.notation.suite import group_titles, read_suite
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIG = """\
@@ -144,13 +144,18 @@ def test_several_groups_are_named_at_once(rig: str) -> None:
     result = conform(rig, "--node", "5", "--communication", "--only", "NMT-0[34], HB-01")
     assert "3 checks:" in result.stdout, result.output
     listed = conform("--list", "--only", "NMT,HB").stdout.splitlines()
-    assert {line.partition("-")[0] for line in listed} == {"NMT", "HB"}
+    end = listed.index("")
+    assert {line.partition("-")[0] for line in listed[:end]} == {"NMT", "HB"}
+    assert listed[end + 1 :] == [
+        "NMT  NMT state machine and boot-up",
+        "HB   Heartbeat producer and consumer",
+    ]
     assert "NMT, or UE-01,PR-*" in " ".join(conform("--help").stdout.split())
 
 
 def test_who_names_no_group_is_told_the_groups(rig: str) -> None:
     told = conform(rig, "--node", "5", "--only", "XYZQ").stderr
-    groups = ", ".join(group.name for group in read_suite())
+    groups = ", ".join([*(group.name for group in read_suite()), "OD"])
     assert told.endswith(f"--only XYZQ: no such group or check; groups: {groups}; see --list\n")
 
 
@@ -247,6 +252,38 @@ def test_the_list_names_checks_and_their_levels() -> None:
     result = conform("--list", "--only", "NMT-03")
     assert result.exit_code == 0
     assert result.stdout.startswith("NMT-03  communication  Start remote node")
+
+
+def test_the_list_has_the_checks_of_objects_where_there_is_an_eds() -> None:
+    alone = conform("--list", "--only", "OD")
+    assert alone.exit_code == 0
+    assert alone.stdout == "\nOD   each object of the EDS, which --eds FILE names\n"
+    assert conform("--list").stdout.endswith(alone.stdout[1:])
+    listed = conform("--list", "--only", "OD-1000*", "--eds", str(EDS)).stdout.splitlines()
+    assert [line.split()[0] for line in listed[:2]] == ["OD-1000.00-type", "OD-1000.00-write"]
+    assert listed[-1] == "OD   each object of the EDS"
+
+
+def test_a_name_is_known_in_any_case(rig: str) -> None:
+    names = "ue-01,nmt-0[34],od-1000.00-TYPE"
+    result = conform(rig, "--node", "5", "--communication", "--only", names)
+    assert "4 checks: 4 pass" in result.stdout, result.output
+    assert conform("--list", "--only", "hb-01").stdout.startswith("HB-01 ")
+
+
+def test_the_report_says_what_a_group_is(rig: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    result = conform(rig, "--node", "5", *NMT, "--html", str(page))
+    assert "\nNMT  NMT state machine and boot-up      3: 3 pass\n" in result.stdout
+    assert page.read_text("utf-8").count("NMT state machine and boot-up") == 2
+    said = json.loads(conform(rig, "--node", "5", *NMT, "--json").stdout)
+    assert said["groups"] == {"NMT": "NMT state machine and boot-up"}
+
+
+def test_the_page_of_docs_explains_all_groups() -> None:
+    text = (Path(__file__).parents[4] / "docs" / "conform.md").read_text("utf-8")
+    for name, title in group_titles().items():
+        assert f"| {name} | {title} |" in text
 
 
 def test_names_of_checks_are_completed() -> None:
