@@ -26,7 +26,7 @@ from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
-from tickrig.host.canopen.conform.verdict import Report
+from tickrig.host.canopen.conform.verdict import BUS_FAILED, Report
 from tickrig.host.canopen.data_sheet.check import check, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.eds import open_eds, read_eds_bytes
@@ -41,7 +41,6 @@ from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
 
 FILES: Final = ("html", "junit", "badge", "write_baseline")
-BUS_FAILED: Final = 3
 
 
 class Conformance:
@@ -73,7 +72,7 @@ class Conformance:
         self._eds: Path | None = options["eds"]
         self._settings: dict[str, str] = {}
         if self._eds is not None:
-            read_eds(self._eds)
+            opened_eds(self._eds)
             self._settings["EDS findings"] = _findings(self._eds)
 
     def _inputs(self) -> Iterator[Path]:
@@ -110,7 +109,7 @@ class Conformance:
         )
         plan = self._plan(source, node_id, consent)
         progress = Progress(shown=sys.stderr.isatty())
-        eds = read_eds(self._eds) if self._eds else source.eds.get(node_id)
+        eds = opened_eds(self._eds) if self._eds else source.eds.get(node_id)
         judged: list[Report] = []
         with until_interrupted():
             if not source.virtual and self._level > Level.READ_ONLY:
@@ -169,9 +168,7 @@ class Conformance:
         if report.absent:
             say(f"Error: {report.aborted}")
             return report.exit_status if written else BUS_FAILED
-        if report.aborted:
-            return INTERRUPTED if report.aborted == "interrupted" else BUS_FAILED
-        status = self._baseline.exit_status(report)
+        status = self._baseline.ends_with(report)
         return status if written or status else BUS_FAILED
 
     def _again(self, report: Report) -> str:
@@ -200,7 +197,7 @@ def _read_baseline(path: Path | None) -> Baseline:
     return baseline
 
 
-def read_eds(path: Path) -> EdsFile:
+def opened_eds(path: Path) -> EdsFile:
     """Read the file of `--eds`; Refused if it has no object."""
     try:
         file = open_eds(path)

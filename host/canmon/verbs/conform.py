@@ -107,15 +107,18 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
 
     The node is a black box: what counts is what it says on its bus.
 
-    SOURCE is a bus, or a rig file in virtual time. Without --node it says which
-    nodes are heard. By default the node is only read: --communication and
-    --intrusive do more, restore what they changed, and ask first (--yes). What
-    could move something, objects 6000h to 9FFFh, is written with --allow only; an
-    object of the maker that could, as a set pressure, is named with --never.
+    SOURCE is a bus, or a rig file in virtual time. In place of it -i and -c name
+    interface and channel of a bus, as python-can does; other options of a bus go
+    with both. Without --node it says which nodes are heard. By default the node is
+    only read: --communication and --intrusive do more, restore what they changed,
+    and ask first (--yes). What could move something, objects 6000h to 9FFFh, is
+    written with --allow only; an object of the maker that could, as a set
+    pressure, is named with --never.
 
     \b
     canmon conform can0 --node 5 --eds drive.eds
     canmon conform can0 --node 5 --eds drive.eds --communication --html report.html
+    canmon conform -i udp_multicast -c 239.74.163.2 --node 5
     canmon conform bench.toml --node 5 --intrusive --junit out.xml
     canmon conform can0 --node 5 --communication --yes --baseline known.txt
     canmon conform udp --node 5 --intrusive --stimulus control:/tmp/5.ctl
@@ -152,11 +155,11 @@ def _level(options: dict[str, Any]) -> str:
 
 def _list(only: Sequence[str], eds: Path | None) -> None:
     from tickrig.host.canmon.conform.chosen import patterns  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.conform.conformance import read_eds  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.conform.conformance import opened_eds  # noqa: PLC0415 - slow
     from tickrig.host.canmon.conform.listing import listed_checks  # noqa: PLC0415 - slow
     from tickrig.wire.canopen.eds.eds_device import read_device  # noqa: PLC0415 - slow
 
-    device = None if eds is None else read_device(read_eds(eds))
+    device = None if eds is None else read_device(opened_eds(eds))
     lines = list(listed_checks(patterns(only), device))
     with until_unread():
         for line in lines:

@@ -26,7 +26,7 @@ from tickrig.host.canopen.conform.safety.stray_heartbeat import StrayHeartbeat
 from tickrig.host.canopen.conform.settings import describe_settings
 from tickrig.host.canopen.conform.subject.other_device import other_device
 from tickrig.host.canopen.conform.subject.subject import Subject, examine
-from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
+from tickrig.host.canopen.conform.verdict import INTERRUPTED, Outcome, Report, Result, Verdict
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedLink
@@ -118,7 +118,7 @@ class ConformRun:
         try:
             aborted = self._run()
         except KeyboardInterrupt:
-            aborted = "interrupted"
+            aborted = INTERRUPTED
         except LinkClosed as error:
             aborted = str(error)
         finally:

@@ -128,3 +128,7 @@ class Report:
 FAILED: Final = 1
 UNDECIDED: Final = 4
 NOTHING_JUDGED: Final = 5
+BUS_FAILED: Final = 3
+CTRL_C: Final = 130
+INTERRUPTED: Final = "interrupted"
+"""Why a run has ended before its end, if somebody ended it."""

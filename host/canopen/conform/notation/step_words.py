@@ -50,7 +50,7 @@ def _of_bus(step: Mapping[str, Any]) -> str:
         case {"app": ["power-cycle"]}:
             return "power cycle"
         case {"app": words}:
-            return f"app: {' '.join(words)}"
+            return f"app: {' '.join(words)}" + (f" within {step['in']} ms" if "in" in step else "")
         case {"macro": words}:
             return " ".join(["macro", *map(_word, words)])
     return ""

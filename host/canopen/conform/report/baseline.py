@@ -10,7 +10,10 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canopen.conform.verdict import (
+    BUS_FAILED,
+    CTRL_C,
     FAILED,
+    INTERRUPTED,
     NOTHING_JUDGED,
     UNDECIDED,
     Report,
@@ -74,6 +77,12 @@ class Baseline:
         if report.aborted or report.count(Verdict.INCONCLUSIVE) or report.count(Verdict.BLOCKED):
             return UNDECIDED
         return 0 if report.count(Verdict.PASS) or report.count(Verdict.FAIL) else NOTHING_JUDGED
+
+    def ends_with(self, report: Report) -> int:
+        """Return the exit status of the command: of a run that was ended, why it was."""
+        if report.aborted and not report.absent:
+            return CTRL_C if report.aborted == INTERRUPTED else BUS_FAILED
+        return self.exit_status(report)
 
 
 NONE_KNOWN: Final = Baseline()

@@ -29,7 +29,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
         "source": report.source,
         "node": report.node_id,
         "level": report.level.word,
-        "exit_status": baseline.exit_status(report),
+        "exit_status": baseline.ends_with(report),
         "aborted": report.aborted,
         "doubt": report.doubt,
         "duration_us": report.duration_us,

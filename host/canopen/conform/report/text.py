@@ -142,6 +142,8 @@ def _list(what: str, lines: tuple[str, ...]) -> list[str]:
 
 
 def _ending(report: Report, baseline: Baseline) -> Iterator[str]:
+    if report.findings:
+        yield f"{counted(len(report.findings), 'finding')}, above"
     yield f"{counted(len(report.results), 'check')}: {counts_text(verdict_counts(report.results))}"
     if baseline.known:
         known, new = sum(map(baseline.knows, report.results)), len(baseline.new(report))

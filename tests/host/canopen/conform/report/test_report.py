@@ -305,6 +305,23 @@ def test_exit_statuses() -> None:
 
 
 @pytest.mark.parametrize(
+    ("aborted", "absent", "status"),
+    [("interrupted", False, 130), ("can0: no such device", False, 3), ("nobody", True, 1)],
+)
+def test_json_has_the_status_with_which_the_command_ends(
+    aborted: str, absent: bool, status: int
+) -> None:
+    report = replace(SAMPLE, aborted=aborted, absent=absent)
+    assert json.loads(report_json(report))["exit_status"] == status
+    assert json.loads(report_json(SAMPLE, KNOWN))["exit_status"] == 4
+
+
+def test_findings_are_counted_where_a_terminal_ends() -> None:
+    assert text_report(SAMPLE).splitlines()[-2] == "1 finding, above"
+    assert "finding" not in text_report(replace(SAMPLE, findings=()))
+
+
+@pytest.mark.parametrize(
     ("data", "why"),
     [
         (b"NMT-01 NMT-02\n", "line 1: 'NMT-01 NMT-02' is no id of a check"),
