@@ -62,5 +62,5 @@ def test_what_is_found_is_told_once() -> None:
     slave = make_slave(Dictionary([kind, count, *identity]), 5)
     found = Judged(slave).judge(Plan()).findings
     assert [text for text in found if "1018h:05" in text] == [
-        "1018h:05 is not described, and the node has it"
+        "1018h:05 cannot be there, and the node has it"
     ]
