@@ -75,6 +75,47 @@ def test_defaults_count_more_than_what_a_node_says(tmp_path: Path) -> None:
     assert "bus.yml:9" in bus.warnings[0].text
 
 
+@pytest.mark.parametrize(
+    ("dcf", "dcf_path", "is_beside"),
+    [
+        ("sheets/drive.eds", "", True),
+        ("$SHEETS/drive.eds", "", True),
+        ("drive.eds", "sheets", False),
+        ("drive.eds", "@BUS_CONFIG_PATH@/sheets", False),
+        ("drive.eds", "${SHEETS}", False),
+        ("/opt/robot/share/config/epos.eds", "", False),
+        ("install/config/above.eds", "install", False),
+    ],
+)
+def test_an_eds_is_found(
+    dcf: str, dcf_path: str, is_beside: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "config"
+    (folder / "sheets").mkdir(parents=True)
+    monkeypatch.setenv("SHEETS", str(folder / "sheets"))
+    options = f'options: {{dcf_path: "{dcf_path}"}}\n' if dcf_path else ""
+    path = write_bus(folder, options + NODE.replace("epos.eds", dcf))
+    (folder / "sheets" / "drive.eds").write_text(LAMP, "utf-8")
+    (tmp_path / "above.eds").write_text(LAMP, "utf-8")
+    bus = read_bus_file(path)
+    assert bus.slaves["axis"].sheet.is_file()
+    told = [one.rule.name for one in bus.findings]
+    assert told == ([] if is_beside else ["file-elsewhere"])
+
+
+def test_an_eds_of_no_name_that_is_there_says_where_it_was_looked_for(tmp_path: Path) -> None:
+    path = write_bus(tmp_path, NODE.replace("epos.eds", "sheets/none.eds"))
+    (error,) = read_bus_file(path).errors
+    assert f"looked in {tmp_path / 'sheets'}, {tmp_path}, {tmp_path.parent}" in error.text
+
+
+def test_a_folder_or_a_device_is_no_eds(tmp_path: Path) -> None:
+    for name in (".", "/dev/zero", "sheets"):
+        (tmp_path / "sheets").mkdir(exist_ok=True)
+        bus = read_bus_file(write_bus(tmp_path, NODE.replace("epos.eds", name)))
+        assert [one.rule.name for one in bus.findings] == ["no-file"]
+
+
 def test_a_long_name_stays_whole(tmp_path: Path) -> None:
     name = "left_front_arm_of_the_second_robot_shoulder_pitch_joint"
     bus = read_bus_file(write_bus(tmp_path, NODE.replace("axis", name)))
