@@ -87,7 +87,9 @@ class Sheet:
     def identity(self, key: str, sub: int) -> int:
         """Return a number of the identity; that of the head counts more, as for dcfgen."""
         section = COMMISSIONING if key.startswith("LSS") else "DeviceInfo"
-        return self.head_number(section, key) or self.value(IDENTITY, sub)
+        if self.file.value(section, key):  # a 0 counts, too: nothing is expected then
+            return self.head_number(section, key)
+        return self.value(IDENTITY, sub)
 
 
 class Sheets:

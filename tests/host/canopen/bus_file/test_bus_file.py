@@ -191,3 +191,12 @@ def pdos_of(slave: Any) -> list[Pdo]:
         for transmit, pdos in ((True, slave.tpdo), (False, slave.rpdo))
         for number, pdo in pdos.items()
     ]
+
+
+@pytest.mark.parametrize(("number", "expected"), [("0x00000000", 0), ("", 10), ("0x0000000A", 10)])
+def test_a_vendor_number_of_0_is_not_checked(number: str, expected: int, tmp_path: Path) -> None:
+    path = write_bus(tmp_path, NODE.replace("epos", "lamp"))
+    sheet = path.with_name("lamp.eds")
+    sheet.write_text(LAMP.replace("VendorNumber=0x0000000A", f"VendorNumber={number}"))
+    (slave,) = read_bus_file(path).slaves.values()
+    assert slave.identity.vendor_id == expected
