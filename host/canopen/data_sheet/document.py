@@ -11,6 +11,7 @@ from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK, EdsFile, decode_text, encoding_of, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 BOM: Final = "\ufeff"
 _END: Final = re.compile(r"(\r\n|\r|\n)")
@@ -47,6 +48,9 @@ class Document:
         self.file = EdsFile(name, decode_text(data))
         self.device = read_device(self.file)
         self.rows = {(row.index, row.sub): row for row in self.device.entries}
+        self._entries: dict[int, list[EntryDescription]] = {}
+        for _, row in sorted(self.rows.items()):
+            self._entries.setdefault(row.index, []).append(row)
         self.findings: list[RuleFinding] | None = None
         self._keywords: dict[tuple[str, str], EdsLine] = {}
         for line in self.file.lines:
@@ -75,6 +79,10 @@ class Document:
     def subs(self, index: int) -> list[int]:
         """Return the sub-indices that have sections of their own."""
         return self._subs.get(index, [])
+
+    def entries(self, index: int) -> list[EntryDescription]:
+        """Return the entries of an object, by sub-index; none if it is not there."""
+        return self._entries.get(index, [])
 
     def found(
         self, rule: str, text: str, section: str = "", line: int | str = "", *edits: Edit

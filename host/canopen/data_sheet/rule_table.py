@@ -82,6 +82,7 @@ _WARNINGS: Final = (
     ("bit-rate-none", DEVICE_INFO, "tools offer none", "set what it supports to 1"),
     ("granularity", DEVICE_INFO, "tools map what it refuses", "0 to 64; 8 for whole bytes"),
     ("flag", DEVICE_INFO, "tools differ in what is true", "write 0 or 1"),
+    ("compact-pdo", DEVICE_INFO, "tools imply other PDOs, or none", "0x01 to 0x3F, and how many"),
     ("pdo-count", DEVICE_INFO, "tools show too many or too few", "count the PDO parameters"),
     ("identity", DEVICE_INFO, "masters refuse the node", "give 1018h and DeviceInfo one number"),
     ("dynamic-channels", "CiA 302-4", "tools look for segments", "add [DynamicChannels], or 0"),

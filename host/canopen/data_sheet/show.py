@@ -116,7 +116,7 @@ def _pdo(document: Document, name: str, index: int, node_id: int) -> dict[str, A
 def _mapped(document: Document, index: int) -> Iterator[dict[str, Any]]:
     """Give the objects that a PDO carries, from its first bit on."""
     count = document.rows.get((index, 0))
-    rows = [row for (at, sub), row in sorted(document.rows.items()) if at == index and sub]
+    rows = [row for row in document.entries(index) if row.sub]
     used = int.from_bytes(count.default, "little") if count and count.has_default else len(rows)
     bit = 0
     for row in rows[:used]:

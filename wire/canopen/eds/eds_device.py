@@ -8,6 +8,7 @@ from operator import attrgetter
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.compact_pdo import implied_pdos
 from tickrig.wire.canopen.eds.eds_entry import KIND_WORDS, read_entry, required
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
@@ -62,19 +63,23 @@ def read_device(file: EdsFile) -> EdsDevice:
     warning that says what is taken: C suffixes, empty and missing keywords,
     CompactSubObj in a RECORD, texts beyond ASCII. A ParameterValue (DCF) counts
     as power-on value. ObjFlags concern configuration tools, not the device, and
-    are not kept.
+    are not kept. What CompactPDO implies is there as if it were described.
     """
     kinds = _kinds(file)
-    entries = tuple(_entries(file, kinds))
+    entries = list(_entries(file, kinds))
+    objects = {
+        index: ObjectDescription(file.value(f"{index:04X}", "ParameterName"), kind)
+        for index, kind in kinds.items()
+    }
     if not (entries or file.errors):
         file.refuse("", "has no objects", "no-objects")
+    for described, rows in implied_pdos(file) if entries else ():
+        objects[rows[0].index] = described
+        entries += rows
     return EdsDevice(
         _device_info(file),
-        entries,
-        {
-            index: ObjectDescription(file.value(f"{index:04X}", "ParameterName"), kind)
-            for index, kind in kinds.items()
-        },
+        tuple(entries),
+        objects,
         _node_id(file),
         1_000 * file.number(COMMISSIONING, "Baudrate") or None,
     )

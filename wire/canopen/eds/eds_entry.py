@@ -131,6 +131,24 @@ def _default(
     return None, False
 
 
+def read_value_beside(
+    file: EdsFile, index: int, sub: int, kind: DataType
+) -> tuple[bytes | None, bool]:
+    """Return the value that a DCF gives an entry without a section, None if it gives none.
+
+    Args:
+        file: takes what is wrong.
+        index: of the object; the value stands in `[INDEXValue]`.
+        sub: sub-index.
+        kind: its data type.
+
+    Returns:
+        The bytes, and whether the node-ID is added to them.
+    """
+    place = f"{index:04X}Value"
+    return _value(file, place, str(sub), kind) if file.value(place, str(sub)) else (None, False)
+
+
 def _exact(file: EdsFile, section: str, kind: DataType) -> bytes | None:
     text = file.value(section, "DefaultBytes")
     try:

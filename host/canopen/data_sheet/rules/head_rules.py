@@ -121,8 +121,6 @@ def _missing(document: Document, key: str) -> str:
 def counts(document: Document) -> Iterator[RuleFinding]:
     """Hold the numbers of [DeviceInfo] against the objects."""
     title = "DeviceInfo"
-    if number(document, title, "CompactPDO"):
-        return
     for key, area in PDO_AREAS:
         present = sum(index in area for index in document.device.objects)
         said, line = number(document, title, key), document.keyword(title, key)

@@ -100,7 +100,7 @@ def sub_zeros(document: Document) -> Iterator[RuleFinding]:
 
 
 def _highest(document: Document, index: int, section: str, said: int) -> Iterator[RuleFinding]:
-    subs = [sub for at, sub in document.rows if at == index and sub != STRUCTURE]
+    subs = [row.sub for row in document.entries(index) if row.sub != STRUCTURE]
     line = document.keyword(section, "DefaultValue")
     if said == max(subs) or section not in document.file.sections:
         return
@@ -125,7 +125,7 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     if place is None or document.file.is_xml or not known:
         return ()
     index, _ = place
-    rows = [row for (at, _), row in sorted(document.rows.items()) if at == index]
+    rows = document.entries(index)
     told = set(document.subs(index))
     try:
         texts = [text for row in rows if row.sub not in told for text in _section_of(row)]

@@ -9,6 +9,7 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.compact_pdo import ELEMENTS, WAYS
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
@@ -33,6 +34,9 @@ SDO: Final = range(0x1200, 0x1300)
 """Servers, clients from 1280h on; sub-indices 1 and 2 are COB-IDs."""
 DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
 """The lowest CAN-ID, which the node-ID is added to."""
+ALL_SUBS: Final = (1 << len(ELEMENTS)) - 1
+NEEDED_SUBS: Final = 0b11
+"""COB-ID and transmission type."""
 NODE: Final = 5
 """The node-ID for which CAN-IDs are compared."""
 
@@ -95,11 +99,26 @@ def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
     return row.relative and default == base
 
 
+def compact(document: Document) -> Iterator[RuleFinding]:
+    """Judge what CompactPDO implies."""
+    title, key = "DeviceInfo", "CompactPDO"
+    mask = number(document, title, key)
+    if not mask or document.file.is_xml:
+        return
+    if mask & ~ALL_SUBS:
+        what = f"CompactPDO=0x{mask:X} has bits beyond 0x{ALL_SUBS:X}"
+        yield document.found("compact-pdo", what, title, key)
+    if ~mask & NEEDED_SUBS:
+        what = f"CompactPDO=0x{mask:X} leaves out sub-index 1 or 2, which each PDO has"
+        yield document.found("compact-pdo", what, title, key)
+    if not any(number(document, title, way.key) for way in WAYS):
+        what = f"CompactPDO=0x{mask:X}, but NrOfRXPDO and NrOfTXPDO say that there are no PDOs"
+        yield document.found("compact-pdo", what, title, key)
+
+
 def halves(document: Document) -> Iterator[RuleFinding]:
     """Find PDOs that lack their parameter or their mapping."""
     objects = document.device.objects
-    if number(document, "DeviceInfo", "CompactPDO"):
-        return
     for index in objects:
         if (index in RPDO or index in TPDO) and index + MAPPING not in objects:
             what = f"there is no mapping {index + MAPPING:04X}h"
@@ -120,7 +139,7 @@ def mappings(document: Document) -> Iterator[RuleFinding]:
 
 
 def _mapping(document: Document, index: int, way: Access) -> Iterator[RuleFinding]:
-    rows = [row for (at, sub), row in sorted(document.rows.items()) if at == index and sub]
+    rows = [row for row in document.entries(index) if row.sub]
     head = document.rows.get((index, 0))
     in_use = [row for row in rows if any(row.default)]
     count = len(in_use)

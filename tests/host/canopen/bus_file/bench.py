@@ -26,6 +26,7 @@ SHEETS = {
     "lamp.dcf": f"{LAMP}[DeviceComissioning]\nNodeID=9\n",
     "broken.eds": LAMP.replace("DefaultValue=0x0000000A", "DefaultValue=ten"),
     "other.eds": LAMP.replace("VendorNumber=0x0000000A", "VendorNumber=0x0000000B"),
+    "counted.eds": LAMP.replace("NrOfRXPDO=0", "CompactPDO=0x3F\nNrOfRXPDO=2"),
     "bare.eds": LAMP.replace("1018", "2018"),
 }
 """The EDS and DCF files beside a bus.yml, by name."""

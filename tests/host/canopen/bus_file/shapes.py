@@ -144,10 +144,21 @@ two:
     5: {cob_id: auto, mapping: [{index: 0x2000}]}
 """
 
+COUNTED: Final = """\
+master: {node_id: 1}
+lamp:
+  dcf: counted.eds
+  node_id: 9
+  rpdo:
+    1: {cob_id: auto, transmission: 1, mapping: [{index: 0x2000}]}
+    2: {enabled: true, cob_id: 0x345, transmission: 254}
+"""
+
 GOOD: Final = {
     "plain": PLAIN,
     "cogen": COGEN,
     "hidden": HIDDEN,
     "heartbeats": HEARTBEATS,
     "lamps": LAMPS,
+    "counted": COUNTED,
 }

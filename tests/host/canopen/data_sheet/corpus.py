@@ -163,6 +163,22 @@ def compact(text: str) -> str:
     return f"{head}[1A02]{COMPACT}\n{rest[rest.index('[1A03]') :]}"
 
 
+COUNTED: Final = put_in("DeviceInfo", "CompactPDO=0x3F")
+"""PDOs that are not described are implied."""
+
+
+def counted_only(text: str) -> str:
+    """Take the fourth RPDO and TPDO out of the good file, and out of its list, and count them."""
+    for index in ("1403", "1603", "1803", "1A03"):
+        text = without_object(index)(re.sub(rf"\d+=0x{index}\n", "", text))
+    lines = iter(range(1, 1_000))
+    head, title, rest = text.partition("[OptionalObjects]\n")
+    block, blank, tail = rest.partition("\n[")
+    listed = re.sub(r"\d+=0x", lambda _: f"{next(lines)}=0x", block)
+    count = f"SupportedObjects={next(lines) - 1}"
+    return COUNTED(f"{head}{title}{re.sub('SupportedObjects=.*', count, listed)}{blank}{tail}")
+
+
 def doubled(text: str) -> str:
     """Tear a section in two."""
     torn = out("1017", "AccessType")(text)
@@ -235,6 +251,23 @@ CORPUS: Final = (
     Deviation("pdo-count", put("NrOfRXPDO=4", "NrOfRXPDO=8")),
     Deviation(
         "pdo-count", without_object("1403"), False, lacks(0x1403), keeps=("NrOfRXPDO=4", "=0x1403")
+    ),
+    Deviation("pdo-count", all_of(COUNTED, put("NrOfRXPDO=4", "NrOfRXPDO=3"))),
+    Deviation(
+        "pdo-count",
+        all_of(counted_only, put("NrOfTXPDO=4", "NrOfTXPDO=513")),
+        True,
+        entry(0x19FF, 1, default=b"\0\0\0\x80"),
+    ),
+    Deviation("compact-pdo", put_in("DeviceInfo", "CompactPDO=0x3C"), False),
+    Deviation("compact-pdo", put_in("DeviceInfo", "CompactPDO=0xFF"), False),
+    Deviation(
+        "compact-pdo",
+        all_of(COUNTED, put("NrOfRXPDO=4", "NrOfRXPDO=0"), put("NrOfTXPDO=4", "NrOfTXPDO=0")),
+    ),
+    Deviation("empty-value", put_in("DeviceInfo", "CompactPDO=")),
+    Deviation(
+        "identity", all_of(COUNTED, put("ProductNumber=0x00000002", "ProductNumber=3")), False
     ),
     Deviation("identity", put("ProductNumber=0x00000002", "ProductNumber=3"), False),
     Deviation("dynamic-channels", put("ChannelsSupported=0", "ChannelsSupported=2"), False),

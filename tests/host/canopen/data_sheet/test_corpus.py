@@ -6,12 +6,22 @@ from typing import Final
 
 import pytest
 
-from tests.host.canopen.data_sheet.corpus import CORPUS, DRIVE, GOOD, NAME, Deviation, within
+from tests.host.canopen.data_sheet.corpus import (
+    CORPUS,
+    DRIVE,
+    GOOD,
+    NAME,
+    Deviation,
+    counted_only,
+    within,
+)
 from tickrig.host.canopen.data_sheet.check import check, failing
+from tickrig.host.canopen.data_sheet.diff import diff
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.fix import fix
 from tickrig.host.canopen.data_sheet.rule import Severity
 from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.show import pdos
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 FIELDS: Final = [name for name in EntryDescription.__slots__ if name != "key"]
@@ -31,9 +41,22 @@ def rules(document: Document) -> set[str]:
     return {one.rule.name for one in check(document)}
 
 
-@pytest.mark.parametrize(("text", "name"), [(GOOD, NAME), (DRIVE, "epos.eds")])
+@pytest.mark.parametrize(
+    ("text", "name"), [(GOOD, NAME), (DRIVE, "epos.eds"), (counted_only(GOOD), NAME)]
+)
 def test_what_is_deviated_from_is_without_any_finding(text: str, name: str) -> None:
     assert check(Document(name, text.encode())) == []
+
+
+def test_pdos_that_are_only_counted_are_compared_and_shown() -> None:
+    described, counted = (Document(NAME, text.encode()) for text in (GOOD, counted_only(GOOD)))
+    changed = {(one.place[:5], one.what) for one in diff(described, counted)}
+    assert "object" not in {what for _, what in changed}
+    assert {place for place, _ in changed} == {"1403h", "1603h", "1803h", "1A03h"}
+    assert [pdo["can_id"] for pdo in pdos(counted, 5)] == [
+        pdo["can_id"] for pdo in pdos(described, 5)
+    ]
+    assert fix(counted).document.data == counted.data
 
 
 def test_every_rule_has_a_deviation() -> None:

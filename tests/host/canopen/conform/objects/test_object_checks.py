@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from tests.host.canopen.conform.bench import NODE_ID, Bench, make_bench
+from tests.host.canopen.data_sheet.corpus import GOOD, counted_only
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
@@ -117,6 +118,17 @@ def test_a_slave_of_ours_is_as_its_eds_declares(path: Path) -> None:
     before = [entry.data for entry in bench.slave.dictionary]
     assert list(failures(bench, checks)) == []
     assert [entry.data for entry in bench.slave.dictionary] == before
+
+
+def test_pdos_that_an_eds_only_counts_are_there(tmp_path: Path) -> None:
+    path = tmp_path / "counted.eds"
+    path.write_text(counted_only(GOOD), "utf-8")
+    bench = make_bench(read_eds(path).make_dictionary())
+    assert bench.upload(0x1403, 1) == b"\x05\x05\0\0"
+    assert list(failures(bench, object_checks(read_sound(path)[0], NODE_ID))) == []
+    full = make_bench(read_eds(FILES[0]).make_dictionary())
+    checks = {check.id: check for check in object_checks(read_sound(path)[0], NODE_ID)}
+    assert list(failures(full, [checks["OD-absent"], checks["OD-1403.01-type"]])) == []
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
