@@ -79,7 +79,7 @@ def _named(section: Section) -> Iterator[str]:
         if isinstance(key, str):
             yield key
         else:
-            section.note("kind", key, f"{key}: the name of a node is a text")
+            section.note("kind", key, f"{shorten(str(key))}: the name of a node is a text")
 
 
 def _with_defaults(notes: Notes, name: str, item: Item, defaults: Section | None) -> Item:
@@ -89,7 +89,7 @@ def _with_defaults(notes: Notes, name: str, item: Item, defaults: Section | None
     for key, own in item.fields.items():
         usual = defaults.fields.get(key, own)
         if usual is not own:
-            text = f"{key} is that of defaults: {usual.place}"
+            text = f"{shorten(str(key))} is that of defaults: {usual.place}"
             notes.note("defaults-win", item.keys[key], shorten(name), text)
     keys: dict[Key, Place] = {
         **item.keys,

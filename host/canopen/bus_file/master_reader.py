@@ -79,7 +79,7 @@ def _error_behavior(section: Section) -> dict[int, int]:
             if isinstance(sub, int):
                 behavior[sub] = given.whole(sub, 0, 0, UNSIGNED8)
             else:
-                given.note("kind", sub, f"{sub}: a sub-index of 1029h is a number")
+                given.note("kind", sub, f"{sub!r:.40}: a sub-index of 1029h is a number")
     return behavior
 
 

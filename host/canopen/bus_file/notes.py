@@ -83,7 +83,7 @@ class Section:
         if item is None:
             return []
         if not item.is_list:
-            self.note("kind", key, f"{key}: {item} is no list")
+            self.note("kind", key, f"{shorten(str(key))}: {item} is no list")
         name = f"{self.name}.{key}"
         return [Section(self.notes, name, each, each.place) for each in item.items]
 
@@ -96,11 +96,13 @@ class Section:
         if number is None:
             return default
         if isinstance(number, float) and not number.is_integer():
-            self.note("not-whole", key, f"{key}: {item.text} is cut off: {int(number)}")
+            self.note(
+                "not-whole", key, f"{shorten(str(key))}: {item.text} is cut off: {int(number)}"
+            )
         number = int(number)
         if not low <= number <= high:
             allowed = f"{low}..{high}" if high <= UNSIGNED16 else f"{low}..0x{high:X}"
-            self.note("number-range", key, f"{key}: {item.text} is not in {allowed}")
+            self.note("number-range", key, f"{shorten(str(key))}: {item.text} is not in {allowed}")
             return default
         return number
 
@@ -116,7 +118,8 @@ class Section:
         if item is None:
             return default
         if not isinstance(item.value, bool | int):
-            text = f"{key}: {item} is not true or false: {str(bool(item.value)).lower()} is taken"
+            taken = str(bool(item.value)).lower()
+            text = f"{shorten(str(key))}: {item} is not true or false: {taken} is taken"
             self.note("flag-text", key, text)
         return bool(item.value)
 
@@ -126,7 +129,7 @@ class Section:
         if item is None:
             return default
         if item.is_list or item.is_mapping or item.value is None:
-            self.note("kind", key, f"{key}: {item} is no text")
+            self.note("kind", key, f"{shorten(str(key))}: {item} is no text")
             return default
         return item.value if isinstance(item.value, str) else item.text
 
@@ -140,5 +143,5 @@ class Section:
                 return value
         except (ValueError, OverflowError):
             pass
-        self.note("no-number", key, f"{key}: {item} is no number")
+        self.note("no-number", key, f"{shorten(str(key))}: {item} is no number")
         return None

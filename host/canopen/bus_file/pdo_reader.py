@@ -12,6 +12,7 @@ from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
 from tickrig.host.canopen.bus_file.sheet import Sheet
 from tickrig.host.canopen.bus_file.writes import Writes
 from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 
@@ -72,9 +73,8 @@ class PdoReader:
             for number in section.fields:
                 pdo = pdos.get(number) if isinstance(number, int) else None
                 if pdo is None:
-                    text = (
-                        f"{key} {number} is not in {self._sheet.path.name}, which has {_said(pdos)}"
-                    )
+                    what = f"{key} {shorten(str(number))} is not in {self._sheet.path.name}"
+                    text = f"{what}, which has {_said(pdos)}"
                     section.note("pdo-missing", number, text)
                 else:
                     one = section.section(number)

@@ -25,6 +25,7 @@ from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoRead
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet
 from tickrig.host.canopen.bus_file.writes import Writes
 from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.wire.canopen.eds.eds_file import shorten
 
 HIGHEST_NODE_ID: Final = 127
 MOST_CHANNELS: Final = 8
@@ -191,8 +192,10 @@ class SlaveReader:
         for sub in section.fields:
             number = section.whole(sub, 0, 0, UNSIGNED8)
             row = self._sheet.row(ERROR_BEHAVIOR, sub) if isinstance(sub, int) and sub else None
-            if row is None:
-                text = f"1029h:{sub} is not in {self._sheet.path.name}"
+            if not isinstance(sub, int):
+                section.note("kind", sub, f"{sub!r:.40}: a sub-index of 1029h is a number")
+            elif row is None:
+                text = f"1029h:{shorten(str(sub))} is not in {self._sheet.path.name}"
                 section.note("no-object", sub, text)
             elif number != self._sheet.value(ERROR_BEHAVIOR, row.sub):
                 self.writes.add(ERROR_BEHAVIOR, row.sub, number, section.place_of(sub))

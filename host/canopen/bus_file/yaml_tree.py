@@ -15,6 +15,8 @@ import yaml
 from tickrig.host.canopen.bus_file.item import Item, Key, Place, Scalar
 from tickrig.wire.canopen.eds.eds_file import shorten
 
+WIDEST: Final = 1_000
+"""Bits of a number; a longer one stays a text."""
 MERGE: Final = "tag:yaml.org,2002:merge"
 
 
@@ -129,6 +131,8 @@ class _Tree:
             value = self._plain.construct_object(node)
         except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, OverflowError):
             self._wrong("yaml-value", node, f"{shorten(str(node.value))!r} is no {node.tag}")
+            return str(node.value)
+        if isinstance(value, int) and value.bit_length() > WIDEST:  # Python prints none so long
             return str(node.value)
         if isinstance(value, datetime.date | bytes):
             return str(node.value)

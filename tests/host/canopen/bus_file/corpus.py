@@ -57,6 +57,7 @@ CORPUS: Final = (
     Case("no-number", NODE + "  heartbeat_producer: soon\n", 5, "'soon' is no number"),
     Case("no-number", NODE + "  heartbeat_producer: '0x10'\n", 5, "'0x10' is no number"),
     Case("no-number", NODE + "  heartbeat_multiplier: .nan\n", 5, "'.nan' is no number"),
+    Case("kind", SLEEPY + "  error_behavior: {a: 1}\n", 5, "a sub-index of 1029h is a number"),
     Case("no-number", "master: {start: 'false'}\n", 1, "start: 'false' is no number"),
     Case("no-number", "master: {time_cob_id: x}\n", 1, "'x' is no number"),
     Case("number-range", NODE + "  guard_time: 65536\n", 5, "65536 is not in 0..65535"),

@@ -60,5 +60,13 @@ def test_mappings_that_double_sixty_times_are_sorted_at_once() -> None:
     assert judge(NAME, text.encode()) == "good"
 
 
+@pytest.mark.parametrize(
+    "place", ["? {} : 1", "  ? {}\n  : 1", "  tpdo: {{? {} : {{}}}}", "  x: {}"]
+)
+def test_a_number_of_5000_digits_is_told_in_a_line(place: str) -> None:
+    for digits in ("0x" + "F" * 5_000, "9" * 4_000, "0b" + "1" * 20_000):
+        judge(NAME, f"{NODE}{place.format(digits)}\n".encode())
+
+
 def test_a_megabyte_is_no_bus() -> None:
     assert judge(NAME, NODE.encode() + b"#" * (1 << 20)) == "wrong"
