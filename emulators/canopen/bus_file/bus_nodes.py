@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
 from tickrig.emulators.canopen.bus_file.node_keys import URDF
@@ -14,6 +14,8 @@ from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, Version, version_of
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.item import Place
+from tickrig.host.canopen.bus_file.notes import Notes
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +61,8 @@ def read_bus(
     return found
 
 
-def check_nodes(bus: BusFile) -> tuple[Mistake, ...]:
-    """Return what keeps slaves from being made beside the errors of the file: in `tickrig:`, ...
+def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
+    """Return what is wrong or odd beside the findings of the file: in `tickrig:`, the robot, ...
 
     Args:
         bus: the file; one without slaves has nothing to be made.
@@ -68,11 +70,13 @@ def check_nodes(bus: BusFile) -> tuple[Mistake, ...]:
     if not bus.slaves:
         return ()
     told = {Place(one.file, one.line) for one in bus.errors}
-    try:
-        _nodes_of(replace(bus, findings=()), None, EdsCache(), AUTO)
-    except BusMistakesError as error:
-        return tuple(one for one in error.mistakes if one.place not in told)
-    return ()
+    made = _made(bus, None, EdsCache(), AUTO)
+    notes = Notes()
+    for rule, found in (("tickrig", made.mistakes), ("joint", made.remarks)):
+        for place, text in sorted(found):
+            if place not in told:
+                notes.note(rule, place, "", text)
+    return notes.all
 
 
 def _is_same(file: Path, version: Version) -> bool:
@@ -82,24 +86,39 @@ def _is_same(file: Path, version: Version) -> bool:
         return False
 
 
-def _nodes_of(
-    bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str
-) -> tuple[BusNodes, tuple[Path, ...]]:
-    """Return the slaves, and the file of the robot if there is one."""
-    mistakes = [Mistake(Place(one.file, one.line), _said(one)) for one in bus.errors]
+class _Made(NamedTuple):
+    """What became of a file: its slaves, what is wrong, what is odd, the robot."""
+
+    nodes: tuple[BusNode, ...]
+    mistakes: list[Mistake]
+    remarks: list[Mistake]
+    robot: Urdf | None
+
+
+def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Made:
+    mistakes: list[Mistake] = []
     robot = None
     try:
         robot = _robot(bus, urdf)
     except BusMistakesError as error:
         mistakes += error.mistakes
-    reader = NodeMaker(bus, robot, cache, mistakes, profile)
-    nodes = tuple(reader.nodes())
+    maker = NodeMaker(bus, robot, cache, mistakes, profile)
+    return _Made(tuple(maker.nodes()), mistakes, maker.remarks, robot)
+
+
+def _nodes_of(
+    bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str
+) -> tuple[BusNodes, tuple[Path, ...]]:
+    """Return the slaves, and the file of the robot if there is one."""
+    made = _made(bus, urdf, cache, profile)
+    mistakes = [Mistake(Place(one.file, one.line), _said(one)) for one in bus.errors]
+    mistakes += made.mistakes
     if mistakes:
         raise BusMistakesError(mistakes)
     if not bus.slaves:
         raise BusMistakesError([Mistake(Place(str(bus.path), 1), "no node with a dcf")])
-    remarks = (*map(str, bus.warnings), *reader.remarks)
-    return BusNodes(nodes, remarks), (Path(robot.name),) if robot else ()
+    remarks = (*map(str, bus.warnings), *map(str, made.remarks))
+    return BusNodes(made.nodes, remarks), (Path(made.robot.name),) if made.robot else ()
 
 
 def _said(one: Any) -> str:

@@ -71,7 +71,7 @@ class NodeMaker:
         profile: of `choices.PROFILES`, for nodes that name none.
 
     Attributes:
-        remarks: what is odd, a line each.
+        remarks: what is odd.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class NodeMaker:
     ) -> None:
         self._bus, self._cache, self._mistakes = bus, cache, mistakes
         self._profile = profile
-        self.remarks: list[str] = []
+        self.remarks: list[Mistake] = []
         self._joints = dict(self._joints_of(robot)) if robot else {}
 
     def nodes(self) -> Iterator[BusNode]:
@@ -111,7 +111,7 @@ class NodeMaker:
             else:
                 what = f"node {name!r}" if name else f"node-ID {joint.node_id}"
                 text = f"joint {joint.name!r}: no {what} in {self._bus.path.name}"
-                self.remarks.append(str(Mistake(joint.place, text)))
+                self.remarks.append(Mistake(joint.place, text))
 
     def _node(self, slave: BusSlave, keys: NodeKeys, sheet: DeviceDescription) -> BusNode:
         sheet = replace(sheet, template=self._identified(slave, sheet.template))
@@ -154,7 +154,7 @@ class NodeMaker:
             self._mistakes.append(Mistake(slave.place, text))
         elif dictionary.find(second) is not None:
             text = f"{slave.name}: of its axes (CiA 402-1) the first one is emulated"
-            self.remarks.append(str(Mistake(slave.place, text)))
+            self.remarks.append(Mistake(slave.place, text))
 
     def _check_units(self, slave: BusSlave, dictionary: Dictionary) -> None:
         """Tell of speeds that the driver believes in other units; an EDS may have its own."""
@@ -167,7 +167,7 @@ class NodeMaker:
                     f"{slave.name}: scale_vel_to_dev is {axis.scale_vel_to_dev:g}, but the drive"
                     f" counts speeds as positions: {axis.scale_pos_to_dev:g} a second"
                 )
-                self.remarks.append(str(Mistake(slave.place, text)))
+                self.remarks.append(Mistake(slave.place, text))
 
     def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
         """Note keys of a motor in a node that has none."""
@@ -203,7 +203,7 @@ class NodeMaker:
         if added := missing(dictionary, wanted):
             names = ", ".join(f"{index:04X}h" for index in added)
             text = f"its EDS lacks {names}, which its modes need: they are added"
-            self.remarks.append(str(Mistake(slave.place, f"{slave.name}: {text}")))
+            self.remarks.append(Mistake(slave.place, f"{slave.name}: {text}"))
         return complete(dictionary, modes, added, joint.defaults())
 
     def _asked_for(self, slave: BusSlave, listed: frozenset[int]) -> frozenset[int]:
@@ -220,7 +220,7 @@ class NodeMaker:
                 text = f"mode {number} is not emulated: 6060h refuses it, and so fails the boot-up"
             else:
                 continue
-            self.remarks.append(str(Mistake(write.place, f"{slave.name}: {text}")))
+            self.remarks.append(Mistake(write.place, f"{slave.name}: {text}"))
         return frozenset(found)
 
     def _check_start(self, slave: BusSlave, keys: NodeKeys, description: DeviceDescription) -> None:

@@ -12,6 +12,7 @@ from tickrig.emulators.canopen.bus_file.bus_nodes import check_nodes
 from tickrig.host.canopen.bus_file.bus_checks import check_sheets
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
+from tickrig.host.canopen.data_sheet.rule import Severity
 
 MISTAKES: Final = 1
 
@@ -28,16 +29,20 @@ def check_bus(file: Path, *, strict: bool) -> int:
         ImportError: PyYAML is not installed.
     """
     bus = read_bus_file(file)
-    of_sheets = check_sheets(bus.slaves)
-    for finding in (*bus.findings, *of_sheets):
+    found = sorted((*bus.findings, *check_nodes(bus)), key=lambda one: (one.file, one.line))
+    found += check_sheets(bus.slaves)
+    for finding in found:
         click.echo(str(finding))
-    ours = check_nodes(bus)
-    for place, text in ours:
-        click.echo(f"{place}: error: {text}")
-    if bus.errors or ours or (strict and (bus.warnings or of_sheets)):
+    severities = [one.rule.severity for one in found]
+    warnings = severities.count(Severity.WARNING)
+    if Severity.ERROR in severities or (strict and warnings):
         return MISTAKES
-    click.echo("\n".join([f"{file}: ok: {_head(bus)}", *_slaves(bus)]))
+    click.echo("\n".join([f"{file}: {_verdict(warnings)}: {_head(bus)}", *_slaves(bus)]))
     return 0
+
+
+def _verdict(warnings: int) -> str:
+    return f"ok, with {warnings} warning{'' if warnings == 1 else 's'}" if warnings else "ok"
 
 
 def _head(bus: BusFile) -> str:

@@ -40,6 +40,7 @@ _ERRORS: Final = (
     ("hidden", CONTAINER, "the container stops here", "defaults: and nodes:, for cogen"),
     ("node-name", CONTAINER, "the container does not load it", "give it another name"),
     ("no-nodes", COGEN, "cogen writes nothing", "nodes: NAME: ..."),
+    ("tickrig", "canopen-slave-emu", "no slave is made of it", "docs/canopen-slave-emu.md has all"),
 )
 _WARNINGS: Final = (
     (
@@ -74,6 +75,7 @@ _WARNINGS: Final = (
     ("cob-id-restricted", "CiA 301", "it clashes with a service", "cob_id: auto, or another one"),
     ("error-control", DCFGEN, "dcfgen drops guarding", "keep heartbeat or guarding"),
     ("no-entry", DCFGEN, "the node does not watch the master", "free an entry of 1016h"),
+    ("joint", "canopen-slave-emu", "the slave is not what is meant", "let the files agree"),
 )
 _NOTES: Final = (
     ("own-key", CONTAINER, "nothing", "leave it, if a driver of your own reads it"),

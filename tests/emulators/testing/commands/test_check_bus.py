@@ -26,7 +26,7 @@ def run(*words: str) -> tuple[int, list[str], str]:
 
 
 def test_a_good_file_is_summed_up(folder: Path) -> None:
-    write_bus(folder, PLAIN)
+    write_bus(folder, PLAIN.replace("value: -3", "value: 1"))
     assert run("bus.yml") == (
         0,
         [
@@ -55,9 +55,36 @@ def test_what_is_for_the_slaves_alone_is_told_with_all_else(folder: Path) -> Non
     write_bus(folder, NODE + "  tickrig: {motr: {}}\n  boot: soon\n  sdo: [{index: 0x9999}]\n")
     status, out, _ = run("bus.yml")
     assert status == 1
-    assert out[0].startswith("bus.yml:6: warning: [flag-text]")
-    assert out[1].startswith("bus.yml:7: error: [object-missing]")
-    assert out[2:] == ["bus.yml:5: error: axis.tickrig: no key 'motr'; did you mean 'motor'?"]
+    assert out[0] == (
+        "bus.yml:5: error: [tickrig] axis.tickrig: no key 'motr'; did you mean 'motor'?;"
+        " fix: docs/canopen-slave-emu.md has all (canopen-slave-emu)"
+    )
+    assert out[1].startswith("bus.yml:6: warning: [flag-text]")
+    assert out[2].startswith("bus.yml:7: error: [object-missing]")
+    assert len(out) == 3
+
+
+def test_ok_says_how_many_warnings_there_are(folder: Path) -> None:
+    write_bus(folder, NODE + "  sdo: [{index: 0x6041, value: 1}]\n")
+    assert run("bus.yml")[1][1] == "bus.yml: ok, with 1 warning: 1 slave, master 1"
+
+
+ROBOT = """<robot name="arm"><joint name="elbow" type="revolute"/>
+<ros2_control><joint name="elbow"><param name="device_name">elbo</param></joint></ros2_control>
+</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted"), [('device_name">elbo', "node 'elbo'"), ('node_id">9', "node-ID 9")]
+)
+def test_a_joint_of_the_robot_without_a_node_is_warned_of(
+    folder: Path, said: str, wanted: str
+) -> None:
+    write_bus(folder, f"options: {{tickrig: {{urdf: arm.urdf}}}}\n{NODE}  tickrig: {{motr: 1}}\n")
+    (folder / "arm.urdf").write_text(ROBOT.replace('device_name">elbo', said))
+    _, out, _ = run("bus.yml")
+    assert out[0].startswith(f"arm.urdf:2: warning: [joint] joint 'elbow': no {wanted} in bus.yml;")
+    assert "no key 'motr'" in out[1]
 
 
 def test_a_finding_of_the_eds_is_told_once(folder: Path) -> None:

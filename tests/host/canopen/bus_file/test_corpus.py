@@ -22,7 +22,7 @@ def test_a_mistake_is_told_where_it_is(case: Case, tmp_path: Path) -> None:
 
 
 def test_each_rule_has_a_file_that_breaks_it() -> None:
-    assert {case.rule for case in CORPUS} == RULES.keys() - {"eds-check"}
+    assert {case.rule for case in CORPUS} == RULES.keys() - {"eds-check", "tickrig", "joint"}
 
 
 STOPPING = [case for case in EDS_CORPUS if case.rule in STOPS and b"\naccesstype" not in case.data]
