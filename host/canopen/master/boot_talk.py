@@ -71,7 +71,7 @@ class BootTalk:
         if state is None:
             self.record(what, f"none within {wait_us // 1_000} ms", status.text)
             raise BootEnded(status)
-        self.record(what, _STATES[state], "goes on")
+        self.record(what, state_text(state), "goes on")
         return state
 
     def read(
@@ -154,6 +154,11 @@ _STATES: Final = {
     NmtState.OPERATIONAL: "Operational",
     NmtState.PRE_OPERATIONAL: "Pre-operational",
 }
+
+
+def state_text(state: NmtState) -> str:
+    """Return a state as people write it."""
+    return _STATES[state]
 
 
 def is_value(data: bytes, expected: int) -> bool:

@@ -7,6 +7,7 @@ from types import TracebackType
 from typing import Any, Final, Self, cast
 
 from tickrig.host.canopen.master.assignment import MasterPlan
+from tickrig.host.canopen.master.boot_talk import BootStep, state_text
 from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.nmt_master import NmtMaster
@@ -132,11 +133,24 @@ class CanopenMaster:
                 operation.close()
 
     def explain(self, name: str | int) -> str:
-        """Return what was asked and answered in the latest boot-up of a slave, line by line."""
+        """Return the latest boot-up of a slave, and its losses, line by line.
+
+        Of the boot-up it has what was asked and answered, and how it ended. What came before it
+        and after it, a loss and what was heard then, stands there.
+        """
         slave = self.slave(name)
-        first_us = slave.steps[0][0] if slave.steps else 0
-        lines = [f"{(at_us - first_us) / 1e3:8.1f} ms  {step}" for at_us, step in slave.steps]
-        return "\n".join([*lines, _verdict(slave)])
+        steps, events = slave.steps, slave.events
+        began_us = steps[0][0] if steps else 0
+        before = [event for event in events if event[0] < began_us]
+        after = events[len(before) :]
+        first_us = min((at_us for at_us, _ in (*events, *steps)), default=0)
+        lines = [_line(first_us, one) for one in (*before, *steps)]
+        lines.append(_verdict(slave))
+        if after:
+            lines += [_line(first_us, one) for one in after]
+            state = "lost" if slave.state is None else state_text(slave.state)
+            lines.append(f"{_who(slave)}: now {state}")
+        return "\n".join(lines)
 
     def _all_booted(self) -> bool:
         return all(slave.outcome is not None for slave in self.nmt.slaves.values())
@@ -161,10 +175,19 @@ class BootFailed(Exception):  # noqa: N818 - what the network did
         self.slaves = slaves
 
 
+def _line(first_us: int, step_at: tuple[int, BootStep]) -> str:
+    at_us, step = step_at
+    return f"{(at_us - first_us) / 1e3:8.1f} ms  {step}"
+
+
+def _who(slave: NetworkSlave) -> str:
+    assignment = slave.assignment
+    return f"node {assignment.node_id}" + (f" {assignment.name}" if assignment.name else "")
+
+
 def _verdict(slave: NetworkSlave) -> str:
     """Say in a line how a boot-up ended."""
-    assignment = slave.assignment
-    who = f"node {assignment.node_id}" + (f" {assignment.name}" if assignment.name else "")
+    who = _who(slave)
     if slave.outcome is None:
         return f"{who}: not booted" + (", still tried" if slave.booting else "; nothing was heard")
     status = slave.outcome.status

@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.canopen.bus_file.bus_file import BusFile
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
 from tickrig.host.canopen.master.assignment import MasterPlan, ObjectWrite, SlaveAssignment
-from tickrig.host.canopen.master.cia402.drive_driver import DriveSettings
+from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.cia402.drive_state import DriveState
 
 DRIVE_PROFILE: Final = 402

@@ -9,7 +9,7 @@ from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Send
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.boot_slave import BootOutcome, SlaveBoot
 from tickrig.host.canopen.master.boot_status import BootStatus
-from tickrig.host.canopen.master.boot_talk import BootStep
+from tickrig.host.canopen.master.boot_talk import BootStep, state_text
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
@@ -38,6 +38,7 @@ class NetworkSlave:
         steps: of its latest boot-up, each with its time.
         emergencies: error codes of its EMCYs, the first one first.
         lost: how often its error control has failed.
+        events: when it was lost, and what was heard of it then, each with its time.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class NetworkSlave:
         self.outcome: BootOutcome | None = None
         self.steps: list[tuple[int, BootStep]] = []
         self.emergencies: list[int] = []
+        self.events: list[tuple[int, BootStep]] = []
         self.booting, self.lost = False, 0
         self._now_us = self._first_us = 0
         self._again_us = self._silent_us = self._guard_us = NEVER
@@ -106,19 +108,21 @@ class NetworkSlave:
             state = NmtState(number & STATE_BITS)
         except ValueError:
             return
+        if self.events and self.state is None and not self.booting:
+            self._return(state)
         self.state = state
         self.dialogue.receive_state(now_us, state)
         if state is NmtState.INITIALISING:
             self.state = NmtState.PRE_OPERATIONAL
             self.boot(now_us)
-        elif not self.booting and self.good:
+        elif not self.booting:
             self._watch(number & TOGGLE)
 
     def _watch(self, toggle: int) -> None:
-        """Go on with error control."""
+        """Go on with error control: by heartbeat of all that were heard, booted or not."""
         if self.assignment.heartbeat_us:
             self._silent_us = self._now_us + self.assignment.heartbeat_us
-        elif toggle != self._toggle:
+        elif self.good and toggle != self._toggle:
             self._toggle, self._unanswered = toggle, 0
 
     def tick(self, now_us: int) -> bool:
@@ -144,6 +148,26 @@ class NetworkSlave:
     def _lose(self) -> bool:
         self.state, self.lost = None, self.lost + 1
         return True
+
+    def note_loss(self, following: str) -> None:
+        """Take note of its loss, and of what the master does about that."""
+        slave = self.assignment
+        what, silence_us = "heartbeat", slave.heartbeat_us
+        if not silence_us:
+            what, silence_us = "guarding", slave.guard_us * slave.life_time_factor
+        self._happened(what, f"none within {silence_us // 1_000} ms", f"lost; {following}")
+
+    def _return(self, state: NmtState) -> None:
+        """Tell that a lost slave is heard; only a boot-up has it booted anew."""
+        if state is NmtState.INITIALISING:
+            self._happened("boot-up", "heard", "booted anew")
+        else:
+            self._happened(
+                "heartbeat", state_text(state), "heard again, but not booted: no boot-up"
+            )
+
+    def _happened(self, request: str, answer: str, meaning: str) -> None:
+        self.events.append((self._now_us, BootStep(request, answer, meaning)))
 
     def _note(self, step: BootStep) -> None:
         self.steps.append((self._now_us, step))

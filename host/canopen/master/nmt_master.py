@@ -178,12 +178,15 @@ class NmtMaster:
         """Act on the loss of a slave as 1F80h says (CiA 302-2, error handling)."""
         mandatory = slave.assignment.mandatory
         if mandatory and self.plan.stops_all:
+            slave.note_loss("all nodes are stopped")
             self.command(NmtCommand.STOP)
             self.state = NmtState.STOPPED
         elif mandatory and self.plan.resets_all:
+            slave.note_loss("all nodes are reset")
             self.command(NmtCommand.RESET_NODE)
             self.state, self.halted = NmtState.INITIALISING, False
         else:
+            slave.note_loss("reset node is sent, once")
             self.command(NmtCommand.RESET_NODE, slave.assignment.node_id)
 
     def _produce(self) -> bool:

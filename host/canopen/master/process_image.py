@@ -41,6 +41,7 @@ class ProcessImage:
         self._inputs = {key for pdo in self._received.values() for key in keys(pdo)}
         self._outputs = {key for pdo in self._sent for key in keys(pdo)}
         self._values: dict[Key, int] = {}
+        self._seen: set[Key] = set()
         self._written: set[int] = set()
         self._syncs = 0
 
@@ -56,6 +57,14 @@ class ProcessImage:
     def sends(self, key: Key) -> bool:
         """Whether an RPDO of the slave carries an object."""
         return key in self._outputs
+
+    def is_fresh(self, key: Key) -> bool:
+        """Whether an object was received or read since it was doubted last."""
+        return key in self._seen
+
+    def doubt(self, key: Key) -> None:
+        """Take note that an object may be otherwise by now; its value stays."""
+        self._seen.discard(key)
 
     def read(self, key: Key) -> int:
         """Return the bits of an object."""
@@ -74,6 +83,7 @@ class ProcessImage:
     def learn(self, key: Key, bits: int) -> None:
         """Take what was read otherwise, as by SDO."""
         self._values[key] = bits
+        self._seen.add(key)
 
     def receive(self, can_id: int, data: bytes) -> None:
         """Take a TPDO; one that is too short is passed over."""
@@ -83,7 +93,7 @@ class ProcessImage:
             return
         values = unpack_bits(data, widths)
         for mapped, bits in zip(pdo.mapping, values, strict=True):
-            self._values[mapped.index, mapped.sub] = bits
+            self.learn((mapped.index, mapped.sub), bits)
 
     def sync(self) -> None:
         """Send what is due with this SYNC."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Final, TypeVar
 
-from tickrig.host.canopen.bus_file.bus_values import Channel
 from tickrig.host.canopen.dialogue import QueuedScript, Script
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.canopen.master.cia402.drive_mode import (
@@ -18,6 +16,7 @@ from tickrig.host.canopen.master.cia402.drive_mode import (
     HomingMode,
     ModeNumber,
 )
+from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.cia402.drive_state import (
     MODE_BITS,
     Controlword,
@@ -47,26 +46,7 @@ AXIS: Final = 0x800
 SWITCH_US: Final = 5_000_000
 """How long a change of state or of mode may take."""
 
-HOMING_US: Final = 10_000_000
-
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class DriveSettings:
-    """How an axis is driven.
-
-    Attributes:
-        channel: its name, its scales and offsets.
-        axis: 0 for the first axis of the device.
-        switching_state: in this state the mode is changed.
-        homing_us: how long homing may take.
-    """
-
-    channel: Channel
-    axis: int = 0
-    switching_state: DriveState = DriveState.OPERATION_ENABLED
-    homing_us: int = HOMING_US
 
 
 class DriveDriver:
@@ -100,12 +80,20 @@ class DriveDriver:
         self.refusals: list[SdoAborted] = []
         self._missing: set[Key] = set()
         self._chosen, self._mode = ModeNumber.NONE, DriveMode()
-        self._reset_fault = False
+        self._reset_fault = self._known = False
 
     @property
     def state(self) -> DriveState:
-        """The state that the statusword says."""
-        return state_of(self.statusword)
+        """The state that the statusword says; unknown until one was read since the node booted.
+
+        It is unknown again when the node is lost, until a statusword comes.
+        """
+        return state_of(self.statusword) if self._known else DriveState.UNKNOWN
+
+    def doubt(self) -> None:
+        """Know nothing of the drive's state until its next statusword."""
+        self._known = False
+        self._image.doubt(self._key(STATUSWORD))
 
     @property
     def position(self) -> float:
@@ -144,6 +132,8 @@ class DriveDriver:
         for item in (STATUSWORD, MODE_DISPLAY, POSITION, VELOCITY, TORQUE):
             yield from self._read(item)
         self.statusword, self.mode = self._value(STATUSWORD), self._value(MODE_DISPLAY)
+        key = self._key(STATUSWORD)
+        self._known = key in self._missing or self._image.is_fresh(key)
         if self.mode == self._chosen:
             self._mode.read(self.statusword)
         yield from self._control()
@@ -152,7 +142,7 @@ class DriveDriver:
     def _control(self) -> Script[None]:
         """Write the set-point and the controlword."""
         word = self.controlword | Controlword.HALT
-        if self.state is DriveState.OPERATION_ENABLED:
+        if state_of(self.statusword) is DriveState.OPERATION_ENABLED:
             halted = True
             self._mode.controlword = word & MODE_BITS
             if self.mode == self._chosen:
@@ -193,7 +183,7 @@ class DriveDriver:
 
     def halt(self) -> None:
         """Stop quickly; a drive that is not in Operation enabled stays as it is."""
-        state = self.state
+        state = state_of(self.statusword)
         if (word := lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)) is not None:
             self.controlword = word
 
@@ -203,6 +193,8 @@ class DriveDriver:
         Raises:
             DriveFailed: no transition leads there, or it takes too long.
         """
+        silent = f"{self.name}: no statusword since the node was lost, or booted"
+        await Until(lambda: self._known, SWITCH_US, silent)
         while (state := self.state) is not goal:
             following = next_state(state, goal)
             word = lead(self.controlword, state, following)

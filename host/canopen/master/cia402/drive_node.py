@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from tickrig.host.canopen.dialogue import QueuedScript, Script
-from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver, DriveSettings
+from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
+from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
@@ -33,6 +34,7 @@ class DriveNode:
         period_us: int,
     ) -> None:
         self._slave, self._period_us = slave, period_us
+        self._lost = slave.lost
         self.drivers = tuple(DriveDriver(axis, image, self._talk) for axis in axes)
         self._timer, self._busy, self._now_us = PeriodicTimer(period_us), False, 0
 
@@ -49,6 +51,10 @@ class DriveNode:
             sync: a SYNC was sent just now.
         """
         self._now_us = now_us
+        if self._lost != self._slave.lost or not self._slave.good:
+            self._lost = self._slave.lost
+            for driver in self.drivers:
+                driver.doubt()
         if not self._slave.good:
             self._timer = PeriodicTimer(self._period_us)
             return

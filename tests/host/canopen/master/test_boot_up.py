@@ -294,6 +294,27 @@ def test_a_slave_that_falls_silent_is_reset_and_booted_anew() -> None:
         assert net.master.wait_until(lambda: slave.state is NmtState.OPERATIONAL, 2_000_000)
 
 
+def test_a_slave_that_misses_its_reset_is_not_booted_again_until_it_is_reset() -> None:
+    with network(GUARDED) as net:
+        net.master.boot()
+        net.bench["node5"].fault("unplugged", for_="300ms")
+        net.master.run_for("2s")
+        slave = net.master.slave("left")
+        assert (slave.lost, net.heard().count("000#8105")) == (1, 1)
+        told = [line.split("ms  ")[-1] for line in net.master.explain("left").splitlines()]
+        assert told[-4:] == [
+            "node 5 left: booted",
+            "heartbeat: none within 150 ms; lost; reset node is sent, once",
+            "heartbeat: Operational; heard again, but not booted: no boot-up",
+            "node 5 left: now Operational",
+        ]
+        net.master.nmt.command(NmtCommand.RESET_NODE, 5)
+        net.master.run_for("1s")
+        told = [line.split("ms  ")[-1] for line in net.master.explain("left").splitlines()]
+        assert told[0] == "heartbeat: none within 150 ms; lost; reset node is sent, once"
+        assert told[-1] == "node 5 left: booted"
+
+
 def test_a_guarded_slave_is_asked_in_each_guard_time_and_lost_after_its_life_time() -> None:
     with network(replace(LEFT, guard_us=50_000, life_time_factor=3)) as net:
         net.master.boot()

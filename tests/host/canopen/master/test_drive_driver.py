@@ -10,13 +10,14 @@ from tests.host.canopen.master.joints import NO_PDOS, PDOS, Cell, cell
 from tests.host.canopen.master.network import NODE_ID, network
 from tickrig.host.canopen.bus_file.bus_values import Channel
 from tickrig.host.canopen.master.assignment import SlaveAssignment
-from tickrig.host.canopen.master.cia402.drive_driver import DriveSettings
 from tickrig.host.canopen.master.cia402.drive_node import DriveNode
+from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.cia402.drive_state import DriveState
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed
 from tickrig.host.links.errors import LinkClosed
+from tickrig.wire.canopen.nmt import NmtCommand
 
 HOMING_35 = "  sdo: [{index: 0x6098, value: 35}]\n"
 """Home is where the motor is."""
@@ -235,6 +236,37 @@ def test_a_drive_that_loses_its_supply_is_booted_and_initialised_anew(tmp_path: 
         drives.joint.set_target(0.3)
         drives.master.run_for("500ms")
         assert drives.joint.velocity == pytest.approx(0.3, abs=0.02)
+
+
+def test_a_drive_that_missed_its_reset_is_unknown_and_no_recovery_succeeds(tmp_path: Path) -> None:
+    consumer = "  heartbeat_consumer: true\n"
+    with cell(tmp_path, HOMING_35 + consumer) as drives:
+        ready(drives, "pp")
+        drives.bench["joint2"].fault("unplugged", for_="600ms")
+        drives.master.run_for("2s")
+        assert drives.bench["joint2"].get("drive_state") == "Fault"
+        assert drives.joint.state is DriveState.UNKNOWN
+        with pytest.raises(DriveFailed, match="joint2: no statusword since the node was lost"):
+            drives.master.perform(drives.joint.recover())
+        with pytest.raises(DriveFailed, match="joint2: no target in unknown"):
+            drives.joint.set_target(1.0)
+        drives.master.nmt.command(NmtCommand.RESET_NODE, 2)
+        drives.master.run_for("1s")
+        ready(drives, "pp")
+
+
+def test_a_recovery_by_sdo_finds_the_fault_of_a_drive_that_was_unplugged(tmp_path: Path) -> None:
+    consumer = "  heartbeat_consumer: true\n"
+    with cell(tmp_path, HOMING_35 + consumer, pdos=NO_PDOS) as drives:
+        ready(drives, "pp")
+        drives.bench["joint2"].fault("unplugged", for_="600ms")
+        states = []
+        for _ in range(2):
+            drives.master.run_for("590ms")
+            states.append(drives.joint.state)
+        assert states == [DriveState.UNKNOWN, DriveState.FAULT]
+        drives.master.perform(drives.joint.recover())
+        assert drives.bench["joint2"].get("drive_state") == "Operation enabled"
 
 
 def test_an_error_of_homing_is_told(tmp_path: Path) -> None:

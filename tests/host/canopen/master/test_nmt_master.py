@@ -165,6 +165,16 @@ def test_a_lost_slave_is_reset_alone() -> None:
     assert desk.nmt.state is NmtState.OPERATIONAL
 
 
+def test_a_slave_that_failed_to_boot_is_reset_when_its_heartbeats_end() -> None:
+    desk = Desk(SlaveAssignment(3, device_type=1, heartbeat_us=90_000))
+    desk.at(0, "703#00")
+    desk.at(0, f"583#{DEVICE_TYPE}")
+    assert desk.nmt.slaves[3].outcome is not None
+    assert not desk.nmt.slaves[3].good
+    assert desk.at(200_000, "703#7F") == []
+    assert desk.at(290_000) == ["000#8103"]
+
+
 def test_an_optional_slave_that_is_lost_is_reset_alone_whatever_mandatory_ones_cause() -> None:
     for plan in ({"resets_all": True}, {"stops_all": True}):
         desk = Desk(SlaveAssignment(3, heartbeat_us=90_000), **plan)

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from tests.host.canopen.master.network import HEARTBEAT, VENDOR
 from tickrig.host.canopen.bus_file.bus_values import BusPdo, Channel
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.cia402.drive_driver import DriveSettings
 from tickrig.host.canopen.master.cia402.drive_node import DriveNode
+from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.nmt_master import NmtMaster
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage

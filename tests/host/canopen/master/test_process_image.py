@@ -6,7 +6,8 @@ import pytest
 
 from tickrig.host.canopen.bus_file.bus_values import BusPdo, Channel
 from tickrig.host.canopen.dialogue import QueuedScript, SdoRequest
-from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver, DriveSettings
+from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
+from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.wire.canopen.cob_id import INVALID
 from tickrig.wire.canopen.pdo import MappedObject
