@@ -37,6 +37,7 @@ _ALWAYS: Final = (
     *(indices.MODES_OF_OPERATION_DISPLAY, indices.POSITION_ACTUAL, indices.VELOCITY_ACTUAL),
     indices.SUPPORTED_MODES,
 )
+_FACTORS: Final = (indices.ENCODER_RESOLUTION, indices.GEAR_RATIO, indices.FEED_CONSTANT)
 _TORQUE: Final = (indices.TARGET_TORQUE, indices.TORQUE_ACTUAL)
 NEEDED: Final = {
     1: (indices.TARGET_POSITION, indices.PROFILE_VELOCITY, *_PROFILE),
@@ -110,6 +111,17 @@ def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value])
     return Dictionary(entries, given.objects)
 
 
+def with_factors(dictionary: Dictionary, defaults: Defaults) -> Dictionary:
+    """Return a dictionary whose position units are those of some defaults, not of its EDS."""
+    values = {at: value for at, value in defaults.items() if at[0] in _FACTORS}
+    found = {
+        at: _fitting(entry.description, value)
+        for at, value in {**values, (indices.SI_UNIT_POSITION, 0): 0}.items()
+        if (entry := dictionary.find(*at)) is not None and entry.description.data_type.is_integer
+    }
+    return with_values(dictionary, found)
+
+
 def missing(dictionary: Dictionary, modes: Iterable[int]) -> list[int]:
     """Return the objects that some modes need and a dictionary has not, sorted."""
     wanted = {*_ALWAYS, *(index for mode in modes for index in NEEDED[mode])}
@@ -132,11 +144,16 @@ def _with_default(
     own = entry.has_default and not (anew or open_zero)
     if own or value is None or entry.index not in PROFILE_AREA or not entry.data_type.is_integer:
         return entry
+    return _replaced(entry, _fitting(entry, value))
+
+
+def _fitting(entry: EntryDescription, value: int) -> int:
+    """Return the nearest number that an entry of an integer takes."""
     fitting = clamped(value, 8 * entry.size, signed=entry.signed)
     low, high = entry.low, entry.high
     if low is not None and high is not None:
         fitting = round(max(low, min(high, fitting)))
-    return _replaced(entry, fitting)
+    return fitting
 
 
 def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescription:

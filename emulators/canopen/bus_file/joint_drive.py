@@ -9,9 +9,12 @@ from functools import partial
 from math import pi
 from typing import Final
 
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.ds402.objects.parameters import Parameters
+from tickrig.device.canopen.ds402.objects.settings import Settings, read_settings
 from tickrig.device.canopen.ds402.state.supervision import Bounds
 from tickrig.device.servo.parameters import Encoders, ServoParameters
 from tickrig.device.servo.presets import PRESETS
@@ -25,6 +28,8 @@ SPARE_SPEED: Final = 1.5
 """How much faster than a joint shall be its motor turns without load, where it can be chosen."""
 LOW_SUPPLY: Final = 0.4
 HIGH_SUPPLY: Final = 1.5
+NEARLY: Final = 0.99
+"""How much of the motor's speed a limit may leave, to be told."""
 FINEST: Final = 100_000
 """Largest denominator of the factor group that a drive begins with."""
 
@@ -103,17 +108,37 @@ class JointDrive:
         return found
 
     @property
-    def about(self) -> str:
-        """What it is, for people."""
+    def unit(self) -> str:
+        """What positions are told in."""
+        return "rad" if self.travel_m is None else "m"
+
+    def about(self, dictionary: Dictionary) -> str:
+        """Return what it is with these objects, for people."""
+        servo, unit = self.servo, self.unit
+        turn = self.per_turn / (2 * pi)
+        torque = peak_torque_nm(servo) * servo.gear.efficiency / turn
+        speed, limit = free_speed_rad_s(servo) * turn, self._settings(dictionary).max_velocity
+        limit /= self._counts_per_unit
+        words = [f"CiA 402, {self.motor}", f"gear {servo.gear.ratio:.4g}:1"]
+        words.append(f"{torque:.3g} {'Nm' if unit == 'rad' else 'N'}")
+        slower = limit < speed * NEARLY
+        words.append(f"{limit:.3g} {unit}/s of {speed:.3g}" if slower else f"{speed:.3g} {unit}/s")
+        return ", ".join([*words, f"{self.units_of(dictionary):.6g} units a {unit}"])
+
+    def units_of(self, dictionary: Dictionary) -> float:
+        """Return the position units in a radian, or in a metre, that some objects make."""
+        per_position = self._settings(dictionary).units.per_position
+        return self._counts_per_unit / abs(per_position)
+
+    @property
+    def _counts_per_unit(self) -> float:
+        """Counts of the encoder in a radian, or in a metre."""
         servo = self.servo
-        torque = peak_torque_nm(servo) * servo.gear.efficiency
-        speed = free_speed_rad_s(servo)
-        if self.travel_m is None:
-            what = f"{torque:.3g} Nm, {speed:.3g} rad/s"
-        else:
-            turn = self.per_turn / (2 * pi)
-            what = f"{torque / turn:.3g} N, {speed * turn:.3g} m/s"
-        return f"CiA 402, {self.motor}, gear {servo.gear.ratio:.4g}:1, {what}"
+        return servo.encoders.counts_per_turn * servo.gear.ratio / self.per_turn
+
+    def _settings(self, dictionary: Dictionary) -> Settings:
+        parameters = Parameters(dictionary, self.defaults())
+        return read_settings(parameters, self.servo.encoders.counts_per_turn)
 
     def defaults(self) -> Defaults:
         """Return what counts for objects of the drive to which its EDS gives no value."""

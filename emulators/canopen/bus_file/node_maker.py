@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import isclose
 from typing import Any, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -16,6 +17,7 @@ from tickrig.emulators.canopen.bus_file.drive_objects import (
     complete,
     missing,
     modes_listed,
+    with_factors,
     with_values,
 )
 from tickrig.emulators.canopen.bus_file.joint_drive import UNITS, JointDrive
@@ -37,6 +39,8 @@ BEYOND_M: Final = 0.001
 """How far beyond the limits of a URDF its switches are: at its limit a joint presses none."""
 SECOND_AXIS: Final = 0x800
 """How far the objects of a further axis are from those of the first one (CiA 402-1)."""
+SAME_UNITS: Final = 0.001
+"""How far the units of an EDS may be off what ROS believes, as a part of them."""
 IDENTITY: Final = 0x1018
 SOFTWARE: Final = (0x1F56, 1)
 
@@ -123,7 +127,7 @@ class NodeMaker:
             self._check_units(slave, sheet.template)
             template = self._completed(slave, keys, sheet.template, joint)
             sheet, application = replace(sheet, template=template), joint.application()
-            about, start = joint.about, {**joint.start, **start}
+            about, start = joint.about(template), {**joint.start, **start}
         else:
             self._check_no_joint(slave, keys)
         if keys.configured:
@@ -203,8 +207,32 @@ class NodeMaker:
         if added := missing(dictionary, wanted):
             names = ", ".join(f"{index:04X}h" for index in added)
             text = f"its EDS lacks {names}, which its modes need: they are added"
-            self.remarks.append(Mistake(slave.place, f"{slave.name}: {text}"))
-        return complete(dictionary, modes, added, joint.defaults())
+            self.remarks.append(str(Mistake(slave.place, f"{slave.name}: {text}")))
+        template = complete(dictionary, modes, added, joint.defaults())
+        return self._in_units(slave, keys, template, joint)
+
+    def _in_units(
+        self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
+    ) -> Dictionary:
+        """Return the objects of a drive with the units of its keys; those of others are told."""
+        written = {(each.index, each.sub_index): each.data for each in slave.writes}
+        given, place = joint.units_of(dictionary), slave.place
+        said, result = f"scale_pos_to_dev {joint.units:g}", dictionary
+        if "units" in keys.joint:
+            result = with_factors(dictionary, joint.defaults())
+            said, place = f"tickrig.units {joint.units:g}", keys.places["units"]
+        found = joint.units_of(with_values(result, written))
+        differs = (
+            f"{slave.name}: {said}, but {slave.sheet.name} says {given:g} units a {joint.unit}"
+        )
+        fix = "its 608Fh, 6091h, 6092h, 60A8h"
+        if not isclose(found, joint.units, rel_tol=SAME_UNITS):
+            after = f" ({found:g} after the boot-up)" if not isclose(found, given) else ""
+            text = f"{differs}{after} by {fix}: its shaft turns by another angle than ROS believes"
+            self.remarks.append(Mistake(place, text))
+        elif result is not dictionary and not isclose(given, joint.units, rel_tol=SAME_UNITS):
+            self.remarks.append(Mistake(place, f"{differs}: {fix} are changed"))
+        return result
 
     def _asked_for(self, slave: BusSlave, listed: frozenset[int]) -> frozenset[int]:
         """Return the modes that the file writes to 6060h and the EDS does not list."""

@@ -49,8 +49,8 @@ def test_the_heads_tell_what_each_node_is(tmp_path: Path) -> None:
         check=False,
     )
     head = f"2 CANopen slaves of {path} on virtual heads:\n"
-    line = "  joint_1  node-ID 2  joint.eds  CiA 402, epos-wheel, gear 51:1, 9.25 Nm, 16.4 rad/s\n"
-    assert head + line in done.stderr
+    line = "  joint_1  node-ID 2  joint.eds  CiA 402, epos-wheel, gear 51:1, 9.25 Nm, 16.4 rad/s, "
+    assert f"{head}{line}1000 units a rad\n" in done.stderr
 
 
 def test_identity_and_cob_ids_are_what_the_master_checks(tmp_path: Path) -> None:
