@@ -207,7 +207,7 @@ class NodeMaker:
         if added := missing(dictionary, wanted):
             names = ", ".join(f"{index:04X}h" for index in added)
             text = f"its EDS lacks {names}, which its modes need: they are added"
-            self.remarks.append(str(Mistake(slave.place, f"{slave.name}: {text}")))
+            self.remarks.append(Mistake(slave.place, f"{slave.name}: {text}"))
         template = complete(dictionary, modes, added, joint.defaults())
         return self._in_units(slave, keys, template, joint)
 

@@ -16,7 +16,7 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, seed_of
 from tickrig.emulators.testing.bench.plan_parts import NoNodeIdError, slave_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
-from tickrig.emulators.testing.rig_file.devices import kind_of
+from tickrig.emulators.testing.rig_file.devices import RIG_SUFFIXES, kind_of
 from tickrig.emulators.testing.rig_file.fields import node_id as read_node_id
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.host.cli.refused import Refused
@@ -30,7 +30,6 @@ BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
 """A device, a device type, or what a rig file has as `type`: the name of a device type or CANopen
 model, an EDS or DCF file, `FILE.py:Class`; the last three with their node-ID: `5=drive.eds`."""
 
-RIG: Final = ".toml"
 _NODE: Final = re.compile(r"[0-9]+=")
 
 
@@ -80,7 +79,7 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
         ValueError: it names no device.
     """
     node, _, rest = text.rpartition("=") if _NODE.match(text) else ("", "", text)
-    if rest.lower().endswith(RIG):
+    if rest.lower().endswith(RIG_SUFFIXES):
         raise ValueError(f"{rest} is a rig file: open_bench({rest!r}) opens its bench")
     kind, place = kind_of(rest, folder)
     if node and kind is DeviceKind.SERIAL:

@@ -18,19 +18,18 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.build import BenchedDevice, name_of, named_device
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES
+from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXES
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.text.values import Setting
 
 Source = BenchedDevice | Mapping[str, Any] | Path
 BenchSource = Source | Callable[[], Source] | None
-"""A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`).
+"""A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`, `.yml`).
 
 A device may be a text too: what a rig file has as its `type`."""
 
 HARDWARE: Final = "hardware"
-SUFFIX: Final = ".toml"
 
 NO_DEVICES: Final = ("seed", "line", "mode")
 """Arguments of `Bench` that are something else."""
@@ -152,7 +151,7 @@ def _placed(source: Source, folder: Path) -> Source:
         }
     if isinstance(source, Path) and source.suffix.lower() not in EDS_SUFFIXES:
         return folder / source
-    if isinstance(source, str) and source.endswith(SUFFIX):
+    if isinstance(source, str) and source.lower().endswith(RIG_SUFFIXES):
         return folder / source
     placed: Source = _placed_device(source, folder)
     return placed

@@ -24,6 +24,8 @@ BUS: Final = "can"
 RESERVED: Final = ("control", "tolerance", "body", BUS)
 """Names that mean something else beside those of devices."""
 
+RIG_SUFFIXES: Final = (".toml", ".yml", ".yaml")
+"""Of rig files, and of a bus.yml, which is one."""
 EDS_SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 EVERYTHING: Final[Schema] = {**SERIAL_DEVICE, **CANOPEN_DEVICE}
 READ_LATER: Final = "start"

@@ -10,6 +10,7 @@ from typing import Final
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.canopen.choices import is_bus_node
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.body import read_body
 from tickrig.emulators.testing.rig_file.devices import DeviceReader, kind_of
@@ -55,6 +56,9 @@ def read_rig_file(path: Path) -> RigPlan:
         with path.open("rb") as file:
             data = file.read((MAX_MB << 20) + 1)
     except FileNotFoundError as error:
+        if is_bus_node(str(path)):
+            text = f"no such file; it is a node of a bus.yml: Bench({str(path)!r}) has it alone"
+            raise FileNotFoundError(error.errno, text, error.filename) from None
         if not _is_device(str(path)):
             raise
         hint = f"tickrig init --device {path} writes a rig file, Bench({str(path)!r}) needs none"

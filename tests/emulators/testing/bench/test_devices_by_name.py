@@ -54,6 +54,7 @@ def test_an_eds_with_its_node_id() -> None:
         ("fpalette", "no device 'fpalette'; did you mean 'f-palette'?"),
         ("toaster", "no device 'toaster'; known: rrc, "),
         ("rig.toml", "rig.toml is a rig file: open_bench('rig.toml') opens its bench"),
+        ("a/bus.yml", "a/bus.yml is a rig file: open_bench('a/bus.yml') opens its bench"),
         ("128=epos", "it takes 1..127, or lss for a node that waits for LSS, not 128"),
         ("5=rrc", "5=rrc: rrc is on no CAN bus, and has no node-ID"),
         ("missing.eds", "missing.eds: No such file or directory"),
@@ -76,6 +77,8 @@ def test_two_of_a_model_share_its_node_id() -> None:
 def test_the_name_of_a_device_is_no_rig_file() -> None:
     with pytest.raises(FileNotFoundError, match=r"it is the name of a device: .*Bench\('epos'\)"):
         open_bench("epos")
+    with pytest.raises(FileNotFoundError, match=r"it is a node of a bus.yml: Bench\('b.yml:one'\)"):
+        open_bench("b.yml:one")
     with pytest.raises(FileNotFoundError):
         open_bench("eposs")
 

@@ -157,3 +157,20 @@ def test_a_bus_yml_is_a_bench_too(pytester: pytest.Pytester, run: Run) -> None:
     (pytester.path / "joint.eds").unlink()
     missing = run("--bench", "bus.yml")
     missing.stdout.fnmatch_lines(["*bus.yml:*joint_1: dcf: no file 'joint.eds'*"])
+
+
+@pytest.mark.parametrize("source", ["'bus.yml'", "Path('bus.yml')", "'bus.yml:joint_1'"])
+def test_a_bus_yml_is_a_bench_by_its_name(pytester: pytest.Pytester, run: Run, source: str) -> None:
+    write_system(pytester.path)
+    pytester.makepyfile(f"""
+        from pathlib import Path
+        import pytest
+
+        @pytest.fixture
+        def bench_config():
+            return {source}
+
+        def test_a_joint(bench):
+            assert bench.devices == ("joint_1",)
+    """)
+    run().assert_outcomes(passed=1)
