@@ -92,6 +92,7 @@ class _Made(NamedTuple):
     nodes: tuple[BusNode, ...]
     mistakes: list[Mistake]
     remarks: list[Mistake]
+    added: list[Mistake]
     robot: Urdf | None
 
 
@@ -103,7 +104,7 @@ def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Ma
     except BusMistakesError as error:
         mistakes += error.mistakes
     maker = NodeMaker(bus, robot, cache, mistakes, profile)
-    return _Made(tuple(maker.nodes()), mistakes, maker.remarks, robot)
+    return _Made(tuple(maker.nodes()), mistakes, maker.remarks, maker.added, robot)
 
 
 def _nodes_of(
@@ -117,7 +118,7 @@ def _nodes_of(
         raise BusMistakesError(mistakes)
     if not bus.slaves:
         raise BusMistakesError([Mistake(Place(str(bus.path), 1), "no node with a dcf")])
-    remarks = (*map(str, bus.warnings), *map(str, made.remarks))
+    remarks = tuple(map(str, (*bus.warnings, *made.remarks, *made.added)))
     return BusNodes(made.nodes, remarks), (Path(made.robot.name),) if made.robot else ()
 
 

@@ -76,6 +76,7 @@ class NodeMaker:
 
     Attributes:
         remarks: what is odd.
+        added: which objects the EDS of a node lacks: these are added.
     """
 
     def __init__(
@@ -89,6 +90,7 @@ class NodeMaker:
         self._bus, self._cache, self._mistakes = bus, cache, mistakes
         self._profile = profile
         self.remarks: list[Mistake] = []
+        self.added: list[Mistake] = []
         self._joints = dict(self._joints_of(robot)) if robot else {}
 
     def nodes(self) -> Iterator[BusNode]:
@@ -195,7 +197,13 @@ class NodeMaker:
             }
             if robot.kind == PRISMATIC:
                 found["travel_m"] = TRAVEL_M
-        return JointDrive(**{**found, **keys.joint})
+        found |= keys.joint
+        lower, upper = found.get("lower"), found.get("upper")
+        if lower is not None and upper is not None and lower >= upper:
+            place = keys.places.get("lower", keys.places.get("upper", slave.place))
+            text = f"{slave.name}.tickrig.lower: {lower:g} is not below upper, which is {upper:g}"
+            self._mistakes.append(Mistake(place, text))
+        return JointDrive(**found)
 
     def _completed(
         self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
@@ -207,7 +215,7 @@ class NodeMaker:
         if added := missing(dictionary, wanted):
             names = ", ".join(f"{index:04X}h" for index in added)
             text = f"its EDS lacks {names}, which its modes need: they are added"
-            self.remarks.append(Mistake(slave.place, f"{slave.name}: {text}"))
+            self.added.append(Mistake(slave.place, f"{slave.name}: {text}"))
         template = complete(dictionary, modes, added, joint.defaults())
         return self._in_units(slave, keys, template, joint)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final, NamedTuple
 
-from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
-from tickrig.host.canopen.bus_file.item import Place
+from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, Channel
+from tickrig.host.canopen.bus_file.item import Item, Place
 from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
 from tickrig.host.canopen.bus_file.notes import Notes, Section
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO
@@ -15,10 +15,54 @@ from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.eds import read_eds_bytes
+from tickrig.host.text.names import near
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID, is_restricted
+from tickrig.wire.canopen.eds.eds_file import shorten
 
 SYNC: Final = 0x080
 DRIVER_KEYS: Final = ("driver", "package")
+NAMESPACE: Final = "ros2_canopen::"
+CLASSES: Final = {
+    "MasterDriver": "canopen_master_driver",
+    "ProxyDriver": "canopen_proxy_driver",
+    "Cia402Driver": "canopen_402_driver",
+    "BaseDriver": "canopen_base_driver",
+}
+"""The packages of its classes, of which each has one for life cycles, too."""
+MOST_OFF: Final = 0.01
+"""How far a scale and its inverse may be from each other: they are rounded."""
+
+
+class Allowed(NamedTuple):
+    """What a setting of a driver may be: whole numbers, or without any a flag."""
+
+    numbers: Sequence[int]
+    said: str
+
+    def takes(self, item: Item) -> bool:
+        """Return whether yaml-cpp makes such a value of it; quotes do not matter to it."""
+        if not self.numbers:
+            text = item.text.lower()
+            return text in {"true", "false", "yes", "no", "on", "off", "y", "n"}
+        try:
+            return not isinstance(item.value, bool) and int(item.text, 0) in self.numbers
+        except ValueError:
+            return False
+
+
+_TIME: Final = Allowed(range(1, 1 << 31), "a whole number above 0")
+_MODE: Final = Allowed((1, 2, 3, 4, 6, 7, 8, 9, 10), "a mode of CiA 402: 1..4, 6..10")
+SETTINGS: Final = {
+    "polling": Allowed((), "true or false"),
+    "period": _TIME,
+    "sdo_timeout_ms": _TIME,
+    "homing_timeout_seconds": _TIME,
+    "switching_state": Allowed(range(2, 7), "a state to go to: 2..6, 5 is Operation enabled"),
+    "position_mode": _MODE,
+    "velocity_mode": _MODE,
+    "effort_mode": _MODE,
+}
+"""By key of a node."""
 STOPS: Final = frozenset(
     (
         *("access-form", "access-missing", "bom", "data-type-missing", "doubled-key"),
@@ -86,15 +130,21 @@ def _pdos(
                 yield f"{kind} {pdo.number}", pdo.cob_id & CAN_ID_MASK, place, slave, transmit
 
 
+def _sections(layout: Layout) -> list[Section]:
+    return [*layout.slaves.values(), *([] if layout.master is None else [layout.master])]
+
+
+def has_drivers(layout: Layout) -> bool:
+    """Return whether a file is for the container of ros2_canopen, too."""
+    return any(key in section for section in _sections(layout) for key in DRIVER_KEYS)
+
+
 def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
     """Note what the container of ros2_canopen refuses, in a file that is for it."""
     unmade = layout.slaves.keys() - slaves.keys()
-    sections = [*layout.slaves.values()]
-    if layout.master is not None:
-        sections.append(layout.master)
-    if not any(key in section for section in sections for key in DRIVER_KEYS):
+    if not has_drivers(layout):
         return
-    for section in sections:
+    for section in _sections(layout):
         missing = [key for key in DRIVER_KEYS if key not in section]
         if missing:
             section.note("no-driver", missing[0], f"no {' and no '.join(missing)}")
@@ -106,6 +156,49 @@ def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]
     for name, place in layout.hidden.items():
         text = "the container takes it for a node, too, and finds no driver"
         notes.note("hidden", place, name, text)
+
+
+def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
+    """Note settings that the drivers of ros2_canopen drop without a word, or fail at."""
+    for section in _sections(layout):
+        _check_class(section)
+        for key, allowed in SETTINGS.items():
+            item = section.fields.get(key)
+            if item is not None and not allowed.takes(item):
+                text = f"{key}: {item} is not {allowed.said}"
+                section.note("driver-value", key, text)
+    for name, slave in slaves.items():
+        for channel in slave.channels:
+            _check_scale(layout.slaves[name], channel, "pos")
+            _check_scale(layout.slaves[name], channel, "vel")
+
+
+def _check_class(section: Section) -> None:
+    """Note a class that ros2_canopen has not, or not in this package."""
+    if not (set(DRIVER_KEYS) <= section.fields.keys()):
+        return
+    named, package = (section.text(key) for key in DRIVER_KEYS)
+    short = named.removeprefix(NAMESPACE)
+    if short == named:
+        return
+    own = CLASSES.get(short.removeprefix("Lifecycle"))
+    if own is None:
+        known = [each for name in CLASSES for each in (name, f"Lifecycle{name}")]
+        text = f"driver: ros2_canopen has no class {shorten(short)!r}; {near(short, known)}"
+        section.note("driver-class", "driver", text)
+    elif package != own and package in CLASSES.values():
+        text = f"package: {package} has no {short}: that is in {own}"
+        section.note("driver-class", "package", text)
+
+
+def _check_scale(section: Section, channel: Channel, what: str) -> None:
+    """Note scales to and from the device that do not cancel out."""
+    keys = f"scale_{what}_to_dev", f"scale_{what}_from_dev"
+    to_dev, from_dev = (getattr(channel, key) for key in keys)
+    if abs(to_dev * from_dev - 1) > MOST_OFF:
+        key = next((key for key in keys if key in section), "channels")
+        text = f"{keys[0]}: {to_dev:g} times {keys[1]}: {from_dev:g} is not 1"
+        section.note("scale", key, text)
 
 
 def _check_name(section: Section) -> None:

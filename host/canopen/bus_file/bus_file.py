@@ -11,6 +11,8 @@ from tickrig.host.canopen.bus_file.bus_checks import (
     check_cob_ids,
     check_container,
     check_node_ids,
+    check_settings,
+    has_drivers,
 )
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusOptions, BusSlave
 from tickrig.host.canopen.bus_file.item import Place
@@ -131,7 +133,8 @@ class _Reader:
         """Read them all."""
         master = None
         if self._layout.master is None:
-            self._notes.note("no-master", self._top, "", "it has no section master")
+            rule = "no-master" if has_drivers(self._layout) else "slaves-only"
+            self._notes.note(rule, self._top, "", "it has no section master")
         else:
             master = read_master(self._layout.master, self._options)
         slaves: dict[str, BusSlave] = {}
@@ -141,6 +144,7 @@ class _Reader:
         check_node_ids(self._layout, master, slaves)
         check_cob_ids(self._notes, master, slaves)
         check_container(self._notes, self._layout, slaves)
+        check_settings(self._layout, slaves)
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
     def _slave(self, name: str, node: Section, master: BusMaster | None) -> BusSlave | None:

@@ -11,6 +11,7 @@ DCFGEN: Final = "dcfgen"
 COGEN: Final = "cogen"
 READERS: Final = "dcfgen, ros2_canopen"
 CONTAINER: Final = "device container of ros2_canopen"
+DRIVERS: Final = "drivers of ros2_canopen"
 
 _ERRORS: Final = (
     ("yaml", YAML, "nothing of it can be read", "write YAML"),
@@ -33,6 +34,7 @@ _ERRORS: Final = (
     ("pdo-missing", DCFGEN, "dcfgen refuses the file", "configure a PDO that is there"),
     ("cob-id-none", DCFGEN, "dcfgen refuses the file", "give COB-IDs of your own"),
     ("event-deadline", DCFGEN, "dcfgen fails, or writes the event timer", "write 14xxh:05 as sdo"),
+    ("no-master", CONTAINER, "dcfgen and the container refuse the file", "master: node_id: 1"),
     ("no-node-id", CONTAINER, "the container refuses the node", "node_id: 1 to 127"),
     ("node-id", "CiA 301 7.2", "no node has it", "node_id: 1 to 127"),
     ("node-id-twice", "CiA 301 7.2", "two nodes answer to one master", "give each its own"),
@@ -49,8 +51,14 @@ _WARNINGS: Final = (
         "dcfgen stops, or misreads it",
         "canmon eds fix mends a part",
     ),
-    ("no-master", DCFGEN, "dcfgen and the container refuse the file", "master: node_id: 1"),
+    ("slaves-only", DCFGEN, "dcfgen refuses the file", "master: node_id: 1"),
     ("file-elsewhere", DCFGEN, "dcfgen, which runs beside bus.yml, fails", "put the EDS there"),
+    ("sync-period", DCFGEN, "nothing else has time on the bus", "give µs: 10 ms are 10000"),
+    ("bit-rate", "CiA 301", "devices have no such bit rate", "baudrate: 125, 250, 500 or 1000"),
+    ("no-value", DCFGEN, "dcfgen writes 0", "value: what is meant"),
+    ("driver-class", CONTAINER, "the container finds no such driver", "a class and its package"),
+    ("driver-value", DRIVERS, "the driver takes another one, or fails", "give what it takes"),
+    ("scale", DRIVERS, "the joint is not where ROS has it", "from_dev: 1 divided by to_dev"),
     ("not-whole", DCFGEN, "dcfgen cuts it off", "write a whole number"),
     ("flag-text", DCFGEN, "dcfgen takes any text for true", "true or false, without quotes"),
     ("unknown-key", DCFGEN, "nobody reads it", "write the key that is meant"),

@@ -10,11 +10,13 @@ from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
 from tickrig.host.canopen.bus_file.sheet import Sheet
 from tickrig.host.canopen.bus_file.slave_reader import read_extra
 from tickrig.host.canopen.bus_file.writes import Writes
+from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
 UNSET: Final = 255
 HIGHEST_NODE_ID: Final = 127
 CONSUMER: Final = 0x1016
 TIME: Final = 0x100
+SHORTEST_SYNC_US: Final = 1_000
 FLAGS: Final = {
     "start": True,
     "start_nodes": True,
@@ -50,9 +52,9 @@ def read_master(section: Section, options: BusOptions) -> BusMaster:
     return BusMaster(
         node_id,
         section.place,
-        baudrate=whole("baudrate", 1000, 1, 1000),
+        baudrate=_bit_rate(section),
         identity=Identity(0, *(whole(key) for key in numbers)),
-        sync_period_us=whole("sync_period"),
+        sync_period_us=_sync_period(section),
         sync_window_us=whole("sync_window"),
         sync_overflow=whole("sync_overflow", 0, 0, 240),
         heartbeat_producer_ms=whole("heartbeat_producer", 0, 0, UNSIGNED16),
@@ -69,6 +71,22 @@ def read_master(section: Section, options: BusOptions) -> BusMaster:
         package=section.text("package"),
         extra=read_extra(section),
     )
+
+
+def _bit_rate(section: Section) -> int:
+    rate = section.whole("baudrate", 1000, 1, 1000)
+    if rate not in BIT_RATES_KBIT:
+        allowed = ", ".join(map(str, BIT_RATES_KBIT))
+        section.note("bit-rate", "baudrate", f"baudrate: {rate} kbit/s is none of {allowed}")
+    return rate
+
+
+def _sync_period(section: Section) -> int:
+    period_us = section.whole("sync_period")
+    if 0 < period_us < SHORTEST_SYNC_US:
+        text = f"sync_period: a SYNC each {period_us} µs; {SHORTEST_SYNC_US} µs is short already"
+        section.note("sync-period", "sync_period", text)
+    return period_us
 
 
 def _error_behavior(section: Section) -> dict[int, int]:

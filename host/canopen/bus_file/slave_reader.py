@@ -225,6 +225,8 @@ class SlaveReader:
             value = entry.whole("value", 0, -(1 << 63), (1 << 64) - 1)
             item = entry.fields.get("value")
             self.writes.add(index, sub, value, entry.place, item.text if item else "")
+            if item is None:
+                entry.note("no-value", "value", f"{index:04X}h:{sub:02X}: no value: 0 is written")
 
     def _settings(self) -> dict[str, Item]:
         fields = self._node.fields

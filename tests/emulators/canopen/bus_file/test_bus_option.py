@@ -168,6 +168,15 @@ def test_the_check_tells_what_is_wrong_with_our_keys(tmp_path: Path) -> None:
     assert done.stdout.splitlines()[-1].startswith(f"{path}:7: {text}")
 
 
+@pytest.mark.parametrize("keys", ["lower: 1, upper: -1", "upper: 0, lower: 0"])
+def test_a_joint_between_no_limits_is_wrong(tmp_path: Path, keys: str) -> None:
+    path = write_system(tmp_path, f"{ONE_JOINT}  tickrig: {{{keys}}}\n")
+    done = CliRunner().invoke(check, [str(path)])
+    assert done.exit_code == 1
+    assert "error: [tickrig] joint_1.tickrig.lower: " in done.stdout
+    assert " is not below upper, which is " in done.stdout
+
+
 def test_a_node_may_begin_as_its_master_leaves_it(tmp_path: Path) -> None:
     text = (
         f"{ONE_JOINT}  heartbeat_producer: 50\n  sdo: [{{index: 0x6081, value: 0}}]\n"

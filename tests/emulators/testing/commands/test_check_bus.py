@@ -38,7 +38,9 @@ def test_a_good_file_is_summed_up(folder: Path) -> None:
 
 
 def test_a_mistake_is_told_with_both_places(folder: Path) -> None:
-    write_bus(folder, NODE + "  sdo:\n    - {index: 0x6041, value: 1}\n    - {index: 0x9999}\n")
+    write_bus(
+        folder, NODE + "  sdo:\n    - {index: 0x6041, value: 1}\n    - {index: 0x9999, value: 1}\n"
+    )
     status, out, _ = run("bus.yml")
     assert status == 1
     assert out[0].startswith(
@@ -52,7 +54,9 @@ def test_a_mistake_is_told_with_both_places(folder: Path) -> None:
 
 
 def test_what_is_for_the_slaves_alone_is_told_with_all_else(folder: Path) -> None:
-    write_bus(folder, NODE + "  tickrig: {motr: {}}\n  boot: soon\n  sdo: [{index: 0x9999}]\n")
+    write_bus(
+        folder, NODE + "  tickrig: {motr: {}}\n  boot: soon\n  sdo: [{index: 0x9999, value: 1}]\n"
+    )
     status, out, _ = run("bus.yml")
     assert status == 1
     assert out[0] == (

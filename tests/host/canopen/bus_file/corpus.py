@@ -30,6 +30,10 @@ BEATING: Final = SLEEPY.replace("1}", "1, heartbeat_producer: 100}")
 MANY: Final = f"{MASTER}.a: &a {{dcf: lamp.eds, tpdo: {{5: {{cob_id: auto, mapping: []}}}}}}\n"
 ROS: Final = "driver: D\n  package: P\n"
 ROS_NODE: Final = f"master:\n  node_id: 1\n  {ROS}axis:\n  node_id: 5\n  dcf: epos.eds\n  {ROS}"
+ROS_CLASS: Final = (
+    "master: {{node_id: 1, driver: D, package: P}}\naxis:\n  node_id: 5\n  dcf: epos.eds\n"
+    "  # a driver\n  driver: ros2_canopen::{}\n  package: canopen_{}_driver\n"
+)
 MAPPED: Final = NODE + "  tpdo:\n    1:\n      mapping:\n        - "
 
 CORPUS: Final = (
@@ -67,11 +71,24 @@ CORPUS: Final = (
     Case("no-file", NODE.replace("epos.eds", '"a\\0b"'), 4, "no file 'a?b'"),
     Case("eds", NODE.replace("epos", "broken"), 172, "DefaultValue=ten is no UNSIGNED32"),
     Case("no-identity", NODE.replace("epos", "bare"), 4, "1018h:01 is not in bare.eds"),
-    Case("object-missing", NODE + "  sdo: [{index: 0x5555}]\n", 5, "epos.eds has no 5555h"),
-    Case("object-missing", NODE + "  sdo: [{index: 0x1018, sub_index: 9}]\n", 5, "epos.eds:"),
+    Case(
+        "object-missing", NODE + "  sdo: [{index: 0x5555, value: 0}]\n", 5, "epos.eds has no 5555h"
+    ),
+    Case(
+        "object-missing",
+        NODE + "  sdo: [{index: 0x1018, sub_index: 9, value: 0}]\n",
+        5,
+        "epos.eds:",
+    ),
     Case("object-missing", MAPPED + "{index: 0x5555}\n", 8, "5555h:00 is not there"),
     Case("value-range", NODE + "  sdo: [{index: 0x6060, value: 200}]\n", 5, "200 is no INTEGER8"),
-    Case("value-type", NODE + "  sdo: [{index: 0x1008}]\n", 5, "VISIBLE_STRING", alone=False),
+    Case(
+        "value-type",
+        NODE + "  sdo: [{index: 0x1008, value: 0}]\n",
+        5,
+        "VISIBLE_STRING",
+        alone=False,
+    ),
     Case("value-range", SLEEPY + "  sdo: [{index: 0x2003, value: -1}]\n", 5, "-1 is no"),
     Case("odd-size", SLEEPY + "  sdo: [{index: 0x2002, value: 5}]\n", 5, "is a UNSIGNED24"),
     Case("pdo-missing", NODE + "  tpdo: {99: {}}\n", 5, "tpdo 99 is not in epos.eds, which has 1,"),
@@ -95,12 +112,30 @@ CORPUS: Final = (
     Case("hidden", ".a: {boot: true}\n" + ROS_NODE, 1, "takes it for a node, too"),
     Case("node-name", ROS_NODE.replace("axis", "webmaster"), 5, "'master' is in its name"),
     Case("no-nodes", MASTER + "defaults: {dcf: epos.eds}\n", 2, "defaults, but no nodes"),
-    Case("no-master", NODE.removeprefix(MASTER), 0, "it has no section master"),
+    Case("no-master", ROS_NODE[ROS_NODE.index("axis") :], 0, "it has no section master"),
+    Case("slaves-only", NODE.removeprefix(MASTER), 0, "it has no section master"),
+    Case("sync-period", "master: {sync_period: 10}\n", 1, "a SYNC each 10 µs"),
+    Case("bit-rate", "master: {baudrate: 42}\n", 1, "42 kbit/s is none of 10, 20, 50, "),
+    Case("no-value", NODE + "  sdo: [{index: 0x6081}]\n", 5, "6081h:00: no value"),
+    Case("driver-class", ROS_CLASS.format("ProxiDriver", "proxy"), 6, "mean 'ProxyDriver'?"),
+    Case("driver-class", ROS_CLASS.format("ProxyDriver", "402"), 7, "is in canopen_proxy_driver"),
+    Case("driver-value", NODE + "  polling: nope\n", 5, "'nope' is not true or false"),
+    Case("driver-value", NODE + "  polling: 1\n", 5, "'1' is not true or false"),
+    Case("driver-value", NODE + "  period: fast\n", 5, "'fast' is not a whole number above 0"),
+    Case("driver-value", NODE + "  period: []\n", 5, "a list is not a whole number above 0"),
+    Case("driver-value", NODE + "  switching_state: 99\n", 5, "'99' is not a state to go to: 2..6"),
+    Case("driver-value", NODE + "  position_mode: 42\n", 5, "'42' is not a mode of CiA 402"),
+    Case("driver-value", NODE + "  homing_timeout_seconds: -1\n", 5, "'-1' is not a whole"),
+    Case("scale", NODE + "  scale_pos_to_dev: 0\n", 5, "scale_pos_to_dev: 0 times "),
+    Case("scale", NODE + "  scale_vel_from_dev: 1\n", 5, "scale_vel_from_dev: 1 is not 1"),
+    Case("scale", NODE + "  channels: [{scale_pos_to_dev: 5}]\n", 5, "scale_pos_to_dev: 5 times"),
     Case("file-elsewhere", NODE.replace("epos", "install/epos"), 4, "it is taken from "),
     Case("not-whole", NODE + "  heartbeat_producer: 10.5\n", 5, "10.5 is cut off: 10"),
     Case("flag-text", NODE + "  boot: 'no'\n", 5, "'no' is not true or false: true is taken"),
     Case("unknown-key", NODE + "  heartbeat_prodcer: 5\n", 5, "did you mean 'heartbeat_producer'?"),
-    Case("unknown-key", SLEEPY + "  sdo: [{index: 0x2000, xyz: 1}]\n", 5, "known: index, "),
+    Case(
+        "unknown-key", SLEEPY + "  sdo: [{index: 0x2000, value: 1, xyz: 1}]\n", 5, "known: index, "
+    ),
     Case("own-key", NODE + "  colour: red\n", 5, "'colour' is no key that is known"),
     Case("section-lost", MASTER + "nodes: {}\naxis: {dcf: a}\n", 3, "'axis' stands beside nodes"),
     Case(
@@ -116,7 +151,12 @@ CORPUS: Final = (
     Case("no-object", SLEEPY + "  restore_configuration: 9\n", 5, "lamp.eds has no 1011h:09"),
     Case("no-object", SLEEPY + "  error_behavior: {9: 1}\n", 5, "1029h:9 is not in lamp.eds"),
     Case("no-object", SLEEPY + "  serial_number: 5\n", 5, "lamp.eds has no 1018h:04"),
-    Case("read-only", NODE + "  sdo: [{index: 0x6041}]\n", 5, "6041h:00 cannot be written: "),
+    Case(
+        "read-only",
+        NODE + "  sdo: [{index: 0x6041, value: 0}]\n",
+        5,
+        "6041h:00 cannot be written: ",
+    ),
     Case("value-limits", SLEEPY + "  sdo: [{index: 0x2000, value: 99}]\n", 5, "99 is not in"),
     Case("not-mappable", MAPPED + "{index: 0x1017}\n", 8, "1017h:00 cannot be mapped: "),
     Case("direction", MAPPED + "{index: 0x607A}\n", 8, "607Ah:00 cannot be mapped into a TPDO"),
