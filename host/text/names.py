@@ -28,11 +28,14 @@ def near(name: str, names: Iterable[str]) -> str:
 
     >>> near("stik", ["stick", "lamp"]), near("x", ["stick", "lamp"])
     ("did you mean 'stick'?", 'known: stick, lamp')
+    >>> near("left/x", ["left/stick", "right/lamp"])
+    'known: left/stick'
     """
-    names = list(names)
+    names, device = list(names), "".join(name.rpartition("/")[:2])
     if close := closest(name, names):
         return f"did you mean {close[0]!r}?"
-    return f"known: {known(names) or 'none'}"
+    own = [each for each in names if device and each.startswith(device)]
+    return f"known: {known(own or names) or 'none'}"
 
 
 def closest(name: str, names: Iterable[str]) -> list[str]:

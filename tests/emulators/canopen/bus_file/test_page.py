@@ -16,6 +16,7 @@ from tickrig import open_bench
 from tickrig.emulators.canopen.bus_file.node_keys import KEYS, rows
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.testing.commands.check_cli import check
+from tickrig.testing import open_master
 
 ROOT = Path(__file__).parents[4]
 TEXT = (ROOT / "docs/ros2-canopen.md").read_text("utf-8")
@@ -86,3 +87,26 @@ def test_the_keys_are_those_of_the_code() -> None:
 
 def test_the_eds_of_the_example_is_what_its_script_writes() -> None:
     assert (ROOT / "examples/ros2_canopen/joint.eds").read_text() == joint_sheet()
+
+
+def test_the_load_that_is_shown_moves_no_joint_without_power() -> None:
+    (load_nm,) = re.findall(r"set shoulder/load_nm (\S+)\n", TEXT)
+    with open_bench("examples/ros2_canopen/bus.yml") as bench:
+        bench.set("shoulder/load_nm", float(load_nm))
+        bench.run_for("10s")
+        assert bench.get("shoulder/shaft_deg") == 0
+        bench.set("shoulder/load_nm", -20)
+        bench.run_for("1s")
+        assert abs(bench.get("shoulder/shaft_deg")) > 100  # as the page says
+
+
+def test_the_rail_of_the_example_is_as_fast_as_its_file_says() -> None:
+    bus = "examples/ros2_canopen/bus.yml"
+    with open_bench(bus) as bench, open_master(bench.link, bus) as master:
+        master.boot()
+        rail = master.joints["rail"]
+        master.perform(rail.init())
+        master.perform(rail.choose("pp"))
+        rail.set_target(0.1)
+        assert master.wait_until(lambda: abs(rail.position - 0.1) < 0.001, "3s")
+        assert bench["rail"].get("shaft_deg") == pytest.approx(0.1 / 0.04 * 360, rel=0.01)
