@@ -26,6 +26,24 @@ def parse_time_us(text: str) -> int:
     return int(f"{whole}{fraction:0<9}") * _UNIT_US[match[2] or "s"] // 1_000_000_000
 
 
+def us_of(duration: int | str) -> int:
+    """Return a duration in microseconds.
+
+    Raises:
+        TypeError: a number that is not whole: nobody knows its unit.
+        ValueError: a text that is no time, or a negative number.
+
+    >>> us_of("1.5s"), us_of(250)
+    (1500000, 250)
+    """
+    if isinstance(duration, bool) or not isinstance(duration, int | str):
+        raise TypeError(f'{duration!r} is not a time: write "1.5s", or whole microseconds')
+    duration_us = parse_time_us(duration) if isinstance(duration, str) else duration
+    if duration_us < 0:
+        raise ValueError(f"a duration is not negative, got {duration_us} us")
+    return duration_us
+
+
 def format_time(t_us: int) -> str:
     """Write a time as traces and transcripts do, in seconds.
 

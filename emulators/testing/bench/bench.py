@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
 
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration, us_of
+from tickrig.emulators.testing.bench.bench_device import BenchDevice, Duration
 from tickrig.emulators.testing.bench.bench_rig import Parts
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
@@ -26,7 +26,7 @@ from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.control.requests import Object
 from tickrig.host.text.names import near
-from tickrig.host.text.values import Setting
+from tickrig.host.text.values import Setting, us_of
 from tickrig.wire.instant import NEVER
 
 T = TypeVar("T")

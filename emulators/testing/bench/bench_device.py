@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger, check_condition
-from tickrig.host.text.values import Setting, parse_time_us
+from tickrig.host.text.values import Setting, us_of
 
 if TYPE_CHECKING:
     import can
@@ -22,24 +22,6 @@ Duration = int | str
 
 PRESS: Final = "100ms"
 SOON: Final = "100ms"
-
-
-def us_of(duration: Duration) -> int:
-    """Return a duration in microseconds.
-
-    Raises:
-        TypeError: a number that is not whole: nobody knows its unit.
-        ValueError: a text that is no time, or a negative number.
-
-    >>> us_of("1.5s"), us_of(250)
-    (1500000, 250)
-    """
-    if isinstance(duration, bool) or not isinstance(duration, int | str):
-        raise TypeError(f'{duration!r} is not a time: write "1.5s", or whole microseconds')
-    duration_us = parse_time_us(duration) if isinstance(duration, str) else duration
-    if duration_us < 0:
-        raise ValueError(f"a duration is not negative, got {duration_us} us")
-    return duration_us
 
 
 class BenchDevice:

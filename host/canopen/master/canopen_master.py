@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import TracebackType
-from typing import Any, Final, Self, cast
+from typing import Any, Final, Self, TypeVar, cast
 
 from tickrig.host.canopen.master.assignment import MasterPlan
 from tickrig.host.canopen.master.boot_talk import BootStep, state_text
@@ -14,13 +14,34 @@ from tickrig.host.canopen.master.nmt_master import NmtMaster
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.waiting import Operation, perform
 from tickrig.host.links.link import Link, StampedLink
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.names import known, near
+from tickrig.host.text.values import us_of
 
 Duration = int | str
 """Microseconds, or a text as `"100ms"`."""
 
 STARTED_US: Final = 2_000
 """By then a command to start has been heard."""
+
+
+V = TypeVar("V")
+
+
+class Named(dict[str, V]):
+    """What has a name; of a name that is none it says which there are.
+
+    Args:
+        kind: of what, as `joint`.
+        items: by name.
+    """
+
+    def __init__(self, kind: str, items: Mapping[str, V]) -> None:
+        super().__init__(items)
+        self._kind = kind
+
+    def __missing__(self, name: str) -> V:
+        """Raise KeyError with the name that could be meant."""
+        raise KeyError(f"no {self._kind} {name!r}; {near(str(name), self)}")
 
 
 class CanopenMaster:
@@ -43,8 +64,9 @@ class CanopenMaster:
             raise TypeError(f"a master needs a CAN bus, got {type(link).__name__}")
         self._link = cast(StampedLink, link)  # what has receive_stamped is one
         self.nmt = NmtMaster(plan)
-        self.joints: dict[str, DriveDriver] = {}
-        self._by_name = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
+        self.joints = Named[DriveDriver]("joint", {})
+        slaves = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
+        self._by_name = Named("slave", slaves)
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -70,15 +92,17 @@ class CanopenMaster:
 
     def slave(self, name: str | int) -> NetworkSlave:
         """Return a slave by its name or node-ID; KeyError if there is none."""
-        if isinstance(name, int):
-            return self.nmt.slaves[name]
-        return self._by_name[name]
+        if not isinstance(name, int):
+            return self._by_name[name]
+        if name not in self.nmt.slaves:
+            raise KeyError(f"no slave {name}; known: {known(map(str, self.nmt.slaves))}")
+        return self.nmt.slaves[name]
 
     def attach(self, process_data: ProcessData) -> None:
         """Let the master exchange process data and drive drives from now on."""
         self.nmt.process_data = process_data
         drivers = [driver for node in process_data.drives for driver in node.drivers]
-        self.joints = {driver.name: driver for driver in drivers}
+        self.joints = Named("joint", {driver.name: driver for driver in drivers})
 
     def boot(self, within: Duration = "10s") -> None:
         """Start the network: let time pass until each slave has booted.
@@ -110,8 +134,10 @@ class CanopenMaster:
 
         Raises:
             LinkClosed: the bus is gone.
+            TypeError: a time that is neither a whole number nor a text.
+            ValueError: a text that is no time, or less than nothing.
         """
-        until_us = self.now_us + (parse_time_us(within) if isinstance(within, str) else within)
+        until_us = self.now_us + us_of(within)
         while not done():
             if self.now_us >= until_us:
                 return False

@@ -118,6 +118,8 @@ class DriveDriver:
             DriveFailed: the drive is not in Operation enabled.
             ValueError: no number, or a mode without a target.
         """
+        if not hasattr(target, "__float__"):
+            raise ValueError(f"{self.name}: {target!r} is no target: a number is wanted")
         if self.state is not DriveState.OPERATION_ENABLED:
             raise DriveFailed(f"{self.name}: no target in {self._where()}")
         channel = self._channel
@@ -187,12 +189,17 @@ class DriveDriver:
         if (word := lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)) is not None:
             self.controlword = word
 
-    async def switch_to(self, goal: DriveState) -> None:
+    async def switch_to(self, goal: DriveState | str) -> None:
         """Lead the drive to a state, step by step to Operation enabled, else at once.
 
+        Args:
+            goal: a state, or its words: `Switched on`.
+
         Raises:
+            ValueError: there is no such state.
             DriveFailed: no transition leads there, or it takes too long.
         """
+        goal = DriveState.of(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
         await Until(lambda: self._known, SWITCH_US, silent)
         while (state := self.state) is not goal:
@@ -206,7 +213,7 @@ class DriveDriver:
     async def _leave(self, state: DriveState, complaint: str) -> None:
         await Until(lambda: self.state is not state, SWITCH_US, complaint)
 
-    async def choose(self, mode: ModeNumber | str) -> None:
+    async def choose(self, mode: int | str) -> None:
         """Change the mode of operation; the drive has no target then, and is halted.
 
         Args:

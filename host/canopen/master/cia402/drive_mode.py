@@ -33,10 +33,11 @@ class ModeNumber(IntEnum):
     CYCLIC_TORQUE = 10
 
     @classmethod
-    def of(cls, mode: ModeNumber | str) -> ModeNumber:
+    def of(cls, mode: int | str) -> ModeNumber:
         """Return a mode by its usual abbreviation, as `pp`; ValueError if there is none."""
-        if isinstance(mode, ModeNumber):
-            return mode
+        if isinstance(mode, int) and mode in list(cls):
+            return cls(mode)
+        mode = str(mode)
         if mode not in _SHORT:
             raise ValueError(f"no mode {mode!r}; {near(mode, _SHORT)}")
         return _SHORT[mode]

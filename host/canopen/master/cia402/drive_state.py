@@ -11,6 +11,8 @@ from __future__ import annotations
 from enum import Enum, IntFlag
 from typing import Final
 
+from tickrig.host.text.names import near
+
 
 class Controlword(IntFlag):
     """Bits of 6040h."""
@@ -51,6 +53,15 @@ class DriveState(Enum):
     QUICK_STOP_ACTIVE = "Quick stop active"
     FAULT_REACTION_ACTIVE = "Fault reaction active"
     FAULT = "Fault"
+
+    @classmethod
+    def of(cls, state: DriveState | str) -> DriveState:
+        """Return a state by its words, as `Switched on`; ValueError if there is none."""
+        try:
+            return cls(state)
+        except ValueError:
+            names = [each.value for each in cls]
+            raise ValueError(f"no state {state!r}; {near(str(state), names)}") from None
 
 
 _PATTERNS: Final = (

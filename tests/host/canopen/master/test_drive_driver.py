@@ -213,6 +213,41 @@ def test_modes_that_the_drive_has_not_and_words_that_are_none(tmp_path: Path) ->
             drives.joint.set_target(float("nan"))
 
 
+def test_words_that_are_no_joint_state_target_or_time_are_answered_by_those_there_are(
+    tmp_path: Path,
+) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        master, joint = drives.master, drives.joint
+        with pytest.raises(KeyError, match="no joint 'joit2'; did you mean 'joint2'"):
+            master.joints["joit2"]
+        with pytest.raises(KeyError, match="no slave 'joit2'; did you mean 'joint2'"):
+            master.explain("joit2")
+        with pytest.raises(KeyError, match="no slave 7; known: 2"):
+            master.explain(7)
+        ready(drives, "pp")
+        with pytest.raises(ValueError, match="no state 'Switch on'; did you mean 'Switched on'"):
+            master.perform(joint.switch_to("Switch on"))
+        with pytest.raises(ValueError, match=r"no mode '99'; known: none, pp"):
+            master.perform(joint.choose(99))
+        for target in ("x", None, [1.0]):
+            with pytest.raises(ValueError, match=r"joint2: .* is no target: a number is wanted"):
+                joint.set_target(target)  # type: ignore[arg-type]
+        master.perform(joint.switch_to("Switched on"))
+        assert joint.state is DriveState.SWITCHED_ON
+        master.perform(joint.choose(3))
+        assert joint.mode == 3
+
+
+@pytest.mark.parametrize("duration", [0.5, True, 500_000.5, None])
+def test_a_time_without_a_unit_is_refused(tmp_path: Path, duration: object) -> None:
+    with cell(tmp_path, HOMING_35) as drives:
+        with pytest.raises(TypeError, match="is not a time: write"):
+            drives.master.run_for(duration)  # type: ignore[arg-type]
+        with pytest.raises(ValueError, match="a duration is not negative, got -5 us"):
+            drives.master.wait_until(lambda: False, -5)
+        assert isinstance(drives.master.now_us, int)
+
+
 def test_scales_and_offsets_are_those_of_the_file(tmp_path: Path) -> None:
     scales = (
         "  scale_pos_to_dev: 2000.0\n  scale_pos_from_dev: 0.0005\n"
