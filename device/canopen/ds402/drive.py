@@ -182,6 +182,11 @@ class Ds402(Application):
         """Whether it is in Operation enabled."""
         return self.automaton.state is DriveState.OPERATION_ENABLED
 
+    @property
+    def error_code(self) -> int:
+        """The latest error code that no reset has cleared, 0 for none."""
+        return self._faults[-1] if self._faults else 0
+
     def read(self, name: str) -> int | float | str:
         """Look at an output, as it was left by the latest tick.
 
@@ -212,6 +217,7 @@ class Ds402(Application):
     def without_power(self, now_us: int) -> int:
         """Let the shaft coast; see `Application.without_power`."""
         self._interrupt()
+        self.automaton.restart()
         motor = self._axis.motor
         motor.release()
         motor.step_to(now_us)

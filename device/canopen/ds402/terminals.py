@@ -46,6 +46,10 @@ OUTPUTS: Final = {
         OutputSignal("winding_c", "temperature of the winding", "degC"),
         OutputSignal("drive_state", "state of the drive"),
         OutputSignal("mode", "mode of operation, as in 6061h"),
+        OutputSignal("error_code", "latest error code since the last reset, 0 for none"),
+        OutputSignal("at_negative_limit", "the drive sees its negative limit switch pressed"),
+        OutputSignal("at_positive_limit", "the drive sees its positive limit switch pressed"),
+        OutputSignal("at_home", "the drive sees its home switch pressed"),
     )
 }
 
@@ -57,6 +61,10 @@ READ: Final[dict[str, Callable[[Ds402], float | str]]] = {
     "winding_c": lambda drive: drive.axis.motor.winding_dc / 10,
     "drive_state": lambda drive: drive.state.name.capitalize().replace("_", " "),
     "mode": lambda drive: drive.mode_number,
+    "error_code": lambda drive: drive.error_code,
+    "at_negative_limit": lambda drive: int(drive.switches.negative_limit),
+    "at_positive_limit": lambda drive: int(drive.switches.positive_limit),
+    "at_home": lambda drive: int(drive.switches.home),
 }
 
 

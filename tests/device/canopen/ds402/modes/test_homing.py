@@ -55,6 +55,21 @@ def make_wheel(method: int, home: tuple[float, float] = (900.0, 901.0)) -> Wheel
     return wheel
 
 
+def test_switches_are_seen_whoever_presses_them() -> None:
+    wheel = Wheel()
+    names = ("at_negative_limit", "at_positive_limit", "at_home")
+
+    def pressed() -> list[object]:
+        wheel.run(2)
+        return [wheel.drive.read(name) for name in names]
+
+    assert pressed() == [0, 0, 0]
+    wheel.set(home_from=-1.0, home_to=1.0, negative_limit_at=5.0)
+    assert pressed() == [1, 0, 1]
+    wheel.set(positive_limit_switch=1)
+    assert pressed() == [1, 1, 1]
+
+
 def home(wheel: Wheel) -> int:
     """Home; return bits 10, 12 and 13 in the end."""
     wheel.control(START)

@@ -67,6 +67,23 @@ def test_a_short_circuit_that_is_still_there_is_found_again(wheel: Wheel) -> Non
     assert wheel.drive.state is FAULT
 
 
+def test_the_latest_error_code_is_seen_until_it_is_reset(wheel: Wheel) -> None:
+    assert wheel.drive.read("error_code") == 0
+    turning(wheel).set(encoder_unplugged=1)
+    wheel.run(2)
+    assert wheel.drive.read("error_code") == wheel.read(0x603F) != 0
+    wheel.set(encoder_unplugged=0)
+    assert recovers(wheel)
+    assert wheel.drive.read("error_code") == 0
+
+
+def test_without_power_the_drive_is_in_no_operation(wheel: Wheel) -> None:
+    turning(wheel)
+    assert wheel.drive.read("drive_state") == "Operation enabled"
+    wheel.drive.without_power(1_000_000)
+    assert wheel.drive.read("drive_state") == "Not ready to switch on"
+
+
 def test_a_blocked_wheel_is_found_after_a_second_by_its_current(wheel: Wheel) -> None:
     turning(wheel).set(shaft_blocked=1)
     ended_ms = wheel.run_until(lambda: wheel.drive.state is FAULT, 2_000)
