@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, Channel
@@ -29,6 +29,7 @@ CLASSES: Final = {
     "BaseDriver": "canopen_base_driver",
 }
 """The packages of its classes, of which each has one for life cycles, too."""
+MISSING: Final = ("object-missing", "pdo-missing")
 MOST_OFF: Final = 0.01
 """How far a scale and its inverse may be from each other: they are rounded."""
 
@@ -96,22 +97,29 @@ def check_cob_ids(notes: Notes, master: BusMaster | None, slaves: Mapping[str, B
 
     The master sends what slaves receive; two slaves may receive one message.
     """
-    senders: dict[int, tuple[str, Place]] = {}
+    senders: dict[int, tuple[str, Place, BusSlave | None]] = {}
     if master is not None and master.sync_period_us:
-        senders[SYNC] = "SYNC", master.place
+        senders[SYNC] = "SYNC", master.place, None
     for slave in slaves.values():
         if not slave.emcy_cob_id & (INVALID | EXTENDED):
             can_id = slave.emcy_cob_id & CAN_ID_MASK
-            senders.setdefault(can_id, (f"EMCY of {slave.name}", slave.place))
+            senders.setdefault(can_id, (f"EMCY of {slave.name}", slave.place, slave))
     for what, can_id, place, slave, transmit in _pdos(slaves):
         if is_restricted(can_id):
             text = f"{what}: CAN-ID 0x{can_id:03X} is restricted"
             notes.note("cob-id-restricted", place, slave.name, text)
         elif (other := senders.get(can_id)) is not None:
+            if _is_double(other[2], slave):
+                continue
             text = f"{what}: CAN-ID 0x{can_id:03X} is that of {other[0]}, too: {other[1]}"
             notes.note("cob-id-twice", place, slave.name, text)
         elif transmit:
-            senders[can_id] = f"{what} of {slave.name}", place
+            senders[can_id] = f"{what} of {slave.name}", place, slave
+
+
+def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
+    """Return whether two nodes have one node-ID, which is told, and so all CAN-IDs."""
+    return one is not None and one is not other and one.node_id == other.node_id
 
 
 def _pdos(
@@ -156,6 +164,16 @@ def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]
     for name, place in layout.hidden.items():
         text = "the container takes it for a node, too, and finds no driver"
         notes.note("hidden", place, name, text)
+
+
+def check_defaults(layout: Layout, node: Section, found: Iterable[RuleFinding]) -> None:
+    """Note that writes of `defaults` are those of other nodes, if the EDS of one has not them."""
+    if layout.defaults is None or all(one.rule.name not in MISSING for one in found):
+        return
+    shared = [key for key in ("rpdo", "sdo", "tpdo") if key in layout.defaults]
+    if shared:
+        text = f"{', '.join(shared)} of defaults are for other nodes: {layout.defaults.place}"
+        node.notes.note("defaults-other", node.place, node.name, text)
 
 
 def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:

@@ -10,6 +10,7 @@ from typing import Final
 from tickrig.host.canopen.bus_file.bus_checks import (
     check_cob_ids,
     check_container,
+    check_defaults,
     check_node_ids,
     check_settings,
     has_drivers,
@@ -156,8 +157,10 @@ class _Reader:
                 text = f"no node_id, and none in {sheet.path.name}"
                 node.note("no-node-id", "node_id", text)
             return None
+        count = len(self._notes)
         reader = SlaveReader(name, node, sheet, self._options, self._cob_ids)
         slave = reader.read()
+        check_defaults(self._layout, node, self._notes.since(count))
         if master is not None:
             watch_master(node, sheet, reader.writes, master)
         writes = reader.writes

@@ -14,7 +14,7 @@ CONTAINER: Final = "device container of ros2_canopen"
 DRIVERS: Final = "drivers of ros2_canopen"
 
 _ERRORS: Final = (
-    ("yaml", YAML, "nothing of it can be read", "write YAML"),
+    ("yaml", YAML, "nothing of it can be read", "mend this line, or the one before"),
     ("yaml-twice", YAML, "dcfgen takes the last, the container the first", "keep one"),
     ("yaml-key", YAML, "readers refuse the file", "give a text or a number"),
     ("yaml-value", YAML, "readers refuse the file", "write what the tag says, or leave it out"),
@@ -39,7 +39,12 @@ _ERRORS: Final = (
     ("node-id", "CiA 301 7.2", "no node has it", "node_id: 1 to 127"),
     ("node-id-twice", "CiA 301 7.2", "two nodes answer to one master", "give each its own"),
     ("no-driver", CONTAINER, "the container refuses the node", "driver: a class, package: where"),
-    ("hidden", CONTAINER, "the container stops here", "defaults: and nodes:, for cogen"),
+    (
+        "hidden",
+        CONTAINER,
+        "the container stops here",
+        "<<: &name in the first node: docs/bus-file.md",
+    ),
     ("node-name", CONTAINER, "the container does not load it", "give it another name"),
     ("no-nodes", COGEN, "cogen writes nothing", "nodes: NAME: ..."),
     ("tickrig", "canopen-slave-emu", "no slave is made of it", "docs/canopen-slave-emu.md has all"),
@@ -63,7 +68,13 @@ _WARNINGS: Final = (
     ("flag-text", DCFGEN, "dcfgen takes any text for true", "true or false, without quotes"),
     ("unknown-key", DCFGEN, "nobody reads it", "write the key that is meant"),
     ("section-lost", COGEN, "cogen drops it", "put it under nodes:"),
-    ("defaults-win", COGEN, "cogen overwrites what the node says", "take it out of defaults"),
+    (
+        "defaults-win",
+        COGEN,
+        "cogen overwrites what the node says",
+        "an anchor, not defaults: docs/bus-file.md",
+    ),
+    ("defaults-other", COGEN, "they are written to it, too", "an anchor: docs/bus-file.md"),
     ("identity-key", DCFGEN, "the master checks what the EDS says", "write it into the EDS"),
     ("identity", DCFGEN, "the master refuses the node", "give bus.yml and EDS one number"),
     ("no-object", DCFGEN, "dcfgen leaves it out", "leave the key out"),

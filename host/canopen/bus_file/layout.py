@@ -24,12 +24,14 @@ class Layout(NamedTuple):
         master: None where there is none.
         slaves: by name, in the order of dcfgen.
         hidden: where something begins with a dot, by its name, if dcfgen reads the file as it is.
+        defaults: what cogen gives to all nodes; None where there is nothing.
     """
 
     options: Section | None
     master: Section | None
     slaves: dict[str, Section]
     hidden: dict[str, Place]
+    defaults: Section | None = None
 
 
 def read_layout(tree: Item, notes: Notes) -> Layout:
@@ -41,7 +43,7 @@ def read_layout(tree: Item, notes: Notes) -> Layout:
     top = Section(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)
     if NODES in top or DEFAULTS in top:
-        return Layout(*ends, _cogen_nodes(top), {})
+        return Layout(*ends, _cogen_nodes(top), {}, _optional(top, DEFAULTS))
     names = list(_named(top))
     hidden = {key: top.place_of(key) for key in names if key.startswith(".")}
     nodes = (key for key in names if key not in {OPTIONS, MASTER, *hidden})

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
+from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_rules import RULES
 from tickrig.host.canopen.bus_file.item import Item, Key, Place
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.wire.canopen.eds.eds_file import shorten
 
+_HEX: Final = re.compile(r"[0-9A-Fa-f]{1,8}[hH]")
+_QUOTED: Final = re.compile(r"0[xX][0-9A-Fa-f]+")
 UNSIGNED8, UNSIGNED16, UNSIGNED32 = 0xFF, 0xFFFF, 0xFFFF_FFFF
 
 
@@ -30,6 +34,14 @@ class Notes:
         """
         found = RuleFinding(RULES[rule], place.file, place.line, shorten(where), text)
         self._found.setdefault((rule, place, text), found)
+
+    def __len__(self) -> int:
+        """Return how many there are."""
+        return len(self._found)
+
+    def since(self, count: int) -> list[RuleFinding]:
+        """Return those that came after so many."""
+        return [*self._found.values()][count:]
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
@@ -143,5 +155,14 @@ class Section:
                 return value
         except (ValueError, OverflowError):
             pass
-        self.note("no-number", key, f"{shorten(str(key))}: {item} is no number")
+        self.note(
+            "no-number", key, f"{shorten(str(key))}: {item} is no number{_as_number(item.text)}"
+        )
         return None
+
+
+def _as_number(text: str) -> str:
+    """Say how a text could be meant as a number: without quotes, or with 0x before it."""
+    if _HEX.fullmatch(text):
+        return f"; did you mean 0x{text[:-1]}?"
+    return ": it is a text; without quotes it is one" if _QUOTED.fullmatch(text) else ""

@@ -172,7 +172,8 @@ class PdoReader:
         if "index" not in entry:
             entry.note("kind", "index", "an entry of mapping has an index")
             return None
-        index = entry.whole("index", 0, 0, UNSIGNED16)
+        if (index := entry.whole("index", -1, 0, UNSIGNED16)) < 0:
+            return None
         sub = entry.whole("sub_index", 0, 0, UNSIGNED8)
         row = self._sheet.row(index, sub)
         what = f"{index:04X}h:{sub:02X}"

@@ -25,6 +25,8 @@ FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
 """What the build of ros2_canopen replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
 UNSET: Final = 255
+WRONG: Final = -(1 << 31) - 1
+"""Stands for a node-ID that is no number; what is wrong with it is noted."""
 SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
 
@@ -164,7 +166,9 @@ class Sheets:
 
 def _node_id(node: Section) -> int:
     """Return the node-ID that the section gives, 0 for none or a wrong one."""
-    number = node.whole("node_id", UNSET, -(1 << 31))
+    number = node.whole("node_id", WRONG if "node_id" in node else UNSET, WRONG + 1)
+    if number == WRONG:
+        return 0
     if number != UNSET and not 1 <= number <= HIGHEST_NODE_ID:
         node.note("node-id", "node_id", f"node_id: {number} is not in 1..127")
     elif number == UNSET and "node_id" in node:

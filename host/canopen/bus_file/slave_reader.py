@@ -220,7 +220,8 @@ class SlaveReader:
             if "index" not in entry:
                 entry.note("kind", "index", "an entry of sdo has an index")
                 continue
-            index = entry.whole("index", 0, 0, UNSIGNED16)
+            if (index := entry.whole("index", -1, 0, UNSIGNED16)) < 0:
+                continue
             sub = entry.whole("sub_index", 0, 0, UNSIGNED8)
             value = entry.whole("value", 0, -(1 << 63), (1 << 64) - 1)
             item = entry.fields.get("value")

@@ -20,6 +20,17 @@ WIDEST: Final = 1_000
 MERGE: Final = "tag:yaml.org,2002:merge"
 
 
+LONGEST: Final = 120
+MEANT: Final = {
+    "found character '\\t'": "a tab; indent with spaces",
+    "expected <block end>": "it is indented otherwise than the lines before",
+    "mapping values are not allowed": "a colon too many, or none in the line before",
+    "could not find expected ':'": "no colon with a space behind it, here or in the line before",
+    "cannot start any token": "{}; put it into quotes",
+}
+"""What is meant by the words of PyYAML, by how they begin."""
+
+
 class Wrong(NamedTuple):
     """What is wrong with the YAML: rule, place, reason."""
 
@@ -48,14 +59,26 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, list[Wrong]]:
         line, reason = text.count("\n", 0, error.position) + 1, "a character that no text has"
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        line, reason = mark.line + 1 if mark else 1, str(error.problem or error.context)
+        line, reason = mark.line + 1 if mark else 1, _said(str(error.problem or error.context))
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         line, reason = 1, str(error)
     except RecursionError:
         line, reason = 1, "lists or mappings nest too deep"
-    return None, [
-        Wrong("yaml", Place(name, line), f"not YAML: {shorten(' '.join(reason.split()))}")
-    ]
+    return None, [Wrong("yaml", Place(name, line), f"not YAML: {_in_a_line(reason)}")]
+
+
+def _said(problem: str) -> str:
+    """Return what PyYAML says in words that help."""
+    for words, meant in MEANT.items():
+        if words in problem:
+            return meant.format(problem)
+    return problem
+
+
+def _in_a_line(reason: str) -> str:
+    """Return what can be printed of a reason."""
+    text = "".join(letter if letter.isprintable() else "?" for letter in " ".join(reason.split()))
+    return text[:LONGEST]
 
 
 class _Tree:

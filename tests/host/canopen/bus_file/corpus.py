@@ -38,6 +38,10 @@ MAPPED: Final = NODE + "  tpdo:\n    1:\n      mapping:\n        - "
 
 CORPUS: Final = (
     Case("yaml", "master: [1\n", 2, "not YAML: expected ',' or ']'"),
+    Case("yaml", "a:\n\tb: 1\n", 2, "not YAML: a tab; indent with spaces"),
+    Case("yaml", "a:\n  b: 1\n c: 2\n", 3, "it is indented otherwise than the lines before"),
+    Case("yaml", "a:\n  b: 1\n  c:2\n  d: 3\n", 4, "no colon with a space behind it"),
+    Case("yaml", "a: @x\n", 1, "'@' that cannot start any token; put it into quotes"),
     Case("yaml", "", 1, "the file is empty"),
     Case("yaml", "master: 1\n--- \nmaster: 2\n", 2, "but found another document"),
     Case("yaml", "a: \x01\n", 1, "a character that no text has"),
@@ -64,6 +68,10 @@ CORPUS: Final = (
     Case("kind", SLEEPY + "  error_behavior: {a: 1}\n", 5, "a sub-index of 1029h is a number"),
     Case("no-number", "master: {start: 'false'}\n", 1, "start: 'false' is no number"),
     Case("no-number", "master: {time_cob_id: x}\n", 1, "'x' is no number"),
+    Case("no-number", NODE + "  sdo: [{index: '0x6081', value: 1}]\n", 5, "without quotes it is"),
+    Case("no-number", NODE + "  sdo: [{index: 6081h, value: 1}]\n", 5, "did you mean 0x6081?"),
+    Case("no-number", MAPPED + "{index: 6041h}\n", 8, "did you mean 0x6041?"),
+    Case("no-number", NODE.replace("5", "five"), 3, "'five' is no number"),
     Case("number-range", NODE + "  guard_time: 65536\n", 5, "65536 is not in 0..65535"),
     Case("no-dcf", MASTER + "axis:\n  node_id: 5\n", 2, "no dcf"),
     Case("no-dcf", MASTER + "axis: {node_id: 5, eds: epos.eds}\n", 2, "called dcf, not eds", False),
@@ -106,6 +114,7 @@ CORPUS: Final = (
     Case("node-id", NODE.replace("5", "128"), 3, "128 is not in 1..127"),
     Case("node-id", "master: {node_id: 128}\n", 1, "128 is not in 1..127"),
     Case("node-id-twice", NODE + "b: {node_id: 5, dcf: lamp.eds}\n", 5, "5 is that of axis", False),
+    Case("node-id-twice", f"{NODE}b: {{node_id: 5, dcf: epos.eds}}\n", 5, "is that of axis, too"),
     Case("node-id-twice", NODE.replace("5", "1"), 3, "1 is that of master, too: "),
     Case("no-driver", ROS_NODE.replace("  driver: D\n", "", 1), 1, "no driver"),
     Case("no-driver", ROS_NODE[: -len("  package: P\n")], 5, "no package"),
@@ -142,6 +151,12 @@ CORPUS: Final = (
         "defaults-win",
         MASTER + "defaults: {dcf: io.eds}\nnodes: {a: {node_id: 5, dcf: epos.eds}}\n",
         *(3, "dcf is that of defaults: "),
+    ),
+    Case(
+        "defaults-other",
+        f"{MASTER}defaults:\n  sdo: [{{index: 0x6081, value: 1}}]\nnodes:\n"
+        "  a: {node_id: 5, dcf: epos.eds}\n  b: {node_id: 6, dcf: io.eds}\n",
+        *(6, "sdo of defaults are for other nodes: ", False),
     ),
     Case("identity", NODE + "  revision_number: 5\n", 5, "0x00000005, but the EDS has 0x"),
     Case("identity", NODE.replace("epos", "other"), 18, "VendorNumber=0x0000000B is expected"),

@@ -9,8 +9,9 @@ from typing import Final
 import pytest
 from click.testing import CliRunner
 
-from tests.host.canopen.bus_file.bench import NODE, ROOT, write_bus
+from tests.host.canopen.bus_file.bench import NODE, ROOT, generate, write_bus
 from tickrig.emulators.commands.cli import main
+from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.canopen.bus_file.bus_rules import RULES
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, PDO, ROS, SLAVE
 
@@ -66,3 +67,12 @@ def test_the_finding_of_the_page_is_what_is_said(
     write_bus(tmp_path, f"{NODE}  sdo:\n    - {{index: 0x6041}}\n")
     said = CliRunner().invoke(main, ["check", "bus.yml"]).output.splitlines()
     assert f"```\n{said[0]}\n```" in PAGE
+
+
+def test_joints_and_others_share_what_an_anchor_has(tmp_path: Path) -> None:
+    (example,) = re.findall(r"^```yaml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    path = write_bus(tmp_path, example)
+    bus = read_bus_file(path)
+    assert bus.findings == ()
+    assert list(bus.slaves) == list(generate(path).slaves)
+    assert [len(slave.writes) for slave in bus.slaves.values()] == [1, 0, 1]
