@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
@@ -16,6 +17,13 @@ from tickrig.wire.can_error import ErrorFrame
 KEPT: Final = 10_000
 """So many lines are kept; of those before it is known how many there were."""
 
+MAPPINGS_KEPT: Final = 4_000
+"""So many frames that say what PDOs carry are kept beyond that."""
+
+SDO_IDS: Final = range(0x581, 0x680)
+ERROR_CONTROL_IDS: Final = range(0x701, 0x780)
+PDO_OBJECTS: Final = range(0x1400, 0x1C00)
+"""What PDOs carry is written there, by SDO; a boot-up ends what was written."""
 
 ENDS: Final = (b"host", b"device")
 
@@ -31,6 +39,7 @@ class Journal(WireLog):
     def __init__(self) -> None:
         super().__init__(KEPT)
         self._logs: list[tuple[str, WireLog]] = []
+        self._mappings: deque[WireLine] = deque(maxlen=MAPPINGS_KEPT)
 
     def of_line(
         self, source: str, splitter: Callable[[Mark], Splitter] | None
@@ -61,7 +70,15 @@ class Journal(WireLog):
 
     def of_bus(self, source: str) -> Callable[[int, CanFrame | ErrorFrame], None]:
         """Return an observer of a CAN bus."""
-        return lambda at_us, frame: self.add(at_us, Mark.FROM_DEVICE, frame, source)
+
+        def hear(at_us: int, frame: CanFrame | ErrorFrame) -> None:
+            self.add(at_us, Mark.FROM_DEVICE, frame, source)
+            if isinstance(frame, CanFrame) and _maps(frame):
+                data = str(frame).encode()
+                line = WireLine(self._count, at_us, Mark.FROM_DEVICE, data, source)
+                self._mappings.append(line)
+
+        return hear
 
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end, by the time of its last byte."""
@@ -73,6 +90,18 @@ class Journal(WireLog):
     def lines(self) -> tuple[WireLine, ...]:
         """Return what is kept."""
         return self.since(0)
+
+    def mappings(self) -> tuple[WireLine, ...]:
+        """Return the frames before those that are kept which say what PDOs carry."""
+        first = self._count - KEPT
+        return tuple(line for line in self._mappings if line.number <= first)
+
+
+def _maps(frame: CanFrame) -> bool:
+    """Say whether a frame writes or reads what PDOs carry, or is a boot-up."""
+    if frame.can_id in SDO_IDS:
+        return int.from_bytes(frame.data[1:3], "little") in PDO_OBJECTS
+    return frame.can_id in ERROR_CONTROL_IDS and frame.data == b"\0"
 
 
 def text_of(lines: Sequence[WireLine]) -> str:

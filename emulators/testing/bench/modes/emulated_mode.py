@@ -119,6 +119,10 @@ class EmulatedMode(ABC):
         """Return the latest lines and frames, and what was done."""
         return self.act(lambda rig: rig.journal.lines())
 
+    def mappings(self) -> tuple[WireLine, ...]:
+        """Return the frames before the journal's which say what PDOs carry."""
+        return self.act(lambda rig: rig.journal.mappings())
+
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end."""
         return self.act(lambda rig: rig.journal.unfinished())

@@ -133,6 +133,10 @@ class BenchMode(Protocol):
         """Return the latest lines and frames, and what was done."""
         ...
 
+    def mappings(self) -> tuple[WireLine, ...]:
+        """Return the frames before the journal's which say what PDOs carry."""
+        ...
+
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun on serial lines and did not end."""
         ...

@@ -9,7 +9,7 @@ from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.evidence.fault_plan import FaultPlan
-from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of, decoded
+from tickrig.emulators.testing.plugin.evidence.journal_text import decoded
 from tickrig.emulators.testing.plugin.evidence.signal_names import names_of
 from tickrig.emulators.testing.report.bench_report import (
     JournalLine,
@@ -63,7 +63,7 @@ class BenchWitness:
         """Return what a report shows."""
         mode = self._bench._mode
         lines = mode.journal()
-        shown = list(decoded(lines, buses_of(self._bench)))[-JOURNAL_LINES:]
+        shown = list(decoded(self._bench))[-JOURNAL_LINES:]
         evidence = BenchEvidence(
             mode.name,
             mode.now_us,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -31,17 +31,17 @@ def buses_of(bench: Bench) -> tuple[str, ...]:
     return tuple(name for name, mount in mounts.items() if isinstance(mount, BusMount))
 
 
-def decoded(lines: Iterable[WireLine], buses: Collection[str]) -> Iterator[tuple[WireLine, str]]:
-    """Return each line with its text; frames have their meaning behind them.
+def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
+    """Return each line of its journal with its text; frames have their meaning behind them.
 
-    Args:
-        lines: from the first on: what frames mean depends on those before them.
-        buses: names of the CAN buses.
+    What PDOs carry is known, too, if it was written before the lines that are kept.
     """
     from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - not for each test
 
-    decoder = Decoder()
-    for line in lines:
+    decoder, buses = Decoder(), buses_of(bench)
+    for line in bench._mode.mappings():
+        _meaning(decoder, line)
+    for line in bench._mode.journal():
         text = escape(line.data)
         if line.source in buses and line.mark is not Mark.PHYSICAL:
             text = f"{text}  {_meaning(decoder, line)}".rstrip()
@@ -53,7 +53,7 @@ def last_lines(bench: Bench, count: int) -> str:
 
     Lines that have begun and did not end stand below.
     """
-    described = list(decoded(bench._mode.journal(), buses_of(bench)))[-count:]
+    described = list(decoded(bench))[-count:]
     begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]
     return "\n".join(
         f"{format_time(line.at_us)} {line.source} {line.mark} {text}"

@@ -199,6 +199,10 @@ class HardwareMode:
         """Return what passed the doors last, and what the operator did."""
         return self._journal.lines()
 
+    def mappings(self) -> tuple[WireLine, ...]:
+        """Return the frames before the journal's which say what PDOs carry."""
+        return self._journal.mappings()
+
     def unfinished(self) -> tuple[WireLine, ...]:
         """Return what has begun at the doors of serial lines and did not end."""
         return self._journal.unfinished()
