@@ -37,6 +37,7 @@ class NetworkSlave:
         outcome: how its latest boot-up ended, None before that and during one.
         steps: of its latest boot-up, each with its time.
         emergencies: error codes of its EMCYs, the first one first.
+        began_us: when its latest boot-up began.
         lost: how often its error control has failed.
         events: when it was lost, and what was heard of it then, each with its time.
     """
@@ -58,7 +59,7 @@ class NetworkSlave:
         self.emergencies: list[int] = []
         self.events: list[tuple[int, BootStep]] = []
         self.booting, self.lost = False, 0
-        self._now_us = self._first_us = 0
+        self._now_us = self.began_us = 0
         self._again_us = self._silent_us = self._guard_us = NEVER
         self._unanswered, self._toggle = 0, -1
 
@@ -81,7 +82,7 @@ class NetworkSlave:
     def boot(self, now_us: int) -> None:
         """Begin a boot-up, unless one is under way."""
         if not self.booting:
-            self._first_us = now_us
+            self.began_us = now_us
             self._boot(now_us)
 
     def _boot(self, now_us: int) -> None:
@@ -189,7 +190,7 @@ class NetworkSlave:
         """Say whether the boot time of a mandatory slave is not over; of others it never is."""
         if not self.assignment.mandatory or not self._boot_time_us:
             return True
-        return self._now_us - self._first_us < self._boot_time_us
+        return self._now_us - self.began_us < self._boot_time_us
 
     def _begin_error_control(self) -> None:
         slave = self.assignment

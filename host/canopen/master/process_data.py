@@ -22,6 +22,7 @@ class ProcessData:
         self, images: Mapping[int, ProcessImage], drives: tuple[DriveNode, ...] = ()
     ) -> None:
         self.images, self.drives = images, drives
+        self._began = False
         self._by_cob_id = {cob_id: image for image in images.values() for cob_id in image.cob_ids}
 
     @property
@@ -40,6 +41,13 @@ class ProcessData:
             image.sync()
 
     def tick(self, now_us: int, *, sync: bool) -> None:
-        """Begin the periods that are due; `sync` says that a SYNC was sent just now."""
+        """Begin the periods that are due; `sync` says that a SYNC was sent just now.
+
+        None begins while slaves boot at the start: ros2_canopen has its drivers wait for them.
+        """
+        if not self._began:
+            if any(drive.is_awaited(now_us) for drive in self.drives):
+                return
+            self._began = any(drive.is_booted for drive in self.drives)
         for drive in self.drives:
             drive.tick(now_us, sync=sync)

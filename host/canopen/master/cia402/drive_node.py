@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from tickrig.host.canopen.dialogue import QueuedScript, Script
 from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
 from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
@@ -9,6 +11,9 @@ from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.wire.instant import NEVER
+
+AWAITED_US: Final = 3_000_000
+"""How long a driver of ros2_canopen waits for the boot-up of its node: three times 1 s."""
 
 
 class DriveNode:
@@ -42,6 +47,15 @@ class DriveNode:
     def due_us(self) -> int:
         """When `tick` has something to do."""
         return self._timer.due_us if self._slave.good else NEVER
+
+    @property
+    def is_booted(self) -> bool:
+        """Whether its node has booted."""
+        return self._slave.good
+
+    def is_awaited(self, now_us: int) -> bool:
+        """Whether its node boots, and not for so long that nobody waits any more."""
+        return self._slave.booting and now_us - self._slave.began_us < AWAITED_US
 
     def tick(self, now_us: int, *, sync: bool) -> None:
         """Begin a period, if one is due.

@@ -304,6 +304,11 @@ def test_a_recovery_by_sdo_finds_the_fault_of_a_drive_that_was_unplugged(tmp_pat
         assert drives.bench["joint2"].get("drive_state") == "Operation enabled"
 
 
+def test_drives_that_are_read_by_sdo_leave_the_bus_to_those_that_boot(tmp_path: Path) -> None:
+    with cell(tmp_path, pdos=NO_PDOS, nodes=tuple(range(2, 34))) as drives:
+        assert all(slave.good for slave in drives.master.nmt.slaves.values())
+
+
 def test_an_error_of_homing_is_told(tmp_path: Path) -> None:
     with cell(tmp_path, "  sdo: [{index: 0x6098, value: 17}]\n") as drives:
         for name in ("negative_limit_switch", "positive_limit_switch"):
