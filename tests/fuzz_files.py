@@ -56,7 +56,7 @@ def judge_batch(work: Work) -> Batch:
         try:
             seen[work.judge(name, data)] += 1
         except Exception:  # what is looked for
-            kept = f"mutated-{number}-{name}"
+            kept = f"mutated-{number}-{Path(name).name}"
             Path(kept).write_bytes(data)
             said = f"{traceback.format_exc()}file {number} of seed {work.seed}, in {kept}"
             return Batch(seen, slowest_s, said)

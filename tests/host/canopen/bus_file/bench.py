@@ -101,8 +101,13 @@ class _NotStrict:
 
 def _dcfgen() -> Any:
     """Import dcfgen; pkg_resources, which it asks for its template only, may be gone."""
-    sys.modules.setdefault("pkg_resources", ModuleType("pkg_resources"))
-    return import_module("dcfgen.cli")
+    stand_in = ModuleType("pkg_resources")
+    sys.modules.setdefault("pkg_resources", stand_in)
+    try:
+        return import_module("dcfgen.cli")
+    finally:
+        if sys.modules["pkg_resources"] is stand_in:  # pytest asks for it, too
+            del sys.modules["pkg_resources"]
 
 
 @contextmanager
