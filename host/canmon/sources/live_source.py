@@ -5,7 +5,9 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from itertools import repeat
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
 from tickrig.host.canmon.sources.source import AnySource
@@ -77,7 +79,9 @@ class LiveSource(AnySource[Item]):
     ) -> None:
         self._readers, self._queue_frames = readers, queue_frames
         self._queue: deque[Item] = deque()
-        self._came, self._stop, self._overruns, self.failed = threading.Event(), False, 0, ""
+        # No Event: Ctrl-C in the middle of its wait can leave its lock taken, for good.
+        self._came: SimpleQueue[None] = SimpleQueue()
+        self._stop, self._overruns, self.failed = False, 0, ""
         pairs = list(zip(readers, chosen, strict=False))
         self._stepped = [pair for pair in pairs if pair[0].stepped]
         self._threads = [
@@ -107,8 +111,10 @@ class LiveSource(AnySource[Item]):
         for reader, chosen in self._stepped:
             self._take(reader, chosen, timeout_us)
         if not self._queue and not self._stepped and not self.ended:
-            self._came.wait(timeout_us / 1e6)
-        self._came.clear()
+            with suppress(Empty):
+                self._came.get(timeout=timeout_us / 1e6)
+        while not self._came.empty():
+            self._came.get()
         return [self._queue.popleft() for _ in range(len(self._queue))]
 
     def messages(self) -> list[str]:
@@ -137,7 +143,7 @@ class LiveSource(AnySource[Item]):
     def _receive(self, reader: Reader[Item], chosen: CandumpFilter | None) -> None:
         while not self._stop and not self.failed:
             self._take(reader, chosen, WAIT_US)
-        self._came.set()
+        self._came.put(None)
 
     def _take(self, reader: Reader[Item], chosen: CandumpFilter | None, timeout_us: int) -> None:
         try:
@@ -153,7 +159,7 @@ class LiveSource(AnySource[Item]):
             records = records[:room]
         self._queue += records
         if records:
-            self._came.set()
+            self._came.put(None)
 
 
 def _passes(chosen: CandumpFilter, one: Record | LineRecord) -> bool:
