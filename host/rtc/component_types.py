@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.cli.extensions import ExtensionGroup
+from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.states import RtcRefused
 
 _HERE: Final = "tickrig.host.rtc.components"
 
@@ -30,3 +31,14 @@ COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
     "an RtComponent with a spec",
 )
 """The entry-point group `tickrig.components` (docs/extending.md)."""
+
+
+def installed_type(name: str) -> type[RtComponent]:
+    """Load one of them; RtcRefused if that fails, or if its class has another name."""
+    try:
+        found = COMPONENT_TYPES.load(name)
+    except ExtensionError as error:
+        raise RtcRefused(str(error)) from error
+    if found.spec.type_name != name:
+        raise RtcRefused(f"component type {name!r} calls itself {found.spec.type_name!r}")
+    return found

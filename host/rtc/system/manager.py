@@ -7,58 +7,19 @@ from functools import cached_property
 from itertools import count
 from typing import Final, TypeVar
 
-from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.component_types import COMPONENT_TYPES
+from tickrig.host.rtc.component_types import COMPONENT_TYPES, installed_type
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
+from tickrig.host.rtc.system.name_service import NameService
 from tickrig.host.rtc.system.schedule import Schedule
-
-Factory = Callable[[str], RtComponent]
-"""Makes a component of an instance name; a class of components is one."""
 
 R = TypeVar("R", bound=RtComponent)
 
 DEFAULT_RATE_HZ: Final = 1_000.0
-
-
-class NameService:
-    """Components by path, as rtshell writes them: `localhost/ConsoleIn0.rtc`.
-
-    In process: not emulated is the CORBA naming service, which others could ask.
-    """
-
-    def __init__(self) -> None:
-        self._components: dict[str, RtComponent] = {}
-
-    def bind(self, path: str, component: RtComponent) -> None:
-        """Give a component a path; RtcRefused if it is taken."""
-        path = _plain(path)
-        if path in self._components:
-            raise RtcRefused(f"{path} is taken")
-        self._components[path] = component
-
-    def unbind(self, path: str) -> None:
-        """Take a path away; one that is not there is no error."""
-        self._components.pop(_plain(path), None)
-
-    def resolve(self, path: str) -> RtComponent:
-        """Return the component at a path; RtcRefused if there is none."""
-        path = _plain(path)
-        if path not in self._components:
-            known = ", ".join(self._components) or "none"
-            raise RtcRefused(f"nothing at {path}; known: {known}")
-        return self._components[path]
-
-    def names(self, context: str = "") -> tuple[str, ...]:
-        """Return what stands in a naming context: names, and contexts with `/` at their end."""
-        prefix = f"{_plain(context)}/" if _plain(context) else ""
-        rests = (path.removeprefix(prefix) for path in self._components if path.startswith(prefix))
-        heads = (rest.partition("/") for rest in rests)
-        return tuple(dict.fromkeys(head + slash for head, slash, _ in heads))
 
 
 class Manager(Schedule):
@@ -81,13 +42,13 @@ class Manager(Schedule):
         super().__init__()
         self.names = NameService()
         self._host = host
-        self._factories: dict[str, Factory] = {}
+        self._registered: dict[str, type[RtComponent]] = {}
         self._components: dict[str, RtComponent] = {}
 
     @property
     def types(self) -> tuple[str, ...]:
         """Names of the types that can be created, registered ones before those installed."""
-        return tuple(dict.fromkeys((*self._factories, *self._installed)))
+        return tuple(dict.fromkeys((*self._registered, *self._installed)))
 
     @property
     def components(self) -> tuple[RtComponent, ...]:
@@ -113,7 +74,7 @@ class Manager(Schedule):
         Args:
             kind: the class, under the type name of its `spec`.
         """
-        self._factories[kind.spec.type_name] = kind
+        self._registered[kind.spec.type_name] = kind
 
     def create(
         self,
@@ -136,8 +97,7 @@ class Manager(Schedule):
         Raises:
             RtcRefused: no such type, one that cannot be loaded, and what `add` refuses.
         """
-        factory = self._factories.get(type_name) or self._installed_type(type_name)
-        component = factory(instance_name or self.free_name(type_name))
+        component = self._type(type_name)(instance_name or self.free_name(type_name))
         return self.add(component, rate_hz, context)
 
     def add(
@@ -356,16 +316,12 @@ class Manager(Schedule):
         """Names of the types that installed packages have, ours first."""
         return tuple(COMPONENT_TYPES.names())
 
-    def _installed_type(self, name: str) -> type[RtComponent]:
+    def _type(self, name: str) -> type[RtComponent]:
+        if name in self._registered:
+            return self._registered[name]
         if name not in self._installed:
             raise RtcRefused(f"no component type {name!r}; known: {', '.join(self.types)}")
-        try:
-            found = COMPONENT_TYPES.load(name)
-        except ExtensionError as error:
-            raise RtcRefused(str(error)) from error
-        if found.spec.type_name != name:
-            raise RtcRefused(f"component type {name!r} calls itself {found.spec.type_name!r}")
-        return found
+        return installed_type(name)
 
     def _request(
         self,
@@ -396,7 +352,3 @@ class Manager(Schedule):
             self.remove_context(own)
         for context in tuple(component.contexts):
             context.remove_component(component)
-
-
-def _plain(path: str) -> str:
-    return path.strip("/")

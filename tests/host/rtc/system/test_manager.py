@@ -13,7 +13,6 @@ from tickrig.host.rtc import (
     RtcRefused,
 )
 from tickrig.host.rtc.components import ConsoleIn, SeqIn, SeqOut
-from tickrig.host.rtc.system.manager import NameService
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedLongSeq
 
@@ -281,15 +280,3 @@ def test_console_out_shows_what_arrives() -> None:
     chain.source.enter(4)
     chain.manager.run_for(PERIOD_US)
     assert [value.data for value in shown] == [4]
-
-
-def test_a_path_is_bound_once_and_may_be_deep() -> None:
-    names = NameService()
-    names.bind("/localhost/my.host_cxt/A0.rtc", component := ConsoleIn("A0"))
-    assert names.names("localhost") == ("my.host_cxt/",)
-    assert names.resolve("localhost/my.host_cxt/A0.rtc") is component
-    with pytest.raises(RtcRefused, match="is taken"):
-        names.bind("localhost/my.host_cxt/A0.rtc", component)
-    names.unbind("localhost/my.host_cxt/A0.rtc")
-    names.unbind("localhost/my.host_cxt/A0.rtc")
-    assert names.names() == ()
