@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -13,7 +15,10 @@ from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormatError
-from tickrig.host.monitor.logs.log_writer import write_log
+from tickrig.host.monitor.logs.log_writer import in_blocks, write_log
+
+BLOCK_S: Final = 1.0
+"""What a compressed log may lose if this program is killed."""
 
 
 class LogFile:
@@ -30,7 +35,7 @@ class LogFile:
     """
 
     def __init__(self, path: Path, source: Sequence[str]) -> None:
-        self._path = path
+        self._path, self._due_s = path, 0.0
         read = (
             parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec)
         )
@@ -49,8 +54,10 @@ class LogFile:
             for record, _ in decoded_frames:
                 assert isinstance(record, Record), "who opens serial ports does not write a log"
                 self._writer.write(record)
-            if decoded_frames:
+            if decoded_frames and time.monotonic() >= self._due_s:
                 self._writer.flush()
+                if in_blocks(self._path):
+                    self._due_s = time.monotonic() + BLOCK_S
         except OSError as error:
             raise SourceFailed(f"{self._path}: {error.strerror}") from error
 

@@ -13,7 +13,7 @@ from typing import BinaryIO, Final
 
 import can
 
-_FILE: Final = struct.Struct("<4sL24xL")  # signature, size of the header, count of objects
+_FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
 _OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
 _CONTAINER: Final = struct.Struct("<H6xL4x")  # compression, size of what is in it
 _SIGNATURE: Final = b"LOBJ"
@@ -44,7 +44,7 @@ def missing_end(file: BinaryIO) -> str:
         file: a log that python-can has read without an error; it is read from its beginning.
     """
     file.seek(0)
-    _, header_bytes, declared = _FILE.unpack(file.read(_FILE.size))
+    _, header_bytes, _, declared = _FILE.unpack(file.read(_FILE.size))
     file.seek(header_bytes)
     found, held = 0, b""
     for content in _contents(file):
@@ -55,6 +55,12 @@ def missing_end(file: BinaryIO) -> str:
     if len(held) >= _OBJECT.size:
         return f"it is cut after {found} objects"
     return f"it ends after {found} of {declared} objects" if found < declared else ""
+
+
+def has_end(file: BinaryIO) -> bool:
+    """Say whether whoever wrote a log ended it: only then its header tells the size of the file."""
+    _, header_bytes, file_bytes, _ = _FILE.unpack(file.read(_FILE.size))
+    return bool(file_bytes != header_bytes)
 
 
 def _contents(file: BinaryIO) -> Iterator[bytes | None]:

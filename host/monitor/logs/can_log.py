@@ -20,7 +20,7 @@ import can
 from can.io.blf import BLFParseError
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.blf_damage import BlfReader, missing_end
+from tickrig.host.monitor.logs.blf_damage import BlfReader, has_end, missing_end
 from tickrig.host.monitor.logs.can_record import to_record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormat, open_log
 from tickrig.host.monitor.logs.notation import UNNAMED
@@ -184,11 +184,12 @@ class CanLogReader:
         count = 0
         for count, message in enumerate(reader, 1):  # noqa: B007 - counted
             yield message
-        if reader.object_count == count:
-            return
         with open_log(self._path) as file:
-            if reason := missing_end(file):
+            ended = has_end(file)
+            if reader.object_count != count and (reason := missing_end(file)):
                 raise LogError(f"{self._path}: {reason}")
+        if count and not ended:
+            raise LogError(f"{self._path}: its recorder did not end it: it has {count} frames")
         if reader.object_count > count:
             self.tally.passed_over[OTHER_OBJECTS] += reader.object_count - count
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import re
 import time
 from collections import Counter
@@ -11,10 +12,12 @@ from pathlib import Path
 from typing import Any, Final, TextIO
 
 import can
+from can.io.blf import FILE_HEADER_SIZE
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_can
 from tickrig.host.monitor.logs.log_file import COMPRESSED, LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.mark import Mark
 from tickrig.wire.can_error import ErrorFrame
 
 _DATE: Final = "%a %b %d %H:%M:%S.{:03d} %Y"
@@ -43,6 +46,15 @@ class AscWriter:
         assert self._begin_us is not None, "it has begun"
         seconds, micros = divmod(at_us - self._begin_us, 1_000_000)
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
+
+    def mark(self, mark: Mark) -> None:
+        """Write a comment."""
+        if self._begin_us is None:
+            self._begin(mark.at_us)
+        self._file.write(f"// {mark.text}\n")
+
+    def flush(self) -> None:
+        """There is nothing but the file."""
 
     def stop(self) -> None:
         """End the log."""
@@ -88,10 +100,21 @@ class TrcWriter(can.TRCWriter):
 
     def on_message_received(self, msg: can.Message) -> None:
         """Write a frame."""
-        if self.first_timestamp is None:
-            self.first_timestamp = int(msg.timestamp * 1e6) // TRC_STEP_US * TRC_STEP_US / 1e6
-            self.write_header(self.first_timestamp)
+        self._begin(int(msg.timestamp * 1e6))
         super().on_message_received(msg)
+
+    def mark(self, mark: Mark) -> None:
+        """Write a comment."""
+        self._begin(mark.at_us)
+        self.file.write(f";   {mark.text}\n")
+
+    def flush(self) -> None:
+        """There is nothing but the file."""
+
+    def _begin(self, at_us: int) -> None:
+        if self.first_timestamp is None:
+            self.first_timestamp = at_us // TRC_STEP_US * TRC_STEP_US / 1e6
+            self.write_header(self.first_timestamp)
 
 
 class BlfWriter(can.BLFWriter):
@@ -102,24 +125,54 @@ class BlfWriter(can.BLFWriter):
     """
 
     early = 0
+    _dated = False
 
     def on_message_received(self, msg: can.Message) -> None:
         """Write a frame."""
-        if self.start_timestamp is None:
-            begin_s = int(msg.timestamp)
-            self.start_timestamp = float(begin_s if begin_s >= FIRST_BLF_S else 0)
-        self.early += msg.timestamp < self.start_timestamp
+        self.early += msg.timestamp < self._begin(msg.timestamp)
         super().on_message_received(msg)
+
+    def mark(self, mark: Mark) -> None:
+        """Write a marker."""
+        at_s = mark.at_us / 1e6
+        self.log_event(mark.text, max(at_s, self._begin(at_s)))
+
+    def flush(self) -> None:
+        """End a container: what is in it can be read if no end follows.
+
+        python-can's own tells when the log began in its end alone.
+        """
+        self._flush()
+        if not self._dated and self.start_timestamp is not None:
+            self._dated = True
+            self.file.seek(0)
+            self._write_header(FILE_HEADER_SIZE)  # the size of a log without an end
+            self.file.seek(0, os.SEEK_END)
+
+    def _begin(self, at_s: float) -> float:
+        if self.start_timestamp is None:
+            begin_s = int(at_s)
+            self.start_timestamp = float(begin_s if begin_s >= FIRST_BLF_S else 0)
+        return self.start_timestamp
+
+
+class Mf4Writer(can.MF4Writer):
+    """Is written as a whole at its end."""
+
+    def flush(self) -> None:
+        """There is nothing to give yet."""
 
 
 TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: AscWriter,
     LogFormat.TRC: TrcWriter,
 }
-BINARY: Final[dict[LogFormat, Any]] = {LogFormat.BLF: BlfWriter, LogFormat.MF4: can.MF4Writer}
+BINARY: Final[dict[LogFormat, Any]] = {LogFormat.BLF: BlfWriter, LogFormat.MF4: Mf4Writer}
 
 END_US: Final = 16_725_225_600_000_000
 """The year 2500: dates of ASC and TRC go on to 9999, nanoseconds of BLF to 2554."""
+
+MARKS: Final = "marks of gaps and triggers"
 
 _NUMBER: Final = re.compile(r"can([0-9]{1,3})")
 
@@ -159,16 +212,26 @@ class CanLogWriter:
                 return
         self._writer.on_message_received(to_can(record, self._number(record.channel)))
 
+    def mark(self, mark: Mark, /) -> None:
+        """Add a comment or marker, or count it."""
+        if self._kind is LogFormat.MF4 or mark.at_us >= END_US:
+            self._passed_over[MARKS] += 1
+        else:
+            self._writer.mark(mark)
+
     def flush(self) -> None:
         """Give what was added to the operating system; the end of some formats is still missing."""
+        self._writer.flush()
         self._file.flush()
 
     def close(self) -> None:
         """End the log."""
         if not self._closed:
             self._closed = True
-            self._writer.stop()
-            self._file.close()
+            try:
+                self._writer.stop()
+            finally:
+                self._file.close()
 
     def messages(self) -> list[str]:
         """Say what the format could not hold."""

@@ -18,11 +18,13 @@ import re
 import zlib
 from collections.abc import Iterator
 from importlib import import_module
+from io import BufferedReader
 from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormat, log_format, open_log
+from tickrig.host.monitor.logs.mark import lost_frames
 from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
 from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
 from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
@@ -81,7 +83,8 @@ def parse_log_line(
     nanoseconds or with fewer digits, a direction behind the frame, the raw length code behind
     eight bytes, error frames with less than eight bytes.
 
-    Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault.
+    Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault; what a comment of ours
+    says was lost is counted.
 
     Args:
         line: without its LF.
@@ -91,6 +94,7 @@ def parse_log_line(
     """
     text = line.strip()
     if not text or text.startswith(COMMENTS):
+        tally.lost += lost_frames(text)
         return None
     record = _parsed(line, text, tally, clock or ScreenClock())
     if record is None:
@@ -244,7 +248,8 @@ class TextLogReader:
         self.tally = lines.tally
         try:
             with open_log(self._path) as file:
-                while data := file.read(BLOCK_BYTES):
+                some = cast("BufferedReader", file).read1  # `read` loses the end of a cut log
+                while data := some(BLOCK_BYTES):
                     yield from lines.push(data)
         except (EOFError, zlib.error) as error:
             raise LogError(f"{self._path}: {error}") from error

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log
+from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
+from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.logs.notation import LOG_HEADER, csv_row, json_line
 from tickrig.wire.candump import LogLine
 
@@ -16,6 +17,8 @@ BLOCK_LINES: Final = 256
 
 CAN_LOG_WRITER: Final = "tickrig.host.monitor.logs.can_log_writer"
 """python-can is slow to import: this module is when a log needs it."""
+
+MARKS: Final = "marks of gaps and triggers left out"
 
 WRITERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogWriter"),
@@ -37,8 +40,15 @@ class LogWriter(Protocol):
         """Add a frame."""
         ...
 
+    def mark(self, mark: Mark, /) -> None:
+        """Add what is no frame, where the format can hold it."""
+        ...
+
     def flush(self) -> None:
-        """Give what was added to the operating system, as far as the format can."""
+        """Give all that was added to the operating system: it is readable if nothing follows.
+
+        Where `in_blocks` says so that makes the file larger: do it seldom.
+        """
         ...
 
     def close(self) -> None:
@@ -48,6 +58,11 @@ class LogWriter(Protocol):
     def messages(self) -> list[str]:
         """Say what the format could not hold, one line each."""
         ...
+
+
+def in_blocks(path: Path) -> bool:
+    """Say whether a log is compressed, block by block."""
+    return path.suffix.lower() == COMPRESSED or log_format(path) is LogFormat.BLF
 
 
 def write_log(path: Path) -> LogWriter:
@@ -76,18 +91,30 @@ _LINES: Final = {
 }
 
 
+def comment(mark: Mark) -> str:
+    """Write a mark as programs pass it over that read candump's logs."""
+    return f"# {mark.text}"
+
+
+_MARKS: Final = {LogFormat.CANDUMP: comment, LogFormat.JSONL: Mark.json}
+
+
 class TextLogWriter:
     """A log in lines: candump's, JSON or CSV."""
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
         self._file, self._lines = open_log(path, "wb"), list[str]()
-        self._text = _LINES[kind]
+        self._text, self._kind = _LINES[kind], kind
 
     def write(self, record: Record, /) -> None:
         """Add a line."""
         self._lines.append(self._text(record))
         if len(self._lines) >= BLOCK_LINES:
             self._give()
+
+    def mark(self, mark: Mark, /) -> None:
+        """Add a comment, or an event."""
+        self._lines.append(_MARKS[self._kind](mark))
 
     def flush(self) -> None:
         """Give what was added to the operating system."""
@@ -97,8 +124,10 @@ class TextLogWriter:
     def close(self) -> None:
         """End the log."""
         if not self._file.closed:
-            self._give()
-            self._file.close()
+            try:
+                self._give()
+            finally:
+                self._file.close()
 
     def messages(self) -> list[str]:
         """Nothing: these formats hold all there is."""
@@ -114,7 +143,7 @@ class CsvLogWriter(TextLogWriter):
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
         super().__init__(path, kind)
-        self._name, self._channels = path.name, dict[str, None]()
+        self._name, self._channels, self._marks = path.name, dict[str, None](), 0
         self._lines.append(LOG_HEADER)
 
     def write(self, record: Record, /) -> None:
@@ -122,8 +151,14 @@ class CsvLogWriter(TextLogWriter):
         self._channels[record.channel] = None
         super().write(record)
 
+    def mark(self, mark: Mark, /) -> None:
+        """Count it: readers of python-can take each row for a frame."""
+        self._marks += 1
+
     def messages(self) -> list[str]:
-        """Say which buses became one."""
-        if len(self._channels) < 2:
-            return []
-        return [f"{self._name}: csv does not tell buses apart: {', '.join(self._channels)}"]
+        """Say which buses became one, and what was left out."""
+        said = [f"{self._name}: {self._marks} {MARKS}"] if self._marks else []
+        if len(self._channels) > 1:
+            buses = ", ".join(self._channels)
+            said.append(f"{self._name}: csv does not tell buses apart: {buses}")
+        return said

@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.mark import Mark as LogMark
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.host.text.bench_header import (
     BenchHeader,
@@ -26,6 +27,7 @@ from tickrig.wire.can import CanFrame
 
 OTHER_BUSES = "frames of other buses"
 ERROR_FRAMES = "error frames"
+LOG_MARKS = "marks of gaps and triggers"
 
 MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
@@ -49,6 +51,10 @@ class TraceLogWriter:
         self._latest_us = max(self._latest_us, record.at_us - self._began_us)
         mark = MARKS[record.sent]
         self._put(BenchRecord(self._latest_us, _name(self._channel), mark, record.frame).encode())
+
+    def mark(self, mark: LogMark, /) -> None:
+        """Count it: a trace has frames alone."""
+        self._left_out[LOG_MARKS] += 1
 
     def flush(self) -> None:
         """Give what was added to the operating system."""
