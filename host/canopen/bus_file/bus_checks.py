@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, Channel
-from tickrig.host.canopen.bus_file.item import Item, Place
+from tickrig.host.canopen.bus_file.item import Place
+from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
 from tickrig.host.canopen.bus_file.notes import Notes, Section
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO
@@ -34,36 +35,6 @@ MOST_OFF: Final = 0.01
 """How far a scale and its inverse may be from each other: they are rounded."""
 
 
-class Allowed(NamedTuple):
-    """What a setting of a driver may be: whole numbers, or without any a flag."""
-
-    numbers: Sequence[int]
-    said: str
-
-    def takes(self, item: Item) -> bool:
-        """Return whether yaml-cpp makes such a value of it; quotes do not matter to it."""
-        if not self.numbers:
-            text = item.text.lower()
-            return text in {"true", "false", "yes", "no", "on", "off", "y", "n"}
-        try:
-            return not isinstance(item.value, bool) and int(item.text, 0) in self.numbers
-        except ValueError:
-            return False
-
-
-_TIME: Final = Allowed(range(1, 1 << 31), "a whole number above 0")
-_MODE: Final = Allowed((1, 2, 3, 4, 6, 7, 8, 9, 10), "a mode of CiA 402: 1..4, 6..10")
-SETTINGS: Final = {
-    "polling": Allowed((), "true or false"),
-    "period": _TIME,
-    "sdo_timeout_ms": _TIME,
-    "homing_timeout_seconds": _TIME,
-    "switching_state": Allowed(range(2, 7), "a state to go to: 2..6, 5 is Operation enabled"),
-    "position_mode": _MODE,
-    "velocity_mode": _MODE,
-    "effort_mode": _MODE,
-}
-"""By key of a node."""
 STOPS: Final = frozenset(
     (
         *("access-form", "access-missing", "bom", "data-type-missing", "doubled-key"),
@@ -182,7 +153,7 @@ def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
         _check_class(section)
         for key, allowed in SETTINGS.items():
             item = section.fields.get(key)
-            if item is not None and not allowed.takes(item):
+            if item is not None and allowed.value_of(item) is None:
                 text = f"{key}: {item} is not {allowed.said}"
                 section.note("driver-value", key, text)
     for name, slave in slaves.items():

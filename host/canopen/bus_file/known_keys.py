@@ -1,10 +1,11 @@
-"""The keys of a bus.yml, by section."""
+"""The keys of a bus.yml, by section, and what the settings of drivers may be."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Final
+from collections.abc import Iterable, Sequence
+from typing import Final, NamedTuple
 
+from tickrig.host.canopen.bus_file.item import Item
 from tickrig.host.canopen.bus_file.notes import Section
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.eds.eds_file import shorten
@@ -46,6 +47,46 @@ PDO: Final = (
 )
 MAPPED: Final = ("index", "sub_index", "bits")
 WRITE: Final = ("index", "sub_index", "value")
+FLAGS: Final = {
+    **dict.fromkeys(("true", "yes", "on", "y"), 1),
+    **dict.fromkeys(("false", "no", "off", "n"), 0),
+}
+"""Words that yaml-cpp takes for a flag."""
+
+
+class Allowed(NamedTuple):
+    """What a setting of a driver may be: whole numbers, or without any a flag."""
+
+    numbers: Sequence[int]
+    said: str
+
+    def value_of(self, item: Item) -> int | None:
+        """Return what yaml-cpp makes of a value, None if the driver does not take it.
+
+        Quotes do not matter to it. A flag is 1 or 0.
+        """
+        if not self.numbers:
+            return FLAGS.get(item.text.lower())
+        try:
+            number = None if isinstance(item.value, bool) else int(item.text, 0)
+        except ValueError:
+            return None
+        return number if number in self.numbers else None
+
+
+_TIME: Final = Allowed(range(1, 1 << 31), "a whole number above 0")
+_MODE: Final = Allowed((1, 2, 3, 4, 6, 7, 8, 9, 10), "a mode of CiA 402: 1..4, 6..10")
+SETTINGS: Final = {
+    "polling": Allowed((), "true or false"),
+    "period": _TIME,
+    "sdo_timeout_ms": _TIME,
+    "homing_timeout_seconds": _TIME,
+    "switching_state": Allowed(range(2, 7), "a state to go to: 2..6, 5 is Operation enabled"),
+    "position_mode": _MODE,
+    "velocity_mode": _MODE,
+    "effort_mode": _MODE,
+}
+"""By key of a node."""
 
 
 def check_keys(section: Section, known: Iterable[str], *, open_to_others: bool = False) -> None:

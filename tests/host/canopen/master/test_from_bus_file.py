@@ -70,6 +70,18 @@ def test_a_drive_is_driven_as_its_keys_say(tmp_path: Path) -> None:
     assert period_us_of(bus(tmp_path, "    polling: false\n").slaves["one"]) == 0
 
 
+@pytest.mark.parametrize(
+    ("key", "period_us"),
+    [
+        *(("period: '20'", 20_000), ("polling: 'false'", 0), ("polling: n", 0)),
+        *(("period: -5", 10_000), ("period: 0", 10_000), ("polling: maybe", 10_000)),
+    ],
+)
+def test_a_setting_is_what_its_driver_makes_of_it(key: str, period_us: int, tmp_path: Path) -> None:
+    slave = bus(tmp_path, f"    {key}\n", MASTER.replace("  period: 10\n", "")).slaves["one"]
+    assert period_us_of(slave) == period_us
+
+
 def test_a_slave_with_another_driver_is_no_drive(tmp_path: Path) -> None:
     assert not is_drive(bus(tmp_path, "", MASTER.replace("402", "Proxy")).slaves["one"])
 
