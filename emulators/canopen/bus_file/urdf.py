@@ -22,6 +22,7 @@ from typing import Final
 
 from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
 from tickrig.host.canopen.bus_file.item import Place
+from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
 from tickrig.wire.canopen.eds.eds_file import decode_text
 from tickrig.wire.canopen.eds.xdd import Element, XddError, read_xml
 
@@ -32,7 +33,6 @@ LIMITS: Final = ("lower", "upper", "velocity", "effort")
 REVOLUTE, CONTINUOUS, PRISMATIC = "revolute", "continuous", "prismatic"
 MOVES: Final = (REVOLUTE, CONTINUOUS, PRISMATIC)
 REDUCTIONS: Final = ("mechanicalReduction", "mechanical_reduction")
-HIGHEST_NODE_ID: Final = 127
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -120,9 +120,9 @@ def has_drivers(layout: Layout) -> bool:
 
 def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
     """Note what the container of ros2_canopen refuses, in a file that is for it."""
-    unmade = layout.slaves.keys() - slaves.keys()
     if not has_drivers(layout):
         return
+    unmade = layout.slaves.keys() - slaves.keys()
     for section in _sections(layout):
         missing = [key for key in DRIVER_KEYS if key not in section]
         if missing:

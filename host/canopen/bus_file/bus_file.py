@@ -163,5 +163,5 @@ class _Reader:
         check_defaults(self._layout, node, self._notes.since(count))
         if master is not None:
             watch_master(node, sheet, reader.writes, master)
-        writes = reader.writes
-        return replace(slave, writes=writes.all, pdos=pdos_after(sheet, writes))
+        pdos = pdos_after(sheet, reader.writes)
+        return replace(slave, writes=reader.writes.all, pdos=pdos)

@@ -47,7 +47,7 @@ _ERRORS: Final = (
     ),
     ("node-name", CONTAINER, "the container does not load it", "give it another name"),
     ("no-nodes", COGEN, "cogen writes nothing", "nodes: NAME: ..."),
-    ("tickrig", "canopen-slave-emu", "no slave is made of it", "docs/canopen-slave-emu.md has all"),
+    ("tickrig", "canopen-slave-emu", "no slave is made of it", "docs/ros2-canopen.md has all keys"),
 )
 _WARNINGS: Final = (
     (

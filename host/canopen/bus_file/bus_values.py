@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -50,16 +49,6 @@ class BusWrite:
     sub_index: int
     data: bytes
     place: Place
-
-    def encode(self) -> bytes:
-        """Return the bytes of the entry (CiA 302-3, concise DCF)."""
-        return struct.pack("<HBL", self.index, self.sub_index, len(self.data)) + self.data
-
-
-def concise_dcf(writes: Iterable[BusWrite]) -> bytes:
-    """Return a concise DCF (1F22h): how many entries, and the entries."""
-    entries = [write.encode() for write in writes]
-    return struct.pack("<L", len(entries)) + b"".join(entries)
 
 
 @dataclass(frozen=True, slots=True)

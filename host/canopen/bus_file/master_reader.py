@@ -7,13 +7,12 @@ from typing import Final
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusOptions, Identity
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, check_keys
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
-from tickrig.host.canopen.bus_file.sheet import Sheet
+from tickrig.host.canopen.bus_file.sheet import UNSET, Sheet
 from tickrig.host.canopen.bus_file.slave_reader import read_extra
 from tickrig.host.canopen.bus_file.writes import Writes
+from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
 from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
-UNSET: Final = 255
-HIGHEST_NODE_ID: Final = 127
 CONSUMER: Final = 0x1016
 TIME: Final = 0x100
 SHORTEST_SYNC_US: Final = 1_000

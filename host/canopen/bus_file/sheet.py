@@ -25,6 +25,7 @@ FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
 """What the build of ros2_canopen replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
 UNSET: Final = 255
+"""The node-ID of who has none."""
 WRONG: Final = -(1 << 31) - 1
 """Stands for a node-ID that is no number; what is wrong with it is noted."""
 SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")

@@ -21,13 +21,12 @@ from tickrig.host.canopen.bus_file.known_keys import (
     check_keys,
 )
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
-from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader, pdos_after
+from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet
 from tickrig.host.canopen.bus_file.writes import Writes
 from tickrig.wire.canopen.cob_id import INVALID
 from tickrig.wire.canopen.eds.eds_file import shorten
 
-HIGHEST_NODE_ID: Final = 127
 MOST_CHANNELS: Final = 8
 TIME, EMCY, HEARTBEAT, GUARD_TIME, LIFE_TIME = 0x1012, 0x1014, 0x1017, 0x100C, 0x100D
 ERROR_BEHAVIOR, RESTORE, SOFTWARE = 0x1029, 0x1011, 0x1F56
@@ -52,7 +51,7 @@ class SlaveReader:
         self.writes = Writes(sheet, node.name, node.notes)
 
     def read(self) -> BusSlave:
-        """Read it all; the writes come in the order of dcfgen."""
+        """Read all but its writes, which are in `writes` in the order of dcfgen, and its PDOs."""
         node, sheet = self._node, self._sheet
         check_keys(node, SLAVE, open_to_others=True)
         self._check_identity_keys()
@@ -66,8 +65,6 @@ class SlaveReader:
         self._sdo()
         return replace(
             slave,
-            writes=self.writes.all,
-            pdos=pdos_after(sheet, self.writes),
             driver=node.text("driver"),
             package=node.text("package"),
             channels=read_channels(node, self._name),

@@ -77,7 +77,7 @@ class DriveNode:
         due = self._timer.advance(now_us) if self._period_us else sync
         if due and not self._busy:
             self._busy = True
-            self._talk(QueuedScript("cycle", self._cycle(), self._end, self._end, self._rest))
+            self._talk(QueuedScript("cycle", self._cycle(), self._end, self._end, self._end))
 
     def _cycle(self) -> Script[None]:
         for driver in self.drivers:
@@ -86,8 +86,5 @@ class DriveNode:
     def _talk(self, script: QueuedScript) -> None:
         self._slave.dialogue.start(self._now_us, script)
 
-    def _end(self, result: object) -> None:
-        self._busy = False
-
-    def _rest(self) -> None:
+    def _end(self, _result: object = None) -> None:
         self._busy = False

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import struct
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +14,8 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import yaml
+
+from tickrig.host.canopen.bus_file.bus_values import BusWrite
 
 ROOT = Path(__file__).parents[4]
 EPOS = (ROOT / "examples/eds/epos.eds").read_text("utf-8")
@@ -43,6 +46,17 @@ def write_bus(folder: Path, text: str) -> Path:
     path = folder / "bus.yml"
     path.write_text(text, "utf-8")
     return path
+
+
+def entry_of(write: BusWrite) -> bytes:
+    """Return an entry of a concise DCF (CiA 302-3)."""
+    return struct.pack("<HBL", write.index, write.sub_index, len(write.data)) + write.data
+
+
+def concise_dcf(writes: Iterable[BusWrite]) -> bytes:
+    """Return a concise DCF (1F22h): how many entries, and the entries."""
+    entries = [entry_of(write) for write in writes]
+    return struct.pack("<L", len(entries)) + b"".join(entries)
 
 
 class Pdo(NamedTuple):

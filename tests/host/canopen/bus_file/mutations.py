@@ -8,10 +8,9 @@ from pathlib import Path
 from random import Random
 from typing import Final
 
-from tests.host.canopen.bus_file.bench import NODE, ROOT
+from tests.host.canopen.bus_file.bench import NODE, ROOT, concise_dcf
 from tests.host.canopen.bus_file.shapes import GOOD
 from tickrig.host.canopen.bus_file.bus_file import BusFile, decode_bus_file, is_bus_file
-from tickrig.host.canopen.bus_file.bus_values import concise_dcf
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 
 NAME: Final = str(ROOT / "examples/eds/mutated.yml")

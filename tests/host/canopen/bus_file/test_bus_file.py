@@ -5,10 +5,19 @@ from typing import Any
 
 import pytest
 
-from tests.host.canopen.bus_file.bench import LAMP, NODE, Generated, Pdo, generate, write_bus
+from tests.host.canopen.bus_file.bench import (
+    LAMP,
+    NODE,
+    Generated,
+    Pdo,
+    concise_dcf,
+    entry_of,
+    generate,
+    write_bus,
+)
 from tests.host.canopen.bus_file.shapes import COGEN, GOOD, PLAIN
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
-from tickrig.host.canopen.bus_file.bus_values import BusPdo, BusSlave, concise_dcf
+from tickrig.host.canopen.bus_file.bus_values import BusPdo, BusSlave
 
 
 @pytest.mark.parametrize("name", GOOD)
@@ -18,7 +27,7 @@ def test_the_writes_are_those_of_dcfgen(name: str, tmp_path: Path) -> None:
     assert not ours.errors
     assert list(ours.slaves) == list(theirs.slaves)
     for slave, other in pairs(ours, theirs):
-        assert [write.encode().hex() for write in slave.writes] == [one.hex() for one in other.sdo]
+        assert [entry_of(write).hex() for write in slave.writes] == [one.hex() for one in other.sdo]
 
 
 @pytest.mark.parametrize("name", GOOD)
