@@ -31,6 +31,7 @@ class DeviceDescription:
         application: what the device does with its objects.
         warnings: what is not by the standard in its file.
         start: inputs that are not as usual when a slave of it begins, by name.
+        files: of a node of a bus.yml: its EDS or DCF, and the URDF that has its joint.
     """
 
     file: str
@@ -41,6 +42,7 @@ class DeviceDescription:
     application: ServiceMaker = Application
     warnings: tuple[Finding, ...] = ()
     start: Mapping[str, Setting] = field(default_factory=dict)
+    files: tuple[Path, ...] = ()
 
     def make_dictionary(self) -> Dictionary:
         """Make the dictionary of one more slave."""

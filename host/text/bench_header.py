@@ -56,6 +56,7 @@ class DeviceEntry:
         config: its settings.
         node_id: of a CANopen node.
         sha256: of the file that its type names.
+        files: SHA-256 of the files that this one names, by their names.
         stored: what it had in its non-volatile memory.
     """
 
@@ -64,6 +65,7 @@ class DeviceEntry:
     config: Config = field(default_factory=dict)
     node_id: int | None = None
     sha256: str = ""
+    files: Mapping[str, Any] = field(default_factory=dict)
     stored: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -115,7 +117,7 @@ class BenchHeader:
 
 def _written(device: DeviceEntry) -> dict[str, object]:
     """Return what is written of a device: what it has."""
-    fields = ("wire", "type", "config", "node_id", "sha256", "stored")
+    fields = ("wire", "type", "config", "node_id", "sha256", "files", "stored")
     found = {name: getattr(device, name) for name in fields}
     return {name: value for name, value in found.items() if value not in ("", None, {})}
 
@@ -150,6 +152,7 @@ def _device(name: str, table: object) -> DeviceEntry:
         config,
         found.take("node_id", int, None),
         found.take("sha256", str, ""),
+        found.table("files", {}),
         found.table("stored", {}),
     )
 

@@ -54,8 +54,8 @@ def read_bus(
     if isinstance(found, BusNodes) and all(_is_same(*each) for each in versions.items()):
         return found
     bus = read_bus_file(path)
-    found, robot = _nodes_of(bus, urdf, cache, profile)
-    files = {path, *(slave.sheet for slave in bus.slaves.values()), *robot}
+    found = _nodes_of(bus, urdf, cache, profile)
+    files = {path, *(file for node in found.nodes for file in node.description.files)}
     versions = {file: version_of(file) for file in sorted(files)}
     cache.others[path, urdf, profile] = versions, found
     return found
@@ -87,13 +87,12 @@ def _is_same(file: Path, version: Version) -> bool:
 
 
 class _Made(NamedTuple):
-    """What became of a file: its slaves, what is wrong, what is odd, the robot."""
+    """What became of a file: its slaves, what is wrong, what is odd, what is added."""
 
     nodes: tuple[BusNode, ...]
     mistakes: list[Mistake]
     remarks: list[Mistake]
     added: list[Mistake]
-    robot: Urdf | None
 
 
 def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Made:
@@ -104,13 +103,10 @@ def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Ma
     except BusMistakesError as error:
         mistakes += error.mistakes
     maker = NodeMaker(bus, robot, cache, mistakes, profile)
-    return _Made(tuple(maker.nodes()), mistakes, maker.remarks, maker.added, robot)
+    return _Made(tuple(maker.nodes()), mistakes, maker.remarks, maker.added)
 
 
-def _nodes_of(
-    bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str
-) -> tuple[BusNodes, tuple[Path, ...]]:
-    """Return the slaves, and the file of the robot if there is one."""
+def _nodes_of(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> BusNodes:
     made = _made(bus, urdf, cache, profile)
     mistakes = [Mistake(Place(one.file, one.line), _said(one)) for one in bus.errors]
     mistakes += made.mistakes
@@ -119,7 +115,7 @@ def _nodes_of(
     if not bus.slaves:
         raise BusMistakesError([Mistake(Place(str(bus.path), 1), "no node with a dcf")])
     remarks = tuple(map(str, (*bus.warnings, *made.remarks, *made.added)))
-    return BusNodes(made.nodes, remarks), (Path(made.robot.name),) if made.robot else ()
+    return BusNodes(made.nodes, remarks)
 
 
 def _said(one: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isclose
+from pathlib import Path
 from typing import Any, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -92,6 +93,7 @@ class NodeMaker:
         self.remarks: list[Mistake] = []
         self.added: list[Mistake] = []
         self._joints = dict(self._joints_of(robot)) if robot else {}
+        self._robot = (Path(robot.name),) if robot else ()
 
     def nodes(self) -> Iterator[BusNode]:
         """Give all slaves of which something can be made."""
@@ -135,7 +137,8 @@ class NodeMaker:
         if keys.configured:
             written = {(each.index, each.sub_index): each.data for each in slave.writes}
             sheet = replace(sheet, template=with_values(sheet.template, written))
-        description = replace(sheet, application=application, start=start)
+        files = (slave.sheet, *self._robot)
+        description = replace(sheet, application=application, start=start, files=files)
         self._check_start(slave, keys, description)
         return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
 

@@ -154,7 +154,8 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
             stores[device.store] = StoreFile(device.store)
         memory = stores[device.store].nonvolatile(device.name, dictionary)
     slave = make_slave(dictionary, node_id, memory, description.application)
-    return slave, node_entry(device.wire, slave, kind, device.profile or AUTO)
+    profile, files = device.profile or AUTO, description.files
+    return slave, node_entry(device.wire, slave, kind, profile, files)
 
 
 def _body(plan: BodyPlan, mounts: Iterable[Mount]) -> BodyOnDrives:

@@ -28,7 +28,11 @@ PROFILE: Final = "profile"
 
 
 def node_entry(
-    wire: str, slave: CanopenSlave, device: Path | str = "", profile: str = AUTO
+    wire: str,
+    slave: CanopenSlave,
+    device: Path | str = "",
+    profile: str = AUTO,
+    files: Iterable[Path] = (),
 ) -> DeviceEntry:
     """Return what a trace says of a CANopen slave, before its first tick.
 
@@ -38,9 +42,10 @@ def node_entry(
         device: what it was made of: EDS or DCF, the name of a model, or `FILE.py:Class`; empty
             for the model that it says it is.
         profile: of `choices.PROFILES`, for a file.
+        files: what else it was made of.
 
     Raises:
-        OSError: the file cannot be read.
+        OSError: a file cannot be read.
     """
     file = _file_of(str(device)) if isinstance(device, str) else device
     memory = slave.nonvolatile
@@ -50,7 +55,8 @@ def node_entry(
         str(device) or slave.model,
         {PROFILE: profile} if isinstance(device, Path) else {},
         slave.configured_id,
-        sha256(file.read_bytes()).hexdigest() if file else "",
+        _hash(file) if file else "",
+        {each.name: _hash(each) for each in files},
         memory_values(memory) if stored else {},
     )
 
@@ -93,6 +99,8 @@ def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
     if profile not in PROFILES:
         raise ValueError(f"profile {profile!r:.60} is not one of {', '.join(PROFILES)}")
     description = describe(cache, device, profile)
+    for file in description.files if entry.files else ():
+        _check_same(file, entry.files.get(file.name))
     dictionary = description.make_dictionary()
     memory = _memory(entry, dictionary) if entry.stored else None
     slave = make_slave(dictionary, entry.node_id or 0, memory, description.application)
@@ -116,10 +124,19 @@ def _found(entry: DeviceEntry, folder: Path) -> Path | str:
     named = _file_of(entry.type) or Path(entry.type)
     for file in (named, folder / named, folder / named.name):
         if file.is_file():
-            if sha256(file.read_bytes()).hexdigest() != entry.sha256:
-                raise ValueError(f"{file} is another file than the one that was recorded")
+            _check_same(file, entry.sha256)
             return file if named == Path(entry.type) else f"{file}:{entry.type.rpartition(':')[2]}"
     raise ValueError(f"its file {named} is not here, nor beside the trace")
+
+
+def _hash(file: Path) -> str:
+    return sha256(file.read_bytes()).hexdigest()
+
+
+def _check_same(file: Path, recorded: object) -> None:
+    """Raise ValueError unless a file has the hash that was recorded."""
+    if _hash(file) != recorded:
+        raise ValueError(f"{file} is another file than the one that was recorded")
 
 
 def _file_of(device: str) -> Path | None:

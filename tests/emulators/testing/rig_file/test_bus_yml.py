@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -14,7 +15,9 @@ from tickrig.emulators.testing.commands.replay_cli import replay_command
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.testing import open_master
 
-IO_MODULE = Path(__file__).parents[4] / "examples/io_module.eds"
+EXAMPLES = Path(__file__).parents[4] / "examples"
+IO_MODULE = EXAMPLES / "io_module.eds"
+EXAMPLE = EXAMPLES / "ros2_canopen"
 
 TWO = f"""{ONE_JOINT}  tickrig: {{start: {{load_nm: 0.5}}, supply_v: 48, upper: 0.5}}
 
@@ -46,6 +49,39 @@ def test_a_test_presses_loads_unplugs_and_blocks_a_joint_by_its_name(tmp_path: P
         one.fault("unplugged")
         bench.run_for("20ms")
         assert float(one.get("shaft_deg_s")) > 5
+
+
+@pytest.mark.parametrize("name", ["bus.yml", "joint.eds", "arm.urdf"])
+def test_a_trace_replays_while_all_files_of_its_nodes_are_the_same(
+    tmp_path: Path, name: str
+) -> None:
+    for file in EXAMPLE.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    trace = tmp_path / "run.trace"
+    with open_bench(tmp_path / "bus.yml") as bench:
+        bench.run_for("10ms")
+        bench.save_trace(trace)
+    replay = CliRunner().invoke(replay_command, [str(trace)])
+    assert replay.output.startswith("identical: ")
+    (tmp_path / name).write_text((tmp_path / name).read_text() + "\n")
+    replay = CliRunner().invoke(replay_command, [str(trace)])
+    assert replay.exit_code == 2
+    file = tmp_path / name
+    assert f": {file} is another file than the one that was recorded\n" in replay.stderr
+
+
+def test_a_trace_without_the_files_that_a_bus_yml_names_replays(tmp_path: Path) -> None:
+    trace = tmp_path / "run.trace"
+    with open_bench(write_system(tmp_path, TWO)) as bench:
+        bench.run_for("10ms")
+        bench.save_trace(trace)
+    head, _, rest = trace.read_text().partition("\n")
+    mark, _, header = head.partition("{")
+    devices = json.loads("{" + header)
+    for device in devices["devices"].values():
+        assert set(device.pop("files")) == {"joint.eds"}
+    trace.write_text(f"{mark}{json.dumps(devices)}\n{rest}")
+    assert CliRunner().invoke(replay_command, [str(trace)]).output.startswith("identical: ")
 
 
 def test_the_shaft_runs_into_the_limit_switch_that_the_file_says(tmp_path: Path) -> None:
