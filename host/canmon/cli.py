@@ -23,6 +23,7 @@ VERBS: Final = {
         "Judge one CANopen node, clause by clause.",
     ),
     "eds": ("tickrig.host.canmon.eds.group:command", "Check, mend, compare and show EDS files."),
+    "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
     "graph": (f"{HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
     "nodes": (f"{HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
     "send": (f"{HERE}.send:command", "Send frames on BUS."),
@@ -52,6 +53,7 @@ def main() -> None:
     canmon nodes can0 --eds 3=drive.eds           all nodes
     canmon check run.log --no-emcy --nodes 3,5    exit status 1 if a rule is broken
     canmon conform can0 --node 5 --eds drive.eds  is this a CANopen node?
+    canmon net can0 scan                          find, address, configure, program nodes
     canmon tui can0                               all there is on one screen
 
     \b

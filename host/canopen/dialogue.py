@@ -157,6 +157,7 @@ class Dialogue:
         self._now_us, self.due_us = 0, NEVER
         self.job: QueuedScript | None = None
         self._step: Step | None = None
+        self._transfer: tuple[int, int] | None = None
         self._jobs: deque[QueuedScript] = deque()
 
     @property
@@ -184,6 +185,12 @@ class Dialogue:
         for job in dropped:
             job.script.close()
             job.dropped()
+
+    def abort(self, code: AbortCode) -> None:
+        """Forget all jobs; the node is told that the transfer under way has ended, if one was."""
+        if self.job is not None and self._transfer is not None:
+            self._say(Abort(*self._transfer, code).encode())
+        self.clear()
 
     def receive_sdo(self, now_us: int, data: bytes) -> None:
         """Take a response; one that nobody asked for, or too late, is passed over."""
@@ -251,6 +258,7 @@ class Dialogue:
         """Take a step; True if it waits."""
         match step:
             case SdoRequest():
+                self._transfer = step.index, step.sub
                 self._say(step.request)
                 self._step, self.due_us = step, self._now_us + self._sdo_timeout_us
             case AwaitState() | AwaitReport():

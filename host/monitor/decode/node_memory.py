@@ -47,6 +47,13 @@ def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
         EdsError: it has no object that can be used.
     """
     device, findings = read_sound(path)
+    return eds_objects(device, node_id, path.stem, findings)
+
+
+def eds_objects(
+    device: EdsDevice, node_id: int, name: str, findings: tuple[Finding, ...] = ()
+) -> EdsObjects:
+    """Return what the device of an EDS says of a node; `name` is for one that has none."""
     return EdsObjects(
         {(row.index, row.sub): _text(device, row) for row in device.entries},
         {
@@ -54,7 +61,7 @@ def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
             for row in device.entries
             if row.has_default and row.data_type.is_integer
         },
-        device.info.product_name or path.stem,
+        device.info.product_name or name,
         findings,
     )
 

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Script
+from tickrig.host.canopen.dialogue import Dialogue, Script
 from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.canopen.script_run import run_script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import Abort
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
 
 T = TypeVar("T")
 
@@ -65,18 +66,8 @@ class SdoClient:
 
     def run(self, script: Script[T]) -> T:
         """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
-        ended: list[T | Exception] = []
         talk = Dialogue(self._node_id, self._send)
-        talk.start(self._exchange.now_us, QueuedScript("", script, ended.append, ended.append))
-        while not ended:
-            now_us, frames = self._exchange.listen(talk.due_us)
-            for _, frame in frames:
-                if frame[:1] + frame[2:4] == (RESPONSE_COB_ID + self._node_id, False, False):
-                    talk.receive_sdo(now_us, frame.data)
-            talk.tick(now_us)
-        if isinstance(ended[0], Exception):
-            raise ended[0]
-        return ended[0]
+        return run_script(talk, self._node_id, script, self._exchange.now_us, self._exchange.listen)
 
     def _send(self, can_id: int, data: bytes) -> None:
         self._exchange.send(data_frame(can_id, data))

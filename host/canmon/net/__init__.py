@@ -1,0 +1,1 @@
+"""The verbs of `canmon net`: a CANopen network set to work."""

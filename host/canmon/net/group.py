@@ -1,0 +1,76 @@
+"""The verb `net`: a CANopen network, set to work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import click
+
+from tickrig.host.cli.can_options import BusOptions, bus_options, spread
+from tickrig.host.cli.lazy_group import LazyGroup
+from tickrig.host.cli.options import time_option
+
+HERE: Final = "tickrig.host.canmon.net"
+VERBS: Final = {
+    "scan": (f"{HERE}.scan_verb:command", "Say which nodes are there."),
+    "nmt": (f"{HERE}.nmt_verb:command", "Start, stop or reset a node, or all nodes."),
+    "read": (f"{HERE}.read_verb:command", "Read objects of a node."),
+    "write": (f"{HERE}.write_verb:command", "Write objects of a node."),
+}
+ANSWER_US: Final = 500_000
+
+
+@dataclass(frozen=True, slots=True)
+class NetCall:
+    """What stands before the verb.
+
+    Attributes:
+        word: SOURCE; None where the options name a bus.
+        bus: what the options say of a bus.
+        timeout_us: how long an answer is waited for.
+    """
+
+    word: str | None
+    bus: BusOptions
+    timeout_us: int
+
+
+class NetGroup(LazyGroup):
+    """A group with SOURCE before its verbs, unless options name the bus."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Put an empty SOURCE where a verb comes first."""
+        args = spread(args)
+        found, rest, _ = self.make_parser(ctx).parse_args(list(args))
+        if found.get("source") in self.commands:
+            args.insert(len(args) - len(rest) - 1, "")
+        return super().parse_args(ctx, args)
+
+
+@click.group(cls=NetGroup, commands=VERBS, subcommand_metavar="VERB [ARGS]...")
+@click.argument("source", required=False)
+@time_option("--timeout", "timeout_us", help="How long a node may take to answer.  [500ms]")
+@bus_options
+@click.pass_context
+def command(
+    context: click.Context, /, source: str | None, timeout_us: int | None, **options: Any
+) -> None:
+    """Set a CANopen network to work: find, address, configure and program its nodes.
+
+    SOURCE is a bus, or a rig file in virtual time. In place of it -i and -c name
+    interface and channel of a bus, as python-can does. What writes asks first, or
+    wants --yes; what may turn a motor says so. In a rig nobody is asked.
+
+    \b
+    canmon net can0 scan                          which nodes are there?
+    canmon net can0 read 5 device_name 1018h:1    objects by name or index
+    canmon net can0 write 5 heartbeat_time=100
+    canmon net can0 nmt start 5
+
+    \b
+    Exit status  0 all is done            2 usage
+                 1 a node refused, did    3 the bus or a file failed
+                   not answer, or differs
+    """  # noqa: D301 - click wants the backspace
+    context.obj = NetCall(source or None, BusOptions(**options), timeout_us or ANSWER_US)

@@ -1,0 +1,163 @@
+"""The objects of a node by name: from its EDS, else those that CiA 301 and CiA 402 name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canmon.conform.conformance import opened_eds
+from tickrig.host.canmon.net.session import NetSession
+from tickrig.host.canopen.conform.subject.other_device import TOLD, other_device
+from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.decode.node_memory import NodeMemory, eds_objects
+from tickrig.host.monitor.decode.object_text import (
+    ObjectText,
+    describe_drive,
+    describe_standard,
+)
+from tickrig.host.monitor.decode.sdo.transfer import write_entry
+from tickrig.host.text.names import near
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
+from tickrig.wire.canopen.eds.object_table import EntryDescription
+
+Entry = tuple[int, int]
+
+ADDRESS: Final = re.compile(
+    r"(?:0x)?([0-9a-f]{4})h?(?:(?::|sub|/)(?:0x)?([0-9a-f]{1,2})h?)?", re.IGNORECASE
+)
+COMMUNICATION: Final = range(0x1000, 0x2000)
+DRIVE: Final = range(0x6000, 0x6100)
+SUBS: Final = range(9)
+"""Of the objects that CiA 301 names, to be found by name without an EDS."""
+
+
+class NodeObjects:
+    """What is known of the objects of one node.
+
+    Args:
+        node_id: the node.
+        device: what its EDS says, None without one.
+        name: of the EDS.
+    """
+
+    def __init__(self, node_id: int, device: EdsDevice | None = None, name: str = "") -> None:
+        self.node_id, self.device = node_id, device
+        eds = None if device is None else eds_objects(device, node_id, name)
+        self._memory = NodeMemory(eds)
+        entries = device.entries if device is not None else ()
+        self.rows: dict[Entry, EntryDescription] = {(one.index, one.sub): one for one in entries}
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is a drive of CiA 402, as far as is known."""
+        return self._memory.is_drive
+
+    def learn(self, entry: Entry, data: bytes) -> None:
+        """Take what the node says of itself, as its device type."""
+        self._memory.read(entry, data)
+
+    def text(self, entry: Entry) -> ObjectText:
+        """Return name, type and unit of an object."""
+        return self._memory.describe(*entry)
+
+    def size(self, entry: Entry) -> int:
+        """Return the size of an object in bytes, 0 where it varies or nobody knows."""
+        kind = self.text(entry).kind
+        return 0 if kind is None else kind.size
+
+    def title(self, entry: Entry) -> str:
+        """Write index, sub-index and name of an object."""
+        return f"{write_entry(entry)} {self.text(entry).name}".rstrip()
+
+    def find(self, word: str) -> Entry:
+        """Return the object that a word names: `statusword`, `1018h:1`, `0x6041`.
+
+        Raises:
+            Refused: none is called so.
+        """
+        if (entry := self._names.get(word.casefold())) is not None:
+            return entry
+        if match := ADDRESS.fullmatch(word):
+            return int(match[1], 16), int(match[2] or "0", 16)
+        raise Refused(
+            f"no object {word!r} of node {self.node_id}; {near(word.casefold(), self._names)}"
+            " An index is written 6041h, or 1018h:1"
+        )
+
+    @cached_property
+    def _names(self) -> dict[str, Entry]:
+        found: dict[str, Entry] = {}
+        for entry in sorted(self.rows) if self.rows else self._standard():
+            if name := self.text(entry).name:
+                found.setdefault(name, entry)
+        for entry in self.rows:  # those of CiA 301 mean the same object, where it is there
+            standard = describe_standard(*entry)
+            if standard is not None:
+                found.setdefault(standard.name, entry)
+        return found
+
+    def _standard(self) -> Iterator[Entry]:
+        """Yield the objects that CiA 301 names, and those of CiA 402 if it is a drive."""
+        for index in COMMUNICATION:
+            for sub in SUBS:
+                if describe_standard(index, sub) is not None:
+                    yield index, sub
+        if self.is_drive:
+            yield from ((index, 0) for index in DRIVE if describe_drive(index, 0) is not None)
+
+
+DEVICE_TYPE: Final = (0x1000, 0)
+
+
+def known_objects(session: NetSession, node_id: int, eds: Path | None) -> NodeObjects:
+    """Return what is known of the objects of a node; who it is is read from it.
+
+    An EDS of another device is told.
+
+    Raises:
+        Refused: the EDS cannot be used.
+        SdoFailed: the node does not answer.
+    """
+    file = opened_eds(eds) if eds is not None else session.source.eds.get(node_id)
+    device = None if file is None else read_device(file)
+    objects = NodeObjects(node_id, device, "" if file is None else Path(file.name).stem)
+    data = session.bus.read(node_id, *DEVICE_TYPE, 4)
+    objects.learn(DEVICE_TYPE, data)
+    if eds is not None and device is not None:
+        about = {"device type": as_hex(data)}
+        for name, at in list(TOLD.items())[1:]:
+            if (said := _number(session, node_id, at)) is not None:
+                about[name] = said
+        if text := other_device(device, about):
+            say(f"warning: node {node_id}: {text}")
+    return objects
+
+
+def as_hex(data: bytes) -> str:
+    """Write a number of 32 bits."""
+    return f"{int.from_bytes(data, 'little'):08X}h"
+
+
+def _number(session: NetSession, node_id: int, at: Entry) -> str | None:
+    try:
+        return as_hex(session.bus.read(node_id, *at, 4))
+    except SdoFailed:
+        return None
+
+
+TYPES: Final = {
+    "bool": DataType.BOOLEAN,
+    **{f"i{bits}": DataType[f"INTEGER{bits}"] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
+    **{f"u{bits}": DataType[f"UNSIGNED{bits}"] for bits in (8, 16, 24, 32, 40, 48, 56, 64)},
+    "f32": DataType.REAL32,
+    "f64": DataType.REAL64,
+    "text": DataType.VISIBLE_STRING,
+    "hex": DataType.OCTET_STRING,
+}
+"""Types as they stand before a value, where no EDS names one: `u16:5`."""

@@ -1,0 +1,68 @@
+"""What a command may do in the world, in a sentence: empty where it moves nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from tickrig.host.canmon.net.node_objects import Entry, NodeObjects
+from tickrig.wire.canopen.nmt import NmtCommand
+
+DRIVE_AREA: Final = range(0x6000, 0xA000)
+"""Objects of the device profiles; those of CiA 402 for eight axes, each 800h further."""
+AXIS: Final = 0x800
+COMMANDS: Final = {
+    0x40: "controlword",
+    0x42: "target velocity of vl mode",
+    0x5A: "quick stop option",
+    0x60: "mode of operation",
+    0x71: "target torque",
+    0x7A: "target position",
+    0x98: "homing method",
+    0xC1: "interpolated position",
+    0xFF: "target velocity",
+}
+"""What turns a motor, by the low part of the index (CiA 402-2)."""
+MANUFACTURER: Final = range(0x2000, 0x6000)
+DRIVE_PROFILE: Final = 402
+IO_PROFILE: Final = 401
+SEVERAL: Final = 0xFFFF
+
+
+def write_risk(objects: NodeObjects, entries: Iterable[Entry]) -> str:
+    """Say what writing objects may move."""
+    indices = [index for index, _ in entries]
+    profile = [index for index in indices if index in DRIVE_AREA]
+    told = [name for index in profile if (name := COMMANDS.get((index - 0x6000) % AXIS))]
+    if told and objects.is_drive:
+        return f"This may turn a motor: {', '.join(dict.fromkeys(told))}"
+    if profile:
+        return f"This may move what the node drives: {_listed(profile)} is of its device profile"
+    maker = [index for index in indices if index in MANUFACTURER]
+    if maker:
+        return f"What {_listed(maker)} does its maker knows; it may move something"
+    return ""
+
+
+def nmt_risk(command: NmtCommand, device_type: int | None) -> str:
+    """Say what an NMT command may move at one node.
+
+    Args:
+        command: what is commanded.
+        device_type: 1000h of the node, None if it does not say it.
+    """
+    profile = SEVERAL if device_type is None else device_type & 0xFFFF
+    may_turn = profile in (DRIVE_PROFILE, SEVERAL)
+    if command is NmtCommand.START:
+        if may_turn:
+            return "This may turn a motor: a drive that is Operational obeys RPDOs"
+        return "Outputs may switch: a node that is Operational obeys RPDOs"
+    if command is NmtCommand.ENTER_PRE_OPERATIONAL:
+        return "It obeys RPDOs no more: what moves may go on as it is"
+    if may_turn:
+        return "A drive may let go of its motor: what hangs on it may fall"
+    return "Its outputs may switch to their error values"
+
+
+def _listed(indices: Iterable[int]) -> str:
+    return ", ".join(f"{index:04X}h" for index in dict.fromkeys(indices))

@@ -1,0 +1,73 @@
+"""Values of objects, as people read and write them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.canmon.net.node_objects import TYPES, Entry, NodeObjects
+from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.decode.object_text import ObjectText, drive_state
+from tickrig.host.monitor.dictionary.node_dictionary import encode_value
+from tickrig.wire.canopen.datatypes import DataType
+
+STATUSWORD: Final = (0x6041, 0)
+MOST_SHOWN: Final = 64
+"""Bytes of a domain; of longer ones the number is told."""
+
+
+def shown(objects: NodeObjects, entry: Entry, data: bytes) -> str:
+    """Write a value with its unit; whole numbers in hex too."""
+    text = objects.text(entry)
+    if len(data) > MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
+        return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
+    value, said = text.read(data)
+    if entry == STATUSWORD and objects.is_drive and isinstance(value, int):
+        return f"{value} ({said}) {drive_state(value)}"
+    if text.in_hex and isinstance(value, int):
+        return f"{value} ({said})"
+    unit = f" {text.unit}" if text.unit else ""
+    if text.kind is not None and text.kind.is_integer and text.kind is not DataType.BOOLEAN:
+        return f"{said}{unit} (0x{int.from_bytes(data, 'little'):0{2 * len(data)}X})"
+    return f"{said}{unit}"
+
+
+def encoded(objects: NodeObjects, entry: Entry, words: str) -> bytes:
+    """Return the bytes of a value, as `100`, `0x64`, `-1.5` in the object's unit, `u16:100`.
+
+    Raises:
+        Refused: it is no value of this object.
+    """
+    text = objects.text(entry)
+    kind, colon, rest = words.partition(":")
+    if colon and kind in TYPES:
+        text, words = ObjectText(text.name, TYPES[kind]), rest
+    if text.kind is None:
+        raise Refused(
+            f"the type of {objects.title(entry)} is not known: give its EDS (--eds FILE), or the"
+            f" type before the value, as u16:100; types: {', '.join(TYPES)}"
+        )
+    try:
+        data = encode_value(text, words)
+    except ValueError as error:
+        raise Refused(f"{objects.title(entry)}: {error}{_range(text)}") from None
+    return data
+
+
+def _range(text: ObjectText) -> str:
+    """Say which numbers a whole number may be."""
+    kind = text.kind
+    if kind is None or not kind.is_integer:
+        return ""
+    low = -(1 << kind.bits - 1) if kind.signed else 0
+    high = (1 << kind.bits - kind.signed) - 1
+    factor = text.factor
+    return f" ({low * factor:g} to {high * factor:g})" if factor != 1 else f" ({low} to {high})"
+
+
+def limits(objects: NodeObjects, entry: Entry) -> str:
+    """Say what the EDS allows of a value; empty where it says nothing."""
+    row = objects.rows.get(entry)
+    if row is None or (row.low is None and row.high is None):
+        return ""
+    low, high = ("..." if bound is None else f"{bound}" for bound in (row.low, row.high))
+    return f"; the EDS allows {low} to {high}"

@@ -1,0 +1,1 @@
+"""What sets a CANopen network to work: its nodes found, addressed, configured, programmed."""

@@ -1,0 +1,145 @@
+"""The verbs of `canmon net` on rigs in virtual time: what they do, and what they say."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tickrig.device import make_epos
+from tickrig.host.canmon.cli import main
+from tickrig.wire.canopen.eds.eds_writer import write_eds
+
+RIG = """\
+[device.drive]
+type = "epos"
+node_id = 5
+
+[device.module]
+type = "f-palette"
+node_id = 16
+"""
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> str:
+    path = tmp_path / "bench.toml"
+    path.write_text(RIG)
+    return str(path)
+
+
+def net(*words: str) -> Result:
+    return CliRunner().invoke(main, ["net", *words], catch_exceptions=False)
+
+
+def test_a_scan_lists_nodes_with_profile_identity_and_name(rig: str) -> None:
+    result = net(rig, "scan")
+    assert result.exit_code == 0
+    assert [line.split() for line in result.stdout.splitlines()] == [
+        ["5", "CiA", "402", "drive", "00000000:00006210:00010000:00000001", "EPOS"],
+        ["16", "CiA", "401", "I/O", "00000000:00000001:00010000:00000001", "f-palette"],
+    ]
+    said = [json.loads(line) for line in net(rig, "scan", "--json").stdout.splitlines()]
+    assert [node["node"] for node in said] == [5, 16]
+
+
+def test_objects_are_read_by_name_and_by_index(rig: str) -> None:
+    result = net(rig, "read", "5", "statusword", "1018h:2", "manufacturer_device_name", "0x6060")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines() == [
+        "6041h:00 statusword = 848 (0x0350) switch on disabled",
+        "1018h:02 identity_object.product_code = 25104 (0x00006210)",
+        "1008h:00 manufacturer_device_name = 'EPOS'",
+        "6060h:00 modes_of_operation = 1 (0x01)",
+    ]
+
+
+def test_names_of_the_standard_mean_the_same_object(rig: str) -> None:
+    assert net(rig, "read", "5", "device_name").stdout.startswith("1008h:00 manufacturer_dev")
+
+
+def test_all_that_the_eds_names_is_read(rig: str) -> None:
+    result = net(rig, "read", "5", "--json")
+    assert result.exit_code == 1, "1003h:01 has no data"
+    said = {(one["index"], one["sub"]): one for one in map(json.loads, result.stdout.splitlines())}
+    assert said[0x1000, 0]["value"] == 0x20192
+    assert "1003h:01 pre_defined_error_field.error_1: refused: no data" in result.stderr
+
+
+def test_objects_are_written_and_what_may_turn_a_motor_is_told(rig: str) -> None:
+    result = net(rig, "write", "5", "controlword=6", "heartbeat_time=0x64")
+    assert result.exit_code == 0, result.output
+    assert result.stderr.splitlines() == [
+        "writes to node 5: 6040h:00 controlword = 6, 1017h:00 producer_heartbeat_time = 0x64."
+        " This may turn a motor: controlword",
+        "written: 6040h:00 controlword = 6",
+        "written: 1017h:00 producer_heartbeat_time = 0x64",
+    ]
+
+
+def test_what_a_node_refuses_ends_it_and_says_what_was_done(rig: str) -> None:
+    result = net(rig, "write", "5", "1017h=5", "1008h=text:x", "1017h=7")
+    assert result.exit_code == 1
+    assert result.stderr.splitlines()[-1] == (
+        "Error: node 5: 1008h:00 manufacturer_device_name: refused: object is read only"
+        " (06010002h); done: 1017h:00 producer_heartbeat_time = 5; not done:"
+        " 1008h:00 manufacturer_device_name = text:x, 1017h:00 producer_heartbeat_time = 7"
+    )
+
+
+def test_nmt_commands_and_what_comes_of_them(rig: str) -> None:
+    result = net(rig, "nmt", "reset-node", "5")
+    assert (result.exit_code, result.stderr.splitlines()[-1]) == (0, "node 5: boot-up")
+    result = net(rig, "nmt", "start", "5")
+    assert "This may turn a motor" in result.stderr
+    assert result.stderr.endswith("node 5: sent; it has no heartbeat that tells its state\n")
+    result = net(rig, "nmt", "reset-comm", "ALL")
+    assert result.stderr.splitlines()[1:] == ["node 5: boot-up", "node 16: boot-up"]
+
+
+def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
+    path = tmp_path / "drive.eds"
+    path.write_text(write_eds(make_epos(5).dictionary.description), "utf-8")
+    result = net(rig, "read", "16", "1000h", "--eds", str(path))
+    assert "warning: node 16: this EDS is of another device: device type" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "why"),
+    [
+        (("read", "5", "stausword"), 2, "no object 'stausword' of node 5; did you mean 'status"),
+        (("read", "7", "1000h"), 2, "has no node 7; its nodes: 5, 16"),
+        (("read", "128", "1000h"), 2, "128 is not in the range 1<=x<=127"),
+        (("read", "5", "1000h", "--eds", "nosuch.eds"), 2, "--eds nosuch.eds: No such file"),
+        (("write", "5", "controlword"), 2, "'controlword' is not OBJECT=VALUE"),
+        (("write", "5", "controlword=-1"), 2, "-1 is not in the range of UNSIGNED16 (0 to 65535)"),
+        (("write", "5", "controlword=x"), 2, "'x' is no number; controlword is UNSIGNED16"),
+        (("write", "5", "2222h=1"), 2, "the type of 2222h:00 is not known: give its EDS"),
+        (("write", "5", "2222h=u16:1"), 1, "2222h:00: refused: object does not exist"),
+        (("write", "5", "1018h:9=u8:1"), 1, "refused: sub-index does not exist"),
+        (("nmt", "start", "0"), 2, "'0' is no node-ID 1..127, and not all"),
+        (("nmt", "sart", "5"), 2, "'sart' is not one of 'start'"),
+        (("red", "5"), 2, "No such command 'red'"),
+        (("scan", "--wait", "x"), 2, "--wait 'x' is not a time"),
+    ],
+)
+def test_what_cannot_be_is_one_line(
+    rig: str, words: tuple[str, ...], status: int, why: str
+) -> None:
+    result = net(rig, *words)
+    assert result.exit_code == status, result.output
+    (told,) = (line for line in result.stderr.splitlines() if line.startswith("Error:"))
+    assert why in told
+
+
+def test_what_answers_nothing_is_no_source() -> None:
+    assert "no SOURCE: name a bus as can0" in net("scan").stderr
+    assert "is no bus: a log holds what was said" in net("run.log", "scan").stderr
+
+
+def test_a_bus_may_stand_in_options() -> None:
+    result = net("-i", "nosuch", "-c", "x", "scan")
+    assert result.exit_code == 2
+    assert "-i 'nosuch' is none of python-can" in result.stderr
