@@ -19,30 +19,34 @@ from tickrig.wire.canopen.eds.eds_writer import write_eds
 BOOT_US = 100_000
 """All nodes have booted by then."""
 
+Buses = dict[str, dict[str, CanopenSlave]]
+"""The slaves on each CAN bus, by their names."""
 
-def bench_source(mode: BenchMode, node_id: int | None = None, name: str = "") -> ConformSource:
+
+def bench_source(
+    mode: BenchMode, node_id: int | None = None, name: str = "", device: str = ""
+) -> ConformSource:
     """Return where the nodes of a bench are; some time passes on it.
 
     Args:
         mode: of the bench; its time is virtual.
         node_id: of the node whose bus it is; that of the first node if nobody says it.
         name: of the bench, for people.
+        device: of which the bus is wanted, by its name; empty for any.
 
     Raises:
-        ValueError: it is in another mode, has no CANopen node, or none of this node-ID.
+        ValueError: it is in another mode, has no CANopen node, none of this node-ID, or some on
+            several buses; or the device is none.
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
     mode.run_for(BOOT_US)
-    buses = mode.act(_slaves)
-    nodes = {slave.node_id: (bus, each) for bus in buses for each, slave in buses[bus].items()}
-    if not nodes:
-        raise ValueError(f"{name or 'the bench'} has no CANopen node")
-    if node_id is not None and node_id not in nodes:
-        known = ", ".join(map(str, sorted(nodes)))
-        raise ValueError(f"{name or 'the bench'} has no node {node_id}; its nodes: {known}")
-    bus = nodes[min(nodes) if node_id is None else node_id][0]
+    buses = {bus: on for bus, on in mode.act(_slaves).items() if not device or device in on}
+    if device and not buses:
+        raise ValueError(f"{device} is no CANopen node")
+    bus = _bus_of(buses, node_id, name or (device and f"the bus of {device}") or "the bench")
     slaves = buses[bus]
+    names = {slave.node_id: each for each, slave in slaves.items()}
     crashes = mode.act(lambda rig: _watch_nodes(_mount(rig, bus)))
     return ConformSource(
         mode.act(lambda rig: CanHost(rig.rig, _mount(rig, bus).open_end())),
@@ -50,14 +54,28 @@ def bench_source(mode: BenchMode, node_id: int | None = None, name: str = "") ->
         "a rig in virtual time",
         mode.act(lambda rig: _mount(rig, bus).wire.bit_rate),
         virtual=True,
-        nodes={number: nodes[number][1] for number in sorted(nodes) if nodes[number][0] == bus},
+        nodes=dict(sorted(names.items())),
         eds={slave.node_id: eds_of(slave, f"{each}.eds") for each, slave in slaves.items()},
         stimulus=lambda number: guarded(
-            BenchStimulus(BenchDevice(mode, nodes[number][1]), slaves[nodes[number][1]])
+            BenchStimulus(BenchDevice(mode, names[number]), slaves[names[number]])
         ),
         close=lambda: mode.act(lambda rig: _watch_no_more(_mount(rig, bus))),
-        watch=lambda number, run: _watch(crashes, nodes[number][1], run),
+        watch=lambda number, run: _watch(crashes, names[number], run),
     )
+
+
+def _bus_of(buses: Buses, node_id: int | None, name: str) -> str:
+    """Return the bus on which a node is; that of the lowest node-ID if none is given."""
+    nodes = sorted((slave.node_id, bus) for bus, on in buses.items() for slave in on.values())
+    if not nodes:
+        raise ValueError(f"{name} has no CANopen node")
+    found = dict.fromkeys(bus for number, bus in nodes if node_id in (None, number))
+    if not found:
+        known = ", ".join(str(number) for number, _ in nodes)
+        raise ValueError(f"{name} has no node {node_id}; its nodes: {known}")
+    if node_id is not None and len(found) > 1:
+        raise ValueError(f"{name} has a node {node_id} on each of {', '.join(found)}: leave one")
+    return next(iter(found))
 
 
 def eds_of(slave: CanopenSlave, name: str) -> EdsFile:
@@ -65,7 +83,7 @@ def eds_of(slave: CanopenSlave, name: str) -> EdsFile:
     return EdsFile(name, write_eds(slave.dictionary.description))
 
 
-def _slaves(rig: BenchRig) -> dict[str, dict[str, CanopenSlave]]:
+def _slaves(rig: BenchRig) -> Buses:
     """Return the slaves on each CAN bus, by their names."""
     return {
         mount.name: {name: node.slave for name, node in mount.nodes.items()}

@@ -79,7 +79,7 @@ def conformance(  # noqa: PLR0913 - by keyword
     0
     """
     chosen_level, names = level_of(level), names_of(only)
-    with closing(_source(node, bit_rate, stimulus)) as source:
+    with closing(_source(node, node_id, bit_rate, stimulus)) as source:
         number = node_id_of(node, node_id)
         plan = Plan(
             level=chosen_level,
@@ -98,14 +98,16 @@ def conformance(  # noqa: PLR0913 - by keyword
         return run.run()
 
 
-def _source(node: Node, bit_rate: int, stimulus: Stimulus | None) -> ConformSource:
+def _source(
+    node: Node, node_id: int | None, bit_rate: int, stimulus: Stimulus | None
+) -> ConformSource:
     """Return the bus on which a node is."""
     if isinstance(node, CanopenSlave):  # alone: a bench and its journal took a quarter more
         source = SlaveBench(node, bit_rate, stimulus or SlaveStimulus(node)).source
         name = f"node{node.node_id}"
         return replace(source, name="can", eds={node.node_id: eds_of(node, f"{name}.eds")})
     if isinstance(node, BenchDevice):
-        source = bench_source(node._mode)
+        source = bench_source(node._mode, node_id, device=node.name)
         return replace(source, stimulus=lambda number: guarded(stimulus)) if stimulus else source
     if isinstance(node, Slave) and not isinstance(node, type):
         return SlaveBench(node, bit_rate, stimulus).source

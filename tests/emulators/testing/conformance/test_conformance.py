@@ -4,6 +4,7 @@ import re
 import struct
 from collections.abc import Callable
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,7 +15,9 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import SERVICES
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.conformance.conformance import conformance
+from tickrig.emulators.testing.conformance.rig_source import open_rig
 from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.verdict import Report, Verdict
@@ -40,6 +43,53 @@ def test_a_device_of_a_bench_is_judged_beside_others() -> None:
         report = conformance(bench["right"], only=NMT)
         assert (report.node_id, report.exit_status) == (2, 0)
         assert bench["left"].get("state") == "Pre-operational"
+
+
+TWO_BUSES = """\
+[wire.one]
+type = "can"
+[wire.two]
+type = "can"
+[device.left]
+type = "epos"
+wire = "one"
+node_id = 5
+[device.right]
+type = "epos"
+wire = "two"
+node_id = {right}
+[device.remote]
+type = "rrc"
+"""
+
+
+def two_buses(tmp_path: Path, right: int = 6) -> Path:
+    path = tmp_path / "two.toml"
+    path.write_text(TWO_BUSES.format(right=right))
+    return path
+
+
+def test_a_device_of_a_bench_is_judged_on_its_own_bus(tmp_path: Path) -> None:
+    with Bench.of_plan(read_rig_file(two_buses(tmp_path))) as bench:
+        report = conformance(bench["right"], only="NMT-03")
+    assert (report.node_id, report.source, report.exit_status) == (6, "two", 0)
+
+
+def test_a_bench_is_asked_only_for_nodes_that_it_has(tmp_path: Path) -> None:
+    with Bench.of_plan(read_rig_file(two_buses(tmp_path))) as bench:
+        for node_id in (6, 9):
+            with pytest.raises(ValueError, match=f"of left has no node {node_id}; its nodes: 5$"):
+                conformance(bench["left"], node_id=node_id)
+        with pytest.raises(ValueError, match="remote is no CANopen node"):
+            conformance(bench["remote"])
+
+
+def test_one_node_id_on_two_buses_is_refused(tmp_path: Path) -> None:
+    path = two_buses(tmp_path, right=5)
+    with pytest.raises(ValueError, match="has a node 5 on each of one, two: leave one"):
+        open_rig(path, 5)
+    with Bench.of_plan(read_rig_file(path)) as bench:
+        assert conformance(bench["right"], only="NMT-03").source == "two"
 
 
 def test_a_node_has_not_failed_because_another_one_answers() -> None:
