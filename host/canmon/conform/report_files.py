@@ -17,9 +17,6 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 
 HTML: Final = "--html"
-JUNIT: Final = "--junit"
-BADGE: Final = "--badge"
-WRITE_BASELINE: Final = "--write-baseline"
 
 
 def check_files(files: Mapping[str, Path]) -> None:

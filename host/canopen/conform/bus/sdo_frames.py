@@ -20,7 +20,6 @@ from tickrig.wire.canopen.sdo.sdo_command import (
 UPLOAD: Final = 0x40
 UPLOADED: Final = 0x43
 DOWNLOAD: Final = 0x23
-DOWNLOADED: Final = 0x60
 ABORTED: Final = 0x80
 
 

@@ -36,11 +36,6 @@ def parse_step(line: str) -> Step:
     raise ValueError(f"{line!r} is no step; docs/conform.md has the notation")
 
 
-def parse_steps(text: str) -> tuple[Step, ...]:
-    """Read lines; ValueError names the first that is none of the notation."""
-    return tuple(parse_step(line) for line in text.split("\n"))
-
-
 def _expect(patterns: str, within_ms: str | None) -> Step:
     return {"expect": patterns.split(" or "), "in": int(within_ms or ANSWER_MS)}
 
@@ -71,12 +66,6 @@ def _refuse_read(target: str, codes: str) -> Step:
 
 def _macro(name: str, words: str) -> Step:
     return {"macro": [name, *words.split()]}
-
-
-def _compile(
-    pattern: str, make: Callable[..., Step]
-) -> tuple[re.Pattern[str], Callable[..., Step]]:
-    return re.compile(pattern), make
 
 
 _LINES: Final[tuple[tuple[str, Callable[..., Step]], ...]] = (
