@@ -22,7 +22,7 @@ from tickrig.emulators.testing.conformance.conformance import (
     names_of,
     node_id_of,
 )
-from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.notation.suite import suite_checks
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
@@ -84,8 +84,7 @@ def conformance_tests(
     options |= {"eds": eds, "level": level}
     objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
     known_to_fail = NONE_KNOWN if baseline is None else Baseline.read(Path(baseline))
-    suite = [check for group in read_suite() for check in group.checks]
-    names = [check.id for check in (*suite, *objects) if plan.chooses(check)]
+    names = [check.id for check in (*suite_checks(), *objects) if plan.chooses(check)]
     parametrised = pytest.mark.parametrize("check_id", names)
     if isinstance(node, str):
         return parametrised(_test_on_bench(node, options, known_to_fail))

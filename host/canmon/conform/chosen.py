@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from tickrig.host.canopen.conform.check import Check, Level
-from tickrig.host.canopen.conform.notation.suite import OBJECTS, group_titles, read_suite
+from tickrig.host.canopen.conform.notation.suite import OBJECTS, group_titles, suite_checks
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.names import closest
@@ -27,7 +27,7 @@ def unknown(words: Iterable[str]) -> list[str]:
     Args:
         words: groups or ids, with * and ?.
     """
-    suite = _suite()
+    suite = suite_checks()
 
     def is_one(word: str) -> bool:
         plan = Plan(Level.INTRUSIVE, (word,))
@@ -48,7 +48,7 @@ def chosen(only: Sequence[str]) -> list[Check]:
     """
     for text in unknown(only):
         raise Refused(f"--only {text}; see --list")
-    return list(filter(Plan(Level.INTRUSIVE, tuple(only)).chooses, _suite()))
+    return list(filter(Plan(Level.INTRUSIVE, tuple(only)).chooses, suite_checks()))
 
 
 def _near(word: str, suite: list[Check]) -> str:
@@ -57,10 +57,6 @@ def _near(word: str, suite: list[Check]) -> str:
     if close := closest(word.upper(), sorted([*groups, *(check.id for check in suite)])):
         return f"did you mean {close[0]!r}?"
     return f"groups: {', '.join(groups)}"
-
-
-def _suite() -> list[Check]:
-    return [check for group in read_suite() for check in group.checks]
 
 
 def check_chosen(only: Sequence[str], level: Level) -> None:

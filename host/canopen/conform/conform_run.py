@@ -16,7 +16,7 @@ from tickrig.host.canopen.conform.bus.steps import Player
 from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
 from tickrig.host.canopen.conform.check import Check, Level
 from tickrig.host.canopen.conform.judge import Judge
-from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.notation.suite import suite_checks
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.objects.object_steps import play_object_step
 from tickrig.host.canopen.conform.plan import Plan
@@ -137,7 +137,7 @@ class ConformRun:
         except (SdoFailed, StepFailed, Disturbed) as error:
             return self._give_up(error)
         assert self._subject is not None
-        checks = [*_suite(), *self._object_checks()]
+        checks = [*suite_checks(), *self._object_checks()]
         self._judge_all([check for check in checks if self._plan.chooses(check)])
         return ""
 
@@ -146,7 +146,7 @@ class ConformRun:
         presence = self._exchange.presence
         crashed = next(iter(self._crashes), "")
         if crashed or presence is Presence.ONE:
-            self._block([*_suite()], crashed or str(error))
+            self._block(suite_checks(), crashed or str(error))
             return ""
         self._absent = True
         if presence is Presence.NONE:
@@ -154,7 +154,7 @@ class ConformRun:
         else:
             reason = f"each request is answered twice: two nodes have ID {self._node_id}?"
             verdict = Verdict.INCONCLUSIVE
-        self._block([*_suite()], reason, verdict)
+        self._block(suite_checks(), reason, verdict)
         return reason
 
     def _nobody(self) -> str:
@@ -241,7 +241,3 @@ class ConformRun:
             absent=self._absent,
             doubt=other_device(self._device, subject.about) if subject else "",
         )
-
-
-def _suite() -> list[Check]:
-    return [check for group in read_suite() for check in group.checks]

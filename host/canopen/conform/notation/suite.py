@@ -36,14 +36,20 @@ class Group(NamedTuple):
     checks: tuple[Check, ...]
 
 
+@cache
 def read_suite() -> tuple[Group, ...]:
-    """Read all groups that come with the package, in the order in which they are judged."""
+    """Return all groups that come with the package, in the order in which they are judged."""
     found = [
         parse_group(path.read_text("utf-8"))
         for path in files(checks).iterdir()
         if path.name.endswith(".txt")
     ]
     return tuple(sorted(found, key=lambda group: ORDER.index(group.name)))
+
+
+def suite_checks() -> list[Check]:
+    """Return the checks of all groups."""
+    return [check for group in read_suite() for check in group.checks]
 
 
 @cache

@@ -11,7 +11,7 @@ from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.notation.suite import ORDER, read_suite
+from tickrig.host.canopen.conform.notation.suite import ORDER, suite_checks
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report, Verdict
 
@@ -34,7 +34,7 @@ def not_passed(report: Report) -> list[str]:
 
 
 def test_each_older_check_is_among_those_of_the_tester() -> None:
-    checks = {check.id for group in read_suite() for check in group.checks}
+    checks = {check.id for check in suite_checks()}
     assert checks >= {check.id for check in load_all()}
 
 

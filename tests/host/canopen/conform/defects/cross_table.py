@@ -9,7 +9,7 @@ from tests.host.canopen.conform.defects.defect import Defect
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.defects.test_found import judge
 from tickrig.host.canopen.conform.check import Check
-from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.notation.suite import suite_checks
 from tickrig.host.canopen.conform.verdict import Verdict
 
 SEEN: Final = (Verdict.FAIL, Verdict.IMPLEMENTATION_DEFINED)
@@ -40,7 +40,7 @@ def cross(
 def unseen(seen: Iterable[str]) -> list[Check]:
     """Return the checks that saw no defect."""
     known = {*seen, *CANNOT_FAIL}
-    return [c for group in read_suite() for c in group.checks if c.id not in known]
+    return [check for check in suite_checks() if check.id not in known]
 
 
 def lines(*, whole: bool = False) -> Iterator[str]:

@@ -4,9 +4,9 @@ import pytest
 
 from tickrig.host.canopen.conform.notation.step_text import parse_step
 from tickrig.host.canopen.conform.notation.step_words import step_words
-from tickrig.host.canopen.conform.notation.suite import read_suite
+from tickrig.host.canopen.conform.notation.suite import suite_checks
 
-STEPS = [step for group in read_suite() for check in group.checks for step in check.steps]
+STEPS = [step for check in suite_checks() for step in check.steps]
 
 
 def test_each_step_of_the_suite_is_written_as_it_was_read() -> None:
