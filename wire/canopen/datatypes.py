@@ -64,6 +64,12 @@ class DataType(IntEnum):
         """Whether its value is a whole number; BOOLEAN counts as one bit."""
         return self in _SIGNED or self in _UNSIGNED
 
+    @property
+    def limits(self) -> tuple[int, int]:
+        """The smallest and the largest number of an integer."""
+        lowest = -(1 << self.bits - 1) if self.signed else 0
+        return lowest, lowest + (1 << self.bits) - 1
+
     def encode(self, value: Value) -> bytes:
         """Return the bytes of a value, little endian (CiA 301, 7.1.4).
 

@@ -28,16 +28,10 @@ def factor(entry: Entry | None) -> float:
 def show(entry: Entry, value: float) -> None:
     """Put a number into an object, limited to what its data type holds."""
     if entry.data_type.is_integer:
-        low, high = limits(entry)
+        low, high = entry.data_type.limits
         entry.value = int(max(low, min(high, value)))
     else:
         entry.value = copysign(inf, value) if abs(value) > REAL32_MAX else value
-
-
-def limits(entry: Entry) -> tuple[int, int]:
-    """Return the smallest and the largest number of an integer object."""
-    bits, signed = entry.data_type.bits, entry.data_type.signed
-    return (-(1 << bits - 1), (1 << bits - 1) - 1) if signed else (0, (1 << bits) - 1)
 
 
 class AnalogueChannel(Part):
@@ -95,7 +89,7 @@ class AnalogueChannel(Part):
         """Smallest and largest quantity of the physical side."""
         if self.converter is not None:
             return self.converter.low, self.converter.high
-        return limits(self.integers[-1]) if self.integers else (-REAL32_MAX, REAL32_MAX)
+        return self.integers[-1].data_type.limits if self.integers else (-REAL32_MAX, REAL32_MAX)
 
     def scalings(self) -> list[Entry]:
         """Return offsets and scalings."""

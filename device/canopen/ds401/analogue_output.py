@@ -6,7 +6,7 @@ from math import isfinite, isnan
 
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel, limits, quantity
+from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel, quantity
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.families import (
     ANALOGUE_ERROR_MODE,
@@ -71,7 +71,7 @@ class AnalogueOutput(Part):
 
     def _whole(self, *, error: bool) -> float:
         entry, converter = self._latest, self.channel.converter
-        low, high = limits(entry)
+        low, high = entry.data_type.limits
         value = quantity(self._error) if error else entry.number
         counts = int(max(low, min(high, self.channel.scaled(max(low, min(high, value))))))
         if converter is None:

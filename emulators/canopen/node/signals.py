@@ -161,8 +161,7 @@ def _access(entry: Entry) -> str:
 
 def _range(data_type: DataType) -> tuple[float, float]:
     if data_type.is_integer:
-        half = 1 << (data_type.bits - 1)
-        return (-half, half - 1) if data_type.signed else (0, 2 * half - 1)
+        return data_type.limits
     if not _is_number(data_type):
         return 0, 0
     most = REAL32_MAX if data_type is DataType.REAL32 else REAL64_MAX

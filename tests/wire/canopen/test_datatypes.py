@@ -44,3 +44,14 @@ def test_a_value_that_does_not_fit_is_refused(kind: DataType, value: Value) -> N
 def test_bytes_of_the_wrong_number_are_refused() -> None:
     with pytest.raises(FieldError, match="3 bytes for UNSIGNED16, which has 2"):
         DataType.UNSIGNED16.decode(bytes(3))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in DataType if kind.is_integer])
+def test_limits_are_what_just_fits(kind: DataType) -> None:
+    lowest, highest = kind.limits
+    assert highest - lowest == (1 << kind.bits) - 1
+    for value, beyond in (lowest, lowest - 1), (highest, highest + 1):
+        assert kind.decode(kind.encode(value)) == value
+        if kind is not DataType.BOOLEAN:
+            with pytest.raises(FieldError):
+                kind.encode(beyond)

@@ -104,8 +104,8 @@ def _limited(entry: EntryDescription) -> bool:
     kind = entry.data_type
     if not _both(entry) or not kind.is_integer or entry.low is None or entry.high is None:
         return False
-    lowest = -1 << kind.bits - 1 if kind.signed else 0
-    return lowest < entry.low and entry.high < lowest + (1 << kind.bits) - 1
+    lowest, highest = kind.limits
+    return lowest < entry.low and entry.high < highest
 
 
 def _mapping(entry: EntryDescription) -> Access:

@@ -178,15 +178,13 @@ def _of_sizes(entry: EntryDescription) -> Iterator[Check]:
 
 def _of_limits(entry: EntryDescription) -> Iterator[Check]:
     """Write the numbers just outside of the limits, as far as the data type has them."""
-    bits, signed = entry.data_type.bits, entry.data_type.signed
-    lowest = -(1 << bits - 1) if signed else 0
-    highest = lowest + (1 << bits) - 1
+    lowest, highest = entry.data_type.limits
     for suffix, limit, step, codes in (
         ("high", entry.high, 1, TOO_HIGH),
         ("low", entry.low, -1, TOO_LOW),
     ):
         if isinstance(limit, int) and lowest <= limit + step <= highest:
-            data = (limit + step).to_bytes(entry.size, "little", signed=signed)
+            data = (limit + step).to_bytes(entry.size, "little", signed=entry.signed)
             title = f"{limit + step} is beyond its limit {limit}: refused"
             row = {"refuse write": _place(entry), "data": data.hex().upper(), "codes": list(codes)}
             yield _check(entry, suffix, title, ABORTS, row, Level.COMMUNICATION)

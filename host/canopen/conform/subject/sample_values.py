@@ -62,9 +62,7 @@ def _allowed(name: str, entry: EntryDescription, number: int) -> bytes:
 
 
 def _limits(entry: EntryDescription) -> tuple[int, int]:
-    kind = entry.data_type
-    lowest = -1 << kind.bits - 1 if kind.signed else 0
-    highest = lowest + (1 << kind.bits) - 1
+    lowest, highest = entry.data_type.limits
     low = lowest if entry.low is None else int(entry.low)
     return low, highest if entry.high is None else int(entry.high)
 

@@ -88,8 +88,8 @@ def _limit(
             limit = parse_limit(kind, plain_numbers(text))
         except (ValueError, OverflowError):
             return
-        lowest = -(1 << kind.bits - 1) if kind.signed else 0
-        if limit is not None and not lowest <= limit < lowest + (1 << kind.bits):
+        lowest, highest = kind.limits
+        if limit is not None and not lowest <= limit <= highest:
             what = f"{key}={shorten(text)} is no {kind.name}"
             yield document.found("limit-range", what, section, key)
 
