@@ -91,6 +91,8 @@ def open_conform_source(
     if word is None and not options:
         raise Refused("no SOURCE: name a bus as can0, or a rig file as bench.toml")
     if word is not None and word.lower().endswith(RIG_FILE):
+        if words := options.arguments():
+            raise Refused(f"{words[0]} is of a bus: in {word} the rig file says what the bus is")
         return _open_rig(Path(word), node_id)
     spec = BusSpec() if word is None else parse_source(word)
     if spec is None or isinstance(spec, FileSpec):

@@ -68,7 +68,8 @@ class Conformance:
         self._never = _indices("--never", options["never"])
         self._level = Level[options["level"].upper().replace("-", "_")]
         check_chosen(self._only, self._level)
-        self._stimulus = open_stimulus(options["stimulus"]) if options["stimulus"] else None
+        moved_by: str | None = options["stimulus"]
+        self._stimulus = None if moved_by is None else open_stimulus(moved_by)
         self._eds: Path | None = options["eds"]
         self._settings: dict[str, str] = {}
         if self._eds is not None:
@@ -228,5 +229,5 @@ def _index(option: str, word: str) -> int:
     except ValueError:
         index = -1
     if not 0x1000 <= index <= 0xFFFF:
-        raise Refused(f"{option} {word!r} is no index as 6200h")
+        raise Refused(f"{option} {word!r} is no index as 6200h: 1000h to FFFFh")
     return index

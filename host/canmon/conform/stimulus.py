@@ -42,11 +42,11 @@ def open_stimulus(text: str) -> Stimulus:
         if not sys.stdin.isatty():
             raise Refused("--stimulus ask wants somebody at a terminal")
         return ask_operator
-    path = Path(text.removeprefix(CONTROL))
-    if text.startswith(CONTROL) or path.is_socket():
-        return ControlStimulus(path)
+    place = text.removeprefix(CONTROL)
+    if place and (place != text or Path(place).is_socket()):
+        return ControlStimulus(Path(place))
     with refused_at("--stimulus"):
-        words = shlex.split(text)
+        words = shlex.split(place)
     if not words:
         raise Refused("--stimulus wants a command, ask, or the path of a control socket")
     if shutil.which(words[0]) is None:
