@@ -18,6 +18,7 @@ from tickrig.host.canmon.conform.consent import Consent, Progress
 from tickrig.host.canmon.conform.nodes_heard import list_nodes, nodes_heard
 from tickrig.host.canmon.conform.report_files import check_files, keep_inputs, write_files
 from tickrig.host.canmon.conform.stimulus import CONTROL, open_stimulus
+from tickrig.host.canmon.eds.eds_files import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.conform.check import Level
@@ -29,7 +30,6 @@ from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import BUS_FAILED, Report
 from tickrig.host.canopen.data_sheet.check import check, severities
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.eds import open_eds, read_eds_bytes
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import VERSION
@@ -38,7 +38,7 @@ from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.monitor.views.conform_frames import decoded_frames
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
+from tickrig.wire.canopen.eds.eds_file import EdsFile
 
 FILES: Final = ("html", "junit", "badge", "write_baseline")
 
@@ -71,10 +71,7 @@ class Conformance:
         moved_by: str | None = options["stimulus"]
         self._stimulus = None if moved_by is None else open_stimulus(moved_by)
         self._eds: Path | None = options["eds"]
-        self._settings: dict[str, str] = {}
-        if self._eds is not None:
-            opened_eds(self._eds)
-            self._settings["EDS findings"] = _findings(self._eds)
+        self._document = read_device_document(self._eds, "--eds") if self._eds else None
 
     def _inputs(self) -> Iterator[Path]:
         """Yield the files that are read; a baseline may be written anew."""
@@ -110,7 +107,8 @@ class Conformance:
         )
         plan = self._plan(source, node_id, consent)
         progress = Progress(shown=sys.stderr.isatty())
-        eds = opened_eds(self._eds) if self._eds else source.eds.get(node_id)
+        document = self._document
+        eds = document.file if document else source.eds.get(node_id)
         judged: list[Report] = []
         with until_interrupted():
             if not source.virtual and self._level > Level.READ_ONLY:
@@ -135,7 +133,9 @@ class Conformance:
         settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
         if eds is None:
             return replace(report, settings=settings)
-        settings |= {"EDS": Path(eds.name).name, **self._settings}
+        settings["EDS"] = Path(eds.name).name
+        if self._document is not None:
+            settings["EDS findings"] = _findings(self._document)
         wrong = tuple(map(str, (*eds.errors, *eds.warnings)))
         return replace(report, settings=settings, findings=(*wrong, *report.findings))
 
@@ -198,23 +198,10 @@ def _read_baseline(path: Path | None) -> Baseline:
     return baseline
 
 
-def opened_eds(path: Path) -> EdsFile:
-    """Read the file of `--eds`; Refused if it has no object."""
-    try:
-        file = open_eds(path)
-        if not read_device(file).entries:
-            raise EdsError(file.errors)
-    except OSError as error:
-        refuse_path("--eds", error)
-    except EdsError as error:
-        raise Refused(f"--eds {error}") from None
-    return file
-
-
-def _findings(path: Path) -> str:
+def _findings(document: Document) -> str:
     """Say how much `canmon eds check` finds in an EDS."""
-    found = check(Document(str(path), read_eds_bytes(path)))
-    return f"{severities(found)}: {shlex.join(['canmon', 'eds', 'check', str(path)])}"
+    command = shlex.join(["canmon", "eds", "check", document.name])
+    return f"{severities(check(document))}: {command}"
 
 
 def _indices(option: str, words: Iterable[str]) -> frozenset[int]:

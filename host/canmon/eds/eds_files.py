@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from tickrig.host.cli.refused import Refused, refuse_path
 
@@ -15,8 +15,13 @@ LOOKED_AT = 4096
 """Characters at its beginning by which a binary file is known."""
 
 
-def read_document(path: Path) -> Document:
-    """Read a file; Refused if it cannot be read, or is too large."""
+def read_document(path: Path, what: str = "FILE") -> Document:
+    """Read a file; Refused if it cannot be read, is too large or binary.
+
+    Args:
+        path: of the file.
+        what: the argument or option that names it.
+    """
     from tickrig.host.canopen.data_sheet.document import Document  # noqa: PLC0415 - slow
     from tickrig.host.canopen.eds import read_eds_bytes  # noqa: PLC0415 - slow
     from tickrig.wire.canopen.eds.eds_file import EdsError  # noqa: PLC0415 - slow
@@ -24,13 +29,13 @@ def read_document(path: Path) -> Document:
     try:
         data = read_eds_bytes(path)
     except OSError as error:
-        refuse_path("FILE", error)
+        refuse_path(what, error)
     except EdsError as error:
-        raise Refused(f"FILE {error}") from None
+        raise Refused(f"{what} {error}") from None
     except ValueError as error:
-        _refuse(path, str(error))
+        raise Refused(f"{what} {path}: {error}") from None
     if _is_binary(data):
-        _refuse(path, "a binary file: no EDS")
+        raise Refused(f"{what} {path}: a binary file: no EDS")
     return Document(str(path), data)
 
 
@@ -42,13 +47,9 @@ def _is_binary(data: bytes) -> bool:
     return sum(letter < " " and letter not in "\t\r\n" for letter in head) * 20 > len(head)
 
 
-def read_device_document(path: Path) -> Document:
+def read_device_document(path: Path, what: str = "FILE") -> Document:
     """Read a file that has to describe a device; Refused if it does not."""
-    document = read_document(path)
+    document = read_document(path, what)
     if not document.rows:
-        raise Refused("\n".join(map(str, document.file.errors)))
+        raise Refused(f"{what} " + "\n".join(map(str, document.file.errors)))
     return document
-
-
-def _refuse(path: Path, reason: str) -> NoReturn:
-    raise Refused(f"FILE {path}: {reason}")

@@ -155,11 +155,10 @@ def _level(options: dict[str, Any]) -> str:
 
 def _list(only: Sequence[str], eds: Path | None) -> None:
     from tickrig.host.canmon.conform.chosen import patterns  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.conform.conformance import opened_eds  # noqa: PLC0415 - slow
     from tickrig.host.canmon.conform.listing import listed_checks  # noqa: PLC0415 - slow
-    from tickrig.wire.canopen.eds.eds_device import read_device  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.eds.eds_files import read_device_document  # noqa: PLC0415 - slow
 
-    device = None if eds is None else read_device(opened_eds(eds))
+    device = None if eds is None else read_device_document(eds, "--eds").device
     lines = list(listed_checks(patterns(only), device))
     with until_unread():
         for line in lines:

@@ -118,14 +118,14 @@ def test_a_report_has_a_case_for_each_rule_of_each_file(
         (("fix", "empty.eds", "-o", "a.eds"), "FILE empty.eds: no EDS: it describes no object"),
         (("fix", "a.xdd", "-o", "a.eds"), "FILE a.xdd: XDD files are not mended"),
         (("show", "large.eds"), "FILE large.eds: more than 32,000,000 bytes: no EDS"),
-        (("show", "empty.eds"), "empty.eds: has no objects (no-objects)"),
-        (("diff", "empty.eds", "empty.eds"), "empty.eds: has no objects (no-objects)"),
+        (("show", "empty.eds"), "FILE empty.eds: has no objects (no-objects)"),
+        (("diff", "empty.eds", "empty.eds"), "FILE empty.eds: has no objects (no-objects)"),
         (
             ("show", "r1.eds", "60"),
             "'60' is not INDEX or INDEX:SUB in hexadecimal, as 6040 or 1018:01",
         ),
         (("show", "r1.eds", "6040"), "r1.eds: no 6040 is there"),
-        (("show", "bomb.xdd"), "bomb.xdd:1: has a document type, which is refused (xml)"),
+        (("show", "bomb.xdd"), "FILE bomb.xdd:1: has a document type, which is refused (xml)"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_2(

@@ -189,6 +189,7 @@ def test_what_eds_check_finds_in_the_eds_is_counted(rig: str, tmp_path: Path) ->
     [
         (("--node", "7"), "has no node 7; its nodes: 5"),
         (("--node", "5", "--eds", "nosuch.eds"), "--eds nosuch.eds: No such file"),
+        (("--node", "5", "--eds", "/bin/sh"), "--eds /bin/sh: a binary file: no EDS"),
         (("--node", "5", "--only", "NTM"), "--only NTM: no such group or check; did you mean"),
         (("--node", "5", "--only", "NMT-03"), "--only NMT-03 needs --communication"),
         (("--node", "5", "--only", "UE", "--only", "LS"), "--only LS needs --intrusive"),
