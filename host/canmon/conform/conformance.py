@@ -18,7 +18,7 @@ from tickrig.host.canmon.conform.consent import Consent, Progress
 from tickrig.host.canmon.conform.nodes_heard import list_nodes, nodes_heard
 from tickrig.host.canmon.conform.report_files import check_files, keep_inputs, write_files
 from tickrig.host.canmon.conform.stimulus import CONTROL, open_stimulus
-from tickrig.host.canmon.eds.eds_files import read_device_document
+from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.conform.check import Level

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import click
 
-from tickrig.host.canmon.eds.eds_files import read_document
+from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.rule import RuleFinding

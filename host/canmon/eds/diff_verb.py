@@ -8,7 +8,7 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.eds.eds_files import read_device_document
+from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.options import PATH
 

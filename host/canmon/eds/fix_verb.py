@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from tickrig.host.canmon.eds.eds_files import read_document
+from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canopen.data_sheet.rule import Place, RuleFinding
 from tickrig.host.cli.messages import say

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.eds.eds_files import read_device_document
+from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused

@@ -156,7 +156,7 @@ def _level(options: dict[str, Any]) -> str:
 def _list(only: Sequence[str], eds: Path | None) -> None:
     from tickrig.host.canmon.conform.chosen import patterns  # noqa: PLC0415 - slow
     from tickrig.host.canmon.conform.listing import listed_checks  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.eds.eds_files import read_device_document  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.eds_document import read_device_document  # noqa: PLC0415 - slow
 
     device = None if eds is None else read_device_document(eds, "--eds").device
     lines = list(listed_checks(patterns(only), device))
