@@ -15,6 +15,7 @@ import click
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.bench.keeping_time import keeping_time
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
@@ -76,6 +77,8 @@ class EmulatorRun(ABC):
             player = self._attend(bench, scenario)
             for spec in faults:
                 bench.operator.fault(0, spec)
+            if self._in_real_time:
+                stack.enter_context(keeping_time())
             self._go_on(bench)
             if player:
                 player.finish(bench.rig.now_us)

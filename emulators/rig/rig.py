@@ -116,7 +116,8 @@ class Rig(Copyable):
         self.watchers: Listeners[Callable[[int], None]] = Listeners()
         self._bridges, self._couplings, self._dense = tuple(bridges), tuple(couplings), dense
         self._clock = clock or VirtualClock()
-        self._jumps = not dense and isinstance(self._clock, VirtualClock)
+        self._in_real_time = not isinstance(self._clock, VirtualClock)
+        self._jumps = not (dense or self._in_real_time)
         periods = {station.tick_us for station in stations}
         self._periods = tuple(sorted(periods | {coupling.tick_us for coupling in couplings}))
         self._timetable, self._wires = Timetable(), Wires(self._periods)
@@ -139,7 +140,8 @@ class Rig(Copyable):
     def __getstate__(self) -> object:
         """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
         begun = {"_bridges": (), "_clock": VirtualClock(), "_jumps": not self._dense}
-        return state_of(self, {**begun, "acting_us": None, "in_step": False})
+        now = {"_in_real_time": False, "acting_us": None, "in_step": False}
+        return state_of(self, {**begun, **now})
 
     def __setstate__(self, state: object) -> None:
         """Go on as the rig that was copied; its ports know no devices yet."""
@@ -199,9 +201,13 @@ class Rig(Copyable):
 
     @property
     def next_us(self) -> int:
-        """When there is something to do next: an action, a tick with work, an end on a wire."""
+        """When there is something to do next: an action, a tick with work, an end on a wire.
+
+        In real time nobody outside sees what ends between two ticks: it waits for the tick.
+        """
         self._enter_due()
-        return min(self._planned_us, self._wires.due_us)
+        planned_us = self._planned_us
+        return planned_us if self._in_real_time else min(planned_us, self._wires.due_us)
 
     def step(self) -> None:
         """Go to the next time with something to do, and do it; nothing if that never comes."""
@@ -210,15 +216,17 @@ class Rig(Copyable):
             self._happen(next_us)
             self._wires.advance(self.now_us)
 
-    def run_to(self, t_us: int, host: Host | None = None) -> None:
+    def run_to(self, t_us: int, host: Host | None = None, unseen_us: int = 0) -> None:
         """Step through all that happens up to and at a time, or until something is at a host.
 
         Args:
             t_us: the time, since the start of the rig.
             host: where to look for something, if given.
+            unseen_us: how long after that time it is likely that nobody looks at a device or
+                sets an input between ticks; it may happen, and costs more then.
         """
         self._enter_due()
-        self._foresee(t_us if host is None else 0)
+        self._foresee(t_us + unseen_us if host is None else 0)
         while (next_us := self._go_on(t_us, host)) <= t_us:
             self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:

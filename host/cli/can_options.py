@@ -147,7 +147,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
         import can  # noqa: PLC0415 - slow
         from can.util import load_config  # noqa: PLC0415
 
-    from tickrig.host.links.can_link import keep_to_group  # noqa: PLC0415
+    from tickrig.host.links.can_link import prepare_bus  # noqa: PLC0415
 
     _check_interface(options.interface)
     given = _given(options)
@@ -163,7 +163,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     interface, channel = str(config["interface"]), config["channel"]
     try:
         bus = can.Bus(**{"single_handle": True, **given})
-        keep_to_group(bus, interface)
+        prepare_bus(bus, interface)
     except Exception as error:  # its drivers raise whatever they come across, NameError even
         name = interface if channel is None else f"{interface} {channel}"
         raise BusUnavailable(f"CAN bus {name}: {_reason(error)}") from None

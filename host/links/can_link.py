@@ -73,23 +73,42 @@ IP_MULTICAST_ALL: Final = 49
 IPV6_MULTICAST_ALL: Final = 29
 
 
-def keep_to_group(bus: can.BusABC, interface: str) -> None:
-    """Let a bus hear its own group alone, from now on; other interfaces are left as they are.
+SO_RCVBUFFORCE: Final = 33
+RECEIVE_BYTES: Final = 4 << 20
+"""Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
+
+
+def _enlarge_queue(sock: socket.socket) -> None:
+    """Let the kernel keep what comes while this process is held up: 300 frames are 40 ms."""
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)
+    except OSError:  # PermissionError, and no such option beside Linux
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+
+
+def prepare_bus(bus: can.BusABC, interface: str) -> None:
+    """Let a bus keep what comes while this process is held up, and hear its own group alone.
 
     python-can binds the socket of `udp_multicast` to a port alone. Linux then gives it what
     comes on that port for any group that any program of this machine has joined (ip(7),
     IP_MULTICAST_ALL). Elsewhere there is no such option, and no need.
     """
-    if sys.platform == "linux" and interface == INTERFACE:
+    if sys.platform == "linux" and interface in (INTERFACE, "socketcan"):
         with socket.socket(fileno=os.dup(bus.fileno())) as sock:
-            with suppress(OSError):  # IPv6 before Linux 4.20
-                if sock.family == socket.AF_INET6:
-                    sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
-                else:
-                    sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
-            with suppress(BlockingIOError):
-                while True:  # what came before
-                    sock.recv(1, socket.MSG_DONTWAIT)
+            _enlarge_queue(sock)
+            if interface == INTERFACE:
+                _keep_to_group(sock)
+
+
+def _keep_to_group(sock: socket.socket) -> None:
+    with suppress(OSError):  # IPv6 before Linux 4.20
+        if sock.family == socket.AF_INET6:
+            sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
+        else:
+            sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+    with suppress(BlockingIOError):
+        while True:  # what came before
+            sock.recv(1, socket.MSG_DONTWAIT)
 
 
 SEND_TIMEOUT_S = 1
@@ -227,7 +246,7 @@ class CanLink:
 def _open(channel: str, interface: str, bit_rate: int | None) -> can.BusABC:
     given: dict[str, Any] = {} if bit_rate is None else {"bitrate": bit_rate}
     bus = can.Bus(channel=channel, interface=interface, **given)
-    keep_to_group(bus, interface)
+    prepare_bus(bus, interface)
     return bus
 
 
@@ -265,24 +284,31 @@ class EchoFilter:
     """
 
     def __init__(self) -> None:
-        self._awaited: deque[tuple[int, CanFrame]] = deque()
+        self._sent: deque[tuple[int, CanFrame]] = deque()
+        self._awaited: dict[CanFrame, deque[int]] = {}  # by frame: a look does not take longer
 
     def sent(self, now_us: int, traffic: Frames) -> None:
         """Await the echo of what is sent now."""
-        self._awaited += [(now_us, frame) for frame in traffic]
+        for frame in traffic:
+            self._sent.append((now_us, frame))
+            self._awaited.setdefault(frame, deque()).append(now_us)
 
     def expire(self, now_us: int) -> None:
         """Await no more what was sent more than `ECHO_US` ago."""
-        while self._awaited and self._awaited[0][0] < now_us - ECHO_US:
-            self._awaited.popleft()
+        while self._sent and self._sent[0][0] < now_us - ECHO_US:
+            sent_us, frame = self._sent.popleft()
+            if frame in self._awaited and self._awaited[frame][0] <= sent_us:
+                self.take(frame)
 
     def take(self, frame: CanFrame) -> bool:
         """Return whether a frame is an awaited echo, which is then awaited no more."""
-        for place, (_, awaited) in enumerate(self._awaited):
-            if awaited == frame:
-                del self._awaited[place]
-                return True
-        return False
+        if frame not in self._awaited:
+            return False
+        times = self._awaited[frame]
+        times.popleft()
+        if not times:
+            del self._awaited[frame]
+        return True
 
 
 class EchoFreeLink:

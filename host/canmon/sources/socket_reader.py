@@ -22,12 +22,9 @@ from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
 
 SO_RXQ_OVFL: Final = 40
 SO_TIMESTAMPNS: Final = 35
-SO_RCVBUFFORCE: Final = 33
 SOL_CAN_RAW: Final = 101
 CAN_RAW_FD_FRAMES: Final = 5
 CAN_RAW_XL_FRAMES: Final = 7
-RECEIVE_BYTES: Final = 4 << 20
-"""Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
 
 BATCH: Final = 1_024
 
@@ -69,7 +66,6 @@ class SocketReader:
         for option in (CAN_RAW_FD_FRAMES, CAN_RAW_XL_FRAMES):
             with suppress(OSError):  # older kernels have no such frames
                 self._socket.setsockopt(SOL_CAN_RAW, option, 1)
-        _enlarge(self._socket)
         self._socket.setblocking(False)
 
     def read(self, timeout_us: int, /) -> list[Record]:
@@ -105,13 +101,6 @@ class SocketReader:
             return ()
         sent = bool(flags & MSG_CONFIRM)  # by this very socket (linux, networking/can)
         return (Record(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
-
-
-def _enlarge(sock: socket.socket) -> None:
-    try:
-        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)
-    except PermissionError:
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
 
 
 def _frame(flagged: int, length: int, data: bytes) -> CanFrame | ErrorFrame:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import errno
+import os
+import socket
+import sys
 from collections.abc import Iterator
 
 import can
 import pytest
 
 from tests.emulators.can.can_bench import frames
-from tickrig.host.links.can_link import CanLink
+from tickrig.host.links.can_link import CanLink, prepare_bus
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
 from tickrig.wire.can_error import ErrorState
@@ -114,3 +117,14 @@ def test_a_bus_that_is_gone_ends_it(code: int | None, drops: bool) -> None:
     with pytest.raises(LinkClosed, match="cannot send on full: Transmit buffer full"):
         link.send(frames("080#"))
     link.close()
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(sys.platform != "linux", reason="the queue is that of Linux")
+def test_a_bus_keeps_more_than_the_usual_while_nobody_reads() -> None:
+    with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as usual:
+        usual_bytes = usual.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF)
+    with can.Bus(interface="udp_multicast", channel="ff11::7469:626b", hop_limit=0) as bus:
+        prepare_bus(bus, "udp_multicast")
+        with socket.socket(fileno=os.dup(bus.fileno())) as sock:
+            assert sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) > usual_bytes

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.keeping_time import keeping_time
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
@@ -23,7 +24,6 @@ from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
 from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.real.doors import Doors
-from tickrig.emulators.testing.bench.modes.real.keeping_time import keeping_time
 from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
 from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.triggers import Condition, text_of

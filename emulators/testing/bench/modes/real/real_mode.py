@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NoReturn, Self, TypeVar
 
+from tickrig.emulators.bench.keeping_time import keeping_time
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
@@ -16,7 +17,6 @@ from tickrig.emulators.testing.bench.modes.real.control_thread import ControlThr
 from tickrig.emulators.testing.bench.modes.real.cpu_waits import CpuWaits
 from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
 from tickrig.emulators.testing.bench.modes.real.doors import Doors
-from tickrig.emulators.testing.bench.modes.real.keeping_time import keeping_time
 from tickrig.emulators.testing.bench.modes.real.lateness import too_slow
 from tickrig.emulators.testing.bench.modes.real.outside import Outside
 from tickrig.emulators.testing.bench.modes.real.rig_thread import RigThread

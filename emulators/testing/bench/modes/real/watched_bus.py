@@ -13,7 +13,7 @@ import can
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
-from tickrig.host.links.can_link import keep_to_group
+from tickrig.host.links.can_link import prepare_bus
 from tickrig.host.links.can_message import to_error_frame, to_frame
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
@@ -84,7 +84,7 @@ def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
         bus = can.Bus(plan.channel, plan.interface, **{**rate, **dict(plan.options), **options})
     except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
         raise BusGone(f"cannot open {name_of(plan)}: {error}") from error
-    keep_to_group(bus, plan.interface)
+    prepare_bus(bus, plan.interface)
     return bus
 
 
