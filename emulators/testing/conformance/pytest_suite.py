@@ -22,10 +22,11 @@ from tickrig.emulators.testing.conformance.conformance import (
     names_of,
     node_id_of,
 )
+from tickrig.emulators.testing.conformance.written import known_failures
 from tickrig.host.canopen.conform.notation.suite import suite_checks
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.report.baseline import Baseline
 from tickrig.host.canopen.conform.report.evidence import cut
 from tickrig.host.canopen.conform.report.hints import hint
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
@@ -63,7 +64,8 @@ def conformance_tests(
         eds: its EDS, DCF or XDD; its objects have tests of their own.
         level: `read-only`, `communication` or `intrusive`, as `conformance` has it.
         only: groups or ids of checks, with * and ?, as `"NMT,HB"` or one by one; all unless given.
-        baseline: a file of known failures, an id a line: these are expected to fail.
+        baseline: a file of known failures, an id a line: these are expected to fail; an id that
+            is no check is warned of.
         options: further arguments of `conformance`.
 
     Raises:
@@ -83,7 +85,7 @@ def conformance_tests(
         known = known or _told_by(made)
     options |= {"eds": eds, "level": level}
     objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
-    known_to_fail = NONE_KNOWN if baseline is None else Baseline.read(Path(baseline))
+    known_to_fail = known_failures(baseline)
     names = [check.id for check in (*suite_checks(), *objects) if plan.chooses(check)]
     parametrised = pytest.mark.parametrize("check_id", names)
     if isinstance(node, str):

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
+from warnings import warn
 
+from tickrig.host.canmon.conform.chosen import unknown
 from tickrig.host.canmon.conform.report_files import file_text
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.monitor.views.conform_frames import decoded_frames
+from tickrig.host.text.page_text import one_line
 from tickrig.host.text.whole_file import write_whole
 
 KINDS: Final[Mapping[str, str]] = {
@@ -34,7 +37,7 @@ def conformance_text(report: Report, *, baseline: Path | str | None = None) -> s
         OSError: the baseline cannot be read.
         ValueError: it is none.
     """
-    return text_report(report, _known(baseline), decoded_frames({}))
+    return text_report(report, known_failures(baseline), decoded_frames({}))
 
 
 def write_conformance(
@@ -53,7 +56,7 @@ def write_conformance(
         ValueError: another ending, or a baseline that is none.
         ImportError: a page, and Jinja2 is not there (extra `report`).
     """
-    known, ending = _known(baseline), Path(path).suffix
+    known, ending = known_failures(baseline), Path(path).suffix
     if ending == JSON:
         text = report_json(report, known)
     elif ending in KINDS:
@@ -64,5 +67,16 @@ def write_conformance(
     write_whole(Path(path), text)
 
 
-def _known(baseline: Path | str | None) -> Baseline:
-    return NONE_KNOWN if baseline is None else Baseline.read(Path(baseline))
+def known_failures(path: Path | str | None) -> Baseline:
+    """Read a baseline, none without a file; an id in it that is no check is warned of.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is none.
+    """
+    if path is None:
+        return NONE_KNOWN
+    baseline = Baseline.read(Path(path))
+    for text in unknown(sorted(baseline.known)):
+        warn(one_line(f"baseline {path}: {text}"), stacklevel=3)
+    return baseline

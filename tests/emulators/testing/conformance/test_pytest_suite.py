@@ -70,6 +70,18 @@ def test_a_known_failure_is_expected(pytester: pytest.Pytester, run: Run) -> Non
     result.stdout.fnmatch_lines(["XFAIL *test_mine[[]UE-01] - *known: step 1, read 1000:00*"])
 
 
+def test_a_baseline_with_ids_that_are_none_is_warned_of(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    (pytester.path / "known.txt").write_text("UE-01\nUE-1O1\n")
+    given = "power_on, node_id=5, only='UE-01', baseline='known.txt'"
+    pytester.makepyfile(f"{MINE}\ntest_mine = conformance_tests({given})")
+    result = run("-W", "default")
+    result.assert_outcomes(xfailed=1, warnings=1)
+    said = "*.py:*: UserWarning: baseline known.txt: UE-1O1: no such group or check; *"
+    result.stdout.fnmatch_lines([said, "*test_mine = conformance_tests(*"])
+
+
 def test_a_device_of_the_bench_is_judged_check_by_check(
     pytester: pytest.Pytester, run: Run
 ) -> None:
