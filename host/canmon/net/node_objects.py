@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canmon.conform.conformance import opened_eds
+from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.net.session import NetSession
 from tickrig.host.canopen.conform.subject.other_device import TOLD, other_device
 from tickrig.host.canopen.errors import SdoFailed
@@ -124,7 +124,7 @@ def known_objects(session: NetSession, node_id: int, eds: Path | None) -> NodeOb
         Refused: the EDS cannot be used.
         SdoFailed: the node does not answer.
     """
-    file = opened_eds(eds) if eds is not None else session.source.eds.get(node_id)
+    file = read_device_document(eds, "--eds").file if eds else session.source.eds.get(node_id)
     device = None if file is None else read_device(file)
     objects = NodeObjects(node_id, device, "" if file is None else Path(file.name).stem)
     data = session.bus.read(node_id, *DEVICE_TYPE, 4)
