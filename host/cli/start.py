@@ -6,6 +6,7 @@ import errno
 import os
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -74,9 +75,10 @@ def loading() -> Iterator[None]:
     """Let Ctrl-C end the process, as it ends a program that takes no notice of it.
 
     A KeyboardInterrupt in the middle of an import would show where that was. Where
-    Ctrl-C is ignored, or somebody waits for it, that stays so.
+    Ctrl-C is ignored, or somebody waits for it, that stays so; threads see none of it.
     """
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    waited_for = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    if waited_for or threading.current_thread() is not threading.main_thread():
         yield
         return
     signal.signal(signal.SIGINT, signal.SIG_DFL)

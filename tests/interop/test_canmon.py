@@ -173,6 +173,32 @@ def test_a_bus_that_goes_down_ends_it_with_status_3(vcan: Bus, tmp_path: Path) -
     assert (status, said) == (3, "Error: vcan9: Network is down\n")
 
 
+@pytest.mark.parametrize("verb", ["dump", "top", "check"])
+def test_a_bus_that_was_removed_and_made_again_is_opened_again(
+    vcan: Bus, verb: str, tmp_path: Path
+) -> None:
+    add = ["ip", "link", "add", "dev", "vcan9", "type", "vcan"]
+    if subprocess.run(add, check=False).returncode:
+        pytest.skip("only root makes buses")
+    words = {"dump": ["-L"], "top": ["--for", "600s"], "check": ["--no-loss", "--for", "600s"]}
+    run("ip", "link", "set", "vcan9", "up")
+    with listening([*CANMON, verb, "vcan9", *words[verb], "--reopen"], tmp_path, verb) as canmon:
+        run("cansend", "vcan9", "701#00")
+        run("ip", "link", "set", "vcan9", "down")
+        wait(lambda: "vcan9 is gone: Network is down" in canmon.said)
+        run("ip", "link", "delete", "vcan9")
+        run(*add)
+        run("ip", "link", "set", "vcan9", "up")
+        wait(lambda: "vcan9 is back after" in canmon.said)
+        run("cansend", "vcan9", "702#00")
+        if verb == "dump":
+            wait(lambda: any(line.endswith("702#00") for line in canmon.lines))
+            assert canmon.lines[0].endswith("701#00")
+        assert canmon.end() == (1 if verb == "check" else 0)
+        assert "vcan9: it was away once, " in canmon.said + "".join(canmon.lines)
+    run("ip", "link", "delete", "vcan9")
+
+
 def test_candump_reads_what_it_logs(vcan: Bus, tmp_path: Path) -> None:
     log = tmp_path / "run.log"
     with listening([*CANMON, "dump", vcan.channel, "-l", str(log)], tmp_path, "dump") as canmon:

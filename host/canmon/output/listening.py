@@ -19,6 +19,7 @@ from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import time_option
 from tickrig.host.cli.start import TERMINATING
+from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.frames.record import AnyRecord
@@ -43,6 +44,7 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
     if source.failed:
         raise SourceFailed(source.failed)
     missing = [f"{source.lost} frames were lost"] if source.lost else []
+    missing += [f"a bus was away {counted(source.gaps, 'time')}"] if source.gaps else []
     missing += [f"{source.unread} lines or frames passed over"] if source.unread else []
     if strict and missing:
         raise FramesLost(", ".join(missing))
@@ -116,6 +118,13 @@ def listen(
     begin_s = time.monotonic()
     while not (source.ended or is_over(begin_s, span_us)):
         take(source.poll(POLL_US))
+        say_marks(source)
+
+
+def say_marks(source: AnySource[object]) -> None:
+    """Say on standard error which bus went away, or is back."""
+    for mark in source.marks:
+        click.echo(mark.text, err=True)
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:

@@ -16,6 +16,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormatError
 from tickrig.host.monitor.logs.log_writer import in_blocks, write_log
+from tickrig.host.monitor.logs.mark import Mark
 
 BLOCK_S: Final = 1.0
 """What a compressed log may lose if this program is killed."""
@@ -48,12 +49,16 @@ class LogFile:
         except OSError as error:
             raise SourceFailed(f"{path}: {error.strerror}") from error
 
-    def take(self, decoded_frames: Sequence[DecodedFrame], lost: int) -> None:
+    def take(
+        self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
+    ) -> None:
         """Add frames; what came is with the operating system then."""
         try:
             for record, _ in decoded_frames:
                 assert isinstance(record, Record), "who opens serial ports does not write a log"
                 self._writer.write(record)
+            for mark in marks:
+                self._writer.mark(mark)
             if decoded_frames and time.monotonic() >= self._due_s:
                 self._writer.flush()
                 if in_blocks(self._path):

@@ -6,12 +6,13 @@ import sys
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING, assert_never
+from typing import TYPE_CHECKING, Final, assert_never
 
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_writer import log_line
+from tickrig.host.monitor.logs.log_writer import comment, log_line
+from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.wire.can_error import ErrorFrame
 
@@ -154,19 +155,26 @@ def _cell(text: str) -> str:
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
 
 
+_MARKS: Final = {Output.LOG: comment, Output.JSONL: Mark.json}
+
+
 class StdoutWriter:
-    """Lines on standard output; in JSON, losses among them."""
+    """Lines on standard output; in JSON and in a log, what is between frames among them."""
 
     def __init__(self, printer: Printer, output: Output) -> None:
         self._printer, self._output, self._lost = printer, output, 0
         self._header = output is Output.CSV
 
-    def take(self, decoded_frames: Sequence[DecodedFrame], lost: int) -> None:
+    def take(
+        self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
+    ) -> None:
         """Print frames, at once."""
         lines = [DUMP_HEADER] if self._header else []
         lines += [self._printer(*one) for one in decoded_frames]
         if lost != self._lost and self._output is Output.JSONL:
             lines.append(drop_line(lost - self._lost))
+        if marks and (write := _MARKS.get(self._output)):
+            lines += map(write, marks)
         self._header, self._lost = False, lost
         if lines:
             sys.stdout.write("\n".join(lines) + "\n")

@@ -105,6 +105,41 @@ def reader_of(bus: can.BusABC, interface: str, name: str) -> Reader[Record]:
     return SocketReader(bus, name) if interface == "socketcan" else BusReader(bus, interface, name)
 
 
+class OpenBus:
+    """A bus that a SOURCE word and options name; it can be opened again.
+
+    Args:
+        word: of the bus.
+        options: what the command line says of it.
+
+    Attributes:
+        bus: as it was opened last.
+        name: what it is called.
+
+    Raises:
+        Refused: options that python-can does not know.
+        SourceFailed: it cannot be opened.
+    """
+
+    def __init__(self, word: BusSpec, options: BusOptions) -> None:
+        self._options = merged(word, options)
+        self.bus, self._interface, self.name = open_bus(self._options)
+
+    @property
+    def reader(self) -> Reader[Record]:
+        """What reads it."""
+        return reader_of(self.bus, self._interface, self.name)
+
+    def open_again(self) -> Reader[Record]:
+        """Open it once more; whoever used it has closed it."""
+        self.bus, _, _ = open_bus(self._options)
+        try:
+            return self.reader
+        except OSError:
+            self.bus.shutdown()
+            raise
+
+
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
     """Return the options of a bus: what its word says goes before them."""
     return replace(

@@ -10,10 +10,12 @@ from itertools import repeat
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
+from tickrig.host.canmon.sources.reopening_reader import ReopeningReader
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
@@ -34,18 +36,24 @@ class Reader(Protocol[Read_co]):
 
     Attributes:
         name: what it is called.
-        lost: frames that its driver says it dropped.
         tally: what was no frame.
         stepped: its time passes while it is read, and it belongs to the thread that opened it.
     """
 
     name: str
-    lost: int
     tally: Tally
     stepped: bool
 
-    def read(self, timeout_us: int, /) -> Sequence[Read_co]:
-        """Wait for a first frame; LinkClosed if the bus is gone."""
+    @property
+    def lost(self) -> int:
+        """Frames that its driver says it dropped."""
+        ...
+
+    def read(self, timeout_us: int, /) -> Sequence[Read_co | Mark]:
+        """Wait for a first frame; LinkClosed if the bus is gone.
+
+        A mark in front of all that it returns says that the bus went away or is back.
+        """
         ...
 
     def close(self) -> None:
@@ -78,7 +86,8 @@ class LiveSource(AnySource[Item]):
         queue_frames: int = QUEUE_FRAMES,
     ) -> None:
         self._readers, self._queue_frames = readers, queue_frames
-        self._queue: deque[Item] = deque()
+        self._queue: deque[Item | Mark] = deque()
+        self._marking: deque[None] = deque()  # an entry for each mark in the queue
         # No Event: Ctrl-C in the middle of its wait can leave its lock taken, for good.
         self._came: SimpleQueue[None] = SimpleQueue()
         self._stop, self._overruns, self.failed = False, 0, ""
@@ -97,6 +106,21 @@ class LiveSource(AnySource[Item]):
         """Say that a bus is gone, and all that came was fetched."""
         return (bool(self.failed) or self._stop) and not self._queue
 
+    @property
+    def away(self) -> list[str]:
+        """The buses that went away and are not back."""
+        return [one.name for one in self._reopening() if one.away]
+
+    @property
+    def gaps(self) -> int:
+        """How often a bus went away and was to be opened again."""
+        return sum(one.gaps for one in self._reopening())
+
+    def reopen(self) -> None:
+        """Open buses again that go away from now on, until they are back."""
+        for one in self._reopening():
+            one.wanted = True
+
     def tallies(self) -> Iterable[tuple[str, Tally]]:
         """Return what was no frame, by the name of each bus or port."""
         return [(reader.name, reader.tally) for reader in self._readers]
@@ -107,7 +131,8 @@ class LiveSource(AnySource[Item]):
         return self._overruns + sum(reader.lost for reader in self._readers)
 
     def poll(self, timeout_us: int, /) -> list[Item]:
-        """Wait for a first frame, then return all that are there."""
+        """Wait for a first frame, then return all that are there, up to a mark."""
+        self.marks = ()
         for reader, chosen in self._stepped:
             self._take(reader, chosen, timeout_us)
         if not self._queue and not self._stepped and not self.ended:
@@ -115,7 +140,9 @@ class LiveSource(AnySource[Item]):
                 self._came.get(timeout=timeout_us / 1e6)
         while not self._came.empty():
             self._came.get()
-        return [self._queue.popleft() for _ in range(len(self._queue))]
+        if self._marking:
+            return self._up_to_mark()
+        return [self._queue.popleft() for _ in range(len(self._queue))]  # type: ignore[misc]
 
     def messages(self) -> list[str]:
         """Say what was no frame or got lost."""
@@ -124,7 +151,7 @@ class LiveSource(AnySource[Item]):
 
     def losses(self) -> list[str]:
         """Say what got lost or could not be taken."""
-        said = super().losses()
+        said = super().losses() + [text for one in self._reopening() for text in one.losses()]
         said += [
             f"{one.name}: its driver lost {one.lost} frames" for one in self._readers if one.lost
         ]
@@ -140,6 +167,20 @@ class LiveSource(AnySource[Item]):
         for reader in self._readers:
             reader.close()
 
+    def _reopening(self) -> list[ReopeningReader[Item]]:
+        return [one for one in self._readers if isinstance(one, ReopeningReader)]
+
+    def _up_to_mark(self) -> list[Item]:
+        batch: list[Item] = []
+        while self._queue:
+            one = self._queue.popleft()
+            if isinstance(one, Mark):
+                self._marking.popleft()
+                self.marks = (one,)
+                break
+            batch.append(one)
+        return batch
+
     def _receive(self, reader: Reader[Item], chosen: CandumpFilter | None) -> None:
         while not self._stop and not self.failed:
             self._take(reader, chosen, WAIT_US)
@@ -151,6 +192,11 @@ class LiveSource(AnySource[Item]):
         except LinkClosed as error:
             self.failed = str(error)
             return
+        if records and isinstance(records[0], Mark):
+            self._marking.append(None)
+            self._queue.append(records[0])
+            self._came.put(None)
+            records = records[1:]
         if chosen is not None:
             records = [one for one in records if _passes(chosen, one)]
         room = self._queue_frames - len(self._queue)
@@ -162,5 +208,5 @@ class LiveSource(AnySource[Item]):
             self._came.put(None)
 
 
-def _passes(chosen: CandumpFilter, one: Record | LineRecord) -> bool:
+def _passes(chosen: CandumpFilter, one: Record | LineRecord | Mark) -> bool:
     return not isinstance(one, Record) or chosen.passes(flagged_id(one))

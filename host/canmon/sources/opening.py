@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -15,8 +16,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.links.errors import LinkClosed
 
 if TYPE_CHECKING:
-    import can
-
+    from tickrig.host.canmon.sources.bus_source import OpenBus
     from tickrig.host.canmon.sources.live_source import LiveSource, Reader
     from tickrig.host.monitor.frames.record import AnyRecord
 
@@ -67,8 +67,8 @@ def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
 
 def open_live(
     buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
-) -> tuple[LiveSource[AnyRecord], dict[str, can.BusABC]]:
-    """Open buses and serial ports.
+) -> tuple[LiveSource[AnyRecord], dict[str, OpenBus]]:
+    """Open buses and serial ports, so that they can be opened again.
 
     Returns:
         The source, and the buses by name, to send on.
@@ -78,20 +78,23 @@ def open_live(
         SourceFailed: a bus or port that cannot be opened.
     """
     from tickrig.host.canmon.sources.live_source import LiveSource  # noqa: PLC0415 - threads
+    from tickrig.host.canmon.sources.reopening_reader import ReopeningReader  # noqa: PLC0415
 
-    opened: dict[str, can.BusABC] = {}
+    opened: dict[str, OpenBus] = {}
     readers: list[Reader[AnyRecord]] = []
     try:
         for word in buses:
             from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
 
-            bus, interface, name = bus_source.open_bus(bus_source.merged(word, options))
-            readers.append(bus_source.reader_of(bus, interface, name))
-            opened[name] = bus
+            bus = bus_source.OpenBus(word, options)
+            opened[bus.name] = bus
+            reader: Reader[AnyRecord] = bus.reader
+            readers.append(reader if reader.stepped else ReopeningReader(reader, bus.open_again))
         for line in lines:
             from tickrig.host.canmon.sources.line_source import LineReader  # noqa: PLC0415 - pyserial
 
-            readers.append(LineReader(line))
+            reader = LineReader(line)
+            readers.append(ReopeningReader(reader, partial(LineReader, line)))
     except BaseException as error:
         for reader in readers:
             reader.close()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
+    from tickrig.host.monitor.logs.mark import Mark
     from tickrig.host.monitor.logs.tally import Tally
 
 Taken_co = TypeVar("Taken_co", covariant=True)
@@ -19,16 +20,32 @@ class AnySource(Generic[Taken_co]):
     Attributes:
         live: it goes on by itself; False where all of it is there already.
         failed: why it ended before its time; empty if it did not.
+        marks: what happened behind the frames that `poll` returned last.
     """
 
     live = False
     failed = ""
+    marks: Sequence[Mark] = ()
     _ended = False
 
     @property
     def ended(self) -> bool:
         """Whether no more will come."""
         return self._ended
+
+    @property
+    def away(self) -> Sequence[str]:
+        """Buses that went away and are not back."""
+        return ()
+
+    @property
+    def gaps(self) -> int:
+        """How often a bus went away and was to be opened again."""
+        return 0
+
+    def reopen(self) -> None:
+        """Open buses again that go away; what has an end is left alone."""
+        return
 
     def tallies(self) -> Iterable[tuple[str, Tally]]:
         """Return what was no frame, by the name of each bus or file."""

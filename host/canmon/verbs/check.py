@@ -25,7 +25,7 @@ from tickrig.host.canmon.output.listening import (
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
-from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
@@ -117,13 +117,15 @@ NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
     span_option,
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
+    reopen_option,
 )
-def command(
+def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
     span_us: int | None,
     report_path: Path | None,
     jsonl: bool,
+    reopen: bool,
     strict: bool,
     **options: Any,
 ) -> None:
@@ -145,6 +147,8 @@ def command(
     bit_rate = _bit_rate(rules, words, bus)
     log = whole_log(words)
     frames = log or open_source(words, bus)
+    if reopen:
+        frames.reopen()
     verdict = Verdict(jsonl)
     try:
         if log is not None:

@@ -13,7 +13,7 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
-from tickrig.host.canmon.output.listening import report, until_interrupted
+from tickrig.host.canmon.output.listening import report, say_marks, until_interrupted
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
 from tickrig.host.canmon.sources.opening import open_any
@@ -25,7 +25,7 @@ from tickrig.host.canmon.verbs.decode_options import (
     make_decoder,
     read_filter,
 )
-from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
@@ -33,11 +33,12 @@ from tickrig.host.monitor.frames.dump_line import Stamp
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.frames.record import AnyRecord
+    from tickrig.host.monitor.logs.mark import Mark
 
 POLL_US: Final = 100_000
 
-Take = Callable[[list[DecodedFrame], int], None]
-"""Takes frames, and how many were lost so far."""
+Take = Callable[[list[DecodedFrame], int, "Sequence[Mark]"], None]
+"""Takes frames, how many were lost so far, and what happened behind them."""
 
 _shown: Final = add_options(
     click.option(
@@ -57,6 +58,7 @@ _shown: Final = add_options(
     ),
 )
 _ending: Final = add_options(
+    reopen_option,
     click.option("-n", "count", type=click.IntRange(1), metavar="N", help="End after N frames."),
     click.option(
         "-T", "quiet_ms", type=click.IntRange(1), metavar="MS", help="End after MS without a frame."
@@ -84,6 +86,7 @@ def command(  # noqa: PLR0913 - options
     dbc: Sequence[Path],
     count: int | None,
     quiet_ms: int | None,
+    reopen: bool,
     strict: bool,
     **options: Any,
 ) -> None:
@@ -115,6 +118,8 @@ def command(  # noqa: PLR0913 - options
     shown = StdoutWriter(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
     with ExitStack() as held:
         frames = held.enter_context(closing(open_any(source, BusOptions(**options))))
+        if reopen:
+            frames.reopen()
         log = None if file is None else held.enter_context(closing(LogFile(file, source)))
         with until_interrupted(), until_unread():
             pass_on(frames, meaning, (log or shown).take, count, quiet_ms)
@@ -138,7 +143,8 @@ def pass_on(
     while not source.ended and left != 0:
         records = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
         decoded_frames = list(islice(meaning.take(records), left))
-        take(decoded_frames, source.lost)
+        take(decoded_frames, source.lost, source.marks)
+        say_marks(source)
         left = None if left is None else left - len(decoded_frames)
         if records:
             latest_s = time.monotonic()

@@ -24,6 +24,10 @@ strict_option: Final[Decorator] = click.option(
     "--strict", is_flag=True, help="Exit status 4 if frames were lost or bad."
 )
 
+reopen_option: Final[Decorator] = click.option(
+    "--reopen", is_flag=True, help="Wait for a bus that goes away until it is back."
+)
+
 
 def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.Command]:
     """Return a decorator that makes a verb with SOURCE words, `--strict`, and those of a bus.

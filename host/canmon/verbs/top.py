@@ -19,7 +19,7 @@ from tickrig.host.canmon.verbs.decode_options import (
     make_decoder,
     read_filter,
 )
-from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.views.top_model import TopModel
 
@@ -34,6 +34,7 @@ Take = Callable[["Sequence[AnyRecord]"], None]
     filter_option,
     decode_options,
     span_option,
+    reopen_option,
 )
 def command(  # noqa: PLR0913 - options
     *,
@@ -43,6 +44,7 @@ def command(  # noqa: PLR0913 - options
     eds: Sequence[str],
     dbc: Sequence[Path],
     span_us: int | None,
+    reopen: bool,
     strict: bool,
     **options: Any,
 ) -> None:
@@ -74,9 +76,14 @@ def command(  # noqa: PLR0913 - options
     log = whole_log(source) if plain else None
     model.press("d" if decode else "")
     frames = log or open_any(source, bus)
+    if reopen:
+        frames.reopen()
 
     def lines(at_us: int, width: int, height: int) -> list[str]:
-        return model.lines(at_us, frames.lost, width, height, frames.unread)
+        shown = model.lines(at_us, frames.lost, width, height, frames.unread)
+        if away := frames.away:
+            shown[0] = f"GONE: {', '.join(away)}  {shown[0]}"[:width]
+        return shown
 
     try:
         follow(frames, source, take, span_us, lines, press=model.press)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.extensions import make_decoder
@@ -27,6 +27,9 @@ from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.trace import Trace
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.sources.bus_source import OpenBus
 
 DecodedFrame = tuple[Record, Decoded]
 """A frame and what it means."""
@@ -276,12 +279,15 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
         return Session(open_any(words, options), model)
     if not lines:
         buses = buses or [BusSpec()]
+    source, opened = open_live(buses, lines, options)
+    return Session(source, model, {name: partial(_send, bus) for name, bus in opened.items()})
+
+
+def _send(bus: OpenBus, frame: CanFrame) -> None:
+    """Send on a bus as it was opened last."""
     from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415 - python-can is slow
 
-    source, opened = open_live(buses, lines, options)
-    return Session(
-        source, model, {name: partial(send_on, bus, name) for name, bus in opened.items()}
-    )
+    send_on(bus.bus, bus.name, frame)
 
 
 def _take_pipe() -> int:
