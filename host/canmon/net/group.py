@@ -15,6 +15,10 @@ HERE: Final = "tickrig.host.canmon.net"
 VERBS: Final = {
     "scan": (f"{HERE}.scan_verb:command", "Say which nodes are there."),
     "nmt": (f"{HERE}.nmt_verb:command", "Start, stop or reset a node, or all nodes."),
+    "lss": (
+        f"{HERE}.lss_verb:command",
+        "Configure node-ID and bit rate of nodes by LSS (CiA 305).",
+    ),
     "read": (f"{HERE}.read_verb:command", "Read objects of a node."),
     "write": (f"{HERE}.write_verb:command", "Write objects of a node."),
 }
@@ -67,6 +71,7 @@ def command(
     canmon net can0 read 5 device_name 1018h:1    objects by name or index
     canmon net can0 write 5 heartbeat_time=100
     canmon net can0 nmt start 5
+    canmon net can0 lss --fastscan --node-id 5 --store
 
     \b
     Exit status  0 all is done            2 usage

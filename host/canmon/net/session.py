@@ -40,9 +40,14 @@ class NodeFailed(click.ClickException):
 
 
 class Work:
-    """What is to be done, step by step, so that an end in the middle can say how far it came."""
+    """What is to be done, step by step, so that an end in the middle can say how far it came.
+
+    Attributes:
+        ending: how the nodes are left, however it ends; empty if there is nothing to be said.
+    """
 
     def __init__(self) -> None:
+        self.ending = ""
         self._steps: list[str] = []
         self._done = 0
 
@@ -56,11 +61,10 @@ class Work:
 
     def progress(self) -> str:
         """Say what was done and what was not; empty where nothing was planned."""
-        if not self._steps:
-            return ""
         done, left = self._steps[: self._done], self._steps[self._done :]
         parts = (("done", done), ("not done", left))
-        return "; ".join(f"{word}: {known(items)}" for word, items in parts if items)
+        said = [f"{word}: {known(items)}" for word, items in parts if items]
+        return "; ".join([*said, *filter(None, [self.ending])])
 
 
 class NetSession:
