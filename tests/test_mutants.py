@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
+from collections.abc import Iterator
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
@@ -94,3 +95,19 @@ def test_a_swap_is_taken_back_by_another() -> None:
         assert ast.unparse(tree) != "x = a < 1"
         mutant.swap()
         assert ast.unparse(tree) == "x = a < 1"
+
+
+@pytest.fixture
+def tracer() -> Iterator[object]:
+    before, ours = sys.gettrace(), lambda *_: None
+    sys.settrace(ours)
+    yield ours
+    sys.settrace(before)
+
+
+@pytest.mark.unmeasured
+def test_what_coverage_leaves_out_is_seen_by_other_tracers(
+    tracer: object, request: pytest.FixtureRequest
+) -> None:
+    measured = request.config.getoption("cov_source", [])
+    assert sys.gettrace() is (None if measured else tracer)
