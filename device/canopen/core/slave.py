@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from operator import attrgetter, itemgetter
-from typing import Final, NamedTuple
+from typing import Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.core.frame_handlers import REMOTE, frame_handlers, shared
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.service import Handler, Service
 from tickrig.device.horizon import Horizon
@@ -24,7 +24,6 @@ UNCONFIGURED: Final = 0xFF
 """Node-ID of a slave that waits for LSS (CiA 305)."""
 
 COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
-REMOTE: Final = 1 << 29
 
 _slot = attrgetter("slot")
 _priority = itemgetter(0)
@@ -81,18 +80,10 @@ class CanopenSlave(Copyable):
     """
 
     __slots__ = (  # each slave's attributes lie in one place then, for 1,016 of them 5 %
-        *("__dict__", "__weakref__", "_asking", "_handlers", "_out", "_powered"),
-        *("accepts", "admits", "boots", "configured_id", "dictionary", "due_us", "entered"),
-        *("horizon", "model", "node_id", "nonvolatile", "now_us", "on_accepts", "on_bit_rate"),
-        *(
-            "on_state",
-            "on_sync",
-            "pending_id",
-            "reconfigured_by",
-            "services",
-            "silent_until_us",
-            "state",
-        ),
+        *("__dict__", "__weakref__", "_asking", "_handlers", "_out", "_powered", "accepts"),
+        *("admits", "boots", "configured_id", "dictionary", "due_us", "entered", "horizon"),
+        *("model", "node_id", "nonvolatile", "now_us", "on_accepts", "on_bit_rate", "on_state"),
+        *("on_sync", "pending_id", "reconfigured_by", "services", "silent_until_us", "state"),
         *("sync_handlers", "time_of_day"),
     )
 
@@ -120,7 +111,7 @@ class CanopenSlave(Copyable):
         self.horizon: Horizon | None = None
         self._powered = False
         self._out: Frames = ()  # no list: one that stays keeps the garbage collector busy, 4 %
-        self._handlers: dict[int, Handler]  # by CAN-ID, those of remote frames by REMOTE | CAN-ID
+        self._handlers: dict[int, Handler]
         self.accepts: frozenset[int] | None = None
         self.reconfigured_by: frozenset[int] = frozenset()
         self.on_accepts: list[Callable[[], None]] = []
@@ -252,17 +243,11 @@ class CanopenSlave(Copyable):
 
     def rewire(self) -> None:
         """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
-        self._handlers = {}
-        reconfigured_by: list[int] = []
-        for service in self.services:
-            reconfigured_by += service.reconfigured_by(self.state)
-            for can_id, handler in service.handlers(self.state):
-                first = self._handlers.get(can_id)
-                self._handlers[can_id] = _Both(first, handler).handle if first else handler
-            for can_id, handler in service.remote_handlers(self.state):
-                self._handlers[REMOTE | can_id] = handler
-        self.reconfigured_by = _shared(frozenset(reconfigured_by))
-        self._listen_to(frozenset(key & ~REMOTE for key in self._handlers))
+        services, state = self.services, self.state
+        self._handlers = handlers = frame_handlers(services, state)
+        found = (can_id for service in services for can_id in service.reconfigured_by(state))
+        self.reconfigured_by = shared(frozenset(found))
+        self._listen_to(frozenset(key & ~REMOTE for key in handlers))
 
     def _listen_to(self, accepts: frozenset[int] | None) -> None:
         self.accepts = accepts
@@ -288,15 +273,11 @@ class CanopenSlave(Copyable):
 
     def reset_node(self) -> None:
         """Reset application and communication: every object has its power-on value again."""
-        self.node_id = self.pending_id
-        self._restore(range(0x1_0000))
-        self._boot()
+        self._reset(range(0x1_0000))
 
     def reset_communication(self) -> None:
         """Reset the communication objects, 1000h to 1FFFh, and boot again."""
-        self.node_id = self.pending_id
-        self._restore(COMMUNICATION_AREA)
-        self._boot()
+        self._reset(COMMUNICATION_AREA)
 
     def _power_on(self) -> None:
         self._powered = True
@@ -306,6 +287,17 @@ class CanopenSlave(Copyable):
         for service in self.services:
             service.power_on()
         self.reset_node()
+
+    def _reset(self, area: range) -> None:
+        self.node_id = self.pending_id
+        stored = self.nonvolatile.parameters
+        for entry in self.dictionary:
+            if entry.index in area:
+                data = stored.get(entry.key)
+                if data is None:
+                    data = entry.description.power_on_data(self.node_id)
+                entry.assign(data)
+        self._boot()
 
     def _boot(self) -> None:
         """Go through Initialising; a slave without node-ID stays there, for LSS alone."""
@@ -318,30 +310,21 @@ class CanopenSlave(Copyable):
             for service in self.services:
                 service.booted()
 
-    def _restore(self, area: range) -> None:
-        stored = self.nonvolatile.parameters
-        for entry in self.dictionary:
-            if entry.index in area:
-                data = stored.get(entry.key)
-                if data is None:
-                    data = entry.description.power_on_data(self.node_id)
-                entry.assign(data)
-
     def _receive_special(self, frame: CanFrame) -> None:
         """Handle a remote frame; 29-bit frames are for nobody here."""
         handler = self._handlers.get(REMOTE | frame.can_id)
         if frame.remote and not frame.extended and handler is not None:
             handler(frame)
 
-    def _run_due(self, now_us: int, after: int = -1) -> None:
+    def _run_due(self, now_us: int, first: int = 0) -> None:
         """Let the services act that are due, in their order; most have never asked for a tick."""
         asking = self._asking
         for service in asking:
-            if service.asked_us <= now_us and service.slot > after:
+            if service.asked_us <= now_us and service.slot >= first:
                 service.asked_us = NEVER
                 service.tick(now_us)
                 if self._asking is not asking:  # one that had never asked may be due behind it
-                    self._run_due(now_us, service.slot)
+                    self._run_due(now_us, service.slot + 1)
                     return
         if self._powered:
             self.due_us = self._first_due()
@@ -354,12 +337,6 @@ class CanopenSlave(Copyable):
         return first_us
 
 
-@lru_cache
-def _shared(can_ids: frozenset[int]) -> frozenset[int]:
-    """Return the set that all slaves have which name the same; it then stays in the cache."""
-    return can_ids
-
-
 def _boots() -> bool:
     """Boot, as CiA 301 has it."""
     return True
@@ -368,14 +345,3 @@ def _boots() -> bool:
 def _admits(command: NmtCommand) -> bool:
     """Carry out each command, as CiA 301 has it."""
     return True
-
-
-class _Both(NamedTuple):
-    """Two handlers of one CAN-ID: two services may listen to it."""
-
-    first: Handler
-    second: Handler
-
-    def handle(self, frame: CanFrame) -> None:
-        self.first(frame)
-        self.second(frame)

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
@@ -132,6 +132,8 @@ class PlainSlave:
     st.lists(st.lists(requests, max_size=3), max_size=20),
     st.lists(st.lists(requests, max_size=2), max_size=8),
 )
+@example([[(1, 0), (2, 5)]], [[(1, 0)]])  # for itself, beside one that has never asked
+@example([[(2, 0)], [], [(4, 0)]], [[(1, 0), (2, 0)]])  # for one whose turn is over
 def test_a_slave_runs_what_one_runs_that_asks_all_services(
     told: list[list[Request]], between: list[list[Request]]
 ) -> None:
