@@ -9,7 +9,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
-from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
+from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_writer import comment, log_line
 from tickrig.host.monitor.logs.mark import Mark
@@ -132,14 +132,6 @@ def csv_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     at_s = f"{at_us // 1_000_000}.{at_us % 1_000_000:06d}"
     cells = (at_s, _cell(channel), text, "tx" if sent else "rx", str(length), data, *meaning)
     return ",".join(cells)
-
-
-def decoded_text(decoded: Decoded | None) -> str:
-    """Write what a frame means: node, kind, and what it says."""
-    if decoded is None or decoded.kind == "raw":
-        return ""
-    node = "" if decoded.node is None else f"{decoded.node} "
-    return f"{node}{decoded.kind} {decoded.text}".rstrip()
 
 
 def _plain(value: object) -> object:

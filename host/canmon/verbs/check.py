@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.listening import (
@@ -22,9 +19,11 @@ from tickrig.host.canmon.output.listening import (
     span_option,
     until_interrupted,
 )
+from tickrig.host.canmon.output.verdict import Verdict
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
+from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, Decorator, add_options
@@ -40,7 +39,11 @@ from tickrig.host.monitor.check.rules import (
     joined,
     parse_rules,
 )
+from tickrig.host.monitor.check.surroundings import Surroundings
 from tickrig.host.monitor.frames.record import Record
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoder import Decoder
 
 _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
@@ -67,7 +70,12 @@ rule_options: Final[Decorator] = add_options(
         "--max-gap", multiple=True, metavar="CAN-ID=TIME", help="Comes again, as 181=20ms."
     ),
     click.option("--known", multiple=True, metavar="CAN-IDS", help="No others, as 080,181-18F."),
-    click.option("--rule", multiple=True, metavar="NAME", help="One of an installed package."),
+    click.option(
+        "--rule",
+        multiple=True,
+        metavar="RULE",
+        help="As 'node 3 operational within 2s', 'emcy never'; or NAME of an installed package.",
+    ),
 )
 """Add a rule each as an option."""
 
@@ -109,12 +117,22 @@ BROKEN: Final = 1
 """Exit status where a rule does not hold."""
 
 RULE_FILE: Final = ".toml"
+STDIN: Final = "-"
 NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
+MOST_AROUND: Final = 1_000
 
 
 @source_command(
     rule_options,
+    decode_options,
     span_option,
+    click.option(
+        "--around",
+        type=click.IntRange(0, MOST_AROUND),
+        default=2,
+        show_default=True,
+        help="Frames before and after what a RULE finds.",
+    ),
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
     reopen_option,
@@ -122,7 +140,10 @@ NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
+    eds: Sequence[str],
+    dbc: Sequence[Path],
     span_us: int | None,
+    around: int,
     report_path: Path | None,
     jsonl: bool,
     reopen: bool,
@@ -138,6 +159,7 @@ def command(  # noqa: PLR0913 - options
     canmon check run.log --no-emcy --no-sdo-abort --nodes 3,16-18
     canmon check run.log rules.toml --junit out.xml
     canmon check can0 -b 500000 --for 60s --max-load 60 --heartbeat 3=100ms±20%
+    canmon check run.log --eds 3=drive.eds --rule '3.statusword.fault never'
 
     {source}
     """  # noqa: D301 - click wants the backspace
@@ -145,7 +167,8 @@ def command(  # noqa: PLR0913 - options
     rules = read_rules([Path(word) for word in source if word.endswith(RULE_FILE)], options)
     bus = BusOptions(**{name: options[name] for name in NAMES})
     bit_rate = _bit_rate(rules, words, bus)
-    log = whole_log(words)
+    decoder = make_decoder(eds, dbc) if rules.expressions else None
+    log = None if decoder else whole_log(words)
     frames = log or open_source(words, bus)
     if reopen:
         frames.reopen()
@@ -155,8 +178,8 @@ def command(  # noqa: PLR0913 - options
             verdict.frames = len(log.columns)
             verdict.take(_at_once(log, rules, bit_rate))
         else:
-            checker = Checker(rules, bit_rate)
-            _one_by_one(frames, checker, verdict, span_us or patience_us(frames, words))
+            held = DecodedCheck(rules, bit_rate, decoder, around)
+            _one_by_one(frames, words, held, verdict, span_us)
     finally:
         frames.close()
     unjudged = "" if verdict.frames else _no_frame(frames, words)
@@ -175,49 +198,6 @@ class NothingJudged(click.ClickException):
     """One line on standard error, and exit status 5."""
 
     exit_code = 5
-
-
-class Verdict:
-    """Findings, shown as they come.
-
-    Attributes:
-        findings: all of them.
-        frames: how many were held against the rules.
-    """
-
-    def __init__(self, jsonl: bool) -> None:
-        self.findings: list[Finding] = []
-        self.frames = 0
-        self._text = finding_json if jsonl else str
-
-    def take(self, findings: Sequence[Finding]) -> None:
-        """Show findings."""
-        if findings:
-            self.findings += findings
-            with until_unread():
-                click.echo("\n".join(map(self._text, findings)))
-
-    def summary(self) -> str:
-        """Say how it ended."""
-        if not self.findings:
-            return "all rules hold"
-        rules = Counter(finding.rule for finding in self.findings)
-        counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(rules.items()))
-        return f"{len(self.findings)} findings: {counts}"
-
-
-def finding_json(finding: Finding) -> str:
-    """Write a finding as an object; its frame as candump does."""
-    record = finding.record
-    said: dict[str, object] = {
-        "v": 1,
-        "t": finding.at_us / 1e6,
-        "rule": finding.rule,
-        "text": finding.text,
-    }
-    if record is not None:
-        said |= {"ch": record.channel, "frame": str(record.frame)}
-    return json.dumps(said, ensure_ascii=False)
 
 
 def _no_frame(source: Source, words: Sequence[str]) -> str:
@@ -242,18 +222,73 @@ def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]
     return check_columns(log.columns, rules, bit_rate, log.losses())
 
 
-def _one_by_one(source: Source, checker: Checker, verdict: Verdict, span_us: int | None) -> None:
-    watch = Stopwatch()
+QUIET_US: Final = 1_000_000
+"""On a bus that is silent a finding waits so long for the frames behind it, and what has not come
+in time for frames that this machine has not taken yet."""
+
+
+class DecodedCheck:
+    """A checker whose frames are decoded where a rule asks what they mean.
+
+    Args:
+        rules: what must hold.
+        bit_rate: bits a second, for the load.
+        decoder: None where no rule asks.
+        around: frames that are shown before and after what such a rule finds.
+    """
+
+    def __init__(
+        self, rules: Rules, bit_rate: int | None, decoder: Decoder | None, around: int
+    ) -> None:
+        self._checker, self._decoder = Checker(rules, bit_rate), decoder
+        self._around = Surroundings(around, (one.name for one in rules.expressions))
+        self._latest_us = 0
+
+    def take(self, records: Sequence[Record]) -> list[Finding]:
+        """Return what is wrong with frames."""
+        checker, decoder = self._checker, self._decoder
+        if decoder is None:
+            return [finding for record in records for finding in checker.take(record)]
+        found = []
+        self._latest_us = records[-1].at_us if records else self._latest_us
+        for record in records:
+            decoded = decoder.take(record)
+            found += self._around.take(record, decoded, checker.take(record, decoded))
+        return found
+
+    def wait(self, now_us: int, has_clock: bool) -> list[Finding]:
+        """Return what has not come in time and what waits too long, where no frame comes.
+
+        Args:
+            now_us: the time at the source, by the clock of this machine.
+            has_clock: the source keeps that clock, as a bus does and a pipe need not.
+        """
+        if now_us - self._latest_us <= QUIET_US:
+            return []
+        return self._around.flush(self._checker.advance(now_us - QUIET_US) if has_clock else ())
+
+    def end(self, end_us: int, lost: Iterable[str], judged_us: int) -> list[Finding]:
+        """Return what is missing, as `Checker.end` does."""
+        return self._around.flush(self._checker.end(end_us, lost, judged_us))
+
+
+def _one_by_one(
+    source: Source, words: Sequence[str], held: DecodedCheck, verdict: Verdict, span_us: int | None
+) -> None:
+    watch, has_clock = Stopwatch(), source.live and list(words) != [STDIN]
 
     def take(records: Sequence[Record]) -> None:
         watch.take(records)
         verdict.frames += len(records)
-        verdict.take([finding for record in records for finding in checker.take(record)])
+        verdict.take(held.take(records))
+        if not records and verdict.frames:
+            verdict.take(held.wait(watch.now_us, has_clock))
 
     with until_interrupted():
-        listen(source, take, span_us)
-    lost = source.losses()
-    verdict.take(checker.end(watch.now_us if source.live else watch.latest_us, lost))
+        listen(source, take, span_us or patience_us(source, words))
+    lost, latest_us = source.losses(), watch.latest_us
+    end_us = watch.now_us if source.live else latest_us
+    verdict.take(held.end(end_us, lost, end_us if has_clock else latest_us))
 
 
 def _write(path: Path | None, text: str) -> None:

@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.check.rule import Finding, Rule
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
@@ -20,12 +21,15 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.can_error import ErrorFrame
 
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+
 
 class Checker:
     """Holds frames against rules; what it keeps grows with identifiers, not with frames.
 
     Args:
-        rules: what must hold.
+        rules: what must hold. Those that are written as expressions want decoded frames.
         bit_rate: bits a second, for the load.
 
     Raises:
@@ -37,9 +41,25 @@ class Checker:
         self._wanting: dict[int, list[Rule]] = {}
         self._last_us: dict[tuple[str, int], int] = {}
         self._loads: dict[str, Load] = {}
+        self._expressions = [rule for one in rules.expressions for rule in one.make()]
 
-    def take(self, record: Record) -> list[Finding]:
-        """Return what is wrong with a frame, and with the second that it ended."""
+    def take(self, record: Record, decoded: Decoded | None = None) -> list[Finding]:
+        """Return what is wrong with a frame, and with the second that it ended.
+
+        Args:
+            record: the frame.
+            decoded: what it says, for rules that are expressions.
+        """
+        if decoded is None or not self._expressions:
+            return self._taken(record)
+        found = self.advance(record.at_us) + self._taken(record)
+        return found + [one for rule in self._expressions for one in rule.take(record, decoded)]
+
+    def advance(self, now_us: int) -> list[Finding]:
+        """Return what has not come in time, where no frame tells the time."""
+        return [one for rule in self._expressions for one in rule.advance(now_us)]
+
+    def _taken(self, record: Record) -> list[Finding]:
         at_us, channel, frame, _ = record
         found = self._too_busy(at_us, channel, frame) if self._load else []
         if isinstance(frame, ErrorFrame):
@@ -51,20 +71,29 @@ class Checker:
         gap_us = None if before_us is None else max(0, at_us - before_us)
         return found + self._judged(ident, record, gap_us)
 
-    def end(self, end_us: int, lost: Iterable[str] = ()) -> list[Finding]:
+    def end(
+        self, end_us: int, lost: Iterable[str] = (), judged_us: int | None = None
+    ) -> list[Finding]:
         """Return what is missing.
 
         Args:
             end_us: when listening ended.
             lost: what the source says was lost or is no frame.
+            judged_us: until when expressions are judged; None for `end_us`.
         """
         windows = [(channel, load.end()) for channel, load in sorted(self._loads.items())]
         found = [one for channel, window in windows for one in self.judge_window(channel, window)]
-        return found + ended(self._rules, self._made, _latest(self._last_us), end_us, lost)
+        found += ended(self._rules, self._made, _latest(self._last_us), end_us, lost)
+        judged_us = end_us if judged_us is None else judged_us
+        return found + self.advance(judged_us) + self._written_ended(judged_us)
 
     def missing(self, now_us: int) -> list[Finding]:
         """Return what is missing until now; listening goes on."""
-        return ended(self._rules, self._made, _latest(self._last_us), now_us, ())
+        found = ended(self._rules, self._made, _latest(self._last_us), now_us, ())
+        return found + self._written_ended(now_us)
+
+    def _written_ended(self, end_us: int) -> list[Finding]:
+        return [one for rule in self._expressions for one in rule.end(end_us)]
 
     def judge_window(self, channel: str, window: Window) -> list[Finding]:
         """Return what is wrong with a second of a bus."""

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.monitor.frames.record import Record
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
 
 
 class Finding(NamedTuple):
@@ -16,17 +19,37 @@ class Finding(NamedTuple):
         rule: name of the rule.
         text: what is wrong, in words.
         record: the frame that shows it, None if none does.
+        around: the frames around that time, with what they mean, where somebody asked for them.
     """
 
     at_us: int
     rule: str
     text: str
     record: Record | None = None
+    around: tuple[tuple[Record, Decoded], ...] = ()
 
     def __str__(self) -> str:
-        """Write it as one line, time and frame as candump does.
+        """Write it as `line`, with a line as of `canmon dump` for each frame around it."""
+        if not self.around:
+            return self.line
+        from tickrig.host.monitor.frames.dump_line import (  # noqa: PLC0415 - seldom wanted
+            DumpLines,
+            Stamp,
+            decoded_text,
+        )
 
-        >>> str(Finding(1_500_000, "nodes", "node 3 was never heard"))
+        lines = DumpLines(Stamp.ABSOLUTE)
+        shown = [
+            ("  >" if record is self.record else "   ") + lines.line(record, decoded_text(decoded))
+            for record, decoded in self.around
+        ]
+        return "\n".join([self.line, *shown])
+
+    @property
+    def line(self) -> str:
+        """One line, time and frame as candump does.
+
+        >>> Finding(1_500_000, "nodes", "node 3 was never heard").line
         '(1.500000) nodes: node 3 was never heard'
         """
         shown = f" [{self.record.channel} {self.record.frame}]" if self.record else ""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.check.frame_rules import (
     KnownIds,
@@ -24,6 +24,9 @@ from tickrig.host.monitor.check.time_rules import (
 )
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
 from tickrig.host.text.values import parse_time_us
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.check.expression.parse_rule import Expression
 
 NO_LOSS: Final = "no-loss"
 """The rule that no frame was lost and every line of a log is one."""
@@ -46,6 +49,7 @@ class Rules:
         max_gaps: identifiers and the longest gap of each, microseconds.
         known: all identifiers that may come, None for any.
         others: what makes further rules, those of installed packages.
+        expressions: rules about what frames mean; they need a decoder.
     """
 
     max_load: float | None = None
@@ -60,11 +64,13 @@ class Rules:
     max_gaps: tuple[tuple[int, int], ...] = ()
     known: frozenset[int] | None = None
     others: tuple[Callable[[], Rule], ...] = ()
+    expressions: tuple[Expression, ...] = ()
 
     def names(self) -> list[str]:
         """Return the names of all rules, for a report."""
         names = ["max-load"] * (self.max_load is not None) + [NO_LOSS] * self.no_loss
-        return names + [rule.name for rule in self.make()]
+        names += [rule.name for rule in self.make()]
+        return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
 
     def make(self) -> list[Rule]:
         """Return new rules about frames."""
@@ -101,6 +107,10 @@ LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
 VALUES: Final = (*NUMBERS, *LISTS)
 
 _HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-9]+)?)(%|s|ms|us)")
+_NAMES: Final = re.compile(r"[\w.-]*(?:\s*,\s*[\w.-]+)*", re.ASCII)
+_NAMED: Final = re.compile(r"(.*\S): (.*)", re.DOTALL)
+ONE_WORD: Final = ("dlc",)
+"""Rules that are written out as one word, and no names."""
 _MAX_NODE: Final = 127
 _MAX_IDENTS: Final = 1 << 16
 
@@ -130,6 +140,7 @@ def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
     gaps = (text.partition("=") for text in _texts("max_gap", words))
     idents = [ident for text in _lists("known", words) for ident in _idents(text)]
     nodes = {node for text in _lists("nodes", words) for node in _nodes(text)}
+    others, expressions = _named_and_written(_texts("rule", words))
     return Rules(
         **switches,
         max_load=_percent(words.get("max_load")),
@@ -138,7 +149,8 @@ def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
         nodes=tuple(sorted(nodes)),
         max_gaps=tuple((parse_ident(ident), _time_us(time)) for ident, _, time in gaps),
         known=frozenset(idents) if "known" in words else None,
-        others=tuple(map(load_rule, _lists("rule", words))),
+        others=tuple(map(load_rule, others)),
+        expressions=expressions,
     )
 
 
@@ -153,6 +165,23 @@ def joined(first: RuleValues, second: RuleValues) -> RuleValues:
         both = name in LISTS and name in first
         out[name] = [*_texts(name, first), *_texts(name, second)] if both else value
     return out
+
+
+def _named_and_written(texts: Iterable[str]) -> tuple[list[str], tuple[Expression, ...]]:
+    """Tell names of rules of other packages from rules that are written out."""
+    names: list[str] = []
+    expressions: list[Expression] = []
+    for text in texts:
+        if _NAMES.fullmatch(text) and text not in ONE_WORD:
+            names += [part.strip() for part in text.split(",")]
+            continue
+        from tickrig.host.monitor.check.expression.parse_rule import (  # noqa: PLC0415 - seldom wanted
+            parse_rule,
+        )
+
+        named = _NAMED.fullmatch(text)
+        expressions.append(parse_rule(named[2], named[1].strip()) if named else parse_rule(text))
+    return names, tuple(expressions)
 
 
 def _switch(name: str, value: object) -> bool:
@@ -178,10 +207,11 @@ def _bit_rate(value: object) -> int | None:
 
 
 def _texts(name: str, words: RuleValues) -> list[str]:
-    """Return what a rule is given as texts; a table is texts with `=`."""
+    """Return what a rule is given as texts; a table is texts with `=`, of `rule` with `: `."""
     value = words.get(name, ())
     if isinstance(value, Mapping):
-        return [f"{key}={entry}" for key, entry in value.items()]
+        sign = ": " if name == "rule" else "="
+        return [f"{key}{sign}{entry}" for key, entry in value.items()]
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [str(entry) for entry in value]
     return [str(value)]

@@ -143,12 +143,13 @@ class BusDecoder:
             return Decoded("sdo", node, "remote frame")
         step = take(at_us, frame.data)
         if not step.ended:
-            return Decoded("sdo", node, step.text, (), "", step.entry)
+            return Decoded("sdo", node, step.text, (), "", step.entry, asks=step.asks)
         for transfer in step.ended:
             self._learn(transfer)
         ended = tuple(self._named(transfer) for transfer in step.ended)
         last = ended[-1]
-        return Decoded("sdo", node, None, _signals(last), last.source, step.entry, ended)
+        signals, source = _signals(last), last.source
+        return Decoded("sdo", node, None, signals, source, step.entry, ended, step.asks)
 
     def _named(self, transfer: Transfer) -> Transfer:
         """Return it with name and value of its object."""

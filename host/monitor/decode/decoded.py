@@ -46,6 +46,8 @@ class Decoded(NamedTuple):
         source: `EDS`, `SEEN`, `DBC`; empty where the standard alone says it.
         entry: index and sub-index that an SDO frame is about.
         transfers: the SDO transfers that ended with this frame.
+        asks: who sent it waits for an answer: SDO client, NMT master that guards.
+        size: bytes that a PDO must have by its mapping, None where nobody told it.
     """
 
     kind: str
@@ -55,6 +57,8 @@ class Decoded(NamedTuple):
     source: str = ""
     entry: tuple[int, int] | None = None
     transfers: tuple[Transfer, ...] = ()
+    asks: bool = False
+    size: int | None = None
 
     @property
     def text(self) -> str:

@@ -8,11 +8,12 @@ not    = "not" not | "(" or ")" | term
 term   = 181 | 181-18F | 18FF0000-18FFFFFF | 123:7FF | 400~700 | #FF
        | nmt | sync | time | emcy | heartbeat | boot-up | guard | lss | error | unmapped | raw
        | pdo | tpdo | rpdo | tpdo1 | sdo | sdo[6040h] | sdo[0x1018:1] | sdo.aborted | sdo.unanswered
+       | term of 3 | term of 3-5 | node 3 | node 3-5 | node 3 operational
        | node = 3 | id < 200 | dlc = 8 | channel = can0 | kind = emcy | dir = tx | src = eds
        | statusword.fault | position > 1000 | 3.position > 1000 | state = stopped
 ```
 
-Numbers after `id` and bare CAN-IDs are hexadecimal, all others as in Python.
+Numbers after `id` and bare CAN-IDs are hexadecimal, all others as in Python, or as `8130h`.
 
 >>> from tickrig.host.monitor.decode.decoded import Decoded
 >>> from tickrig.host.monitor.frames.record import Record
@@ -26,13 +27,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 from tickrig.host.monitor.decode.filter_terms import (
     COMPARISONS,
     EQUALITIES,
     FIELDS,
+    HIGHEST_NODE,
     KINDS,
+    NMT_STATES,
     WORDS,
     Test,
     candump_test,
@@ -43,9 +46,12 @@ from tickrig.host.monitor.decode.filter_terms import (
     object_test,
     range_test,
     signal_test,
+    state_path,
+    state_test,
     word_test,
 )
 from tickrig.host.monitor.frames.ident import CandumpFilter
+from tickrig.host.monitor.frames.tokens import Token, tokens_of
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
 
 
@@ -53,28 +59,26 @@ class FilterError(ValueError):
     """Text that is no filter.
 
     Attributes:
+        what: it should be.
         column: where, from 1.
     """
 
+    what = "filter"
+
     def __init__(self, text: str, column: int, reason: str) -> None:
-        super().__init__(f"filter {text!r}, column {column}: {reason}")
+        super().__init__(f"{self.what} {text!r}, column {column}: {reason}")
         self.column = column
 
 
-_TOKEN: Final = re.compile(r"\s*([()\[\],]|==|!=|<=|>=|[=<>]|[^\s()\[\],=!<>]+|!)")
 _CAN_ID: Final = re.compile(r"[0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7}")
 _RULE: Final = re.compile(r"[0-9A-Fa-f]{1,8}[:~][0-9A-Fa-f]{1,8}")
 _ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
 _OBJECT: Final = re.compile(r"(?:0x)?([0-9A-Fa-f]{1,4})h?(?::(?:0x)?([0-9A-Fa-f]{1,2})h?)?")
 _ADDRESS: Final = re.compile(r"([0-9]{1,3}\.)?[0-9A-Fa-f]{4}h:[0-9A-Fa-f]{2}")
 _NAME: Final = re.compile(r"([0-9]{1,3}\.)?[A-Za-z_][\w.]*")
+_NODES: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
 _RESERVED: Final = ("and", "or", "not")
 _ALIASES: Final = {"bootup": "boot-up", "ch": "channel"}
-
-
-class _Token(NamedTuple):
-    text: str
-    column: int
 
 
 class FilterParser:
@@ -84,17 +88,13 @@ class FilterParser:
         text: the filter.
     """
 
+    wrong = FilterError
+
     def __init__(self, text: str) -> None:
         self._text = text
         self._signals: set[str] = set()
-        self._tokens: list[_Token] = []
-        at, end = 0, len(text.rstrip())
-        while at < end:
-            match = _TOKEN.match(text, at)
-            assert match is not None  # a token is any character
-            self._tokens.append(_Token(match[1], match.start(1) + 1))
-            at = match.end()
-        self._tokens.append(_Token("", end + 1))
+        self._nodes: set[range] = set()
+        self._tokens = tokens_of(text)
 
     def parse(self) -> tuple[Test, frozenset[str]]:
         """Return the test and the signals it asks for; FilterError if it is no filter."""
@@ -104,7 +104,7 @@ class FilterParser:
         return test, frozenset(self._signals)
 
     @property
-    def _next(self) -> _Token:
+    def _next(self) -> Token:
         return self._tokens[0]
 
     def _take(self, *words: str) -> bool:
@@ -115,7 +115,7 @@ class FilterParser:
         return True
 
     def _error(self, reason: str) -> FilterError:
-        return FilterError(self._text, self._next.column, reason)
+        return self.wrong(self._text, self._next.column, reason)
 
     def _or(self) -> Test:
         tests = [self._and()]
@@ -148,12 +148,44 @@ class FilterParser:
             raise self._error(f"{word!r} is missing")
 
     def _term(self) -> Test:
+        before = set(self._signals)
+        test = self._plain_term()
+        if not self._take("of"):
+            return test
+        nodes = self._node_ids()
+        new = self._signals - before
+        self._signals = before | {f"{node}.{path}" for path in new for node in nodes}
+        return lambda record, decoded: decoded.node in nodes and test(record, decoded)
+
+    def _node_ids(self) -> range:
+        """Take node-IDs, as 3 or 3-5."""
+        match = _NODES.fullmatch(self._next.text)
+        nodes = range(int(match[1]), int(match[2] or match[1]) + 1) if match else range(0)
+        if not nodes or nodes[0] < 1 or nodes[-1] > HIGHEST_NODE:
+            came = repr(self._next.text) if self._next.text else "nothing"
+            raise self._error(f"{came} is no node-ID 1 to {HIGHEST_NODE}, as 3 or 3-5")
+        del self._tokens[0]
+        self._nodes.add(nodes)
+        return nodes
+
+    def _node(self) -> Test:
+        """Take what stands behind `node`: node-IDs, and an NMT state where there is one."""
+        nodes, word = self._node_ids(), self._next.text
+        if word not in NMT_STATES:
+            return lambda record, decoded: decoded.node in nodes
+        del self._tokens[0]
+        self._signals |= {state_path(node) for node in nodes}
+        return state_test(nodes, NMT_STATES[word])
+
+    def _plain_term(self) -> Test:
         word = self._next.text
         word = _ALIASES.get(word, word)
         if not word or word in _RESERVED or not re.match(r"[\w#]", word):
             raise self._error("a term is missing, as emcy, node=3, 181-18F or statusword.fault")
         if word in FIELDS or word in WORDS:
             del self._tokens[0]
+            if word == "node" and self._next.text[:1].isdecimal():
+                return self._node()
             return self._field(word)
         test = self._id_test(word) or kind_test(word)
         if test is None:

@@ -14,6 +14,7 @@ from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.canopen.nmt import NmtState
 
 Test = Callable[[AnyRecord, Decoded], bool]
 Compare = Callable[[float, float], bool]
@@ -49,6 +50,12 @@ WORDS: Final[dict[str, Callable[[AnyRecord, Decoded], str]]] = {
     "src": lambda record, decoded: decoded.source,
 }
 
+HIGHEST_NODE: Final = 127
+ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
+NMT_STATES: Final = {state.name.lower().replace("_", "-"): int(state) for state in NmtState}
+
+_STATE: Final = re.compile(r"state of node ([0-9]+)")
+_HEX: Final = re.compile(r"(-?)([0-9][0-9A-Fa-f]*)h")
 _PDO: Final = re.compile(r"([tr]?)pdo([0-9]{0,3})")
 _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
 
@@ -70,6 +77,20 @@ def kind_test(word: str) -> Test | None:
         return lambda record, decoded: decoded.kind in kinds
     begins = (*(f"{direction}pdo" for direction in directions), *unmapped)
     return lambda record, decoded: decoded.kind.startswith(begins)
+
+
+def state_path(node: int) -> str:
+    """Return the name under which the NMT state of a node is waited for."""
+    return f"state of node {node}"
+
+
+def state_test(nodes: range, state: int) -> Test:
+    """Return the test for nodes that tell an NMT state."""
+    return lambda record, decoded: (
+        decoded.node in nodes
+        and decoded.kind in ERROR_CONTROL
+        and any(signal.value == state for signal in decoded.signals)
+    )
 
 
 def object_test(index: int, sub: int | None) -> Test:
@@ -127,22 +148,50 @@ def signal_test(path: str, sign: str = "!=", text: str = "0") -> Test:
     """Return the test for a signal, or one bit of it; without a comparison: it is not 0.
 
     Args:
-        path: name, with `.bit` behind it and `node.` before it if need be.
+        path: name, with `.bit` or its number behind it and `node.` before it if need be.
         sign: one of `COMPARISONS`.
         text: what it is compared with.
     """
-    node, whole, shift = signal_place(path)
-    compare = _comparison(sign, text)
+    find, compare = signal_reader(path), comparison(sign, text)
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
-        if node is not None and decoded.node != node:
-            return False
-        for signal in decoded.signals:
-            if signal.name == whole:
-                return compare(signal if shift is None else _bit(signal, shift))
-        return False
+        signal = find(decoded)
+        return signal is not None and compare(signal)
 
     return test
+
+
+def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
+    """Return what finds a signal, or one bit of it, in a frame; None where it is not there.
+
+    Args:
+        path: see `signal_test`.
+    """
+    if match := _STATE.fullmatch(path):
+        return _state_reader(int(match[1]))
+    node, whole, shift = signal_place(path)
+    base, _, digits = whole.rpartition(".")
+    number = int(digits) if base and digits.isdecimal() else None
+
+    def find(decoded: Decoded) -> Signal | None:
+        if node is not None and decoded.node != node:
+            return None
+        for signal in decoded.signals:
+            if signal.name == whole:
+                return signal if shift is None else _bit(signal, shift)
+            if number is not None and signal.name == base:
+                return _bit(signal, number)
+        return None
+
+    return find
+
+
+def _state_reader(node: int) -> Callable[[Decoded], Signal | None]:
+    return lambda decoded: (
+        decoded.signals[0]
+        if decoded.node == node and decoded.kind in ERROR_CONTROL and decoded.signals
+        else None
+    )
 
 
 def signal_place(path: str) -> tuple[int | None, str, int | None]:
@@ -159,7 +208,14 @@ def signal_place(path: str) -> tuple[int | None, str, int | None]:
 
 
 def number(text: str) -> float | None:
-    """Read a number as people write it; None if it is none."""
+    """Read a number as people write it; None if it is none.
+
+    >>> number("0x10"), number("-1.5"), number("8130h"), number("fast")
+    (16, -1.5, 33072, None)
+    """
+    match = _HEX.fullmatch(text)
+    if match:
+        return int(match[1] + match[2], 16)
     for kind in (_whole, float):
         try:
             return kind(text)
@@ -172,7 +228,13 @@ def _whole(text: str) -> int:
     return int(text, 0)
 
 
-def _comparison(sign: str, text: str) -> Callable[[Signal], bool]:
+def comparison(sign: str, text: str) -> Callable[[Signal], bool]:
+    """Return what compares a signal, by its number or its text.
+
+    Args:
+        sign: one of `COMPARISONS`; of `EQUALITIES` where the text is no number.
+        text: what it is compared with.
+    """
     wanted, compare = number(text), COMPARISONS[sign]
     if wanted is None:
         words, equal = text.lower(), sign != "!="
@@ -203,7 +265,7 @@ class MissingSignals:
     """
 
     def __init__(self, paths: Iterable[str]) -> None:
-        self._left = {path: signal_place(path)[:2] for path in sorted(paths)}
+        self._left = {path: signal_reader(path) for path in sorted(paths)}
 
     def __bool__(self) -> bool:
         """Say whether any is missing."""
@@ -211,12 +273,14 @@ class MissingSignals:
 
     def take(self, decoded: Decoded) -> None:
         """Take what a frame says."""
-        names = {signal.name for signal in decoded.signals}
-        self._left = {
-            path: (node, name)
-            for path, (node, name) in self._left.items()
-            if name not in names or node not in (None, decoded.node)
-        }
+        if decoded.signals:
+            left = self._left.items()
+            self._left = {path: find for path, find in left if find(decoded) is None}
+
+    @property
+    def paths(self) -> list[str]:
+        """Those that have not come."""
+        return list(self._left)
 
     def messages(self) -> list[str]:
         """Say what never came, one line each."""

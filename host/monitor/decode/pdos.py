@@ -16,6 +16,7 @@ from tickrig.wire.canopen.pdo import DAM_MPDO, MAX_MAPPED_OBJECTS, SAM_MPDO, Map
 from tickrig.wire.errors import WireError
 
 MPDO: Final = (SAM_MPDO, DAM_MPDO)
+MPDO_BYTES: Final = 8
 DUMMIES: Final = range(0x0020)
 UNMAPPED: Final = "unmapped"
 
@@ -60,6 +61,7 @@ class PdoLayout:
     ) -> None:
         self.kind, self.node, self.source = pdo
         self._fields, self._size, self._note = tuple(fields), (bits + 7) // 8, note
+        self._wanted = None if note else self._size
 
     def decode(self, at_us: int, frame: CanFrame) -> Decoded:
         """Return the signals of a frame."""
@@ -68,7 +70,7 @@ class PdoLayout:
             return Decoded(self.kind, self.node, "asked for by RTR", (), self.source)
         if len(data) < self._size:
             text = f"{len(data)} B, {self._size} are mapped: not processed"
-            return Decoded(self.kind, self.node, text, (), self.source)
+            return Decoded(self.kind, self.node, text, (), self.source, size=self._wanted)
         number = int.from_bytes(data, "little")
         signals = []
         for name, shift, mask, sign, convert, unit, write in self._fields:
@@ -76,7 +78,8 @@ class PdoLayout:
             value: Value = (raw ^ sign) - sign if convert is None else convert(raw)
             signals.append(Signal(name, value, unit, "" if write is None else write(raw)))
         said = " ".join([*map(str, signals), self._note]) if self._note else None
-        return Decoded(self.kind, self.node, said, tuple(signals), self.source)
+        kind, node, told = self.kind, self.node, self._wanted
+        return Decoded(kind, node, said, tuple(signals), self.source, size=told)
 
 
 class MpdoLayout:
@@ -98,14 +101,15 @@ class MpdoLayout:
         try:
             mpdo = Mpdo.parse(frame.data)
         except WireError as error:
-            return Decoded(self.kind, self.node, str(error), (), self.source)
+            return Decoded(self.kind, self.node, str(error), (), self.source, size=MPDO_BYTES)
         text = self._describe(mpdo.index, mpdo.sub)
         data = mpdo.data[: text.kind.size] if text.kind and text.kind.size else mpdo.data
         value, written = text.read(data)
         name = text.name or write_entry((mpdo.index, mpdo.sub))
         way = f"to {mpdo.node_id or 'all'}" if mpdo.destination else f"from {mpdo.node_id}"
         signals = (Signal(name, value, text.unit, written),)
-        return Decoded(self.kind, self.node, f"{signals[0]} {way}", signals, self.source)
+        said = f"{signals[0]} {way}"
+        return Decoded(self.kind, self.node, said, signals, self.source, size=MPDO_BYTES)
 
 
 def make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:

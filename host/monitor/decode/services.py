@@ -123,7 +123,7 @@ def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decode
         guarded: this answers a guarding request.
     """
     if frame.remote:
-        return Decoded("guard", node, "guarding request")
+        return Decoded("guard", node, "guarding request", asks=True)
     if len(frame.data) != 1:
         return Decoded("heartbeat", node, f"no NMT state: {_dump(frame)}")
     byte = frame.data[0]

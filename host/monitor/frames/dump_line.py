@@ -23,6 +23,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
 
 if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
     from tickrig.host.monitor.frames.record import LineRecord
 
 DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
@@ -119,6 +120,14 @@ def line_text(line: LineRecord, text: str) -> str:
     data = bytes_text(line.data)
     shown = f"{data:<{DATA_WIDTH}}   {text}" if text else data
     return f"{line.channel}  {ARROWS[line.sent]}  {shown}"
+
+
+def decoded_text(decoded: Decoded | None) -> str:
+    """Write what a frame means: node, kind, and what it says."""
+    if decoded is None or decoded.kind == "raw":
+        return ""
+    node = "" if decoded.node is None else f"{decoded.node} "
+    return f"{node}{decoded.kind} {decoded.text}".rstrip()
 
 
 def bytes_text(data: bytes) -> str:

@@ -38,6 +38,7 @@ from tickrig.wire.canopen.sdo.sdo import (
 )
 from tickrig.wire.canopen.sdo.sdo_block import (
     BlockDownloadInitiateRequest,
+    BlockEnded,
     BlockUploadInitiateRequest,
 )
 from tickrig.wire.errors import WireError
@@ -50,11 +51,13 @@ class Step(NamedTuple):
         text: the step, where no transfer ended with it.
         entry: index and sub-index it is about, as far as known.
         ended: the transfers that ended with it.
+        asks: the client waits for an answer to it.
     """
 
     text: str
     entry: tuple[int, int] | None = None
     ended: tuple[Transfer, ...] = ()
+    asks: bool = False
 
 
 class SdoChannel:
@@ -83,12 +86,14 @@ class SdoChannel:
         """Take a frame of the client."""
         running = self._running
         if running and is_block_segment(running, Direction.DOWNLOAD, data):
-            return Step(take_block_segment(running, data), running.entry)
+            text = take_block_segment(running, data)
+            return Step(text, running.entry, asks=running.is_block_over)
         try:
             message = parse_request(data)
         except WireError as error:
             return Step(str(error))
-        return self._step(at_us, self._take_request(at_us, message, data), message)
+        step = self._step(at_us, self._take_request(at_us, message, data), message)
+        return step._replace(asks=not isinstance(message, Abort | BlockEnded))
 
     def response(self, at_us: int, data: bytes) -> Step:
         """Take a frame of the server."""

@@ -42,6 +42,7 @@ class OpenTransfer:
         requested_toggle: toggle bit of the segment of an upload that was asked for.
         taken: toggle bit of the latest segment that was taken.
         block_last: place of the last segment in its block, once it was heard.
+        block_size: segments of a block, as its receiver wants it; 0 while it has not said so.
         done: nothing more is expected.
     """
 
@@ -63,6 +64,7 @@ class OpenTransfer:
     requested_toggle: bool | None = None
     taken: bool | None = None
     block_last: int | None = None
+    block_size: int = 0
     done: bool = False
     _block: dict[int, bytes] = field(default_factory=dict)
 
@@ -75,6 +77,12 @@ class OpenTransfer:
     def progress(self) -> str:
         """How many bytes have come."""
         return f"{len(self.data)} of {self.size} B" if self.size else f"{len(self.data)} B"
+
+    @property
+    def is_block_over(self) -> bool:
+        """Whether all segments of a block have come."""
+        heard = max(self._block, default=0)
+        return heard in (self.block_last, self.block_size) and heard > 0
 
     def take_block_segment(self, segment: BlockSegment) -> None:
         """Keep a segment until its receipt says that it counts."""

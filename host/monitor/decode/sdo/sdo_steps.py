@@ -156,8 +156,9 @@ def take_block_frame(running: OpenTransfer, message: Request | Response) -> str:
         case BlockStart(), Phase.BLOCK_READY:
             running.phase = Phase.BLOCK
             return "start of a block upload"
-        case BlockAcknowledge(ackseq=ackseq), Phase.BLOCK:
+        case BlockAcknowledge(ackseq=ackseq, block_size=block_size), Phase.BLOCK:
             running.acknowledge_block(ackseq)
+            running.block_size = block_size
             return f"segments to {ackseq} confirmed, {running.progress}"
         case BlockEnd(), (Phase.BLOCK | Phase.BLOCK_ENDING):
             return _end(running, message)
@@ -176,7 +177,7 @@ def _answer(
         running.size = answer.size
         running.phase = Phase.BLOCK_READY
         return f"block upload of {'unknown size' if answer.size is None else f'{answer.size} B'}"
-    running.phase = Phase.BLOCK
+    running.phase, running.block_size = Phase.BLOCK, answer.block_size
     return f"ready for blocks of {answer.block_size} segments"
 
 

@@ -2,15 +2,20 @@ from __future__ import annotations
 
 import gzip
 import json
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources import whole_log
 
+DRIVE_EDS = Path(__file__).parents[4] / "examples/eds/epos.eds"
+CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 LOG = """\
 (1.000000) can0 703#05
 (1.050000) can0 083#3081110000000000
@@ -202,3 +207,113 @@ def test_a_rule_file_that_is_wrong_is_named(log: str, tmp_path: Path) -> None:
 def test_a_log_that_is_not_there_ends_with_3() -> None:
     result = check("none.log", "--no-emcy")
     assert (result.exit_code, result.stderr) == (3, "Error: none.log: No such file or directory\n")
+
+
+WRITTEN = """\
+(1.000000) can0 703#05
+(1.010000) can0 080#
+(1.050000) can0 083#3081110000000000
+(1.060000) can0 080#
+(1.100000) can0 703#05
+(1.110000) can0 080#
+"""
+FOUND = """\
+(1.050000) emcy never: emcy of node 3: 8130h life guard error or heartbeat error,\
+ register GENERIC|COMMUNICATION [can0 083#3081110000000000]
+    (0000000001.000000)  can0  703   [1]  05                        3 heartbeat operational
+    (0000000001.010000)  can0  080   [0]                            sync
+  > (0000000001.050000)  can0  083   [8]  30 81 11 00 00 00 00 00   3 emcy 8130h life guard error\
+ or heartbeat error, register GENERIC|COMMUNICATION
+    (0000000001.060000)  can0  080   [0]                            sync
+    (0000000001.100000)  can0  703   [1]  05                        3 heartbeat operational
+"""
+
+
+def test_a_finding_of_a_written_rule_has_the_frames_around_it(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", WRITTEN)
+    result = check(log, "--rule", "emcy never")
+    assert (result.exit_code, result.stdout) == (1, FOUND)
+    alone = check(log, "--rule", "emcy never", "--around", "0")
+    assert alone.stdout == FOUND.splitlines(keepends=True)[0]
+    assert check(log, "--rule", "emcy of 4 never").exit_code == 0
+
+
+def test_findings_stand_in_the_order_of_their_frames(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", WRITTEN)
+    result = check(log, "--rule", "emcy never", "--max-gap", "080=10ms", "--rule", "sync at most 2")
+    heads = [line for line in result.stdout.splitlines() if line.startswith("(")]
+    assert [line.split(":")[0] for line in heads] == [
+        "(1.050000) emcy never",
+        "(1.060000) max-gap 080",
+        "(1.110000) max-gap 080",
+        "(1.110000) sync at most 2",
+    ]
+
+
+def test_written_rules_are_held_by_a_file_and_reported(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", WRITTEN)
+    rules = write(tmp_path / "rules.toml", '[rule]\nquiet = "emcy never"\nform = "dlc"\n')
+    report = tmp_path / "out.xml"
+    result = check(log, rules, "--junit", str(report))
+    assert result.stderr == "1 findings: quiet: 1\n"
+    cases = ET.fromstring(report.read_bytes()).iter("testcase")
+    failed = {case.get("name"): case.findtext("failure") for case in cases}
+    quiet = FOUND.replace("emcy never", "quiet").removesuffix("\n")
+    assert failed == {"quiet": quiet, "form": None}
+
+
+def test_frames_around_a_finding_are_in_json(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", WRITTEN)
+    result = check(log, "--rule", "emcy never", "--around", "1", "--jsonl")
+    (line,) = result.stdout.splitlines()
+    found = json.loads(line)
+    assert found["frame"] == "083#3081110000000000"
+    assert [(one["t"], one["frame"]) for one in found["around"]] == [
+        (1.01, "080#"),
+        (1.05, "083#3081110000000000"),
+        (1.06, "080#"),
+    ]
+
+
+def test_written_rules_are_held_against_standard_input() -> None:
+    words = [*CANMON, "check", "-", "--rule", "emcy never", "--rule", "sync to time under 5us"]
+    text = WRITTEN + "(1.120000) can0 100#000000000000\n(1.130000) can0 080#\n"
+    piped = subprocess.run(words, input=text, capture_output=True, text=True, check=False)
+    assert piped.returncode == 1
+    heads = [line.split(":")[0] for line in piped.stdout.splitlines() if line.startswith("(")]
+    late = "sync to time under 5us"
+    at_s = ("1.010005", "1.060005", "1.110005")
+    first, *others = [f"({at}) {late}" for at in at_s]
+    assert heads == [first, "(1.050000) emcy never", *others]
+
+
+def test_written_rules_are_held_against_a_large_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    assert check(write(tmp_path / "run.log", WRITTEN), "--rule", "emcy never").stdout == FOUND
+
+
+def test_written_rules_are_held_against_a_bus() -> None:
+    with new_wire() as wire, wire.calling("083#3081110000000000"):
+        result = check(wire.word, "--for", "2s", "--rule", "emcy at most 2", "--around", "0")
+    assert result.exit_code == 1
+    assert "emcy came 3 times, at most 2 is right [" in result.stdout
+
+
+def test_a_rule_that_is_none_is_one_line(log: str, tmp_path: Path) -> None:
+    said = "rule 'emcy nevr', column 6: 'nevr' is no demand; wanted never, always, "
+    result = check(log, "--rule", "emcy nevr")
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"Error: {said}")
+    assert result.stderr.endswith("; did you mean 'never'?\n")
+    rules = write(tmp_path / "rules.toml", 'rule = ["emcy nevr"]\n')
+    assert check(log, rules).stderr.startswith(f"Error: rules {rules}: {said}")
+
+
+def test_a_written_rule_knows_what_an_eds_says(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", "(1.0) can0 185#3702D2040000\n(1.1) can0 185#3802\n")
+    words = ("--rule", "dlc", "--rule", "5.statusword.fault never", "--around", "0")
+    assert check(log, *words, "--eds", f"5={DRIVE_EDS}").stdout.splitlines() == [
+        "(1.100000) dlc: tpdo1 of node 5 has 2 B, 6 is right by its mapping [can0 185#3802]"
+    ]

@@ -75,6 +75,8 @@ def with_frames(trace: list[Record], text: str) -> list[Record]:
 def test_all_rules_are_held_against_it() -> None:
     default = parse_rules({})
     for field in fields(RULES):
+        if field.name == "expressions":  # they are not held against whole logs
+            continue
         assert getattr(RULES, field.name) != getattr(default, field.name)
 
 

@@ -1,0 +1,1 @@
+"""Rules of `canmon check` as filter expressions with time: what is demanded of which frames."""

@@ -1,0 +1,90 @@
+"""A rule that was written as an expression, held against decoded frames one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from tickrig.host.monitor.check.expression.demand import Demand
+from tickrig.host.monitor.check.expression.scope import Scope
+from tickrig.host.monitor.check.rule import Finding
+from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.decode.filter_terms import KINDS, MissingSignals, signal_place
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.text.names import closest
+
+MOST_NAMES: Final = 1_000
+"""So many names of signals are kept, to tell what a misspelt one may mean."""
+
+
+class ExpressionRule:
+    """One rule, for one node where it was written for several.
+
+    A signal that it names must come: a name may be misspelt, and a rule that judges nothing
+    does not hold.
+
+    Args:
+        name: as findings and reports have it.
+        demand: what must hold.
+        scopes: when; always where there are none.
+        paths: the signals that it names.
+    """
+
+    def __init__(
+        self, name: str, demand: Demand, scopes: Sequence[Scope], paths: Iterable[str]
+    ) -> None:
+        self.name, self._demand, self._scopes = name, demand, tuple(scopes)
+        self._missing = MissingSignals(paths)
+        self._names: set[str] = set()
+        self._running, self._began, self._found = False, False, False
+
+    def take(self, record: Record, decoded: Decoded) -> list[Finding]:
+        """Return what a frame breaks."""
+        if self._missing:
+            self._look_for_signals(decoded)
+        if not self._in_force(record, decoded):
+            return []
+        text = self._demand.judge(record, decoded)
+        if not text:
+            return []
+        self._found = True
+        return [Finding(record.at_us, self.name, text, record)]
+
+    def advance(self, now_us: int) -> list[Finding]:
+        """Return what had not come in time before a frame of this time; listening goes on."""
+        if now_us <= self._demand.due_us:
+            return []
+        self._found = True
+        return [
+            Finding(fault.at_us, self.name, fault.text, fault.record)
+            for fault in self._demand.expire()
+        ]
+
+    def end(self, end_us: int) -> list[Finding]:
+        """Return what is missing at a time; nothing is changed by it."""
+        texts = list(self._demand.end(end_us, self._running or not self._began))
+        if not (texts or self._found):
+            texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
+        return [Finding(end_us, self.name, text) for text in texts]
+
+    def _in_force(self, record: Record, decoded: Decoded) -> bool:
+        self._began = True
+        held = [scope.holds(record, decoded) for scope in self._scopes]  # each must see it
+        running = all(held)
+        if running != self._running:
+            self._running = running
+            if running:
+                self._demand.begin(record.at_us)
+            else:
+                self._demand.pause()
+        return running
+
+    def _look_for_signals(self, decoded: Decoded) -> None:
+        self._missing.take(decoded)
+        if len(self._names) < MOST_NAMES:
+            self._names.update(signal.name for signal in decoded.signals)
+
+    def _near(self, path: str) -> str:
+        _, name, _ = signal_place(path)
+        near = closest(name, [*KINDS, *sorted(self._names)])
+        return f"; did you mean {near[0]}?" if near and near[0] != name else ""

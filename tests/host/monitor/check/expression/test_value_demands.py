@@ -1,0 +1,103 @@
+from __future__ import annotations
+
+import pytest
+
+from tests.host.monitor.check.expression.held import MAPPED, broken
+
+FAULT = "3.statusword.fault never"
+ENABLED, FAULTY = "183#370264000000", "183#3F0264000000"
+FAR = "183#3702E8030000"
+SAID = "tpdo1 of node 3: statusword=0x023F[fault reaction active] position_actual_value=100"
+
+
+def test_a_bit_that_is_never_set_is_told_each_time_it_is() -> None:
+    text = f"1 {ENABLED}\n2 {FAULTY}\n3 {FAULTY}\n4 {ENABLED}\n5 {FAULTY}"
+    assert broken(FAULT, MAPPED + text) == [f"2 {SAID}", f"5 {SAID}"]
+
+
+@pytest.mark.parametrize(
+    "rule",
+    [
+        "3.statusword.3 never",
+        "statusword.fault of 3 never",
+        "3.statusword.fault = 0 always",
+        "3.statusword.fault in {0}",
+        "3.statusword in {237h}",
+        "tpdo1 of 3 and statusword.fault never",
+    ],
+)
+def test_a_bit_is_written_in_several_ways(rule: str) -> None:
+    found = broken(rule, MAPPED + f"1 {ENABLED}\n2 {FAULTY}\n3 {FAULTY}")
+    assert [line[: len(SAID) + 2] for line in found] == [f"2 {SAID}"]
+
+
+def test_a_bit_that_is_always_set_is_told_when_it_is_not() -> None:
+    rule = "3.statusword.operation_enabled always"
+    found = broken(rule, MAPPED + f"1 {ENABLED}\n2 183#330200000000\n3 183#330200000000")
+    assert [line.partition(":")[0] for line in found] == ["2 tpdo1 of node 3"]
+
+
+@pytest.mark.parametrize("values", ["-500..500", "..500", "{0, 100}", "{0..100, 700}"])
+def test_a_value_out_of_range_is_found(values: str) -> None:
+    rule = f"3.position_actual_value in {values}"
+    assert broken(rule, MAPPED + f"1 {ENABLED}\n2 {FAR}\n3 {FAR}") == [
+        "2 tpdo1 of node 3: statusword=0x0237[operation enabled] position_actual_value=1000;"
+        f" {rule} is right"
+    ]
+
+
+def test_an_emcy_of_another_code_is_found_and_its_end_is_not() -> None:
+    text = "1 085#3081110000000000\n2 085#1081110000000000\n3 085#0000000000000000"
+    found = broken("emcy of 5 in {8130h}", text)
+    assert [line[:29] for line in found] == ["2 emcy of node 5: 8110h CAN o"]
+    assert len(broken("emcy of 5 in {8100h..81FFh}", text)) == 0
+    assert len(broken("emcy of 4 in {0}", text)) == 0
+
+
+def test_a_kind_has_the_values_that_its_text_names() -> None:
+    text = "1 703#05\n2 703#7F\n3 703#04"
+    assert broken("heartbeat of 3 in {operational, pre-operational}", text) == [
+        "3 heartbeat of node 3: stopped; heartbeat of 3 in {operational, pre-operational} is right"
+    ]
+
+
+def test_a_counter_that_skips_or_stands_is_found() -> None:
+    text = "1 080#01\n2 080#02\n3 080#03\n4 080#01\n5 080#02\n6 080#02\n7 080#04"
+    assert broken("sync counts", text) == [
+        "6 counter is 2 after 2, one more is right",
+        "7 counter is 4 after 2, one more is right",
+    ]
+
+
+def test_a_counter_begins_anew_after_a_boot_up() -> None:
+    text = MAPPED + "1 183#370205000000\n2 703#00\n" + MAPPED + "3 183#370200000000"
+    assert broken("3.position_actual_value counts", text) == []
+
+
+def test_a_value_that_jumps_is_found() -> None:
+    assert broken("3.position_actual_value steps under 100", MAPPED + f"1 {ENABLED}\n2 {FAR}") == [
+        "2 position_actual_value is 1000 after 100, a step of 100 is right"
+    ]
+
+
+def test_a_value_that_does_not_change_is_found_once() -> None:
+    rule = "3.position_actual_value changes within 1s"
+    text = f"1 {ENABLED}\n1.9 {ENABLED}\n2.1 {ENABLED}\n3 {ENABLED}\n4 {FAR}\n4.5 {FAR}"
+    assert broken(rule, MAPPED + text) == [
+        "2.1 position_actual_value=100 has not changed for 1100.0 ms, at most 1000.0 is right"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("3.statsword.fault never", "no signal 3.statsword.fault came; did you mean statusword?"),
+        ("emyc never", "no signal emyc came; did you mean emcy?"),
+        ("4.statusword.fault never", "no signal 4.statusword.fault came"),
+        ("3.speed in 0..5", "no signal 3.speed came"),
+        ("node 4 stopped never", "no signal state of node 4 came"),
+    ],
+)
+def test_a_rule_whose_signal_never_came_does_not_hold(rule: str, said: str) -> None:
+    found = broken(rule, MAPPED + f"1 {ENABLED}")
+    assert found == [f"1 {said}"]
