@@ -44,6 +44,8 @@ class InputSignal(Immutable):
         unit: unit of the value, empty for a plain number.
         initial: value at the start of the rig.
         real: takes fractions.
+        counts: of a converter: what its object holds at `low` and at `high`, and a step between;
+            empty without one.
     """
 
     name: str
@@ -54,6 +56,7 @@ class InputSignal(Immutable):
     unit: str = ""
     initial: int | float = 0
     real: bool = False
+    counts: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

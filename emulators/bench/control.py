@@ -51,6 +51,7 @@ class EmulatorControl(RequestDispatcher):
                 {
                     **{"name": item.name, "text": item.text, "kind": item.type.value},
                     **{"low": item.low, "high": item.high, "unit": item.unit},
+                    **({"counts": list(item.counts)} if item.counts else {}),
                 }
                 for item in device.inputs.table.values()
             ],

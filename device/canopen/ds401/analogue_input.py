@@ -149,6 +149,7 @@ class AnalogueInput(Part):
     def input(self) -> InputSignal:
         """The physical input."""
         (low, high), whole = self.channel.bounds, self.channel.whole
+        converter = self.channel.converter
         text = f"analogue input {self.number}"
         start = min(max(0, low), high)
         return InputSignal(
@@ -159,6 +160,7 @@ class AnalogueInput(Part):
             unit=self.channel.unit,
             initial=start,
             real=not whole,
+            counts=converter.span if converter else (),
         )
 
     def objects(self) -> list[Entry]:

@@ -48,6 +48,11 @@ class Converter(Immutable):
         if not -limit <= self.low_raw << self.shift <= self.high_raw << self.shift < limit:
             raise ValueError(f"converter: counts do not fit into {self.width} bit")
 
+    @property
+    def span(self) -> tuple[int, int, int]:
+        """What the object holds for `low` and for `high`, and a step between."""
+        return self.low_raw << self.shift, self.high_raw << self.shift, 1 << self.shift
+
     def counts(self, quantity: float) -> int:
         """Return what the object holds for a quantity, which is limited to the range."""
         part = (min(max(quantity, self.low), self.high) - self.low) / (self.high - self.low)

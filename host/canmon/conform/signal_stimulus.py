@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.control.client import ControlRefused
@@ -22,6 +22,16 @@ LINES: Final = 8
 CHANNEL: Final = re.compile(r"(di|do|ai)([1-9][0-9]{0,2})")
 INPUTS: Final = {"6000": "di", "6401": "ai"}
 """Objects of CiA 401 that show what is at the inputs."""
+
+
+class Span(NamedTuple):
+    """A linear converter: from `low` to `high` its object holds `first` to `last` by `step`."""
+
+    low: float
+    high: float
+    first: int
+    last: int
+    step: int
 
 
 class SignalStimulus(ABC):
@@ -72,11 +82,20 @@ class SignalStimulus(ABC):
         if channel and channel[1] == "di":
             self._set_lines(int(channel[2]), int(value, 16))
         elif channel and name not in self.names() and (others := self._channels(name)):
-            unit = self.unit(others[0])
-            raise ValueError(f"{others[0]} takes {unit}, and its counts are not known here")
+            self.set(others[0], self._quantity(others[0], int(value)))
         else:
             signal = signal_name(name)
             self.set(signal, _value(value, self.unit(signal)))
+
+    def _quantity(self, name: str, counts: int) -> float:
+        """Return what a converter turns into these counts."""
+        span = self.span(name)
+        if span is None:
+            raise ValueError(f"{name} takes {self.unit(name)}, and its counts are not known here")
+        if counts not in range(span.first, span.last + 1, span.step):
+            raise NotAllowed(f"the converter of {name} has no step of {counts} counts")
+        part = (counts - span.first) / (span.last - span.first)
+        return span.low + part * (span.high - span.low)
 
     def _channels(self, name: str) -> list[str]:
         """Return an analogue input that has a unit: `ai1_v` is `ai1`."""
@@ -120,6 +139,10 @@ class SignalStimulus(ABC):
     @abstractmethod
     def unit(self, name: str) -> str:
         """Return the unit of a signal, of an object its data type; empty if it has none."""
+
+    @abstractmethod
+    def span(self, name: str) -> Span | None:
+        """Return what the converter of an input tells, None where that is not known."""
 
     @abstractmethod
     def switch(self, *, on: bool) -> None:

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus
+from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus, Span
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.canopen.conform.plan import Stimulus
 from tickrig.host.cli.refused import Refused, refused_at
@@ -115,14 +115,23 @@ class ControlStimulus(SignalStimulus):
 
     def __init__(self, path: Path) -> None:
         self._path, self._units = path, dict[str, str]()
+        self._spans: dict[str, Span] = {}
         try:
             described = self._request("describe")
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or error
             raise Refused(f"--stimulus {path}: {reason}") from None
-        for key in ("inputs", "outputs"):
-            for item in described.get(key) or ():  # type: ignore[attr-defined]  # JSON
-                self._units[item["name"]] = str(item.get("unit", ""))
+        try:
+            self._learn(described)
+        except (AttributeError, KeyError, TypeError):
+            raise Refused(f"--stimulus {path}: no emulator: what it describes is none") from None
+
+    def _learn(self, described: Any) -> None:
+        """Take names, units and converters, as docs/control.md has them."""
+        for item in (*described.get("inputs", ()), *described.get("outputs", ())):
+            self._units[item["name"]] = str(item.get("unit", ""))
+            if "counts" in item:
+                self._spans[item["name"]] = Span(item["low"], item["high"], *item["counts"])
 
     def set(self, name: str, value: Setting) -> None:
         """Set an input."""
@@ -141,6 +150,10 @@ class ControlStimulus(SignalStimulus):
     def unit(self, name: str) -> str:
         """Return the unit that the emulator names."""
         return self._units.get(name, "")
+
+    def span(self, name: str) -> Span | None:
+        """Return what the emulator tells of a converter."""
+        return self._spans.get(name)
 
     def switch(self, *, on: bool) -> None:
         """Let the fault `power_off` come or go."""

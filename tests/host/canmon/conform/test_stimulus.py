@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus
+from tickrig.device.canopen.models.f_palette import ADC
+from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus, Span
 from tickrig.host.canmon.conform.stimulus import CommandStimulus, open_stimulus
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
 from tickrig.host.control.client import ControlRefused
@@ -73,6 +74,9 @@ class Board(SignalStimulus):
     def unit(self, name: str) -> str:
         return self.units.get(name, "")
 
+    def span(self, name: str) -> Span | None:
+        return Span(ADC.low, ADC.high, *ADC.span) if name == "ai1_v" else None
+
     def switch(self, *, on: bool) -> None:
         self.on = on
 
@@ -97,9 +101,30 @@ def test_lines_of_a_module_are_set_eight_at_once() -> None:
 
 
 @pytest.mark.parametrize("words", [("input", "ai1", "1000"), ("input", "6401:01", "E803")])
-def test_counts_of_an_input_with_a_unit_are_inconclusive(words: tuple[str, ...]) -> None:
-    with pytest.raises(Disturbed, match="ai1_v takes V, and its counts are not known here"):
-        Board()(*words)
+def test_counts_of_an_input_are_what_its_converter_makes(words: tuple[str, ...]) -> None:
+    board = Board()
+    board(*words)
+    assert ADC.counts(float(board.values["ai1_v"])) == 1_000
+
+
+def test_all_that_a_converter_makes_can_be_set() -> None:
+    board = Board()
+    for counts in range(0, 4_096 * 8, 8):
+        board("input", "ai1", str(counts))
+        assert ADC.counts(float(board.values["ai1_v"])) == counts
+
+
+@pytest.mark.parametrize("counts", ["999", "-8", "32768"])
+def test_counts_that_a_converter_never_makes_are_not_applicable(counts: str) -> None:
+    with pytest.raises(NotAllowed, match=f"converter of ai1_v has no step of {counts} counts"):
+        Board()("input", "ai1", counts)
+
+
+def test_counts_that_nobody_tells_are_inconclusive() -> None:
+    board = Board()
+    board.values["ai2_v"] = 0
+    with pytest.raises(Disturbed, match="ai2_v takes , and its counts are not known here"):
+        board("input", "ai2", "1000")
 
 
 def test_emergencies_and_the_supply_have_words_of_their_own() -> None:
