@@ -14,7 +14,7 @@ from tickrig.device.rh3.side import STALL_MS, Side
 from tickrig.device.rh3.terminals import SIDES
 from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rh3 import Command, Fault, Mode, Status
+from tickrig.wire.modbus.rh3 import Command, Fault, Mode, Status
 
 TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)
 ENABLED, MOVING, FAULT, WATCHDOG, CLIPPED, EMERGENCY_STOP, BUMPER = (int(bit) for bit in Status)

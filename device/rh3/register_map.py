@@ -6,7 +6,7 @@ from typing import Final
 
 from tickrig.device.modbus.registers import Register
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, ENCODER_COUNTS
-from tickrig.wire.rh3 import DEVICE_ID, VERSION, Address, Command, Mode
+from tickrig.wire.modbus.rh3 import DEVICE_ID, VERSION, Address, Command, Mode
 
 INT32: Final = range(-(2**31), 2**31)
 SPEED_LIMIT: Final = round(10 * COUNTS_PER_RAD)

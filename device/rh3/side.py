@@ -11,7 +11,7 @@ from tickrig.device.rh3.parameters import PER_MILLE, BaseParameters
 from tickrig.device.rh3.speed_loop import PositionLoop, SpeedLoop
 from tickrig.device.rh3.wheel import Wheel
 from tickrig.device.twin import Part
-from tickrig.wire.rh3 import Fault
+from tickrig.wire.modbus.rh3 import Fault
 
 STALL_MS: Final = 500
 """How long full torque may turn nothing; a choice."""

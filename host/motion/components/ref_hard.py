@@ -26,7 +26,7 @@ from tickrig.host.rtc import (
 from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.text.log import log_of
 from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, ExceptionCode, Request
-from tickrig.wire.rh3 import REPORT, Address, Command, Fault, Mode, Report, Status, wide
+from tickrig.wire.modbus.rh3 import REPORT, Address, Command, Fault, Mode, Report, Status, wide
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
 

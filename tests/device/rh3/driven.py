@@ -6,8 +6,8 @@ from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
 from tickrig.device.rh3.register_map import TABLE
 from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
+from tickrig.wire.modbus.rh3 import Command, Mode
 from tickrig.wire.modbus.rtu import encode_frame, parse_frame
-from tickrig.wire.rh3 import Command, Mode
 
 BY_NAME = {register.name: register for register in TABLE}
 M_S = COUNTS_PER_RAD / 0.0995

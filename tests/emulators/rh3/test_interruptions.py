@@ -13,7 +13,7 @@ from tickrig.host.motion.components.ref_hard import RefHardRh3
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import OutPort
 from tickrig.host.rtc.ports.connect import connect
-from tickrig.wire.rh3 import Status
+from tickrig.wire.modbus.rh3 import Status
 from tickrig.wire.rtc_types import iis
 
 AHEAD = Pose(1.0)

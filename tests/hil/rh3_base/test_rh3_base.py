@@ -12,8 +12,8 @@ from tests.hil.line_host import PATIENCE, LineHost
 from tests.hil.rigs import RIGS
 from tickrig import Bench
 from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
+from tickrig.wire.modbus.rh3 import DEVICE_ID, Address, Command, Mode
 from tickrig.wire.modbus.rtu import encode_frame, parse_frame
-from tickrig.wire.rh3 import DEVICE_ID, Address, Command, Mode
 
 pytestmark = pytest.mark.needs("device:rh3_base")
 

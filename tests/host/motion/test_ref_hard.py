@@ -18,7 +18,7 @@ from tickrig.host.links.link import Link
 from tickrig.host.motion.components.ref_hard import RefHard, RefHardRh3
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.service_port import Consumer, ServicePort
-from tickrig.wire.rh3 import Status
+from tickrig.wire.modbus.rh3 import Status
 
 
 def running(v: float = 0.0, w: float = 0.0, **configuration: str) -> BaseBench:
