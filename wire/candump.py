@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.errors import WireError
 
 _LINE: Final = re.compile(r"\(([0-9]{1,12})\.([0-9]{6})\) (\S{1,32}) (\S+)(?: [RT])?", re.ASCII)
@@ -35,7 +36,7 @@ class LogLine(NamedTuple):
 
     at_us: int
     channel: str
-    received: CanFrame | ErrorFrame
+    received: CanFrame | ErrorFrame | FdFrame
 
     def __str__(self) -> str:
         """Write the line, without LF."""

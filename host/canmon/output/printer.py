@@ -14,6 +14,7 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_writer import comment, log_line
 from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
+from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ def csv_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     if isinstance(record, Record):
         frame = record.frame
         text, _, data = str(frame).partition("#")
-        length = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
+        length = frame.dlc if isinstance(frame, CanFrame) else len(frame.data)
     else:
         text, data, length = "", record.data.hex().upper(), len(record.data)
     meaning = ("", "", "")

@@ -16,6 +16,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_message import to_message
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 
 SEND_TIMEOUT_S: Final = 1
 """How long a full queue of the driver may stay full."""
@@ -47,7 +48,7 @@ class Transmitter:
             reader = reader_of(self._bus, interface, self.name)
             self._source = BusSource([reader], [bus_word.chosen])
 
-    def send(self, frame: CanFrame) -> None:
+    def send(self, frame: CanFrame | FdFrame) -> None:
         """Send a frame; SourceFailed if the bus is gone or takes none for 1 s."""
         send_on(self._bus, self.name, frame)
 
@@ -71,7 +72,7 @@ class Transmitter:
             self._source.close()
 
 
-def send_on(bus: can.BusABC, name: str, frame: CanFrame) -> None:
+def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
     """Send a frame on a bus that is called so; SourceFailed if it is gone or takes none for 1 s."""
     try:
         bus.send(to_message(frame), SEND_TIMEOUT_S)

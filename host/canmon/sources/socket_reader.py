@@ -2,8 +2,8 @@
 
 The kernel counts frames for which a socket's queue had no room, and tells the
 count with each frame that is read (socket(7), SO_RXQ_OVFL). Frames of CAN FD and
-CAN XL it shows to sockets alone that want them (linux, networking/can). python-can
-asks for neither; here all is asked for, and what is not classic CAN is counted.
+CAN XL it shows to sockets alone that want them (linux, networking/can). Here all is
+asked for; CAN FD is read, and CAN XL is counted.
 """
 
 from __future__ import annotations
@@ -16,9 +16,10 @@ from typing import Any, Final
 
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
+from tickrig.host.monitor.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
+from tickrig.wire.can_fd import BRS, ESI, FdFrame
 
 SO_RXQ_OVFL: Final = 40
 SO_TIMESTAMPNS: Final = 35
@@ -32,7 +33,8 @@ _EXTENDED: Final = 0x8000_0000
 _REMOTE: Final = 0x4000_0000
 _STANDARD_MASK: Final = 0x7FF
 _FRAME: Final = struct.Struct("=IB3x8s")  # struct can_frame, linux/can.h
-_FD_BYTES: Final = 72  # struct canfd_frame; a frame of CAN XL is cut to as many
+_FD_FRAME: Final = struct.Struct("=IBB2x64s")  # struct canfd_frame
+_FD_BYTES: Final = _FD_FRAME.size  # a frame of CAN XL is cut to as many
 _FLAGS_AT: Final = 4  # flags of struct canxl_frame, where others have a length below
 _XL_FLAG: Final = 0x80
 _STAMP: Final = struct.Struct("@ll")
@@ -96,11 +98,19 @@ class SocketReader:
                 at_us = seconds * 1_000_000 + nanos // 1_000
             elif kind == SO_RXQ_OVFL:
                 self.lost = _COUNT.unpack(said)[0]
-        if len(data) != _FRAME.size:
-            self.tally.passed_over[CAN_XL if data[_FLAGS_AT] & _XL_FLAG else CAN_FD] += 1
-            return ()
         sent = bool(flags & MSG_CONFIRM)  # by this very socket (linux, networking/can)
-        return (Record(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
+        if len(data) == _FRAME.size:
+            return (Record(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
+        if data[_FLAGS_AT] & _XL_FLAG or len(data) != _FD_BYTES:
+            self.tally.passed_over[CAN_XL] += 1
+            return ()
+        return (Record(at_us, self.name, _fd_frame(*_FD_FRAME.unpack(data)), sent),)
+
+
+def _fd_frame(flagged: int, length: int, flags: int, data: bytes) -> FdFrame:
+    extended = bool(flagged & _EXTENDED)
+    can_id = flagged & (ERROR_CLASS_MASK if extended else _STANDARD_MASK)
+    return FdFrame(can_id, data[:length], extended, flags & (BRS | ESI)).checked()
 
 
 def _frame(flagged: int, length: int, data: bytes) -> CanFrame | ErrorFrame:

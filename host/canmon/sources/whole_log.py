@@ -56,9 +56,12 @@ def whole_log(words: Sequence[str]) -> WholeLog | None:
     if path is None:
         return None
     from tickrig.host.monitor.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
+    from tickrig.host.monitor.columns.columns import NoColumnsError  # noqa: PLC0415 - numpy
 
     try:
         return WholeLog(path, read_columns(path))
+    except NoColumnsError:
+        return None
     except OSError as error:
         raise SourceFailed(f"{path}: {error.strerror}") from error
     except LogError as error:

@@ -19,7 +19,7 @@ from operator import itemgetter
 from typing import Final
 
 from tickrig.host.monitor.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
-from tickrig.host.monitor.frames.ident import ident_of, ident_text
+from tickrig.host.monitor.frames.ident import any_ident, ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import ARROWS, Record
 from tickrig.host.monitor.views.top_model import meaning_text
@@ -43,6 +43,7 @@ KIND_STYLES: Final = {
     "sdo": "blue",
     "unmapped": "dim",
     "raw": "dim",
+    "fd": "dim",
 }
 BYTES_WIDTH: Final = len("[8] 00 11 22 33 44 55 66 77")
 BITS_WIDTH: Final = len("[8]") + 8 * len(" 00000000")
@@ -145,4 +146,4 @@ def _ident(row: TraceRow) -> tuple[str, str]:
     frame = record.frame
     if isinstance(frame, ErrorFrame):
         return f"{'error':<9} ", ERROR
-    return f"{ident_text(ident_of(frame)):<9} ", style
+    return f"{ident_text(any_ident(frame)):<9} ", style

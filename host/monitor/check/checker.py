@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 
 from tickrig.host.monitor.check.rule import Finding, Rule
 from tickrig.host.monitor.check.rules import NO_LOSS, Rules
-from tickrig.host.monitor.frames.ident import ERROR, ident_of
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.frames.ident import ERROR, any_ident
+from tickrig.host.monitor.frames.record import AnyFrame, Record
+from tickrig.host.monitor.traffic.bit_rates import BitRates
 from tickrig.host.monitor.traffic.traffic import Load, Window
-from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -31,17 +32,21 @@ class Checker:
     Args:
         rules: what must hold. Those that are written as expressions want decoded frames.
         bit_rate: bits a second, for the load.
+        data_bit_rate: of data of CAN FD frames with BRS; without it these count as slow.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
     """
 
-    def __init__(self, rules: Rules, bit_rate: int | None = None) -> None:
+    def __init__(
+        self, rules: Rules, bit_rate: int | None = None, data_bit_rate: int | None = None
+    ) -> None:
         self._rules, self._made, self._load = rules, rules.make(), rules.load(bit_rate)
         self._wanting: dict[int, list[Rule]] = {}
         self._last_us: dict[tuple[str, int], int] = {}
         self._loads: dict[str, Load] = {}
         self._expressions = [rule for one in rules.expressions for rule in one.make()]
+        self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
 
     def take(self, record: Record, decoded: Decoded | None = None) -> list[Finding]:
         """Return what is wrong with a frame, and with the second that it ended.
@@ -64,7 +69,7 @@ class Checker:
         found = self._too_busy(at_us, channel, frame) if self._load else []
         if isinstance(frame, ErrorFrame):
             return found + self._judged(ERROR, record, None)
-        ident = ident_of(frame)
+        ident = any_ident(frame)
         key = channel, ident
         before_us = self._last_us.get(key)
         self._last_us[key] = at_us
@@ -107,13 +112,14 @@ class Checker:
         texts = ((rule.name, rule.judge(record, gap_us)) for rule in wanting)
         return [Finding(record.at_us, name, text, record) for name, text in texts if text]
 
-    def _too_busy(self, at_us: int, channel: str, frame: CanFrame | ErrorFrame) -> list[Finding]:
+    def _too_busy(self, at_us: int, channel: str, frame: AnyFrame) -> list[Finding]:
         load = self._loads.get(channel)
         if load is None:
             load = self._loads[channel] = Load(at_us)
         if isinstance(frame, ErrorFrame):
             return []
-        window = load.take(at_us, frame_bits(frame))
+        bits = self._rates.bits(frame) if isinstance(frame, FdFrame) else frame_bits(frame)
+        window = load.take(at_us, bits)
         return [] if window is None else self.judge_window(channel, window)
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.host.monitor.check.rule import FrameSelection, Rule
 from tickrig.host.monitor.check.time_rules import BOOT_UP
-from tickrig.host.monitor.frames.ident import ERROR, ident_of, ident_text, sender_of
+from tickrig.host.monitor.frames.ident import ERROR, any_ident, ident_text, sender_of
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
@@ -116,8 +116,8 @@ class KnownIds(Rule):
 
 
 def _text(record: Record) -> str:
-    assert isinstance(record.frame, CanFrame)
-    return ident_text(ident_of(record.frame))
+    assert not isinstance(record.frame, ErrorFrame)
+    return ident_text(any_ident(record.frame))
 
 
 RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])

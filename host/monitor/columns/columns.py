@@ -13,13 +13,19 @@ import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE, flagged_id
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.frames.record import AnyFrame, Record
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import EXTENDED_MAX, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 
 MOST_CHANNELS: Final = 256
+
+
+class NoColumnsError(ValueError):
+    """A log that is no columns, for it holds CAN FD: it is to be read frame by frame."""
+
 
 _Parts = tuple[npt.NDArray[Any], ...]
 
@@ -100,8 +106,10 @@ class Rows:
         return rows
 
     def put(self, row: int, record: Record, channel: int) -> None:
-        """Write one row."""
+        """Write one row; NoColumnsError where a frame of CAN FD does not fit into it."""
         frame = record.frame
+        if isinstance(frame, FdFrame):
+            raise NoColumnsError("CAN FD")
         self.at_us[row], self.ident[row] = record.at_us, flagged_id(record)
         self.dlc[row] = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
         self.payload[row] = int.from_bytes(frame.data, "little")
@@ -145,7 +153,7 @@ def records(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Record]:
     return [Record(at_us, names[channel], _frame(*frame)) for at_us, *frame, channel in parts]
 
 
-def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[CanFrame | ErrorFrame]:
+def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[AnyFrame]:
     """Return the frames of rows."""
     return [record.frame for record in records(columns, rows)]
 

@@ -39,7 +39,8 @@ class Decoded(NamedTuple):
 
     Attributes:
         kind: nmt, sync, time, emcy, heartbeat, boot-up, guard, sdo, tpdo1.., rpdo1.., lss, dbc,
-            error, rrc, rtc-lite; unmapped for a PDO nobody described, raw for all else.
+            error, rrc, rtc-lite; unmapped for a PDO nobody described, fd for a CAN FD frame,
+            raw for all else.
         node: whose object it is; None where it belongs to none.
         summary: one line; None where transfers or else signals say it all.
         signals: the values in it.

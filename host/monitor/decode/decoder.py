@@ -15,6 +15,10 @@ from tickrig.host.monitor.decode.sdo.transfer import Transfer
 from tickrig.host.monitor.decode.services import decode_error
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
+
+FD: Final = Decoded("fd", None, "no CANopen service")
+"""CANopen is spoken in classic frames (CiA 301, 5.3); CANopen FD is another protocol."""
 
 NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
 
@@ -63,6 +67,8 @@ class Decoder:
             decoded = decoder.decode(record)
             if decoded is not None:
                 return decoded
+        if isinstance(frame, FdFrame):
+            return FD
         if frame.extended:
             return Decoded("raw")
         bus = self._buses.get(record.channel)

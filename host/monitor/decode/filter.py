@@ -7,9 +7,11 @@ and    = not "and" ...
 not    = "not" not | "(" or ")" | term
 term   = 181 | 181-18F | 18FF0000-18FFFFFF | 123:7FF | 400~700 | #FF
        | nmt | sync | time | emcy | heartbeat | boot-up | guard | lss | error | unmapped | raw
+       | fd | brs | esi
        | pdo | tpdo | rpdo | tpdo1 | sdo | sdo[6040h] | sdo[0x1018:1] | sdo.aborted | sdo.unanswered
        | term of 3 | term of 3-5 | node 3 | node 3-5 | node 3 operational
-       | node = 3 | id < 200 | dlc = 8 | channel = can0 | kind = emcy | dir = tx | src = eds
+       | node = 3 | id < 200 | dlc = 8 | bytes > 8 | channel = can0 | kind = emcy | dir = tx
+       | src = eds
        | statusword.fault | position > 1000 | 3.position > 1000 | state = stopped
 ```
 

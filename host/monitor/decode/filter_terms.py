@@ -14,6 +14,7 @@ from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.canopen.nmt import NmtState
 
 Test = Callable[[AnyRecord, Decoded], bool]
@@ -33,6 +34,11 @@ KINDS: Final = (
     *("nmt", "sync", "time", "emcy", "heartbeat", "boot-up", "guard", "sdo", "lss", "dbc"),
     *("unmapped", "raw", "error", "rrc", "rtc-lite"),
 )
+FD_KINDS: Final[dict[str, Callable[[FdFrame], bool]]] = {
+    "fd": lambda frame: True,
+    "brs": lambda frame: frame.brs,
+    "esi": lambda frame: frame.esi,
+}
 OUTCOMES: Final = {
     "sdo.aborted": Outcome.ABORTED,
     "sdo.unanswered": Outcome.UNANSWERED,
@@ -42,6 +48,7 @@ FIELDS: Final[dict[str, Callable[[AnyRecord, Decoded], int | None]]] = {
     "node": lambda record, decoded: decoded.node,
     "id": lambda record, decoded: _can_id(record),
     "dlc": lambda record, decoded: getattr(record.frame, "dlc", None),
+    "bytes": lambda record, decoded: None if record.frame is None else len(record.frame.data),
 }
 WORDS: Final[dict[str, Callable[[AnyRecord, Decoded], str]]] = {
     "channel": lambda record, decoded: record.channel,
@@ -62,6 +69,9 @@ _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
 
 def kind_test(word: str) -> Test | None:
     """Return the test for a kind of frame, or for how an SDO transfer ended."""
+    if word in FD_KINDS:
+        test = FD_KINDS[word]
+        return lambda record, decoded: isinstance(record.frame, FdFrame) and test(record.frame)
     if word in KINDS:
         return lambda record, decoded: decoded.kind == word
     if word in OUTCOMES:
@@ -108,7 +118,7 @@ def range_test(low: int, high: int, *, extended: bool) -> Test:
 
     def test(record: AnyRecord, decoded: Decoded) -> bool:
         frame = record.frame
-        if not isinstance(frame, CanFrame) or frame.extended != extended:
+        if not isinstance(frame, CanFrame | FdFrame) or frame.extended != extended:
             return False
         return low <= frame.can_id <= high
 
@@ -254,7 +264,7 @@ def _bit(signal: Signal, shift: int) -> Signal:
 
 
 def _can_id(record: AnyRecord) -> int | None:
-    return record.frame.can_id if isinstance(record.frame, CanFrame) else None
+    return record.frame.can_id if isinstance(record.frame, CanFrame | FdFrame) else None
 
 
 class MissingSignals:

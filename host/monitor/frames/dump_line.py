@@ -1,10 +1,13 @@
 """Frames as lines of text, as candump shows them.
 
+>>> from tickrig.wire.can import CanFrame
 >>> lines = DumpLines(Stamp.ZERO)
 >>> lines.line(Record(1_000_000, "can0", CanFrame.parse("705#7F")))
 ' (000.000000)  can0  705   [1]  7F'
 >>> lines.line(Record(1_250_000, "can0", CanFrame.parse("185#R5")))
 ' (000.250000)  can0  185   [5]  remote request'
+>>> DumpLines(extra=True).line(Record(0, "can0", FdFrame.parse("185##1AABB")))
+'  can0  RX B -  185   [02]  AA BB'
 
 >>> from tickrig.host.monitor.decode.decoded import Decoded
 >>> from tickrig.host.monitor.frames.record import LineRecord
@@ -18,9 +21,9 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, assert_never
 
-from tickrig.host.monitor.frames.record import ARROWS, Record
-from tickrig.wire.can import CanFrame
+from tickrig.host.monitor.frames.record import ARROWS, AnyFrame, Record
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -46,7 +49,7 @@ class DumpLines:
 
     Args:
         stamp: what stands before a frame.
-        extra: show whether the frame was received or sent.
+        extra: show whether the frame was received or sent, with B and E for BRS and ESI.
     """
 
     def __init__(self, stamp: Stamp = Stamp.NONE, extra: bool = False) -> None:
@@ -58,7 +61,7 @@ class DumpLines:
         """Return the line, with what the frame means behind it."""
         ident = _ident(record.frame)
         self._width = max(self._width, len(ident))
-        direction = f"  {'TX' if record.sent else 'RX'} - -" if self._extra else ""
+        direction = f"  {'TX' if record.sent else 'RX'} {_flags(record.frame)}" * self._extra
         stamp = self.stamp(record.at_us)
         data = f"{_data(record.frame):<{DATA_WIDTH}}   {text}" if text else _data(record.frame)
         return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}   {data}"
@@ -83,19 +86,26 @@ class DumpLines:
                 assert_never(self._stamp)
 
 
-def _ident(frame: CanFrame | ErrorFrame) -> str:
+def _flags(frame: AnyFrame) -> str:
+    if not isinstance(frame, FdFrame):
+        return "- -"
+    return f"{'B' if frame.brs else '-'} {'E' if frame.esi else '-'}"
+
+
+def _ident(frame: AnyFrame) -> str:
     if isinstance(frame, ErrorFrame):
         return f"{ERROR_FLAG | frame.error_class:08X}"
     return f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
 
 
-def _data(frame: CanFrame | ErrorFrame) -> str:
+def _data(frame: AnyFrame) -> str:
     data = frame.data.hex(" ").upper()
     if isinstance(frame, ErrorFrame):
         return f"[{len(frame.data)}]  {data}   ERRORFRAME"
     if frame.remote:
-        return f"[{frame.remote_length}]  remote request"
-    return f"[{len(frame.data)}] {' ' * bool(data)}{data}"
+        return f"[{frame.dlc}]  remote request"
+    digits = 2 if isinstance(frame, FdFrame) else 1
+    return f"[{len(frame.data):0{digits}d}] {' ' * bool(data)}{data}"
 
 
 def seconds_text(span_us: int, digits: int) -> str:

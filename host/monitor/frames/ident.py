@@ -14,10 +14,13 @@ from typing import Final
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import EXTENDED_MAX, CanFrame
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 
 EXTENDED: Final = 1 << 31
 REMOTE: Final = 1 << 30
 ERROR: Final = 1 << 29
+FD: Final = 1 << 33
+"""Above what an identifier with flags of struct can_frame takes."""
 
 
 def ident_of(frame: CanFrame) -> int:
@@ -29,14 +32,28 @@ def ident_of(frame: CanFrame) -> int:
     return frame.can_id | frame.extended << 31 | frame.remote << 30
 
 
-def ident_text(ident: int) -> str:
-    """Write it as candump does, with an R for remote frames.
+def fd_ident(frame: FdFrame) -> int:
+    """Return the CAN-ID with a bit each for an extended and for a CAN FD frame.
 
-    >>> ident_text(0x181), ident_text(0xC000_0605)
-    ('181', '00000605R')
+    >>> hex(fd_ident(FdFrame.parse("00000605##1")))
+    '0x280000605'
     """
-    can_id = ident & EXTENDED_MAX
-    return (f"{can_id:08X}" if ident & EXTENDED else f"{can_id:03X}") + "R" * bool(ident & REMOTE)
+    return frame.can_id | frame.extended << 31 | FD
+
+
+def any_ident(frame: CanFrame | FdFrame) -> int:
+    """Return the CAN-ID with its flags."""
+    return fd_ident(frame) if isinstance(frame, FdFrame) else ident_of(frame)
+
+
+def ident_text(ident: int) -> str:
+    """Write it as candump does, with an R for remote frames and a # for those of CAN FD.
+
+    >>> ident_text(0x181), ident_text(0xC000_0605), ident_text(FD | 0x181)
+    ('181', '00000605R', '181#')
+    """
+    can_id, mark = ident & EXTENDED_MAX, "R" if ident & REMOTE else "#" if ident & FD else ""
+    return (f"{can_id:08X}" if ident & EXTENDED else f"{can_id:03X}") + mark
 
 
 def parse_ident(text: str) -> int:
@@ -45,14 +62,14 @@ def parse_ident(text: str) -> int:
     Raises:
         ValueError: not an identifier.
 
-    >>> parse_ident("181"), parse_ident("181R") == 0x181 | REMOTE
-    (385, True)
+    >>> parse_ident("181"), parse_ident("181R") == 0x181 | REMOTE, parse_ident("181#") == 0x181 | FD
+    (385, True, True)
     """
-    digits = text.removesuffix("R")
+    digits = text.removesuffix("R") if text.endswith("R") else text.removesuffix("#")
     most = {3: 0x7FF, 8: EXTENDED_MAX}.get(len(digits))
     if most is None or not set(digits) <= set("0123456789abcdefABCDEF") or int(digits, 16) > most:
         raise ValueError(f"{text!r} is not a CAN-ID: write 3 or 8 hex digits, as 181 or 00000605")
-    flags = EXTENDED * (len(digits) == 8) | REMOTE * text.endswith("R")
+    flags = EXTENDED * (len(digits) == 8) | REMOTE * text.endswith("R") | FD * text.endswith("#")
     return int(digits, 16) | flags
 
 
@@ -98,7 +115,7 @@ def flagged_id(record: Record) -> int:
     frame = record.frame
     if isinstance(frame, ErrorFrame):
         return ERROR_FLAG | frame.error_class
-    return ident_of(frame)
+    return any_ident(frame) & ~FD
 
 
 @dataclass(frozen=True, slots=True)

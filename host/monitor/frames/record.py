@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -14,8 +15,11 @@ ARROWS: Final = {True: ">", False: "<"}
 """How a line is shown that is sent to the device, and one from it."""
 
 
+AnyFrame = CanFrame | ErrorFrame | FdFrame
+
+
 class Record(NamedTuple):
-    """One frame or error frame, as it was on the bus.
+    """One frame, CAN FD frame or error frame, as it was on the bus.
 
     Attributes:
         at_us: when it had ended, microseconds; since the epoch in logs and on real buses.
@@ -26,7 +30,7 @@ class Record(NamedTuple):
 
     at_us: int
     channel: str
-    frame: CanFrame | ErrorFrame
+    frame: AnyFrame
     sent: bool = False
 
 

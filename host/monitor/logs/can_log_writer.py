@@ -16,6 +16,7 @@ from can.io.blf import FILE_HEADER_SIZE
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_can
+from tickrig.host.monitor.logs.fd_lines import fd_asc_event, fd_trc_line
 from tickrig.host.monitor.logs.log_file import COMPRESSED, LogError, LogFormat, open_log
 from tickrig.host.monitor.logs.mark import Mark
 from tickrig.wire.can_error import ErrorFrame
@@ -83,6 +84,8 @@ def _event(message: can.Message) -> str:
         return f"{channel}  ErrorFrame"
     ident = f"{message.arbitration_id:X}{'x' * message.is_extended_id}"
     direction = "Rx" if message.is_rx else "Tx"
+    if message.is_fd:
+        return fd_asc_event(message, channel, ident, direction)
     kind = "r" if message.is_remote_frame else "d"
     data = f" {message.data.hex(' ').upper()}" if message.data else ""
     return f"{channel}  {ident:<15} {direction:<4} {kind} {message.dlc:x}{data}"
@@ -101,7 +104,11 @@ class TrcWriter(can.TRCWriter):
     def on_message_received(self, msg: can.Message) -> None:
         """Write a frame."""
         self._begin(int(msg.timestamp * 1e6))
-        super().on_message_received(msg)
+        if not msg.is_fd:
+            super().on_message_received(msg)
+            return
+        self.msgnr += 1
+        self.file.write(fd_trc_line(msg, self.msgnr, self.first_timestamp or 0.0))
 
     def mark(self, mark: Mark) -> None:
         """Write a comment."""

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import can
 
-from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
+from tickrig.host.links.can_message import (
+    to_error_frame,
+    to_fd_frame,
+    to_frame,
+    to_message,
+)
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import to_us
-from tickrig.host.monitor.logs.tally import CAN_FD, Tally
+from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.errors import WireError
 
@@ -16,7 +21,7 @@ NO_TIME = "frames with what is no time"
 
 
 def to_record(message: can.Message, channel: str, tally: Tally) -> Record | None:
-    """Return what was heard; None for CAN FD, impossible frames and times, which are counted."""
+    """Return what was heard; None for impossible frames and times, which are counted."""
     try:
         at_us = to_us(message.timestamp)
     except ValueError:
@@ -24,11 +29,10 @@ def to_record(message: can.Message, channel: str, tally: Tally) -> Record | None
         return None
     if (error := to_error_frame(message)) is not None:
         return Record(at_us, channel, error, not message.is_rx)
-    frame = to_frame(message)
+    frame = to_frame(message) or to_fd_frame(message)
+    assert frame is not None, "it is no error frame"
     try:
-        if frame is not None:
-            return Record(at_us, channel, frame.checked(), not message.is_rx)
-        tally.passed_over[CAN_FD] += 1
+        return Record(at_us, channel, frame.checked(), not message.is_rx)
     except WireError:
         tally.passed_over[BAD_FRAMES] += 1
     return None

@@ -8,8 +8,9 @@ r"""Log files, and logs that come in pieces, as the frames that are in them.
 >>> record = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
 >>> record.at_us, record.channel, str(record.frame), record.sent
 (10000, 'vcan0', '705#7F', True)
->>> parse_log_line("(0000000000.020000) vcan0 123##1AABB", 2, tally), tally.passed_over
-(None, Counter({'CAN FD frames': 1}))
+>>> parse_log_line("(0000000000.020000) vcan0 00040#81:00:12345678#AABB", 2, tally)
+>>> tally.passed_over
+Counter({'CAN XL frames': 1})
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from tickrig.host.monitor.logs.log_file import LogError, LogFormat, log_format, 
 from tickrig.host.monitor.logs.mark import lost_frames
 from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
 from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
-from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, Tally
+from tickrig.host.monitor.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 
@@ -70,7 +71,6 @@ COMMENTS: Final = ("#", ";", "//")
 _LINE: Final = re.compile(
     r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
 )
-_FD: Final = re.compile(r"(?:[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})##[0-9A-Fa-f](?:[0-9A-Fa-f]{2}){0,64}")
 _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 
 
@@ -114,10 +114,9 @@ def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | 
 def _logged(match: re.Match[str], tally: Tally) -> Record | str | None:
     """Return what a line of `candump -L` says."""
     seconds, fraction, channel, notation, direction = match.groups()
-    for kind, pattern in ((CAN_FD, _FD), (CAN_XL, _XL)):
-        if pattern.fullmatch(notation):
-            tally.passed_over[kind] += 1
-            return kind
+    if _XL.fullmatch(notation):
+        tally.passed_over[CAN_XL] += 1
+        return CAN_XL
     at_us = int(seconds) * 1_000_000 + int(f"{fraction:0<6.6}")
     try:
         return Record(at_us, channel, parse_frame(notation), direction == "T")

@@ -13,18 +13,19 @@ import re
 from binascii import a2b_base64, b2a_base64
 from typing import Any, Final
 
-from tickrig.host.monitor.frames.record import LineRecord, Record
+from tickrig.host.monitor.frames.record import AnyFrame, LineRecord, Record
 from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
+from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame
 from tickrig.wire.errors import WireError
 
 _CODED: Final = re.compile(r"(.+#(?:[0-9A-Fa-f]{16}|R8))_[9A-Fa-f]")
 _ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
 
 
-def parse_frame(notation: str) -> CanFrame | ErrorFrame:
+def parse_frame(notation: str) -> AnyFrame:
     """Read a frame; WireError if that is none.
 
     The raw length code behind eight bytes is passed over; an error frame may have less
@@ -33,6 +34,8 @@ def parse_frame(notation: str) -> CanFrame | ErrorFrame:
     if error := _ERROR.fullmatch(notation):
         data = bytes.fromhex(error[2]).ljust(8, b"\0")
         return ErrorFrame(int(error[1], 16) & ERROR_CLASS_MASK, data)
+    if "##" in notation:
+        return FdFrame.parse(notation)
     coded = _CODED.fullmatch(notation)
     return CanFrame.parse(coded[1] if coded else notation)
 
@@ -47,7 +50,8 @@ def json_line(record: Record, more: str = "") -> str:
 
     A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir` and `data`
     (hex); a remote frame has `rtr`, its length, and an error frame has `err`: 1 and its class as
-    `id`. `{"v":1,"ev":"drop","n":12}` says what was lost; a line of a serial port is an event, too.
+    `id`; one of CAN FD has `fd`: 1, with `brs`: 1 and `esi`: 1 where it has these.
+    `{"v":1,"ev":"drop","n":12}` says what was lost; a line of a serial port is an event, too.
 
     >>> json_line(Record(1_500_000, "can0", CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
@@ -55,6 +59,9 @@ def json_line(record: Record, more: str = "") -> str:
     at_us, channel, frame, sent = record
     if isinstance(frame, ErrorFrame):
         what = f'"id":{frame.error_class},"x":0,"err":1'
+    elif isinstance(frame, FdFrame):
+        flags = ',"brs":1' * frame.brs + ',"esi":1' * frame.esi
+        what = f'"id":{frame.can_id},"x":{frame.extended:d},"fd":1{flags}'
     else:
         remote = f',"rtr":{frame.dlc}' if frame.remote else ""
         what = f'"id":{frame.can_id},"x":{frame.extended:d}{remote}'
@@ -117,10 +124,13 @@ def _name(channel: object) -> str:
     return name
 
 
-def _frame(said: dict[str, Any]) -> CanFrame | ErrorFrame:
+def _frame(said: dict[str, Any]) -> AnyFrame:
     data = bytes.fromhex(said["data"])
     if said.get("err"):
         return ErrorFrame(int(said["id"]) & 0x1FFF_FFFF, data[:8].ljust(8, b"\0"))
+    if said.get("fd"):
+        flags = BRS * bool(said.get("brs")) | ESI * bool(said.get("esi"))
+        return FdFrame(int(said["id"]), data, bool(said["x"]), flags).checked()
     remote = said.get("rtr")
     frame = CanFrame(int(said["id"]), data, remote is not None, bool(said["x"]), int(remote or 0))
     return frame.checked()
@@ -141,9 +151,12 @@ UNNAMED: Final = "can0"
 """What a bus without a name or number is called."""
 
 SENT: Final = ">"
+FD, FD_BRS, FD_ESI = "#", "!", "*"
+"""Behind the data of a row: base64 does not have them."""
+
 _DUMPED: Final = re.compile(
     r"([0-9]{1,12}\.[0-9]{6}),([^,\"\s]{1,32}),([0-9A-Fa-f]*),([rt]x),[0-9]+,"
-    r"(R[0-8]?|[0-9A-Fa-f]*),.*"
+    r"(R[0-8]?|#?[0-9A-Fa-f]*),.*"
 )
 
 
@@ -151,15 +164,20 @@ def csv_row(record: Record) -> str:
     """Write a frame below `LOG_HEADER`.
 
     python-can does not tell who sent a frame. Here a `>` behind its data, which base64 does not
-    have and python-can passes over, says that this program did.
+    have and python-can passes over, says that this program did. Nor does it tell CAN FD: here a
+    `#` there says so, `!` that it has BRS, `*` that it has ESI.
     """
     at_us, _, frame, sent = record
+    marks = SENT * sent
     if isinstance(frame, ErrorFrame):
         what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"
+    elif isinstance(frame, FdFrame):
+        what = f"{frame.can_id:#x},{frame.extended:d},0,0,{len(frame.data)}"
+        marks = FD + FD_BRS * frame.brs + FD_ESI * frame.esi + marks
     else:
         what = f"{frame.can_id:#x},{frame.extended:d},{frame.remote:d},0,{frame.dlc}"
     data = b2a_base64(frame.data, newline=False).decode("ascii")
-    return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{SENT * sent}"
+    return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{marks}"
 
 
 def parse_csv_line(text: str, tally: Tally) -> Record | str | None:
@@ -185,11 +203,14 @@ def _dumped(match: re.Match[str], tally: Tally) -> Record | str:
 def _logged(cells: list[str]) -> Record:
     stamp, ident, extended, remote, error, dlc, text = cells
     data, can_id, length = a2b_base64(text), int(ident, 16), int(dlc)
-    frame: CanFrame | ErrorFrame
+    frame: AnyFrame
     if error == "1":
         frame = ErrorFrame(can_id & ERROR_CLASS_MASK, data[:8].ljust(8, b"\0"))
     elif remote == "1":
         frame = CanFrame(can_id, b"", True, extended == "1", length).checked()
+    elif FD in text or (len(data) > MAX_DATA_BYTES and len(data) in FD_LENGTHS):
+        flags = BRS * (FD_BRS in text) | ESI * (FD_ESI in text)
+        frame = FdFrame(can_id, data, extended == "1", flags).checked()
     else:
         frame = CanFrame(can_id, data, False, extended == "1").checked()
     return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(SENT))

@@ -15,7 +15,8 @@ from typing import Final
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.notation import parse_frame
-from tickrig.host.monitor.logs.tally import CAN_FD, CAN_XL, SERIAL_LINES, Tally
+from tickrig.host.monitor.logs.tally import CAN_XL, SERIAL_LINES, Tally
+from tickrig.wire.can_fd import BRS, ESI
 from tickrig.wire.errors import WireError
 
 HEAD: Final = 1 << 13
@@ -29,7 +30,7 @@ _STAMP: Final = (
     r"\.([0-9]{1,9})\)\s+"
 )
 _FRAME: Final = re.compile(
-    rf"(?:{_STAMP})?(\S{{1,32}})\s+(?:([RT])X [-B] [-E]\s+)?"
+    rf"(?:{_STAMP})?(\S{{1,32}})\s+(?:([RT])X ([-B]) ([-E])\s+)?"
     r"([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})\s+\[([0-9]{1,4})\](?:\s+(.*))?",
     re.ASCII,
 )
@@ -86,13 +87,14 @@ def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | s
     match = _FRAME.fullmatch(text)
     if match is None:
         return _beside(line, text, tally)
-    sign, seconds, date, fraction, channel, direction, ident, length, shown = match.groups()
-    if len(length) > 1:
-        kind = CAN_FD if len(length) == len("08") else CAN_XL
-        tally.passed_over[kind] += 1
-        return kind
+    sign, seconds, date, fraction, channel, direction, brs, esi, *data = match.groups()
+    ident, length, shown = data
+    if len(length) > len("08"):
+        tally.passed_over[CAN_XL] += 1
+        return CAN_XL
+    flags = f"#{BRS * (brs == 'B') | ESI * (esi == 'E')}" * (len(length) == len("08"))
     try:
-        frame = parse_frame(f"{ident}#{_notation(int(length), shown or '')}")
+        frame = parse_frame(f"{ident}#{flags}{_notation(int(length), shown or '')}")
         at_us = clock.at_us(sign, seconds, date, fraction)
     except (WireError, ValueError, OverflowError, OSError):
         return None

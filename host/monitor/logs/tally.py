@@ -13,7 +13,6 @@ SHOWN: Final = 60
 """Characters of a bad line that are shown."""
 
 
-CAN_FD: Final = "CAN FD frames"
 CAN_XL: Final = "CAN XL frames"
 SERIAL_LINES: Final = "lines of a serial port"
 OTHER_LINES: Final = "lines with other events"
@@ -56,7 +55,7 @@ class Tally:
 
     Attributes:
         bad_lines: lines that are none of the log.
-        passed_over: kinds of frames that classic CAN does not have, and of what is no
+        passed_over: kinds of frames that are not read, as CAN XL, and of what is no
             frame at all (`NO_FRAMES`), and how many.
         lost: frames that the recorder says it lost.
         untimed: frames that have no time in the log; they got that of the frame before.

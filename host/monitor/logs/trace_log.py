@@ -24,10 +24,12 @@ from tickrig.host.text.bench_header import (
 from tickrig.host.text.bench_record import BenchParser, BenchRecord
 from tickrig.host.text.trace import Mark, TraceError
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 OTHER_BUSES = "frames of other buses"
 ERROR_FRAMES = "error frames"
 LOG_MARKS = "marks of gaps and triggers"
+FD_FRAMES = "CAN FD frames"
 
 MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
@@ -45,8 +47,8 @@ class TraceLogWriter:
         if not self._channel:
             self._begin(record)
         if record.channel != self._channel or not isinstance(record.frame, CanFrame):
-            other = record.channel != self._channel
-            self._left_out[OTHER_BUSES if other else ERROR_FRAMES] += 1
+            kind = ERROR_FRAMES if isinstance(record.frame, ErrorFrame) else FD_FRAMES
+            self._left_out[OTHER_BUSES if record.channel != self._channel else kind] += 1
             return
         self._latest_us = max(self._latest_us, record.at_us - self._began_us)
         mark = MARKS[record.sent]

@@ -12,6 +12,7 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.gaps import bucket_of, middle_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
 
 FOREVER: Final = 0
 """As `loops`."""
@@ -30,7 +31,7 @@ class Due(NamedTuple):
 
     at_us: int
     channel: str
-    frame: CanFrame
+    frame: CanFrame | FdFrame
 
 
 @dataclass(slots=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from operator import or_
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from tickrig.host.monitor.traffic.gaps import GapRow, Gaps
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can_fd import FdFrame
 
 PAYLOAD_BITS: Final = 64
 
@@ -16,7 +18,8 @@ PAYLOAD_BITS: Final = 64
 class BitRow(NamedTuple):
     """What changed in the payloads of one identifier.
 
-    A payload is a number here: bit 0 of byte 0 is bit 0, bit 7 of byte 7 is bit 63.
+    A payload is a number here: bit 0 of byte 0 is bit 0, bit 7 of byte 7 is bit 63; in CAN FD
+    it goes on to bit 511.
 
     Attributes:
         latest: bits in which the latest payload differs from the one before.
@@ -34,14 +37,15 @@ class BitRow(NamedTuple):
         return reduce(or_, self.planes, 0) & ~self.notched
 
     def counts(self) -> tuple[int, ...]:
-        """Return how often each of the 64 bits changed.
+        """Return how often each bit changed: of 64 bits, in CAN FD of as many as changed.
 
         >>> BitRow(planes=(0b01, 0b11)).counts()[:3]
         (3, 2, 0)
         """
+        highest = max(map(int.bit_length, self.planes), default=0)
         return tuple(
             sum((plane >> bit & 1) << place for place, plane in enumerate(self.planes))
-            for bit in range(PAYLOAD_BITS)
+            for bit in range(max(PAYLOAD_BITS, -(-highest // 8) * 8))
         )
 
 
@@ -89,14 +93,14 @@ class IdRow(NamedTuple):
 
     Attributes:
         channel: the bus.
-        ident: see `ident_of`.
+        ident: see `ident_of` and `fd_ident`.
         frames: how many.
         first_us: when the first of them came.
         last_us: when the latest came.
         frame: the latest.
         gap_us: the latest gap, None before the second frame.
         gaps: all gaps, None before the second frame.
-        bits: bits of all frames on the bus.
+        bits: bits of all frames on the bus; those of CAN FD as `BitRates` has it.
         changed: which payload bits change.
     """
 
@@ -105,7 +109,7 @@ class IdRow(NamedTuple):
     frames: int
     first_us: int
     last_us: int
-    frame: CanFrame
+    frame: CanFrame | FdFrame
     gap_us: int | None
     gaps: GapRow | None
     bits: int
@@ -123,21 +127,31 @@ class Tally:
 
     A frame with an earlier time than the one before it has a gap of 0.
 
+    Args:
+        at_us: when the first frame came.
+        frame: the frame; those that follow are of its kind.
+        measure: tells its bits on the bus.
+
     Attributes:
         length: bits of the latest frame on the bus.
         memory: which payload bits change.
     """
 
-    __slots__ = ("_bits", "_first_us", "_frame", "_gap_us", "_gaps", "_last_us", "length", "memory")
+    __slots__ = (
+        *("_bits", "_first_us", "_frame", "_gap_us", "_gaps", "_last_us", "_measure"),
+        *("length", "memory"),
+    )
 
-    def __init__(self, at_us: int, frame: CanFrame) -> None:
+    def __init__(
+        self, at_us: int, frame: CanFrame | FdFrame, measure: Callable[[Any], int] = frame_bits
+    ) -> None:
         self._first_us = self._last_us = at_us
-        self._frame, self._gaps = frame, Gaps()
-        self.length = self._bits = frame_bits(frame)
+        self._frame, self._gaps, self._measure = frame, Gaps(), measure
+        self.length = self._bits = measure(frame)
         self._gap_us: int | None = None
         self.memory = BitMemory(int.from_bytes(frame.data, "little"))
 
-    def take(self, at_us: int, frame: CanFrame) -> None:
+    def take(self, at_us: int, frame: CanFrame | FdFrame) -> None:
         """Count a frame after the first."""
         gap_us = self._gap_us = max(0, at_us - self._last_us)
         self._last_us = at_us
@@ -145,7 +159,7 @@ class Tally:
         if frame == self._frame:
             self.memory.same()
         else:
-            self._frame, self.length = frame, frame_bits(frame)
+            self._frame, self.length = frame, self._measure(frame)
             self.memory.take(int.from_bytes(frame.data, "little"))
         self._bits += self.length
 

@@ -10,13 +10,16 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
 
-from tickrig.host.monitor.frames.ident import ident_of
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.frames.ident import fd_ident, ident_of
+from tickrig.host.monitor.frames.record import AnyFrame, Record
+from tickrig.host.monitor.traffic.bit_rates import UNRATED, BitRates
 from tickrig.host.monitor.traffic.controller import ErrorRow, ErrorStatistics
 from tickrig.host.monitor.traffic.tally import IdRow, Tally
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_bits import frame_bits
 from tickrig.wire.can_error import ErrorFrame
 
 WINDOW_US: Final = 1_000_000
@@ -121,6 +124,8 @@ class BusRow(NamedTuple):
         load: how busy it was.
         errors: what error frames said.
         went_back: how many frames had an earlier time than the one before.
+        fd: how many of the frames are of CAN FD.
+        unrated: how many of these have data at a bit rate that nobody told: the load is less.
     """
 
     channel: str
@@ -130,6 +135,8 @@ class BusRow(NamedTuple):
     load: LoadRow
     errors: ErrorRow
     went_back: int
+    fd: int = 0
+    unrated: int = 0
 
 
 class Snapshot(NamedTuple):
@@ -149,26 +156,33 @@ class Snapshot(NamedTuple):
 class BusTally:
     """Counts one bus."""
 
-    def __init__(self, channel: str, first_us: int) -> None:
+    def __init__(self, channel: str, first_us: int, rates: BitRates) -> None:
         self._channel = channel
         self._first_us = self._last_us = first_us
         self._ids: dict[int, Tally] = {}
         self._load, self._errors = Load(first_us), ErrorStatistics()
-        self._frames = self._went_back = 0
+        self._frames = self._went_back = self._fd = self._unrated = 0
+        self._rates = rates
 
-    def take(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
+    def take(self, at_us: int, frame: AnyFrame) -> None:
         """Count a frame."""
         if at_us < self._last_us:
             self._went_back += 1
         self._last_us = at_us
-        if isinstance(frame, ErrorFrame):
+        measure: Callable[[Any], int] = frame_bits
+        if isinstance(frame, CanFrame):
+            ident = ident_of(frame)
+        elif isinstance(frame, ErrorFrame):
             self._errors.take(frame)
             return
+        else:
+            ident, measure = fd_ident(frame), self._rates.bits
+            self._fd += 1
+            self._unrated += not self._rates.tells(frame)
         self._frames += 1
-        ident = ident_of(frame)
         tally = self._ids.get(ident)
         if tally is None:
-            tally = self._ids[ident] = Tally(at_us, frame)
+            tally = self._ids[ident] = Tally(at_us, frame, measure)
         else:
             tally.take(at_us, frame)
         self._load.take(at_us, tally.length)
@@ -188,6 +202,8 @@ class BusTally:
             self._load.row(now_us),
             self._errors.row(),
             self._went_back,
+            self._fd,
+            self._unrated,
         )
 
     def id_rows(self) -> list[IdRow]:
@@ -199,10 +215,14 @@ class Traffic:
     """Counts all frames of all buses; what it keeps grows with identifiers, not with frames.
 
     Not counted: what was lost before it was heard; see `Loss`.
+
+    Args:
+        rates: bit rates of all buses, for CAN FD.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rates: BitRates = UNRATED) -> None:
         self._buses: dict[str, BusTally] = {}
+        self._rates = rates
         self._last_us = 0
 
     def take(self, record: Record) -> None:
@@ -210,7 +230,7 @@ class Traffic:
         at_us, channel, frame, _ = record
         bus = self._buses.get(channel)
         if bus is None:
-            bus = self._buses[channel] = BusTally(channel, at_us)
+            bus = self._buses[channel] = BusTally(channel, at_us, self._rates)
         bus.take(at_us, frame)
         self._last_us = at_us
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.frames.ident import EXTENDED, REMOTE, ident_text, node_of
+from tickrig.host.monitor.frames.ident import EXTENDED, FD, REMOTE, ident_text, node_of
 from tickrig.host.monitor.frames.quantity import count_text, load_text, ms_text, rate_text
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot
@@ -66,6 +66,9 @@ def bus_lines(bus: BusRow, bit_rate: int | None) -> list[str]:
         f" {load_text(load.peak.bits, bit_rate)} in the second from {load.peak.at_us / 1e6:.6f}",
         f"  error frames: {bus.errors.frames}",
     ]
+    if bus.fd:
+        rest = f"; {bus.unrated} have BRS to a rate that nobody told: the load is less"
+        lines.insert(2, f"  CAN FD: {bus.fd} frames{rest * bool(bus.unrated)}")
     lines += [f"    {count} x {kind}" for kind, count in bus.errors.kinds]
     if bus.errors.state is not None:
         lines.append(f"  controller: {bus.errors.state.name.lower().replace('_', '-')}")
@@ -138,6 +141,7 @@ def bus_json(bus: BusRow, bit_rate: int | None) -> str:
         error_kinds=dict(errors.kinds),
         state=None if errors.state is None else errors.state.name.lower(),
         went_back=bus.went_back,
+        **({"fd": bus.fd, "fd_unrated": bus.unrated} if bus.fd else {}),
     )
 
 
@@ -169,6 +173,8 @@ def node_json(row: NodeRow) -> str:
 
 def _ident(ident: int) -> dict[str, object]:
     plain: dict[str, object] = {"id": ident & EXTENDED_MAX, "x": int(bool(ident & EXTENDED))}
+    if ident & FD:
+        return plain | {"fd": 1}
     return plain | {"rtr": 1} if ident & REMOTE else plain
 
 

@@ -37,7 +37,9 @@ def heat_text(row: IdRow, styled: bool) -> str:
     cells = []
     for place in range(len(row.frame.data)):
         bits = [
-            _marked(heats[bit], styled and bool(latest >> bit & 1))
+            _marked(
+                heats[bit] if bit < len(heats) else UNCHANGED, styled and bool(latest >> bit & 1)
+            )
             for bit in reversed(range(8 * place, 8 * place + 8))
         ]
         cells.append("".join(bits))

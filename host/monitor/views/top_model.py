@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tickrig.host.monitor.frames.ident import ident_of
+from tickrig.host.monitor.frames.ident import any_ident
 from tickrig.host.monitor.frames.quantity import load_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.line_traffic import LineRow, LineTraffic, line_table
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot, Traffic
 from tickrig.host.monitor.views.top_columns import Column, IdText, data_text, fitting, heat_text
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -25,6 +25,7 @@ HEAT_WIDTH: Final = 71
 MEANING_WIDTH: Final = 50
 CHANNEL_MAX: Final = 12
 KEYS: Final = "  q quit, space hold, b bits, d decode, n notch, s sort, c clear"
+UNRATED: Final = "load at most (no --data-bitrate)"
 UNBOUNDED: Final = 1 << 16
 """A width or height that everything fits into."""
 
@@ -61,7 +62,7 @@ class View:
         bit_rate: of the buses, None if it is not known.
         keys: a line tells the keys.
         meaning: what the latest frame of a row means, shown instead of its bytes.
-        unread: what came and is no frame of classic CAN.
+        unread: what came and is no frame of CAN or CAN FD.
     """
 
     order: Order = Order.ID
@@ -110,6 +111,8 @@ def bus_line(bus: BusRow, bit_rate: int | None) -> str:
         words.append(f"TEC {errors.tec} REC {errors.rec}")
     words += [f"overflows {errors.overflows}"] * bool(errors.overflows)
     words += [f"back in time {bus.went_back}"] * bool(bus.went_back)
+    words += [f"CAN FD {bus.fd}"] * bool(bus.fd)
+    words += [UNRATED] * bool(bus.unrated)
     words.append(f"mean {load_text(load.mean_bit_s, bit_rate)}")
     words.append(f"peak {load_text(load.peak.bits, bit_rate)}")
     return ", ".join(words)
@@ -226,8 +229,9 @@ class TopModel:
         """Count frames, and keep what the latest of each identifier means."""
         for record, decoded in decoded_frames:
             self.take((record,))
-            if decoded is not None and isinstance(record.frame, CanFrame):
-                self._meanings[record.channel, ident_of(record.frame)] = decoded
+            frame = record.frame
+            if decoded is not None and frame is not None and not isinstance(frame, ErrorFrame):
+                self._meanings[record.channel, any_ident(frame)] = decoded
 
     def press(self, key: str) -> None:
         """Act on a key; one without a meaning does nothing."""

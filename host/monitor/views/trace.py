@@ -7,9 +7,9 @@ from itertools import islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.monitor.decode.filter import Filter
-from tickrig.host.monitor.frames.ident import ERROR, ident_of
+from tickrig.host.monitor.frames.ident import ERROR, any_ident
 from tickrig.host.monitor.frames.record import Record
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -141,7 +141,7 @@ def key_of(record: AnyRecord) -> Key:
     if not isinstance(record, Record):
         return record.channel, LINE + record.sent
     frame = record.frame
-    return record.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+    return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
 
 
 def _since(at_us: int, before_us: int | None) -> int | None:

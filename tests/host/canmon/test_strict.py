@@ -12,7 +12,7 @@ from tickrig.host.canmon.sources import whole_log
 
 WELL = "(0000000001.000000) can0 705#7F\n"
 NOISE = "what?\n"
-CAN_FD = "(0000000001.000000) can0 123##1AA\n"
+CAN_XL = "(0000000001.000000) can0 45123#81:00:12345678#1122\n"
 VERBS = [
     ["dump", "--raw"],
     ["dump", "--jsonl"],
@@ -35,8 +35,8 @@ def log(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-@pytest.mark.parametrize("damage", [NOISE, CAN_FD])
-def test_noise_and_can_fd_end_a_strict_run_with_4(verb: list[str], damage: str, log: Path) -> None:
+@pytest.mark.parametrize("damage", [NOISE, CAN_XL])
+def test_noise_and_can_xl_end_a_strict_run_with_4(verb: list[str], damage: str, log: Path) -> None:
     log.write_text(WELL + damage, "ascii")
     result = canmon(verb, log)
     assert result.exit_code == 4, result.output
@@ -53,7 +53,7 @@ def test_a_whole_log_ends_a_strict_run_with_0(verb: list[str], log: Path) -> Non
 def test_a_large_log_is_no_exception(
     verb: list[str], log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    log.write_text(WELL + NOISE + CAN_FD, "ascii")
+    log.write_text(WELL + NOISE + CAN_XL, "ascii")
     monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
     result = canmon(verb, log)
     assert result.exit_code == 4

@@ -13,6 +13,7 @@ from tickrig.host.canmon.sources.socket_reader import SO_TIMESTAMPNS, SocketRead
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import BRS, ESI, FdFrame
 
 PATIENCE_US = 10_000_000
 MANY = 40_000
@@ -84,16 +85,18 @@ def test_frames_of_every_kind_are_read_with_the_time_of_the_kernel(
 
 
 @pytest.mark.realtime
-def test_frames_of_can_fd_and_can_xl_are_counted(bus: Bus, sender: Sender) -> None:
+def test_frames_of_can_fd_are_read_and_those_of_can_xl_counted(bus: Bus, sender: Sender) -> None:
     reader = SocketReader(bus, "can0")
-    sender.socket.send(struct.pack("=IB67x", 0x123, 64))
+    sender.socket.send(struct.pack("=IBB2x64s", 0x123, 64, 0x05, bytes(range(64))))
+    sender.socket.send(struct.pack("=IBB2x64s", 0x8000_0123, 12, 0x02, b"\x11"))
     sender.socket.send(struct.pack("=IBBHI", 0x123, 0x80, 0, 2_048, 0) + bytes(2_048))
     sender.frame(0x705)
-    read(reader, 1)
-    assert reader.tally.messages("can0") == [
-        "can0: 1 CAN FD frames passed over",
-        "can0: 1 CAN XL frames passed over",
+    assert [one.frame for one in read(reader, 3)] == [
+        FdFrame(0x123, bytes(range(64)), flags=BRS),
+        FdFrame(0x123, b"\x11" + bytes(11), extended=True, flags=ESI),
+        CanFrame(0x705),
     ]
+    assert reader.tally.messages("can0") == ["can0: 1 CAN XL frames passed over"]
 
 
 @pytest.mark.realtime

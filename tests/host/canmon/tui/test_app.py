@@ -217,7 +217,7 @@ def test_the_status_tells_load_controller_errors_and_rate(tmp_path: Path) -> Non
 
 def test_what_is_passed_over_is_told_while_it_comes(tmp_path: Path) -> None:
     log = tmp_path / "run.log"
-    log.write_text("(0.1) can0 181#01\n(0.2) can0 123##1AA\nwhat?\n", "ascii")
+    log.write_text("(0.1) can0 181#01\n(0.2) can0 45123#81:00:12345678#1122\nwhat?\n", "ascii")
     session = open_session([str(log)], BusOptions(), Model())
 
     async def act(monitor: Monitor, pilot: Any) -> None:

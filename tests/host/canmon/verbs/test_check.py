@@ -118,7 +118,7 @@ def test_lost_frames_end_a_strict_check_with_4(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("at_once", [False, True])
-@pytest.mark.parametrize("text", ["", "what?\n", "(1.000000) can0 123##1AA\n"])
+@pytest.mark.parametrize("text", ["", "what?\n", "(1.000000) can0 45123#81:00:12345678#1122\n"])
 def test_where_nothing_was_judged_nothing_is_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool, text: str
 ) -> None:

@@ -17,6 +17,7 @@ from tickrig.host.monitor.logs.log_writer import write_log
 from tickrig.host.monitor.logs.notation import DUMP_HEADER
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 
 HEARDS = st.lists(
     st.builds(Record, st.integers(0, 4 * 10**15), st.just("can0"), FRAMES, st.booleans())
@@ -34,7 +35,10 @@ def test_csv_holds_a_bus_with_who_sent_and_python_can_reads_it(records: list[Rec
         assert (list(reader), reader.tally) == (records, Tally())
         with can.CSVReader(path) as foreign:
             theirs = [to_record(message, "can0", Tally()) for message in foreign]
-    assert theirs == [record._replace(sent=False) for record in records]
+    assert len(theirs) == len(records)
+    for their, ours in zip(theirs, records, strict=True):
+        if not isinstance(ours.frame, FdFrame):  # which python-can's rows do not tell
+            assert their == ours._replace(sent=False)
 
 
 @given(records=HEARDS)

@@ -12,11 +12,9 @@ from tests.host.monitor.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.verbs.info import read_head
 from tickrig.host.monitor.columns.column_reader import read_columns
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.frames.record import AnyFrame, Record
 from tickrig.host.monitor.logs.log_reader import LogLines, parse_log_line, read_log
 from tickrig.host.monitor.logs.tally import Tally
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
 
 CANDUMP = """\
  (0000000001.000250)  can0  RX - -  705   [1]  7F                        '.'
@@ -26,7 +24,7 @@ CANDUMP = """\
  (0000000001.001000)  can0  RX - -  20000004   [8]  00 08 00 00 00 00 00 00   ERRORFRAME
 \tcontroller-problem{tx-error-warning}
 \terror-counter-tx-rx{{96}{0}}
- (0000000001.001100)  can0  RX - -  123  [12]  00 01 02 03 04 05 06 07 08 09 0A 0B
+ (0000000001.001100)  can0  RX - E  123  [12]  00 01 02 03 04 05 06 07 08 09 0A 0B
  (0000000001.001200)  can0  RX - -  7FF   [0]
 """
 READ = [
@@ -35,6 +33,7 @@ READ = [
     "(0000000001.000750) can1 123#1122",
     "(0000000001.000900) can1 00000123#R",
     "(0000000001.001000) can0 20000004#0008000000000000",
+    "(0000000001.001100) can0 123##2000102030405060708090A0B",
     "(0000000001.001200) can0 7FF#",
 ]
 GAPS = st.lists(st.tuples(st.integers(0, 5_000_000), FRAMES, st.booleans()), min_size=1, max_size=9)
@@ -53,14 +52,14 @@ def records(text: list[str]) -> list[Record]:
 def test_what_candump_shows_is_read_as_its_log() -> None:
     frames, tally = read(CANDUMP)
     assert frames == records(READ)
-    assert (tally.passed_over, tally.bad_lines.count) == ({"CAN FD frames": 1}, 0)
+    assert (tally.passed_over, tally.bad_lines.count) == ({}, 0)
 
 
 def test_without_stamps_frames_have_no_time_and_that_is_said() -> None:
     text = "".join(f"{line[22:]}\n" for line in CANDUMP.splitlines() if line.startswith(" "))
     frames, tally = read(text)
     assert frames == [record._replace(at_us=0) for record in records(READ)]
-    assert tally.messages("run.txt")[-1] == "run.txt: 6 frames have no time"
+    assert tally.messages("run.txt")[-1] == "run.txt: 7 frames have no time"
 
 
 def test_colours_are_passed_over() -> None:
@@ -70,7 +69,7 @@ def test_colours_are_passed_over() -> None:
 
 @given(gaps=GAPS, stamp=st.sampled_from(list(Stamp)), text=st.sampled_from(["", "5 nmt FF 00"]))
 def test_what_dump_shows_is_read_again(
-    gaps: list[tuple[int, CanFrame | ErrorFrame, bool]], stamp: Stamp, text: str
+    gaps: list[tuple[int, AnyFrame, bool]], stamp: Stamp, text: str
 ) -> None:
     at_us, frames = 1_700_000_000_000_000, []
     for gap_us, frame, sent in gaps:
@@ -131,7 +130,7 @@ def test_other_lines_are_bad(line: str) -> None:
 
 
 SHOWN = st.one_of(
-    st.sampled_from(CANDUMP.splitlines()),
+    st.sampled_from([line for line in CANDUMP.splitlines() if "[12]" not in line]),
     st.builds(" ({:03d}.{:06d})  can0  705   [1]  7F".format, *[st.integers(0, 999)] * 2),
     st.sampled_from(["  can0  705   [1]  7F", "(1.5) can0 705#7F", "timestamp,", "\t", "[1]"]),
 )
