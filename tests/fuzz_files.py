@@ -1,4 +1,4 @@
-"""What `tools/fuzz-eds` and `tools/fuzz-bus` share: mutated files, judged by several processes.
+"""What `tools/fuzz-eds`, `-bus` and `-rig-files` share: mutated files, judged by processes.
 
 It says each minute how far it is; interrupted, how far it came. The files are those of the
 seed, however many processes share them.

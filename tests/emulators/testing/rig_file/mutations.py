@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 from random import Random
 
 from tests.emulators.testing.rig_file.test_reader import WHOLE
+from tests.mutators import damaged, with_piece
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.rig_file.reader import decode_rig_file
 from tickrig.emulators.testing.rig_file.section import RigFileError
@@ -71,26 +73,14 @@ TABLES += [
 _KEY_VALUE = re.compile(r"^([^=\[#\n]+)=(.*)$", re.MULTILINE)
 
 
-def mutated(chance: Random) -> bytes:
-    """Return a rig file with a few things done to it."""
+def mutated(chance: Random) -> tuple[str, bytes]:
+    """Return a rig file with a few things done to it, and its name."""
     text = chance.choice(SEEDS)
     for _ in range(chance.choice([1, 1, 1, 2, 3, 8])):
-        text = chance.choice([_character, _line, _key, _value, _table, _value])(text, chance)
+        text = chance.choice(CHANGES)(text, chance)
     data = text.encode("utf-8", "surrogatepass")
-    match chance.randrange(20):
-        case 0:
-            return data[: chance.randrange(len(data) + 1)]
-        case 1:
-            at = chance.randrange(len(data) + 1)
-            return data[:at] + chance.randbytes(chance.choice([1, 2, 40])) + data[at:]
-        case 2:
-            return data.replace(b"\n", b"\r\n")
-    return data
-
-
-def _character(text: str, chance: Random) -> str:
-    at = chance.randrange(len(text) + 1)
-    return text[:at] + chance.choice([chance.choice(PIECES), ""]) + text[at + chance.randrange(3) :]
+    how = chance.randrange(20)
+    return PLACE.name, data.replace(b"\n", b"\r\n") if how == 2 else damaged(data, chance, how)
 
 
 def _line(text: str, chance: Random) -> str:
@@ -134,24 +124,26 @@ def _table(text: str, chance: Random) -> str:
     return "\n".join(lines)
 
 
-def judge(data: bytes, *, opens: bool = True) -> str:
+CHANGES = (partial(with_piece, PIECES), _line, _key, _value, _table, _value)
+
+
+def judge(name: str, data: bytes) -> str:
     """Read a file; AssertionError unless it opens as a bench, or is told to be wrong as it should.
 
     Args:
-        data: the file.
-        opens: whether a bench of what is right is opened, and runs a little.
+        name: of the file.
+        data: what it holds.
 
     Returns:
         `ok` or `mistakes`.
     """
     try:
-        plan = decode_rig_file(data, PLACE)
+        plan = decode_rig_file(data, PLACE.with_name(name))
     except RigFileError as error:
         _check(error, data.count(b"\n") + 1)
         return "mistakes"
-    if opens:
-        with Bench.of_plan(plan, "virtual") as bench:
-            bench.run_for("11ms")
+    with Bench.of_plan(plan, "virtual") as bench:
+        bench.run_for("11ms")
     return "ok"
 
 

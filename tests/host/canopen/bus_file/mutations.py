@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Final
 
 from tests.host.canopen.bus_file.bench import NODE, ROOT, concise_dcf
 from tests.host.canopen.bus_file.shapes import GOOD
+from tests.mutators import damaged, with_line, with_piece
 from tickrig.host.canopen.bus_file.bus_file import BusFile, decode_bus_file, is_bus_file
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 
@@ -120,30 +122,13 @@ def _text(chance: Random) -> str:
 
 def _bytes(text: str, chance: Random) -> bytes:
     data = text.encode("utf-8", "surrogatepass" if chance.random() < 0.5 else "replace")
-    match chance.randrange(24):
-        case 0:
-            return data[: chance.randrange(len(data) + 1)]
-        case 1:
-            at = chance.randrange(len(data) + 1)
-            return data[:at] + chance.randbytes(chance.choice([1, 2, 40])) + data[at:]
+    how = chance.randrange(24)
+    match how:
         case 2:
             return data.replace(b"\n", b"\r\n")
         case 3:
             return text.encode("utf-16", "replace")
-    return data
-
-
-def _character(text: str, chance: Random) -> str:
-    at = chance.randrange(len(text) + 1)
-    return text[:at] + chance.choice([chance.choice(PIECES), ""]) + text[at + chance.randrange(3) :]
-
-
-def _line(text: str, chance: Random) -> str:
-    lines = text.split("\n")
-    line = lines.pop(chance.randrange(len(lines)))
-    for _ in range(chance.choice([0, 1, 1, 2])):
-        lines.insert(chance.randrange(len(lines) + 1), line)
-    return "\n".join(lines)
+    return damaged(data, chance, how)
 
 
 def _indent(text: str, chance: Random) -> str:
@@ -191,7 +176,7 @@ def _block(text: str, chance: Random) -> str:
 
 
 CHANGES: Final[tuple[Change, ...]] = (
-    *(_character, _line, _indent, _block),
+    *(partial(with_piece, PIECES), with_line, _indent, _block),
     *(_value, _value, _value, _key, _key, _added, _added),
 )
 

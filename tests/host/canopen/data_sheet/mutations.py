@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from random import Random
 from typing import Final
 
 from tests.host.canopen.data_sheet.corpus import CORPUS, ROOT
+from tests.mutators import damaged, with_line, with_piece
 from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig.emulators.canopen.eds import describe
 from tickrig.host.canopen.data_sheet.check import check, failing
@@ -95,8 +97,7 @@ def mutated(chance: Random) -> tuple[str, bytes]:
 def disturbed(text: str, chance: Random) -> str:
     """Return the text of a file with a few things done to it."""
     for _ in range(chance.choice([1, 1, 2, 3, 8])):
-        change = chance.choice([_piece, _line, _value, _value, _key, _title, _section])
-        text = change(text, chance)
+        text = chance.choice(CHANGES)(text, chance)
     return text
 
 
@@ -109,26 +110,7 @@ def _bytes(text: str, chance: Random) -> bytes:
         case 2:
             return text.replace("\n", chance.choice(["\r", "\r\n"])).encode("utf-8", "replace")
     data = text.encode("utf-8", "surrogatepass" if chance.random() < 0.5 else "replace")
-    match chance.randrange(12):
-        case 0:
-            return data[: chance.randrange(len(data) + 1)]
-        case 1:
-            at = chance.randrange(len(data) + 1)
-            return data[:at] + chance.randbytes(chance.choice([1, 2, 40])) + data[at:]
-    return data
-
-
-def _piece(text: str, chance: Random) -> str:
-    at = chance.randrange(len(text) + 1)
-    return text[:at] + chance.choice([chance.choice(PIECES), ""]) + text[at + chance.randrange(3) :]
-
-
-def _line(text: str, chance: Random) -> str:
-    lines = text.split("\n")
-    line = lines.pop(chance.randrange(len(lines)))
-    for _ in range(chance.choice([0, 1, 1, 2])):
-        lines.insert(chance.randrange(len(lines) + 1), line)
-    return "\n".join(lines)
+    return damaged(data, chance, chance.randrange(12))
 
 
 def _value(text: str, chance: Random) -> str:
@@ -165,6 +147,12 @@ def _section(text: str, chance: Random) -> str:
     first, second = sorted(chance.sample(places, 2))
     a, b, c = text[:first], text[first:second], text[second:]
     return chance.choice([a + c + b, a + b + b + c, a + c, b + a + c])
+
+
+CHANGES: Final = (
+    *(partial(with_piece, PIECES), with_line),
+    *(_value, _value, _key, _title, _section),
+)
 
 
 def judge(name: str, data: bytes) -> str:
