@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Generic
 
 from tickrig.emulators.testing.bench.errors import PortGone
@@ -40,11 +42,8 @@ class WatchedLink(Generic[W]):
             LinkClosed: the link was closed.
         """
         self._watch.used()
-        try:
-            with self._watch.sending(traffic):
-                self._link.send(traffic)
-        except LinkClosed as error:
-            raise self._gone(error) from error
+        with self._told_if_gone(), self._watch.sending(traffic):
+            self._link.send(traffic)
         self._watch.passed(Mark.TO_DEVICE, traffic)
 
     def receive(self, timeout_us: int, /) -> W:
@@ -56,10 +55,8 @@ class WatchedLink(Generic[W]):
         """
         self._watch.used()
         begun_us = self.now_us
-        try:
+        with self._told_if_gone():
             traffic = self._link.receive(timeout_us)
-        except LinkClosed as error:
-            raise self._gone(error) from error
         self._took(timeout_us, begun_us, traffic)
         return traffic
 
@@ -74,9 +71,15 @@ class WatchedLink(Generic[W]):
         else:
             self._watch.waited(wanted_us, self.now_us - begun_us)
 
-    def _gone(self, error: LinkClosed) -> LinkClosed:
-        """Return what a closed line is: the host's own doing, or a port that is gone."""
-        return error if self._closed else LinkGone(str(error))
+    @contextmanager
+    def _told_if_gone(self) -> Iterator[None]:
+        """Tell a port that is gone from a line that the host has closed."""
+        try:
+            yield
+        except LinkClosed as error:
+            if self._closed:
+                raise
+            raise LinkGone(str(error)) from error
 
 
 class WatchedFrameLink(WatchedLink[Frames]):
@@ -100,9 +103,7 @@ class WatchedFrameLink(WatchedLink[Frames]):
         """
         self._watch.used()
         begun_us = self.now_us
-        try:
+        with self._told_if_gone():
             now_us, received = self._stamped.receive_stamped(timeout_us)
-        except LinkClosed as error:
-            raise self._gone(error) from error
         self._took(timeout_us, begun_us, tuple(frame for _, frame in received))
         return now_us, received
