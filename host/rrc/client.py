@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Final, Self, TypeVar
 
+from tickrig.host.links.closing import Closing
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
@@ -30,7 +30,7 @@ SLOWEST: Final = 1
 T = TypeVar("T")
 
 
-class RrcClient:
+class RrcClient(Closing):
     """A synchronous client of a Robotic Relay Communicator; nothing runs in the background.
 
     Time passes only in these calls. While a watchdog is set, each of them renews
@@ -122,17 +122,6 @@ class RrcClient:
     def close(self) -> None:
         """Close the link; a watchdog that is set will stop VR2."""
         self._link.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     @property
     def now_us(self) -> int:

@@ -7,7 +7,6 @@ from collections.abc import Callable, Coroutine
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar
 
 from tickrig.emulators.serial.emulator import LineSettings
@@ -25,6 +24,7 @@ from tickrig.emulators.testing.bench.triggers import Condition, check_condition
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.control.requests import Object
+from tickrig.host.links.closing import Closing
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting, us_of
 from tickrig.wire.instant import NEVER
@@ -39,7 +39,7 @@ REAL: Final = "real"
 HARDWARE: Final = "hardware"
 
 
-class Bench(BenchDevice):
+class Bench(BenchDevice, Closing):
     """Devices on a bench, for a test: in virtual time, in real time, or real ones.
 
     Time passes in one place: links, serial objects, buses, networks, `run_for` and `wait_until`
@@ -115,19 +115,6 @@ class Bench(BenchDevice):
         bench = cls.__new__(cls)
         bench._start(mode)
         return bench
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close it."""
-        self.close()
 
     def __getitem__(self, name: str) -> BenchDevice:
         """Return a device; KeyError if there is none of this name."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import TracebackType
-from typing import Any, Final, Self, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 from tickrig.host.canopen.master.assignment import MasterPlan
 from tickrig.host.canopen.master.boot_talk import BootStep, state_text
@@ -13,6 +12,7 @@ from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.nmt_master import NmtMaster
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.waiting import Operation, perform
+from tickrig.host.links.closing import Closing
 from tickrig.host.links.link import Link, StampedLink
 from tickrig.host.text.names import known, near
 from tickrig.host.text.values import us_of
@@ -44,7 +44,7 @@ class Named(dict[str, V]):
         raise KeyError(f"no {self._kind} {name!r}; {near(str(name), self)}")
 
 
-class CanopenMaster:
+class CanopenMaster(Closing):
     """A master; time passes only in its calls, and meanwhile it does what is due.
 
     Args:
@@ -67,19 +67,6 @@ class CanopenMaster:
         self.joints = Named[DriveDriver]("joint", {})
         slaves = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
         self._by_name = Named("slave", slaves)
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Close it."""
-        self.close()
 
     def close(self) -> None:
         """Close the bus; the slaves stay as they are."""
