@@ -11,7 +11,7 @@ from tickrig.host.cli.can_options import BusOptions, bus_options, spread
 from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.options import time_option
 
-HERE: Final = "tickrig.host.canmon.net"
+HERE: Final = "tickrig.host.canmon.net.verbs"
 VERBS: Final = {
     "scan": (f"{HERE}.scan_verb:command", "Say which nodes are there."),
     "nmt": (f"{HERE}.nmt_verb:command", "Start, stop or reset a node, or all nodes."),
@@ -21,6 +21,10 @@ VERBS: Final = {
     ),
     "read": (f"{HERE}.read_verb:command", "Read objects of a node."),
     "write": (f"{HERE}.write_verb:command", "Write objects of a node."),
+    "dcf": (f"{HERE}.dcf_verb:command", "Write what the DCF or XDC FILE configures into NODE"),
+    "compare": (f"{HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node"),
+    "store": (f"{HERE}.store_verb:store", "Store parameters of NODE (1010h)"),
+    "restore": (f"{HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)"),
 }
 ANSWER_US: Final = 500_000
 

@@ -23,7 +23,8 @@ from tickrig.host.monitor.decode.object_text import (
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
+from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 Entry = tuple[int, int]
@@ -42,13 +43,21 @@ class NodeObjects:
 
     Args:
         node_id: the node.
-        device: what its EDS says, None without one.
-        name: of the EDS.
+        file: its EDS, None without one.
+
+    Attributes:
+        node_id: as given.
+        file: as given.
+        device: what the EDS says.
+        rows: its entries, by index and sub-index.
     """
 
-    def __init__(self, node_id: int, device: EdsDevice | None = None, name: str = "") -> None:
-        self.node_id, self.device = node_id, device
-        eds = None if device is None else eds_objects(device, node_id, name)
+    def __init__(self, node_id: int, file: EdsFile | None = None) -> None:
+        self.node_id, self.file = node_id, file
+        self.device = device = None if file is None else read_device(file)
+        eds = None
+        if file is not None and device is not None:
+            eds = eds_objects(device, node_id, Path(file.name).stem)
         self._memory = NodeMemory(eds)
         entries = device.entries if device is not None else ()
         self.rows: dict[Entry, EntryDescription] = {(one.index, one.sub): one for one in entries}
@@ -115,26 +124,39 @@ class NodeObjects:
 DEVICE_TYPE: Final = (0x1000, 0)
 
 
-def known_objects(session: NetSession, node_id: int, eds: Path | None) -> NodeObjects:
+def known_objects(
+    session: NetSession,
+    node_id: int,
+    eds: Path | None,
+    *,
+    what: str = "--eds",
+    strict: bool = False,
+) -> NodeObjects:
     """Return what is known of the objects of a node; who it is is read from it.
 
-    An EDS of another device is told.
+    Args:
+        session: the bus.
+        node_id: the node.
+        eds: its EDS, as somebody names it.
+        what: names it so.
+        strict: an EDS of another device is refused; else it is told.
 
     Raises:
         Refused: the EDS cannot be used.
         SdoFailed: the node does not answer.
     """
-    file = read_device_document(eds, "--eds").file if eds else session.source.eds.get(node_id)
-    device = None if file is None else read_device(file)
-    objects = NodeObjects(node_id, device, "" if file is None else Path(file.name).stem)
+    file = read_device_document(eds, what).file if eds else session.source.eds.get(node_id)
+    objects = NodeObjects(node_id, file)
     data = session.bus.read(node_id, *DEVICE_TYPE, 4)
     objects.learn(DEVICE_TYPE, data)
-    if eds is not None and device is not None:
+    if eds is not None:
         about = {"device type": as_hex(data)}
         for name, at in list(TOLD.items())[1:]:
             if (said := _number(session, node_id, at)) is not None:
                 about[name] = said
-        if text := other_device(device, about):
+        if text := other_device(objects.device, about):
+            if strict:
+                raise Refused(f"node {node_id}: {text}; --other-device takes it all the same")
             say(f"warning: node {node_id}: {text}")
     return objects
 

@@ -20,12 +20,13 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.text.names import known
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.sdo.abort import AbortCode, describe_abort
 
 Title = Callable[[tuple[int, int]], str]
 """Writes index, sub-index and name of an object."""
+
+MOST_LISTED: Final = 5
 
 LOCAL: Final = (AbortCode.COMMAND_SPECIFIER, AbortCode.TOGGLE_BIT)
 
@@ -63,8 +64,15 @@ class Work:
         """Say what was done and what was not; empty where nothing was planned."""
         done, left = self._steps[: self._done], self._steps[self._done :]
         parts = (("done", done), ("not done", left))
-        said = [f"{word}: {known(items)}" for word, items in parts if items]
+        said = [f"{word}: {_listed(items)}" for word, items in parts if items]
         return "; ".join([*said, *filter(None, [self.ending])])
+
+
+def _listed(steps: list[str]) -> str:
+    """List a few steps; of many the first and the last one."""
+    if len(steps) <= MOST_LISTED:
+        return ", ".join(steps)
+    return f"{steps[0]}, ... {steps[-1]} ({len(steps)} in all)"
 
 
 class NetSession:
@@ -158,10 +166,12 @@ def failure_text(error: SdoFailed, timeout_us: int, title: Title = write_entry) 
 
 
 @contextmanager
-def of_node(session: NetSession, node_id: int, title: Title = write_entry) -> Iterator[None]:
+def of_node(
+    session: NetSession, node_id: int, title: Title = write_entry, timeout_us: int = 0
+) -> Iterator[None]:
     """Name the node, and the object, in what goes wrong in the block; NodeFailed then."""
     try:
         yield
     except SdoFailed as error:
-        text = failure_text(error, session.timeout_us, title)
+        text = failure_text(error, timeout_us or session.timeout_us, title)
         raise NodeFailed(f"node {node_id}: {text}") from None

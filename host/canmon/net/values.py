@@ -16,17 +16,17 @@ MOST_SHOWN: Final = 64
 
 
 def shown(objects: NodeObjects, entry: Entry, data: bytes) -> str:
-    """Write a value with its unit; whole numbers in hex too."""
+    """Write a value with its unit; whole numbers in hex too, identifiers and bits in hex alone."""
     text = objects.text(entry)
     if len(data) > MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
         return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
     value, said = text.read(data)
     if entry == STATUSWORD and objects.is_drive and isinstance(value, int):
-        return f"{value} ({said}) {drive_state(value)}"
-    if text.in_hex and isinstance(value, int):
-        return f"{value} ({said})"
+        return f"{said} {drive_state(value)}"
+    if text.in_hex or text.kind is None:
+        return said
     unit = f" {text.unit}" if text.unit else ""
-    if text.kind is not None and text.kind.is_integer and text.kind is not DataType.BOOLEAN:
+    if text.kind.is_integer and text.kind is not DataType.BOOLEAN:
         return f"{said}{unit} (0x{int.from_bytes(data, 'little'):0{2 * len(data)}X})"
     return f"{said}{unit}"
 

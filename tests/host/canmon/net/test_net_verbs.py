@@ -49,8 +49,8 @@ def test_objects_are_read_by_name_and_by_index(rig: str) -> None:
     result = net(rig, "read", "5", "statusword", "1018h:2", "manufacturer_device_name", "0x6060")
     assert result.exit_code == 0, result.output
     assert result.stdout.splitlines() == [
-        "6041h:00 statusword = 848 (0x0350) switch on disabled",
-        "1018h:02 identity_object.product_code = 25104 (0x00006210)",
+        "6041h:00 statusword = 0x0350 switch on disabled",
+        "1018h:02 identity_object.product_code = 0x00006210",
         "1008h:00 manufacturer_device_name = 'EPOS'",
         "6060h:00 modes_of_operation = 1 (0x01)",
     ]

@@ -1,0 +1,124 @@
+"""The verb `net dcf`: what a DCF says goes into a node."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import click
+
+from tickrig.host.canmon.net.group import NetCall
+from tickrig.host.canmon.net.node_objects import Entry, NodeObjects, known_objects
+from tickrig.host.canmon.net.node_values import differences, line
+from tickrig.host.canmon.net.risks import write_risk
+from tickrig.host.canmon.net.session import NetSession, net_session, of_node
+from tickrig.host.canmon.net.stored import save
+from tickrig.host.canmon.net.values import shown
+from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, disabled, writes
+from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused
+from tickrig.host.text.page_text import one_line
+from tickrig.host.text.values import counted
+
+
+@click.command()
+@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("file", type=PATH)
+@click.option("--all", "whole", is_flag=True, help="Write what is there already, too.")
+@click.option("--skip", multiple=True, metavar="OBJECT", help="Is not written; may be repeated.")
+@click.option("--store", is_flag=True, help="Store all of it then (1010h:01).")
+@click.option("--other-device", is_flag=True, help="Though FILE is of another device.")
+@click.option("--dry-run", is_flag=True, help="Say what differs; write nothing.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def command(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall,
+    node: int,
+    file: Path,
+    whole: bool,
+    skip: Sequence[str],
+    store: bool,
+    other_device: bool,
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Write what the DCF or XDC FILE configures into NODE, as far as it differs.
+
+    That is its ParameterValues. PDOs are disabled while they change, as CiA 301 has it,
+    1020h is written last. The first object that is refused ends it, and what was
+    written is told. A file of another device (1000h, 1018h) is refused.
+
+    \b
+    canmon net can0 dcf 5 drive.dcf --dry-run
+    canmon net can0 dcf 5 drive.dcf --store --yes
+    """  # noqa: D301 - click wants the backspace
+    with net_session(call, node) as session:
+        with of_node(session, node):
+            objects = known_objects(session, node, file, what="FILE", strict=not other_device)
+        values = _values(objects, skip)
+        with of_node(session, node, objects.title):
+            changed = values if whole else _changed(session, objects, values)
+            steps = list(writes(changed, _number_of(session, node), _writable(objects)))
+        if dry_run or not steps:
+            return
+        what = f"{counted(len(changed), 'object')} of {file.name} to node {node}"
+        what += ", then stored" if store else ""
+        session.confirm(what, yes=yes, risk=write_risk(objects, [at for at, _ in changed.items()]))
+        _write(session, objects, steps, store=store)
+
+
+def _values(objects: NodeObjects, skip: Sequence[str]) -> Values:
+    file, device = objects.file, objects.device
+    assert file is not None
+    assert device is not None
+    left_out = {objects.find(word) for word in skip}
+    values = dcf_values(file, device, objects.node_id)
+    if not values:
+        raise Refused(f"{file.name} has no ParameterValue of an object that can be written: no DCF")
+    return {at: data for at, data in values.items() if at not in left_out}
+
+
+def _changed(session: NetSession, objects: NodeObjects, values: Values) -> Values:
+    """Return what differs in the node, and say it."""
+    found = list(differences(session, objects, values))
+    for one in found:
+        click.echo(one_line(line(objects, one, "in the file")))
+    say(f"objects that differ: {len(found)} of {len(values)}")
+    return {one.entry: one.wanted for one in found}
+
+
+def _writable(objects: NodeObjects) -> set[Entry]:
+    return {at for at, row in objects.rows.items() if row.writable}
+
+
+def _number_of(session: NetSession, node_id: int) -> Callable[[Entry], int]:
+    def number(at: Entry) -> int:
+        try:
+            return int.from_bytes(session.bus.read(node_id, *at), "little")
+        except SdoFailed:
+            return 0
+
+    return number
+
+
+def _write(
+    session: NetSession,
+    objects: NodeObjects,
+    steps: Sequence[tuple[Entry, bytes]],
+    *,
+    store: bool,
+) -> None:
+    titles = [f"{objects.title(at)} = {shown(objects, at, data)}" for at, data in steps]
+    session.work.plan(*titles, *(["store"] if store else []))
+    for number, (at, data) in enumerate(steps):
+        session.work.ending = disabled(steps[:number], steps[number:])
+        with of_node(session, objects.node_id, objects.title):
+            session.bus.write(objects.node_id, *at, data)
+        session.work.done()
+    session.work.ending = ""
+    say(f"node {objects.node_id}: {counted(len(steps), 'write')} done")
+    if store:
+        save(session, objects.node_id, 1)
+        session.work.done()
