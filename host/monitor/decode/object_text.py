@@ -9,20 +9,9 @@ from __future__ import annotations
 import re
 from typing import Final, NamedTuple
 
+from tickrig.host.canopen.master.cia402.drive_state import DriveState, state_of
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.errors import FieldError
-
-_STATES: Final = (
-    (0x4F, 0x00, "not ready to switch on"),
-    (0x4F, 0x40, "switch on disabled"),
-    (0x6F, 0x21, "ready to switch on"),
-    (0x6F, 0x23, "switched on"),
-    (0x6F, 0x27, "operation enabled"),
-    (0x6F, 0x07, "quick stop active"),
-    (0x4F, 0x0F, "fault reaction active"),
-    (0x4F, 0x08, "fault"),
-)
-"""Mask, value, state."""
 
 STATUSWORD_BITS: Final = {
     "ready_to_switch_on": 0,
@@ -49,11 +38,10 @@ BITS: Final = {"statusword": STATUSWORD_BITS, "controlword": CONTROLWORD_BITS}
 """Bits by name, of the objects whose bits have names."""
 
 
-def _find(bits: int) -> str:
-    return next((state for mask, value, state in _STATES if bits & mask == value), "")
-
-
-_BY_BITS: Final = tuple(_find(bits) for bits in range(0x80))
+_BY_BITS: Final = tuple(
+    "" if (state := state_of(bits)) is DriveState.UNKNOWN else state.value.lower()
+    for bits in range(0x80)
+)
 
 
 def drive_state(statusword: int) -> str:
