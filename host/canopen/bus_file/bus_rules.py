@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.canopen.data_sheet.rule import Rule, Severity
+from tickrig.host.canopen.data_sheet.rule import rules_of
 
 YAML: Final = "YAML 1.1"
 DCFGEN: Final = "dcfgen"
@@ -101,13 +101,5 @@ _NOTES: Final = (
     ("not-disabled", DCFGEN, "the master has a PDO that never comes", "mapping: []"),
 )
 
-RULES: Final = {
-    name: Rule(name, severity, clause, breaks, fix)
-    for severity, rules in (
-        (Severity.ERROR, _ERRORS),
-        (Severity.WARNING, _WARNINGS),
-        (Severity.NOTE, _NOTES),
-    )
-    for name, clause, breaks, fix in rules
-}
+RULES: Final = rules_of(_ERRORS, _WARNINGS, _NOTES)
 """By name, errors first."""

@@ -36,6 +36,20 @@ class Rule(NamedTuple):
     fix: str
 
 
+Rules = tuple[tuple[str, str, str, str], ...]
+"""Name, clause, what breaks, what to do."""
+
+
+def rules_of(errors: Rules, warnings: Rules, notes: Rules) -> dict[str, Rule]:
+    """Return rules by name, in the order of their severity."""
+    tables = zip(Severity, (errors, warnings, notes), strict=True)
+    return {
+        name: Rule(name, severity, clause, breaks, fix)
+        for severity, rules in tables
+        for name, clause, breaks, fix in rules
+    }
+
+
 class Place(Enum):
     """What an edit does with a line."""
 

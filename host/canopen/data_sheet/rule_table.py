@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tickrig.host.canopen.data_sheet.rule import Rule, Severity
+from tickrig.host.canopen.data_sheet.rule import rules_of
 
 PRACTICE: Final = "practice"
 FILE_INFO: Final = "CiA 306-1, [FileInfo]"
@@ -135,13 +135,5 @@ _NOTES: Final = (
     ("profile-none", "CiA 301 7.5.2.1", "masters see no profile", "name the profile in 1000h"),
 )
 
-RULES: Final = {
-    name: Rule(name, severity, clause, breaks, fix)
-    for severity, rules in (
-        (Severity.ERROR, _ERRORS),
-        (Severity.WARNING, _WARNINGS),
-        (Severity.NOTE, _NOTES),
-    )
-    for name, clause, breaks, fix in rules
-}
+RULES: Final = rules_of(_ERRORS, _WARNINGS, _NOTES)
 """By name, errors first."""
