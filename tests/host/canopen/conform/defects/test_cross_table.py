@@ -1,6 +1,8 @@
 from __future__ import annotations
 
-from tests.host.canopen.conform.defects.cross_table import cross, unseen
+from pathlib import Path
+
+from tests.host.canopen.conform.defects.cross_table import CANNOT_FAIL, cross, unseen
 from tests.host.canopen.conform.defects.table import DEFECTS
 
 
@@ -12,3 +14,9 @@ def test_no_check_is_one_that_no_defect_can_fail() -> None:
 def test_the_cross_table_tells_who_sees_a_defect() -> None:
     doubled = next(defect for defect in DEFECTS if defect.name == "boot-up doubled")
     assert [checks for _, checks in cross([doubled])] == [["NMT-01"]]
+
+
+def test_the_page_tells_how_many_defects_there_are() -> None:
+    text = (Path(__file__).parents[5] / "docs" / "conform.md").read_text("utf-8")
+    assert f"\n{len(DEFECTS)} copies of our slave have one defect each" in text
+    assert f"at least one of them but {', '.join(CANNOT_FAIL)}, which" in text
