@@ -1,4 +1,4 @@
-"""What `tools/fuzz-eds`, `-bus` and `-rig-files` share: mutated files, judged by processes.
+"""What `tools/fuzz-eds`, `-bus`, `-check` and `-rig-files` share: mutated files, judged.
 
 It says each minute how far it is; interrupted, how far it came. The files are those of the
 seed, however many processes share them.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
@@ -28,7 +28,7 @@ from tickrig.host.canmon.verbs.source_command import reopen_option, source_comma
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.decoded_check import DecodedCheck
 from tickrig.host.monitor.check.junit import junit
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import (
@@ -39,11 +39,7 @@ from tickrig.host.monitor.check.rules import (
     joined,
     parse_rules,
 )
-from tickrig.host.monitor.check.surroundings import Surroundings
 from tickrig.host.monitor.frames.record import Record
-
-if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.decoder import Decoder
 
 _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
@@ -220,56 +216,6 @@ def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]
     from tickrig.host.monitor.check.column_check import check_columns  # noqa: PLC0415 - numpy
 
     return check_columns(log.columns, rules, bit_rate, log.losses())
-
-
-QUIET_US: Final = 1_000_000
-"""On a bus that is silent a finding waits so long for the frames behind it, and what has not come
-in time for frames that this machine has not taken yet."""
-
-
-class DecodedCheck:
-    """A checker whose frames are decoded where a rule asks what they mean.
-
-    Args:
-        rules: what must hold.
-        bit_rate: bits a second, for the load.
-        decoder: None where no rule asks.
-        around: frames that are shown before and after what such a rule finds.
-    """
-
-    def __init__(
-        self, rules: Rules, bit_rate: int | None, decoder: Decoder | None, around: int
-    ) -> None:
-        self._checker, self._decoder = Checker(rules, bit_rate), decoder
-        self._around = Surroundings(around, (one.name for one in rules.expressions))
-        self._latest_us = 0
-
-    def take(self, records: Sequence[Record]) -> list[Finding]:
-        """Return what is wrong with frames."""
-        checker, decoder = self._checker, self._decoder
-        if decoder is None:
-            return [finding for record in records for finding in checker.take(record)]
-        found = []
-        self._latest_us = records[-1].at_us if records else self._latest_us
-        for record in records:
-            decoded = decoder.take(record)
-            found += self._around.take(record, decoded, checker.take(record, decoded))
-        return found
-
-    def wait(self, now_us: int, has_clock: bool) -> list[Finding]:
-        """Return what has not come in time and what waits too long, where no frame comes.
-
-        Args:
-            now_us: the time at the source, by the clock of this machine.
-            has_clock: the source keeps that clock, as a bus does and a pipe need not.
-        """
-        if now_us - self._latest_us <= QUIET_US:
-            return []
-        return self._around.flush(self._checker.advance(now_us - QUIET_US) if has_clock else ())
-
-    def end(self, end_us: int, lost: Iterable[str], judged_us: int) -> list[Finding]:
-        """Return what is missing, as `Checker.end` does."""
-        return self._around.flush(self._checker.end(end_us, lost, judged_us))
 
 
 def _one_by_one(

@@ -62,6 +62,7 @@ ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
 NMT_STATES: Final = {state.name.lower().replace("_", "-"): int(state) for state in NmtState}
 
 _STATE: Final = re.compile(r"state of node ([0-9]+)")
+_BIT: Final = re.compile(r"[0-9]{1,2}")
 _HEX: Final = re.compile(r"(-?)([0-9][0-9A-Fa-f]*)h")
 _PDO: Final = re.compile(r"([tr]?)pdo([0-9]{0,3})")
 _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
@@ -181,7 +182,7 @@ def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
         return _state_reader(int(match[1]))
     node, whole, shift = signal_place(path)
     base, _, digits = whole.rpartition(".")
-    number = int(digits) if base and digits.isdecimal() else None
+    number = int(digits) if base and _BIT.fullmatch(digits) else None
 
     def find(decoded: Decoded) -> Signal | None:
         if node is not None and decoded.node != node:
