@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.host.canopen.conform.bus.evidence import Evidence
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches
 from tickrig.host.canopen.conform.bus.periods import MS_US, off_period
-from tickrig.host.canopen.conform.bus.presence import Answers, Presence
+from tickrig.host.canopen.conform.bus.presence import MULTIPLEXER, Answers, Presence
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
 from tickrig.host.canopen.conform.bus.unlike import unlike, wanted_text
@@ -36,9 +36,6 @@ NODE_ID_MASK: Final = 0x7F
 HEARTBEATS: Final[tuple[range, ...]] = (range(0x701, 0x780),)
 NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
 """CAN-IDs of the pre-defined connection set that belong to a node."""
-
-MULTIPLEXER: Final = slice(1, 4)
-"""Of an SDO frame."""
 
 UNREAD_FRAMES: Final = 2_000
 """So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""

@@ -12,6 +12,7 @@ LEAST: Final = 3
 """So many objects that were asked for say something."""
 ANSWERS: Final = (ServerCommand.UPLOAD, ServerCommand.ABORT)
 MULTIPLEXER: Final = slice(1, 4)
+"""Of an SDO frame."""
 
 
 class Presence(Enum):

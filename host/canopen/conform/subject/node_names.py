@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.host.canopen.conform.binding.binding import Binding, Bound, BoundObject, BoundPlace
 from tickrig.host.canopen.conform.binding.pdo_binding import CARRIED, RPDOS, BoundPdo
+from tickrig.host.canopen.conform.bus.sdo_frames import multiplexer
 from tickrig.host.canopen.conform.notation.names import Address, Unbound
 from tickrig.host.canopen.conform.subject.sample_values import sample_value
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
@@ -60,7 +61,7 @@ class NodeNames:
         if attribute == "map" and isinstance(bound, BoundPlace):
             return f"08{bound.sub:02X}{bound.index & 0xFF:02X}{bound.index >> 8:02X}"
         if not attribute:
-            return f"{bound.index & 0xFF:02X}{bound.index >> 8:02X}{bound.sub:02X}"
+            return multiplexer((bound.index, bound.sub))
         if not isinstance(bound, BoundObject):
             raise Unbound(name, f"nothing is there that has a {attribute}")
         return sample_value(name, attribute, bound)
