@@ -29,7 +29,7 @@ class SecondNodeAlarm:
     """
 
     def __init__(self, port: CountingPort, nodes: Sequence[Node]) -> None:
-        self._port, self._untold = port, list(nodes)
+        self._port, self._alone = port, list(nodes)
 
     @property
     def lost(self) -> int:
@@ -45,7 +45,7 @@ class SecondNodeAlarm:
         """Read what others have sent."""
         frames = self._port.poll(now_us)
         for frame in frames:
-            if frame.can_id in ERROR_CONTROL and self._untold:
+            if frame.can_id in ERROR_CONTROL and self._alone:
                 self._look(frame)
         return frames
 
@@ -57,9 +57,9 @@ class SecondNodeAlarm:
         if frame.extended or not frame.data:
             return
         node_id = frame.can_id - ERROR_CONTROL_COB_ID
-        for node in self._untold:
+        for node in self._alone:
             if node.slave.node_id == node_id and node.is_on:
-                self._untold.remove(node)
+                self._alone.remove(node)
                 text = "node-ID %d is on the bus twice: somebody else sent %s; end one of the two"
                 _logger.warning(text, node_id, frame)
                 return
