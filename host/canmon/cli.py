@@ -24,6 +24,10 @@ VERBS: Final = {
     ),
     "eds": ("tickrig.host.canmon.eds.group:command", "Check, mend, compare and show EDS files."),
     "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
+    "gateway": (
+        "tickrig.host.canmon.gateway.gateway_verb:command",
+        "Give other programs SOURCE in lines of text: CiA 309-3, ASCII mapping.",
+    ),
     "graph": (f"{HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
     "nodes": (f"{HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
     "send": (f"{HERE}.send:command", "Send frames on BUS."),

@@ -1,35 +1,19 @@
-"""A control socket: many clients, no thread, bounded work."""
+"""A control socket."""
 
 from __future__ import annotations
 
 import contextlib
-import select
-import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final
 
+from tickrig.host.control.line_server import LineServer
 from tickrig.host.control.requests import RequestDispatcher, refusal_line
 from tickrig.host.control.unix_socket import listen_at
 
-MAX_LINE: Final = 4_096
-MAX_CLIENTS: Final = 32
-MAX_UNSENT: Final = 262_144
-READ_BYTES: Final = 4_096
-IDLE_S: Final = 60.0
-"""A client that is silent so long makes room for another where none is left."""
 
-TOO_LONG: Final = refusal_line(f"the line is longer than {MAX_LINE} bytes")
-TOO_MANY: Final = refusal_line(f"there are {MAX_CLIENTS} clients already")
-IDLE: Final = refusal_line(f"silent for {IDLE_S:g} s, and {MAX_CLIENTS} clients are the most")
-
-
-class ControlServer:
+class ControlServer(LineServer):
     """Serves a control socket while somebody gives it time.
-
-    A round answers at most one line of each client; a client that does not
-    read its answers is not read from either.
 
     Args:
         path: where the socket is; that of a killed process is replaced.
@@ -44,135 +28,12 @@ class ControlServer:
     def __init__(
         self, path: Path, control: RequestDispatcher, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self._listener = listen_at(path)
+        super().__init__(listen_at(path), lambda: control.answer_line, refusal_line, clock=clock)
         self._path, self._inode = path, path.stat().st_ino
-        self._control, self._clock = control, clock
-        self._clients: dict[socket.socket, _Client] = {}
-
-    def serve(self, wait_us: int) -> None:
-        """Do one round; wait for something to do, but not longer than `wait_us`."""
-        clients = self._clients.values()
-        readers = [client.connection for client in clients if client.wants_more]
-        writers = [client.connection for client in clients if client.has_unsent]
-        wait_us = 0 if any(client.has_line for client in clients) else max(0, wait_us)
-        ready = select.select([self._listener, *readers], writers, [], wait_us / 1e6)
-        for connection in ready[1]:
-            self._clients[connection].flush()
-            self._clients[connection].active_s = self._clock()
-        for connection in ready[0]:
-            if connection is not self._listener:
-                self._clients[connection].read()
-                self._clients[connection].active_s = self._clock()
-        self._answer()
-        if self._listener in ready[0]:
-            self._accept()
 
     def close(self) -> None:
         """Send what can be sent, hang up, and remove the socket."""
-        for client in self._clients.values():
-            client.flush()
-            client.connection.close()
-        self._clients.clear()
-        self._listener.close()
+        super().close()
         with contextlib.suppress(FileNotFoundError):
             if self._path.stat().st_ino == self._inode:
                 self._path.unlink()
-
-    def _accept(self) -> None:
-        try:
-            connection, _ = self._listener.accept()
-        except OSError:  # the client is gone again, or no descriptor is left
-            return
-        connection.setblocking(False)
-        if len(self._clients) == MAX_CLIENTS:
-            self._make_room()
-        if len(self._clients) < MAX_CLIENTS:
-            self._clients[connection] = _Client(connection, self._clock())
-            return
-        _dismiss(connection, TOO_MANY)
-
-    def _make_room(self) -> None:
-        """Hang up on the client that has been silent the longest, if that was long."""
-        client = min(self._clients.values(), key=lambda client: client.active_s)
-        if self._clock() - client.active_s >= IDLE_S:
-            del self._clients[client.connection]
-            _dismiss(client.connection, b"" if client.has_unsent else IDLE)
-
-    def _answer(self) -> None:
-        for client in list(self._clients.values()):
-            if client.has_line:
-                line = client.take_line()
-                client.send(TOO_LONG if len(line) > MAX_LINE else self._control.answer_line(line))
-            if client.gone:
-                client.connection.close()
-                del self._clients[client.connection]
-
-
-def _dismiss(connection: socket.socket, reason: bytes) -> None:
-    with connection, contextlib.suppress(OSError):
-        connection.send(reason)
-
-
-class _Client:
-    """One connection, its unfinished line, its unsent answers, and when it last did something."""
-
-    def __init__(self, connection: socket.socket, active_s: float) -> None:
-        self.connection, self.active_s = connection, active_s
-        self._received, self._unsent = b"", b""
-        self._closing = self._broken = self._skipping = False
-
-    @property
-    def has_unsent(self) -> bool:
-        return bool(self._unsent)
-
-    @property
-    def has_line(self) -> bool:
-        return b"\n" in self._received and len(self._unsent) < MAX_UNSENT
-
-    @property
-    def wants_more(self) -> bool:
-        return not self._closing and b"\n" not in self._received
-
-    @property
-    def gone(self) -> bool:
-        return self._broken or (self._closing and not self._unsent and not self.has_line)
-
-    def read(self) -> None:
-        """Take what came."""
-        try:
-            data = self.connection.recv(READ_BYTES)
-        except BlockingIOError:
-            return
-        except OSError:
-            self._broken = True
-            return
-        self._closing = not data
-        self._receive(data)
-
-    def take_line(self) -> bytes:
-        """Take the next whole line."""
-        line, _, self._received = self._received.partition(b"\n")
-        return line
-
-    def send(self, data: bytes) -> None:
-        """Queue an answer and send what goes at once."""
-        self._unsent += data
-        self.flush()
-
-    def flush(self) -> None:
-        """Send what goes at once."""
-        try:
-            self._unsent = self._unsent[self.connection.send(self._unsent) :]
-        except BlockingIOError:
-            return
-        except OSError:
-            self._broken = True
-
-    def _receive(self, data: bytes) -> None:
-        if self._skipping:
-            _, end, data = data.partition(b"\n")
-            self._skipping = not end
-        self._received += data
-        if b"\n" not in self._received and len(self._received) > MAX_LINE:
-            self._received, self._skipping = b"", True
-            self.send(TOO_LONG)

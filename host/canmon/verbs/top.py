@@ -10,15 +10,9 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
-from tickrig.host.canmon.output.listening import (
-    bit_rate_of,
-    count_blocks,
-    follow,
-    report,
-    span_option,
-)
-from tickrig.host.canmon.sources.block_log import BlockLog, block_log
+from tickrig.host.canmon.output.listening import bit_rate_of, follow, report, span_option
 from tickrig.host.canmon.sources.opening import open_any
+from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,
@@ -79,10 +73,9 @@ def command(  # noqa: PLR0913 - options
     take: Take = model.take
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
-    log = block_log(source) if plain else None
-    snapshot = count_blocks(log)
+    log = whole_log(source) if plain else None
     model.press("d" if decode else "")
-    frames = (log if snapshot else None) or open_any(source, bus)
+    frames = log or open_any(source, bus)
     if reopen:
         frames.reopen()
 
@@ -93,10 +86,9 @@ def command(  # noqa: PLR0913 - options
         return shown
 
     try:
-        if not isinstance(frames, BlockLog):
-            follow(frames, source, take, span_us, lines, press=model.press)
+        follow(frames, source, take, span_us, lines, press=model.press)
         with until_unread():
-            click.echo("\n".join(model.final(frames.lost, snapshot)))
+            click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
     finally:
         frames.close()
     report(frames, strict, meaning.messages())

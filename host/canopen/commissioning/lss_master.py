@@ -47,7 +47,16 @@ _ERRORS: Final = {
 
 
 class LssFailed(Exception):  # noqa: N818 - what the slave did
-    """A slave refused, did not answer, or several answered where one may."""
+    """A slave refused, did not answer, or several answered where one may.
+
+    Attributes:
+        command: that failed, None where it was several.
+        code: with which the slave refused, 0 if it did not.
+    """
+
+    def __init__(self, message: str, command: LssCommand | None = None, code: int = 0) -> None:
+        super().__init__(message)
+        self.command, self.code = command, code
 
 
 class LssMaster:
@@ -163,17 +172,18 @@ class LssMaster:
             text = _ERRORS.get((command, code), f"error {code}")
             if code == SPECIFIC:
                 text = f"error {answer[2]} of its maker"
-            raise LssFailed(f"LSS {_name(command)}: {text}")
+            raise LssFailed(f"LSS {_name(command)}: {text}", command, code)
 
     def _command(self, request: bytes) -> bytes:
         """Return the answer to a command."""
-        name = _name(LssCommand(request[0]))
+        command = LssCommand(request[0])
         found = [answer for answer in self._request(request) if answer[0] == request[0]]
         found += [answer for answer in self._gather(SETTLE_US) if answer[0] == request[0]]
         if not found:
-            raise LssFailed(f"LSS {name}: no answer within {self._answer_us // 1_000} ms")
+            within = f"{self._answer_us // 1_000} ms"
+            raise LssFailed(f"LSS {_name(command)}: no answer within {within}", command)
         if len(found) > 1:
-            raise LssFailed(f"LSS {name}: {len(found)} slaves answered, where one may")
+            raise LssFailed(f"LSS {_name(command)}: {len(found)} slaves answered, where one may")
         return found[0]
 
     def _request(self, request: bytes) -> list[bytes]:

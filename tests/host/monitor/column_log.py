@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
+from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows, joined
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.tally import Tally
 
 
-def blocks(records: list[Record], size: int) -> list[Columns]:
-    """Return frames in blocks of so many, as a reader of a log gives them."""
+def columns(records: list[Record]) -> Columns:
     names = ChannelNames()
-    cuts = range(0, len(records), size)
-    return [Rows.of(records[cut : cut + size], names).columns(names) for cut in cuts]
+    return joined([Rows.of(records, names)], names, Tally())

@@ -1,0 +1,164 @@
+"""The verb `gateway`: a CANopen network for programs that speak lines of text (CiA 309-3)."""
+
+from __future__ import annotations
+
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig.host.canmon.conform.conform_source import open_conform_source
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canopen.commissioning.node_bus import NodeBus
+from tickrig.host.canopen.gateway.gateway import Gateway
+from tickrig.host.cli.can_options import BusOptions, bus_options
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.options import PATH, VERSION
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.serving import stopped_by_signals
+from tickrig.host.control.line_server import LineServer
+from tickrig.host.control.unix_socket import listen_at
+from tickrig.host.links.errors import LinkClosed
+
+LOOPBACK: Final = "127.0.0.1"
+WAIT_US: Final = 20_000
+"""How long clients are waited for before the bus is listened to again."""
+MAX_LINE: Final = 16 << 20
+MOST_NET: Final = 0xFFFF
+MOST_PORT: Final = 0xFFFF
+ERROR: Final = "] ERROR:"
+
+
+@click.command()
+@click.argument("source", required=False)
+@click.option("--listen", metavar="[HOST:]PORT", help="Serve TCP; HOST is 127.0.0.1 unless given.")
+@click.option("--socket", "path", type=PATH, help="Serve a Unix socket, for this user alone.")
+@click.option("--net", type=click.IntRange(1, MOST_NET), default=1, help="Number of the net.  [1]")
+@bus_options
+def command(
+    *, source: str | None, listen: str | None, path: Path | None, net: int, **options: Any
+) -> None:
+    """Give other programs SOURCE in lines of text: CiA 309-3, ASCII mapping.
+
+    Commands come from standard input, or from clients of --listen or --socket, as
+    CANopenNode's cocomm is one; each line is answered by one. SOURCE is a bus, or a
+    rig file in virtual time. Whoever can connect can command all nodes.
+
+    \b
+    canmon gateway can0 --listen 60000
+    canmon gateway can0 --socket /tmp/CO_command_socket    then: cocomm "5 r 0x1000 0 x32"
+    echo "[1] 5 read 0x1017 0 u16" | canmon gateway can0
+    echo "[1] help" | canmon gateway can0                  all commands
+
+    \b
+    Exit status  0 all is done              2 usage
+                 1 a command from standard  3 the bus failed
+                   input was not carried out
+    """  # noqa: D301 - click wants the backspace
+    if listen is not None and path is not None:
+        raise Refused("--listen and --socket: give one of them")
+    address = None if listen is None else parse_address(listen)
+    opened = open_conform_source(source, None, BusOptions(**options))
+    bus = NodeBus(opened.link, timeout_us=1)
+    try:
+        if address is None and path is None:
+            _answer_input(Gateway(bus, net, VERSION))
+        else:
+            with _listening(address, path) as (listener, where):
+                say(f"CANopen gateway to {opened.name}, net {net}, at {where}. Ctrl-C ends.")
+                _serve(listener, bus, net)
+    except LinkClosed as error:
+        raise SourceFailed(str(error)) from None
+    finally:
+        opened.close()
+
+
+def parse_address(text: str) -> tuple[str, int]:
+    """Read HOST:PORT or PORT; Refused if it is neither."""
+    host, colon, port = text.rpartition(":")
+    number = int(port[:6]) if port.isascii() and port.isdecimal() else -1
+    if not 0 <= number <= MOST_PORT or (colon and not host):
+        raise Refused(f"--listen {text!r}: a port 0..65535 is wanted, or HOST:PORT")
+    return host.removeprefix("[").removesuffix("]") or LOOPBACK, number
+
+
+def _answer_input(gateway: Gateway) -> None:
+    """Answer standard input; exit status 1 if a command was not carried out."""
+    failed = False
+    for line in sys.stdin:
+        answer = gateway.answer(line.rstrip("\r\n"))
+        if answer:
+            failed |= ERROR in answer
+            click.echo(answer)
+    if failed:
+        raise click.exceptions.Exit(1)
+
+
+@contextmanager
+def _listening(
+    address: tuple[str, int] | None, path: Path | None
+) -> Iterator[tuple[socket.socket, str]]:
+    """Listen; give the socket, and its address for people."""
+    if path is not None:
+        try:
+            listener = listen_at(path)
+        except OSError as error:
+            refuse_path("socket", error)
+        try:
+            yield listener, str(path)
+        finally:
+            path.unlink(missing_ok=True)
+        return
+    assert address is not None
+    try:
+        family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
+        listener = socket.create_server(address, family=family)
+    except OSError as error:
+        raise Refused(f"--listen {address[0]}:{address[1]}: {error.strerror or error}") from None
+    listener.setblocking(False)
+    with listener:
+        host, port = listener.getsockname()[:2]
+        yield listener, f"{host}:{port}"
+
+
+def _serve(listener: socket.socket, bus: NodeBus, net: int) -> None:
+    """Answer clients until Ctrl-C; meanwhile the bus is listened to, so that no queue fills."""
+    stopped: list[bool] = []
+
+    def begin() -> LineAnswer:
+        return LineAnswer(Gateway(bus, net, VERSION))
+
+    server = LineServer(listener, begin, _refusal, MAX_LINE)
+    with stopped_by_signals(lambda: stopped.append(True)), suppress(KeyboardInterrupt):
+        while not stopped:
+            server.serve(WAIT_US)
+            bus.listen(bus.now_us)
+    server.close()
+
+
+class LineAnswer:
+    """Answers the lines of a client.
+
+    Args:
+        gateway: of this client.
+    """
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+
+    def __call__(self, line: bytes) -> bytes:
+        """Answer a line."""
+        text = line.decode("latin-1").rstrip("\r")
+        return _line(self._gateway.answer(text))
+
+
+def _line(text: str) -> bytes:
+    return f"{text}\r\n".encode("latin-1", "replace")
+
+
+def _refusal(text: str) -> bytes:
+    return _line(f"[0] ERROR:102 #{text}")

@@ -1,0 +1,1 @@
+"""A gateway to CANopen in lines of text: CiA 309-3, ASCII mapping."""
