@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from tickrig.host.cli.refused import refuse_path
 from tickrig.host.cli.start import TERMINATING
-from tickrig.host.control.requests import RequestDispatcher
-from tickrig.host.control.server import ControlServer
+
+if TYPE_CHECKING:
+    from tickrig.host.control.requests import RequestDispatcher
 
 
 class Waiting(Protocol):
@@ -52,6 +53,8 @@ def serving_control(path: Path, dispatcher: RequestDispatcher, clock: Waiting) -
     Raises:
         Refused: no socket can be made there.
     """
+    from tickrig.host.control.server import ControlServer  # noqa: PLC0415 - a TAB needs none
+
     try:
         server = ControlServer(path, dispatcher)
     except OSError as error:
