@@ -25,6 +25,7 @@ from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.canopen.profiles import application_of
+from tickrig.emulators.canopen.second_node import SecondNodeAlarm
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.rig import Station
@@ -230,7 +231,7 @@ def make_bench(  # noqa: PLR0913 - options, by keyword
         stations,
         wire,
         couplings=bodies,
-        outside=outside,
+        outside=SecondNodeAlarm(outside, nodes) if outside else None,
         clock=clock,
         trace=trace,
         link=link,

@@ -8,7 +8,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -20,12 +20,13 @@ from benchmarks.table import rates, row
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.can_message import to_message
-from tickrig.host.monitor.check.column_check import check_columns
+from tickrig.host.monitor.check.column_check import ColumnChecker
 from tickrig.host.monitor.check.rules import parse_rules
 from tickrig.host.monitor.columns.column_reader import read_columns
-from tickrig.host.monitor.columns.column_traffic import snapshot_of
+from tickrig.host.monitor.columns.column_traffic import ColumnTraffic
+from tickrig.host.monitor.columns.columns import Columns
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.traffic.traffic import Traffic
+from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.host.monitor.views.top_model import TopModel, View, render
 from tickrig.wire.can import CanFrame
 
@@ -85,19 +86,19 @@ def write_log(path: Path, *, dirty: bool, frames: int = FRAMES) -> None:
 
 def whole(what: str, path: Path) -> None:
     """Read, count and check a log of a million frames."""
-    columns = read_columns(path)
-    found = check_columns(columns, RULES, BIT_RATE)
-    row(f"{what} log of 1 M frames: statistics", _cpu_s(lambda: snapshot_of(columns)), CPU)
+    blocks = list(read_columns(path))
+    found = checked(blocks)
+    row(f"{what} log of 1 M frames: statistics", _cpu_s(lambda: counted(blocks)), CPU)
     row(
-        f"{what} log of 1 M frames: checks, {len(found):,} findings",
-        _cpu_s(lambda: check_columns(columns, RULES, BIT_RATE)),
+        f"{what} log of 1 M frames: checks, {found:,} findings",
+        _cpu_s(lambda: checked(blocks)),
         CPU,
     )
 
     def all_of_it() -> None:
-        found = read_columns(path)
-        snapshot_of(found)
-        check_columns(found, RULES, BIT_RATE)
+        found = list(read_columns(path))
+        counted(found)
+        checked(found)
 
     row(f"{what} log of 1 M frames: reading, statistics and checks", _cpu_s(all_of_it), CPU)
     seconds(f"canmon check, {what} log", ["canmon", "check", str(path), *WORDS])
@@ -105,15 +106,29 @@ def whole(what: str, path: Path) -> None:
     seconds(f"canopen-lens, {what} log", ["canopen-lens", str(path), "--lang", "en"])
 
 
+def counted(blocks: Iterable[Columns]) -> Snapshot:
+    """Return the statistics of a log."""
+    traffic = ColumnTraffic()
+    for block in blocks:
+        traffic.take(block)
+    return traffic.snapshot()
+
+
+def checked(blocks: Iterable[Columns]) -> int:
+    """Return how many findings a log has."""
+    checker = ColumnChecker(RULES, BIT_RATE)
+    return sum(len(checker.take(block)) for block in blocks) + len(checker.end())
+
+
 def growth(path: Path) -> None:
     """Check dirty logs of three sizes: what a finding takes should stay the same."""
     for frames in (FRAMES // 16, FRAMES // 4, FRAMES):
         write_log(path, dirty=True, frames=frames)
-        columns = read_columns(path)
-        found = check_columns(columns, RULES, BIT_RATE)
-        each = _cpu_s(partial(check_columns, columns, RULES, BIT_RATE))
-        what = f"{frames:,} dirty frames: {len(found):,} findings"
-        row(what, [1e6 * value / len(found) for value in each], "us a finding")
+        blocks = list(read_columns(path))
+        found = checked(blocks)
+        each = _cpu_s(partial(checked, blocks))
+        what = f"{frames:,} dirty frames: {found:,} findings"
+        row(what, [1e6 * value / found for value in each], "us a finding")
         seconds(
             f"canopen-lens, {frames:,} dirty frames", ["canopen-lens", str(path), "--lang", "en"]
         )

@@ -73,7 +73,7 @@ class Tpdo(Part):
         self.mode: TpdoMode = Silent(self)
         self.pack: Pack
         self.entries: list[Entry] = []
-        self._alone: Entry | None = None
+        self._alone: Entry | None
         self.wake = producer.wake
         self._can_id: int
         self._watched: list[Entry] = []

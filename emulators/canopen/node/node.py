@@ -103,6 +103,11 @@ class Node(Copyable):
         }
 
     @property
+    def is_on(self) -> bool:
+        """Whether it has power."""
+        return self._on
+
+    @property
     def tick_us(self) -> int:
         """The control period."""
         return self.slave.tick_us

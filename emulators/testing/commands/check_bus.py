@@ -13,6 +13,7 @@ from tickrig.host.canopen.bus_file.bus_checks import check_sheets
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
 from tickrig.host.canopen.data_sheet.rule import Severity
+from tickrig.host.canopen.master.cia402.bus_load import check_load
 
 MISTAKES: Final = 1
 
@@ -29,7 +30,8 @@ def check_bus(file: Path, *, strict: bool) -> int:
         ImportError: PyYAML is not installed.
     """
     bus = read_bus_file(file)
-    found = sorted((*bus.findings, *check_nodes(bus)), key=lambda one: (one.file, one.line))
+    found = [*bus.findings, *check_nodes(bus), *check_load(bus)]
+    found.sort(key=lambda one: (one.file, one.line))
     found += check_sheets(bus.slaves)
     for finding in found:
         click.echo(str(finding))

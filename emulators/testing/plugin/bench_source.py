@@ -15,7 +15,7 @@ import pytest
 
 from tickrig.emulators.commands.device_type import DeviceType
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench import HARDWARE, Bench
 from tickrig.emulators.testing.bench.build import BenchedDevice, name_of, named_device
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXES
@@ -28,8 +28,6 @@ BenchSource = Source | Callable[[], Source] | None
 """A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`, `.yml`).
 
 A device may be a text too: what a rig file has as its `type`."""
-
-HARDWARE: Final = "hardware"
 
 NO_DEVICES: Final = ("seed", "line", "mode")
 """Arguments of `Bench` that are something else."""

@@ -14,6 +14,7 @@ import click
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.output.clocks import Stopwatch
+from tickrig.host.canmon.sources.block_log import BlockLog
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
@@ -22,7 +23,9 @@ from tickrig.host.cli.start import TERMINATING
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
+    from tickrig.host.monitor.columns.columns import Columns
     from tickrig.host.monitor.frames.record import AnyRecord
+    from tickrig.host.monitor.traffic.traffic import Snapshot
 
 
 class FramesLost(click.ClickException):
@@ -125,6 +128,29 @@ def say_marks(source: AnySource[object]) -> None:
     """Say on standard error which bus went away, or is back."""
     for mark in source.marks:
         click.echo(mark.text, err=True)
+
+
+def take_blocks(log: BlockLog, take: Callable[[Columns], None]) -> bool:
+    """Take all blocks of a log, or until somebody interrupts it.
+
+    Returns:
+        False where it holds CAN FD: then all of it is to be read frame by frame.
+    """
+    with until_interrupted():
+        while not log.ended:
+            for block in log.poll(0):
+                take(block)
+    return not log.no_columns
+
+
+def count_blocks(log: BlockLog | None) -> Snapshot | None:
+    """Return the statistics of a log; None where it is to be read frame by frame."""
+    if log is None:
+        return None
+    from tickrig.host.monitor.columns.column_traffic import ColumnTraffic  # noqa: PLC0415 - numpy
+
+    traffic = ColumnTraffic()
+    return traffic.snapshot() if take_blocks(log, traffic.take) else None
 
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:

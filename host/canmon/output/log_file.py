@@ -1,33 +1,37 @@
-"""A log file that a verb writes."""
+"""A log file, or a recording in parts, that a verb writes."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING
 
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogError, LogFormatError
-from tickrig.host.monitor.logs.log_writer import in_blocks, write_log
+from tickrig.host.monitor.logs.log_file import LogError, LogFormatError, log_format
 from tickrig.host.monitor.logs.mark import Mark
+from tickrig.host.monitor.recorder.plan import Plan
+from tickrig.host.monitor.recorder.recorder import Recorder
 
-BLOCK_S: Final = 1.0
-"""What a compressed log may lose if this program is killed."""
+if TYPE_CHECKING:
+    from tickrig.host.monitor.recorder.trigger import FilterTrigger, Trigger
 
 
 class LogFile:
-    """A log under way.
+    """A recording under way.
 
     Args:
-        path: the file; one that exists is replaced.
+        plan: what it shall be; where it is one file, one that exists is replaced.
         source: SOURCE words of what is read meanwhile.
+        live: time goes on while no frame comes.
+        triggers: what it waits for, where the plan has it wait.
+        wanted: which frames are recorded; None for all.
 
     Raises:
         Refused: the name tells no format, the format needs what is not there, or the file is
@@ -35,42 +39,62 @@ class LogFile:
         SourceFailed: it cannot be written, now or later.
     """
 
-    def __init__(self, path: Path, source: Sequence[str]) -> None:
-        self._path, self._due_s = path, 0.0
-        read = (
-            parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec)
-        )
-        if path.exists() and any(one.exists() and one.samefile(path) for one in read):
-            raise Refused(f"{path} is read, so it cannot be written")
+    def __init__(
+        self,
+        plan: Plan,
+        source: Sequence[str],
+        live: bool = False,
+        triggers: Sequence[Trigger] = (),
+        wanted: FilterTrigger | None = None,
+    ) -> None:
+        check_not_read(plan.path, source)
+        self._watch, self._live = Stopwatch(), live
         try:
-            self._writer = write_log(path)
+            log_format(plan.path)
+            self.recorder = Recorder(plan, self._now_us, triggers, wanted)
         except (LogFormatError, LogError) as error:
             raise Refused(str(error)) from None
         except OSError as error:
-            raise SourceFailed(f"{path}: {error.strerror}") from error
+            raise SourceFailed(f"{error.filename or plan.path}: {error.strerror}") from error
 
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
-    ) -> None:
-        """Add frames; what came is with the operating system then."""
-        try:
-            for record, _ in decoded_frames:
-                assert isinstance(record, Record), "who opens serial ports does not write a log"
-                self._writer.write(record)
-            for mark in marks:
-                self._writer.mark(mark)
-            if decoded_frames and time.monotonic() >= self._due_s:
-                self._writer.flush()
-                if in_blocks(self._path):
-                    self._due_s = time.monotonic() + BLOCK_S
-        except OSError as error:
-            raise SourceFailed(f"{self._path}: {error.strerror}") from error
+    ) -> bool:
+        """Add frames; what came is with the operating system then.
+
+        Returns:
+            Whether it takes no more.
+        """
+        if decoded_frames:
+            self._watch.take((decoded_frames[-1][0],))
+        self.recorder.take(decoded_frames, lost, self._now_us, marks)
+        if self.recorder.failed:
+            raise SourceFailed(self.recorder.failed)
+        return bool(self.recorder.ended)
+
+    def trigger(self, why: str) -> None:
+        """Record what was kept and what comes, where it waits for that."""
+        self.recorder.trigger(why, self._now_us)
 
     def close(self) -> None:
-        """End the log, and say what it could not hold."""
-        try:
-            self._writer.close()
-        except OSError as error:
-            raise SourceFailed(f"{self._path}: {error.strerror}") from error
-        for word in self._writer.messages():
+        """End the recording, and say how it went."""
+        failed = self.recorder.failed
+        self.recorder.close()
+        for word in self.recorder.messages():
             click.echo(word, err=True)
+        if self.recorder.failed != failed:
+            raise SourceFailed(self.recorder.failed)
+
+    @property
+    def _now_us(self) -> int:
+        """The time at the source: that of this machine until a frame has told it."""
+        if not self._live:
+            return self._watch.latest_us
+        return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
+
+
+def check_not_read(path: Path, source: Sequence[str]) -> None:
+    """Refuse a file that is read meanwhile."""
+    read = (parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec))
+    if path.exists() and any(one.exists() and one.samefile(path) for one in read):
+        raise Refused(f"{path} is read, so it cannot be written")

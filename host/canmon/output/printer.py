@@ -160,8 +160,8 @@ class StdoutWriter:
 
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
-    ) -> None:
-        """Print frames, at once."""
+    ) -> bool:
+        """Print frames, at once; it always takes more."""
         lines = [DUMP_HEADER] if self._header else []
         lines += [self._printer(*one) for one in decoded_frames]
         if lost != self._lost and self._output is Output.JSONL:
@@ -172,3 +172,4 @@ class StdoutWriter:
         if lines:
             sys.stdout.write("\n".join(lines) + "\n")
             sys.stdout.flush()
+        return False

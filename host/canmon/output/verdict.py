@@ -17,30 +17,45 @@ from tickrig.host.monitor.frames.record import Record
 class Verdict:
     """Findings, shown as they come.
 
+    Args:
+        jsonl: show them as JSON.
+        kept: a report will want them.
+
     Attributes:
-        findings: all of them.
+        counts: how many there are, by rule.
+        findings: all of them, where they are kept.
         frames: how many were held against the rules.
     """
 
-    def __init__(self, jsonl: bool) -> None:
+    def __init__(self, jsonl: bool, *, kept: bool) -> None:
+        self.counts: Counter[str] = Counter()
         self.findings: list[Finding] = []
+        self.frames = self._shown = 0
+        self._text, self._kept = finding_json if jsonl else str, kept
+
+    def begin_again(self) -> None:
+        """Forget all but how many findings were shown: those come first again, and are not."""
+        self._shown = self.counts.total()
+        self.counts.clear()
+        self.findings.clear()
         self.frames = 0
-        self._text = finding_json if jsonl else str
 
     def take(self, findings: Sequence[Finding]) -> None:
         """Show findings."""
-        if findings:
-            self.findings += findings
+        self.counts.update(finding.rule for finding in findings)
+        self.findings += findings if self._kept else ()
+        new = findings[self._shown :]
+        self._shown -= len(findings) - len(new)
+        if new:
             with until_unread():
-                click.echo("\n".join(map(self._text, findings)))
+                click.echo("\n".join(map(self._text, new)))
 
     def summary(self) -> str:
         """Say how it ended."""
-        if not self.findings:
+        if not self.counts:
             return "all rules hold"
-        rules = Counter(finding.rule for finding in self.findings)
-        counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(rules.items()))
-        return f"{len(self.findings)} findings: {counts}"
+        counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
+        return f"{self.counts.total()} findings: {counts}"
 
 
 def finding_json(finding: Finding) -> str:

@@ -7,6 +7,7 @@ import os
 import select
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
+from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.errors import SourceFailed
@@ -35,7 +36,7 @@ class FileSource(AnySource[Record]):
         self._names = [str(file.path) for file in files]
         self._readers = [read_log(file.path) for file in files]
         for file in files:
-            _check_readable(file)
+            check_readable(file.path)
         streams = [_chosen(file, reader) for file, reader in zip(files, self._readers, strict=True)]
         self._frames = streams[0] if len(streams) == 1 else _merged(streams)
 
@@ -61,11 +62,12 @@ class FileSource(AnySource[Record]):
         self._frames = iter(())
 
 
-def _check_readable(file: FileSpec) -> None:
+def check_readable(path: Path) -> None:
+    """Raise SourceFailed where a file cannot be read."""
     try:
-        file.path.open("rb").close()
+        path.open("rb").close()
     except OSError as error:
-        raise SourceFailed(f"{file.path}: {error.strerror}") from error
+        raise SourceFailed(f"{path}: {error.strerror}") from error
 
 
 def _chosen(file: FileSpec, frames: Iterable[Record]) -> Iterator[Record]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -17,12 +17,13 @@ from tickrig.host.canmon.output.listening import (
     patience_us,
     report,
     span_option,
+    take_blocks,
     until_interrupted,
 )
 from tickrig.host.canmon.output.verdict import Verdict
+from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.sources.source import Source
-from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
+from tickrig.host.canmon.sources.source import AnySource, Source
 from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
@@ -30,7 +31,6 @@ from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.decoded_check import DecodedCheck
 from tickrig.host.monitor.check.junit import junit
-from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import (
     SWITCHES,
     VALUES,
@@ -40,6 +40,9 @@ from tickrig.host.monitor.check.rules import (
     parse_rules,
 )
 from tickrig.host.monitor.frames.record import Record
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.columns.columns import Columns
 
 _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
@@ -164,16 +167,14 @@ def command(  # noqa: PLR0913 - options
     bus = BusOptions(**{name: options[name] for name in NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     decoder = make_decoder(eds, dbc) if rules.expressions else None
-    log = None if decoder else whole_log(words)
+    verdict = Verdict(jsonl, kept=report_path is not None)
+    log = None if decoder else block_log(words)
+    log = _in_blocks(log, rules, bit_rate, verdict) if log else None
     frames = log or open_source(words, bus)
     if reopen:
         frames.reopen()
-    verdict = Verdict(jsonl)
     try:
-        if log is not None:
-            verdict.frames = len(log.columns)
-            verdict.take(_at_once(log, rules, bit_rate))
-        else:
+        if not isinstance(frames, BlockLog):
             held = DecodedCheck(rules, bit_rate, decoder, around)
             _one_by_one(frames, words, held, verdict, span_us)
     finally:
@@ -181,10 +182,10 @@ def command(  # noqa: PLR0913 - options
     unjudged = "" if verdict.frames else _no_frame(frames, words)
     suite, why = " ".join(words), frames.failed or unjudged
     _write(report_path, junit(suite, rules.names(), verdict.findings, why))
-    if not why or verdict.findings:
+    if not why or verdict.counts:
         click.echo(verdict.summary(), err=True)
     report(frames, strict)
-    if verdict.findings:
+    if verdict.counts:
         click.get_current_context().exit(BROKEN)
     if unjudged:
         raise NothingJudged(unjudged)
@@ -196,7 +197,7 @@ class NothingJudged(click.ClickException):
     exit_code = 5
 
 
-def _no_frame(source: Source, words: Sequence[str]) -> str:
+def _no_frame(source: AnySource[object], words: Sequence[str]) -> str:
     """Say why nothing was judged."""
     where = "no frame came" if source.live else f"no frame in {' '.join(words)}"
     return f"nothing was judged: {where}"
@@ -212,10 +213,23 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
     return bit_rate
 
 
-def _at_once(log: WholeLog, rules: Rules, bit_rate: int | None) -> list[Finding]:
-    from tickrig.host.monitor.check.column_check import check_columns  # noqa: PLC0415 - numpy
+def _in_blocks(
+    log: BlockLog, rules: Rules, bit_rate: int | None, verdict: Verdict
+) -> BlockLog | None:
+    """Judge a log; return None where it is to be read again, frame by frame."""
+    from tickrig.host.monitor.check.column_check import ColumnChecker  # noqa: PLC0415 - numpy
 
-    return check_columns(log.columns, rules, bit_rate, log.losses())
+    checker = ColumnChecker(rules, bit_rate)
+
+    def take(block: Columns) -> None:
+        verdict.frames += len(block)
+        verdict.take(checker.take(block))
+
+    if take_blocks(log, take):
+        verdict.take(checker.end(log.losses()))
+        return log
+    verdict.begin_again()
+    return None
 
 
 def _one_by_one(

@@ -21,6 +21,7 @@ from tickrig.host.canmon.verbs.decode_options import (
 from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.options import PATH
+from tickrig.host.monitor.recorder.plan import Plan
 
 
 @click.command()
@@ -54,7 +55,7 @@ def command(  # noqa: PLR0913 - options
     chosen = read_filter(wanted)
     decoder = None if chosen is None else make_decoder(eds, dbc)
     meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
-    with closing(frames), closing(LogFile(log, source)) as out, until_interrupted():
+    with closing(frames), closing(LogFile(Plan(path=log), source)) as out, until_interrupted():
         pass_on(frames, meaning, out.take)
     report(frames, strict, meaning.messages())
 

@@ -13,9 +13,20 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
-from tickrig.host.canmon.output.listening import report, say_marks, until_interrupted
-from tickrig.host.canmon.output.log_file import LogFile
+from tickrig.host.canmon.output.listening import (
+    bit_rate_of,
+    report,
+    say_marks,
+    until_interrupted,
+)
 from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
+from tickrig.host.canmon.output.recording import (
+    NAMES,
+    Recording,
+    filter_trigger,
+    recording_options,
+)
+from tickrig.host.canmon.output.trigger_keys import TriggerKeys
 from tickrig.host.canmon.sources.opening import open_any
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
@@ -32,13 +43,14 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.frames.dump_line import Stamp
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.output.log_file import LogFile
     from tickrig.host.monitor.frames.record import AnyRecord
     from tickrig.host.monitor.logs.mark import Mark
 
 POLL_US: Final = 100_000
 
-Take = Callable[[list[DecodedFrame], int, "Sequence[Mark]"], None]
-"""Takes frames, how many were lost so far, and what happened behind them."""
+Take = Callable[[list[DecodedFrame], int, "Sequence[Mark]"], bool]
+"""Takes frames, how many were lost so far, and what happened behind them; says when to end."""
 
 _shown: Final = add_options(
     click.option(
@@ -68,6 +80,7 @@ _ending: Final = add_options(
 
 @source_command(
     _shown,
+    recording_options,
     filter_option,
     decode_options,
     _ending,
@@ -100,30 +113,63 @@ def command(  # noqa: PLR0913 - options
     canmon dump can0 -t z
     canmon dump can0 --eds 3=drive.eds -F 'node=3 and (pdo or emcy)'
     canmon dump can0 -l run.blf
+    canmon dump can0 -l run.log.gz --rotate 100M --rotate 1h --disk 10G
+    canmon dump can0 -l fault.log --trigger emcy --pre 10s --post 2s
+    canmon dump can0 -l fault.log --trigger rules.toml --trigger 'statusword.fault'
     canmon dump run.asc.gz -L > run.log
     ssh robot canmon dump can0 --jsonl | canmon top -
+
+    A recording in parts has an index, as run.index.jsonl, which is gone on with
+    when the same is recorded again. One that waits for a trigger takes Enter and
+    SIGUSR1 for one, too. A recording waits for a bus that goes away.
 
     {source}
     """  # noqa: D301 - click wants the backspace
     if file is not None and output:
         raise Refused("-l shows nothing: it goes without -L, --jsonl and --csv")
+    given = {name: options.pop(name) for name in NAMES}
+    if file is None and (named := next((name for name in NAMES if given[name]), "")):
+        raise Refused(f"--{named.replace('_', '-')} goes with -l FILE")
     if (file is not None or output == Output.LOG) and any(map(_is_line, source)):
         raise Refused(
             "a log holds frames alone: a serial port is shown, or goes into --jsonl, --csv"
         )
-    chosen, form = read_filter(wanted), Output(output or "")
-    plain = raw or form is Output.LOG or file is not None
+    chosen, form, bus = read_filter(wanted), Output(output or ""), BusOptions(**options)
+    recording = None if file is None else Recording(file, given, bit_rate_of(source, bus))
+    decodes = recording is not None and recording.decodes
+    plain = (raw or form is Output.LOG or file is not None) and not decodes
     decoder = None if plain and chosen is None else make_decoder(eds, dbc)
+    kept = None
+    if recording is not None and recording.triggers and chosen is not None:
+        kept, chosen = filter_trigger(wanted or "", chosen), None  # triggers see all frames
     meaning = FilteredDecoder(decoder, chosen)
-    shown = StdoutWriter(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form)
+    take: Take = StdoutWriter(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form).take
     with ExitStack() as held:
-        frames = held.enter_context(closing(open_any(source, BusOptions(**options))))
-        if reopen:
+        frames = held.enter_context(closing(open_any(source, bus)))
+        if reopen or (recording is not None and recording.plan.numbered):
             frames.reopen()
-        log = None if file is None else held.enter_context(closing(LogFile(file, source)))
+        if recording is not None:
+            log = held.enter_context(closing(recording.open(source, frames.live, kept)))
+            take = log.take
+            if recording.plan.around is not None:
+                keys = TriggerKeys("-" not in source)
+                held.enter_context(keys.watching())
+                take = _with_keys(log, keys)
         with until_interrupted(), until_unread():
-            pass_on(frames, meaning, (log or shown).take, count, quiet_ms)
+            pass_on(frames, meaning, take, count, quiet_ms)
     report(frames, strict, meaning.messages())
+
+
+def _with_keys(log: LogFile, keys: TriggerKeys) -> Take:
+    """Return what takes frames and looks for keys."""
+
+    def take(decoded_frames: list[DecodedFrame], lost: int, marks: Sequence[Mark]) -> bool:
+        ended = log.take(decoded_frames, lost, marks)
+        if why := keys.pressed():
+            log.trigger(why)
+        return ended
+
+    return take
 
 
 def _is_line(word: str) -> bool:
@@ -143,8 +189,9 @@ def pass_on(
     while not source.ended and left != 0:
         records = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
         decoded_frames = list(islice(meaning.take(records), left))
-        take(decoded_frames, source.lost, source.marks)
         say_marks(source)
+        if take(decoded_frames, source.lost, source.marks):
+            break
         left = None if left is None else left - len(decoded_frames)
         if records:
             latest_s = time.monotonic()

@@ -15,10 +15,9 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
-from tickrig.host.canmon.output.listening import follow, report, span_option, until_interrupted
+from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
+from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.sources.source import Source
-from tickrig.host.canmon.sources.whole_log import WholeLog, whole_log
 from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.can_options import BusOptions, bus_options
@@ -163,27 +162,19 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     eds, dbc, strict = (options.pop(name) for name in ("eds", "dbc", "strict"))
     objects = any(isinstance(word.source, ObjectName) for word in words)
     decoder = make_decoder(eds, dbc) if objects or eds or dbc else None
-    whole = None if objects else whole_log([source])
-    frames = whole or open_source([source], BusOptions(**options))
-    collector = Collector(words, decoder, MOST if frames.live else 0)
+    log = None if objects else block_log([source])
+    collector = Collector(words)
+    whole = log is not None and take_blocks(log, collector.take_columns)
+    frames = (log if whole else None) or open_source([source], BusOptions(**options))
     try:
-        _collect(frames, source, collector, request)
+        if not isinstance(frames, BlockLog):
+            collector = Collector(words, decoder, MOST if frames.live else 0)
+            lines = partial(_live, collector.series, request)
+            follow(frames, [source], collector.take_all, request.span_us, lines)
         _show(collector.series, request)
     finally:
         frames.close()
     report(frames, strict)
-
-
-def _collect(
-    frames: Source | WholeLog, source: str, collector: Collector, request: GraphRequest
-) -> None:
-    """Take what comes; live, paint it where there is a terminal."""
-    if isinstance(frames, WholeLog):
-        with until_interrupted():
-            collector.take_columns(frames.columns)
-    else:
-        lines = partial(_live, collector.series, request)
-        follow(frames, [source], collector.take_all, request.span_us, lines)
 
 
 def _live(

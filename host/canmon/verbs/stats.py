@@ -8,9 +8,16 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.output.listening import bit_rate_of, follow, report, span_option
+from tickrig.host.canmon.output.listening import (
+    bit_rate_of,
+    count_blocks,
+    follow,
+    report,
+    span_option,
+)
+from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.sources.whole_log import whole_log
+from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.frames.record import Record
@@ -58,23 +65,30 @@ def command(
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
     bit_rate = bit_rate_of(source, bus)
-    log = whole_log(source)
-    frames = log or open_source(source, bus)
+    log = block_log(source)
+    snapshot = count_blocks(log)
+    frames = (log if snapshot else None) or open_source(source, bus)
+    try:
+        if not isinstance(frames, BlockLog):
+            snapshot = _one_by_one(frames, source, span_us)
+    finally:
+        frames.close()
+    assert snapshot
+    with until_unread():
+        for line in (_jsonl if jsonl else _tables)(snapshot, by, bit_rate):
+            click.echo(line)
+    report(frames, strict)
+
+
+def _one_by_one(source: Source, words: Sequence[str], span_us: int | None) -> Snapshot:
     traffic = Traffic()
 
     def take(records: Sequence[Record]) -> None:
         for record in records:
             traffic.take(record)
 
-    try:
-        follow(frames, source, take, span_us)
-    finally:
-        frames.close()
-    snapshot = log.snapshot() if log else traffic.snapshot()
-    with until_unread():
-        for line in (_jsonl if jsonl else _tables)(snapshot, by, bit_rate):
-            click.echo(line)
-    report(frames, strict)
+    follow(source, words, take, span_us)
+    return traffic.snapshot()
 
 
 def _tables(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:

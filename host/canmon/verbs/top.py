@@ -10,9 +10,15 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
-from tickrig.host.canmon.output.listening import bit_rate_of, follow, report, span_option
+from tickrig.host.canmon.output.listening import (
+    bit_rate_of,
+    count_blocks,
+    follow,
+    report,
+    span_option,
+)
+from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_any
-from tickrig.host.canmon.sources.whole_log import whole_log
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,
@@ -73,9 +79,10 @@ def command(  # noqa: PLR0913 - options
     take: Take = model.take
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
-    log = whole_log(source) if plain else None
+    log = block_log(source) if plain else None
+    snapshot = count_blocks(log)
     model.press("d" if decode else "")
-    frames = log or open_any(source, bus)
+    frames = (log if snapshot else None) or open_any(source, bus)
     if reopen:
         frames.reopen()
 
@@ -86,9 +93,10 @@ def command(  # noqa: PLR0913 - options
         return shown
 
     try:
-        follow(frames, source, take, span_us, lines, press=model.press)
+        if not isinstance(frames, BlockLog):
+            follow(frames, source, take, span_us, lines, press=model.press)
         with until_unread():
-            click.echo("\n".join(model.final(frames.lost, log.snapshot() if log else None)))
+            click.echo("\n".join(model.final(frames.lost, snapshot)))
     finally:
         frames.close()
     report(frames, strict, meaning.messages())

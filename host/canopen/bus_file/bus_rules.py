@@ -64,6 +64,12 @@ _WARNINGS: Final = (
     ("driver-class", CONTAINER, "the container finds no such driver", "a class and its package"),
     ("driver-value", DRIVERS, "the driver takes another one, or fails", "give what it takes"),
     ("scale", DRIVERS, "the joint is not where ROS has it", "from_dev: 1 divided by to_dev"),
+    (
+        "bus-load",
+        DRIVERS,
+        "periods are left out, heartbeats are late",
+        "map what is polled into PDOs, or a longer period",
+    ),
     ("not-whole", DCFGEN, "dcfgen cuts it off", "write a whole number"),
     ("flag-text", DCFGEN, "dcfgen takes any text for true", "true or false, without quotes"),
     ("unknown-key", DCFGEN, "nobody reads it", "write the key that is meant"),

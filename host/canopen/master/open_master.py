@@ -9,7 +9,8 @@ from typing import Any, Final
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
 from tickrig.host.canopen.master.cia402.drive_node import DriveNode
-from tickrig.host.canopen.master.from_bus_file import axes_of, is_drive, period_us_of, plan_of
+from tickrig.host.canopen.master.cia402.drive_settings import axes_of, is_drive, period_us_of
+from tickrig.host.canopen.master.from_bus_file import plan_of
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.links.link import Link

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.rule import Finding
@@ -13,11 +13,17 @@ from tickrig.host.monitor.check.rules import NO_LOSS, Rules
 from tickrig.host.monitor.frames.quantity import s_text
 from tickrig.host.monitor.frames.record import Record
 
+if TYPE_CHECKING:
+    from tickrig.host.monitor.decode.decoded import Decoded
+
 RECENT_US: Final = 2_000_000
 """A rule that a frame broke counts as broken for so long."""
 
 GRACE_US: Final = 2_000_000
 """What has never come is missed only after so long."""
+
+LATE_US: Final = 1_000_000
+"""What has not come in time may still be on its way through this machine for so long."""
 
 KEPT: Final = 1_000
 """Findings that are kept."""
@@ -94,10 +100,10 @@ class Alarms:
         self.findings = deque(maxlen=KEPT)
         self._begin_us, self.judged = None, False
 
-    def take(self, record: Record) -> None:
-        """Hold a frame against the rules."""
+    def take(self, record: Record, decoded: Decoded | None = None) -> None:
+        """Hold a frame, and what it says, against the rules."""
         self.judged = True
-        for finding in self._checker.take(record):
+        for finding in self._checker.take(record, decoded):
             self._found(finding)
 
     def check_missing(self, now_us: int, lost: int = 0) -> None:
@@ -114,6 +120,8 @@ class Alarms:
         if lost > self._lost and self.rules.no_loss:
             self._found(Finding(now_us, NO_LOSS, f"{lost - self._lost} frames were lost"))
         self._lost = lost
+        for finding in self._checker.advance(now_us - LATE_US):
+            self._found(finding)
         if now_us - self._begin_us >= GRACE_US:
             self._miss(self._checker.missing(now_us))
 
@@ -155,7 +163,9 @@ def _joined(findings: list[Finding]) -> Finding | None:
     return findings[0]._replace(text="; ".join(one.text for one in findings))
 
 
-HEAD: Final = f"{'RULE':<20} {'STATE':<10} {'COUNT':>6} {'AGO':>8}  LATEST"
+RULE: Final = "RULE"
+RULE_WIDTHS: Final = (20, 40)
+"""The first column, and how wide it is at least and at most."""
 
 NO_FRAME: Final = "no frame"
 """The state of a rule that does not hold yet: nothing came."""
@@ -163,15 +173,20 @@ NO_FRAME: Final = "no frame"
 
 def render_alarms(alarms: Alarms, now_us: int) -> list[str]:
     """Return a line for each rule below a head, then the findings, the latest first."""
-    lines = [HEAD, *(_line(alarm, now_us, alarms.judged) for alarm in alarms.rows())]
+    rows = alarms.rows()
+    least, most = RULE_WIDTHS
+    width = min(most, max([least, *(len(alarm.rule) for alarm in rows)]))
+    head = f"{RULE:<{width}} {'STATE':<10} {'COUNT':>6} {'AGO':>8}  LATEST"
+    lines = [head, *(_line(alarm, now_us, alarms.judged, width) for alarm in rows)]
     found = [str(finding) for finding in reversed(alarms.findings)]
     return [*lines, "", f"FINDINGS, latest first: {len(found)}", *found]
 
 
-def _line(alarm: Alarm, now_us: int, judged: bool) -> str:
+def _line(alarm: Alarm, now_us: int, judged: bool, width: int) -> str:
     state, finding = str(alarm.state(now_us)), alarm.finding
     if state == State.HOLDS and not judged:
         state = NO_FRAME
     ago = "" if finding is None else f"{s_text(now_us - finding.at_us)} s"
     text = "" if finding is None else finding.text
-    return f"{alarm.rule:<20} {state:<10} {alarm.count:>6} {ago:>8}  {text}".rstrip()
+    name = alarm.rule if len(alarm.rule) <= width else f"{alarm.rule[: width - 1]}…"
+    return f"{name:<{width}} {state:<10} {alarm.count:>6} {ago:>8}  {text}".rstrip()

@@ -1,9 +1,9 @@
-"""Rules against a whole log at once: only frames that can break one are looked at; needs numpy."""
+"""Rules against a log in blocks: only frames that can break one are looked at; needs numpy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from itertools import zip_longest
+from collections.abc import Iterable, Sequence
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -11,153 +11,174 @@ import numpy.typing as npt
 from tickrig.host.monitor.check.checker import ended
 from tickrig.host.monitor.check.rule import NO_GAP_US, Finding, FrameSelection, Rule
 from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.time_rules import MaxLoad
 from tickrig.host.monitor.columns.column_bits import column_bits
-from tickrig.host.monitor.columns.column_traffic import windows_of
-from tickrig.host.monitor.columns.columns import Columns, Ints, Runs, records
+from tickrig.host.monitor.columns.column_load import ColumnLoad
+from tickrig.host.monitor.columns.columns import Columns, Ints, by_channel, records, select
+from tickrig.host.monitor.columns.runs import Identifiers, Runs, grown
 from tickrig.host.monitor.frames.ident import ERROR
 
+Flags = npt.NDArray[np.bool_]
 
-class SortedLog:
-    """A log by bus and identifier, with the gap before each frame."""
-
-    def __init__(self, columns: Columns) -> None:
-        self._columns = columns
-        errors = columns.ident & ERROR != 0
-        self._errors = np.flatnonzero(errors)
-        self._plain = np.flatnonzero(~errors)
-        self._runs: Runs | None = None
-        if len(self._plain):
-            self._runs = Runs.of(_keys(columns, self._plain))
-            self._gaps_us = self._runs.gaps_us(columns.at_us[self._plain])
-
-    def latest_us(self) -> dict[int, int]:
-        """Return when each identifier was heard last."""
-        latest: dict[int, int] = {}
-        for ident, _, end in self._idents():
-            at_us = int(self._columns.at_us[self._row(end - 1)])
-            latest[ident] = max(at_us, latest.get(ident, at_us))
-        return latest
-
-    def judged(self, rule: Rule) -> list[tuple[int, Finding]]:
-        """Let a rule see what it suspects; return rows and findings."""
-        rows, gaps_us = self._selection(rule)
-        found = []
-        for row, gap_us, record in zip(
-            rows.tolist(), gaps_us.tolist(), records(self._columns, rows), strict=True
-        ):
-            text = rule.judge(record, None if gap_us == NO_GAP_US else gap_us)
-            if text:
-                found.append((row, Finding(record.at_us, rule.name, text, record)))
-        return found
-
-    def _selection(self, rule: Rule) -> tuple[Ints, Ints]:
-        """Return rows and gaps in the order of the log."""
-        errors = self._errors if rule.wants(ERROR) else self._errors[:0]
-        rows, gaps_us = [errors], [np.full(len(errors), NO_GAP_US)]
-        for ident, begin, end in self._idents():
-            if rule.wants(ident):
-                selected = self._selected(rule.selection(ident), begin, end)
-                places = begin + np.flatnonzero(selected)
-                rows.append(self._row(places))
-                gaps_us.append(np.where(places == begin, NO_GAP_US, self._gaps_us[places]))
-        every = np.concatenate(rows)
-        order = np.argsort(every, kind="stable")
-        return every[order], np.concatenate(gaps_us)[order]
-
-    def _selected(self, selection: FrameSelection, begin: int, end: int) -> npt.NDArray[np.bool_]:
-        below_us, above_us, first_bytes, firsts = selection
-        if selection == FrameSelection():
-            return np.ones(end - begin, np.bool_)
-        gaps_us = self._gaps_us[begin:end]
-        selected = np.zeros(end - begin, np.bool_)
-        selected[0] = firsts
-        if below_us is not None:
-            selected |= gaps_us < below_us
-        if above_us is not None:
-            selected |= gaps_us > above_us
-        if first_bytes:
-            low = self._columns.payload[self._row(slice(begin, end))] & np.uint64(0xFF)
-            selected |= np.isin(low, np.array(sorted(first_bytes), np.uint64))
-        return selected
-
-    def _idents(self) -> Iterable[tuple[int, int, int]]:
-        """Give each identifier with begin and end of its run."""
-        if self._runs is not None:
-            idents = (self._runs.idents & 0xFFFF_FFFF).tolist()
-            yield from zip(
-                idents, self._runs.begins.tolist(), self._runs.ends.tolist(), strict=True
-            )
-
-    def _row(self, places: Ints | slice | int) -> Ints:
-        """Return the rows at places of the runs."""
-        assert self._runs is not None
-        rows: Ints = self._plain[self._runs.order[places]]
-        return rows
-
-
-def _keys(columns: Columns, rows: Ints) -> npt.NDArray[np.uint32] | npt.NDArray[np.uint64]:
-    """Return the identifiers of some rows, with the bus above them where there are several."""
-    ident = columns.ident[rows]
-    if len(columns.channels) == 1:
-        return ident
-    return columns.channel[rows].astype(np.uint64) << np.uint64(32) | ident
-
+NEVER_US: Final = np.iinfo(np.int64).max
 
 Placed = tuple[int, int, Finding]
 """A finding with its row, and its place among those of the row: the order of `Checker`."""
 
 
-def check_columns(
-    columns: Columns, rules: Rules, bit_rate: int | None = None, lost: Iterable[str] = ()
-) -> list[Finding]:
-    """Return all findings, as `Checker` finds them frame by frame.
+class ColumnChecker:
+    """Holds blocks of frames against rules, with the findings that `Checker` has frame by frame.
+
+    What it keeps grows with identifiers, not with frames.
 
     Args:
-        columns: the log.
         rules: what must hold.
         bit_rate: bits a second, for the load.
-        lost: what the source says was lost or is no frame.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
     """
-    made = rules.make()
-    placed, at_end = _loads(columns, rules, bit_rate)
-    if not len(columns):
-        return ended(rules, made, {}, 0, lost)
-    log = SortedLog(columns)
-    for place, rule in enumerate(made, 1):
-        placed += [(row, place, finding) for row, finding in log.judged(rule)]
-    placed.sort(key=lambda one: one[:2])
-    found = [finding for _, _, finding in placed] + at_end
-    return found + ended(rules, made, log.latest_us(), int(columns.at_us[-1]), lost)
+
+    def __init__(self, rules: Rules, bit_rate: int | None = None) -> None:
+        self._rules, self._made, self._limit = rules, rules.make(), rules.load(bit_rate)
+        self._wanting: dict[int, list[tuple[int, Rule]]] = {}
+        self._selections: dict[str, BusSelection] = {}
+        self._loads: dict[str, ColumnLoad] = {}
+        self._last_us = 0
+
+    def take(self, columns: Columns) -> list[Finding]:
+        """Return what is wrong with a block of frames, and with the seconds that they ended."""
+        placed: list[Placed] = []
+        found, gaps_us = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        for channel, rows, frames in by_channel(columns):
+            if self._limit is not None:
+                placed += self._too_busy(self._limit, channel, rows, frames)
+            places, gaps = self._selections.setdefault(channel, BusSelection(self._made)).take(
+                frames
+            )
+            found.append(rows[places])
+            gaps_us.append(gaps)
+            self._last_us = int(columns.at_us[-1])
+        placed += self._judged(columns, np.concatenate(found), np.concatenate(gaps_us))
+        placed.sort(key=lambda one: one[:2])
+        return [finding for _, _, finding in placed]
+
+    def end(self, lost: Iterable[str] = ()) -> list[Finding]:
+        """Return what is missing.
+
+        Args:
+            lost: what the source says was lost or is no frame.
+        """
+        found = []
+        for channel, seconds in sorted(self._loads.items()):
+            window = seconds.load.end()
+            text = self._limit.judge(channel, window) if self._limit else None
+            found += [Finding(window.at_us, MaxLoad.name, text)] if text else []
+        latest_us: dict[int, int] = {}
+        for selection in self._selections.values():
+            for ident, at_us in selection.latest_us():
+                latest_us[ident] = max(at_us, latest_us.get(ident, at_us))
+        return found + ended(self._rules, self._made, latest_us, self._last_us, lost)
+
+    def _too_busy(
+        self, limit: MaxLoad, channel: str, rows: Ints, frames: Columns
+    ) -> Iterable[Placed]:
+        if channel not in self._loads:
+            self._loads[channel] = ColumnLoad(int(frames.at_us[0]))
+        plain = np.flatnonzero(frames.ident & ERROR == 0)
+        bits = column_bits(frames.ident[plain], frames.dlc[plain], frames.payload[plain])
+        for window, row in self._loads[channel].take(frames.at_us[plain], bits):
+            if text := limit.judge(channel, window):
+                yield int(rows[plain[row]]), 0, Finding(window.at_us, limit.name, text)
+
+    def _judged(self, columns: Columns, rows: Ints, gaps_us: Ints) -> Iterable[Placed]:
+        """Let the rules see selected frames, in the order of the log."""
+        order = np.argsort(rows, kind="stable")
+        rows, selected = rows[order], select(columns, rows[order])
+        idents = np.where(selected.ident & ERROR, ERROR, selected.ident)
+        seen = zip(
+            rows.tolist(),
+            idents.tolist(),
+            gaps_us[order].tolist(),
+            records(selected),
+            strict=True,
+        )
+        for row, ident, gap_us, record in seen:
+            wanting = self._wanting.get(ident)
+            if wanting is None:
+                made = enumerate(self._made, 1)
+                wanting = [(place, rule) for place, rule in made if rule.wants(ident)]
+                self._wanting[ident] = wanting
+            for place, rule in wanting:
+                text = rule.judge(record, None if gap_us == NO_GAP_US else gap_us)
+                if text:
+                    yield row, place, Finding(record.at_us, rule.name, text, record)
 
 
-def _loads(
-    columns: Columns, rules: Rules, bit_rate: int | None
-) -> tuple[list[Placed], list[Finding]]:
-    """Return what is wrong with seconds that a frame ended, and with those still open."""
-    limit = rules.load(bit_rate)
-    placed: list[Placed] = []
-    at_end: list[Finding] = []
-    if limit is None:
-        return placed, at_end
-    for channel, rows in _rows_by_channel(columns):
-        first_us, plain = int(columns.at_us[rows[0]]), rows[columns.ident[rows] & ERROR == 0]
-        bits = column_bits(columns.ident[plain], columns.dlc[plain], columns.payload[plain])
-        windows = windows_of(first_us, columns.at_us[plain], bits)
-        ends = [int(plain[begin]) for _, begin in windows[1:]]
-        for (window, _), row in zip_longest(windows, ends):
-            text = limit.judge(channel, window)
-            if text and row is None:
-                at_end.append(Finding(window.at_us, limit.name, text))
-            elif text:
-                placed.append((row, 0, Finding(window.at_us, limit.name, text)))
-    return placed, at_end
+class BusSelection:
+    """Tells which frames of a bus rules must see: by their gaps, first bytes and places.
 
+    Args:
+        rules: that say it; no frame but these can change what they find.
+    """
 
-def _rows_by_channel(columns: Columns) -> list[tuple[str, Ints]]:
-    rows = [np.flatnonzero(columns.channel == place) for place in range(len(columns.channels))]
-    return sorted(
-        (columns.channels[place], found) for place, found in enumerate(rows) if len(found)
-    )
+    def __init__(self, rules: Sequence[Rule]) -> None:
+        self._rules, self._errors = rules, any(rule.wants(ERROR) for rule in rules)
+        self._idents = Identifiers()
+        self._below_us, self._above_us = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._all, self._firsts = np.empty(0, np.bool_), np.empty(0, np.bool_)
+        self._bytes = np.empty((0, 256), np.bool_)
+
+    def take(self, frames: Columns) -> tuple[Ints, Ints]:
+        """Return the rows of selected frames and error frames, and the gap before each."""
+        errors = frames.ident & ERROR != 0
+        plain = np.flatnonzero(~errors)
+        found = np.flatnonzero(errors) if self._errors else plain[:0]
+        if not len(plain):
+            return found, np.full(len(found), NO_GAP_US)
+        runs = self._idents.take(frames.ident[plain], frames.at_us[plain])
+        self._extend(len(self._idents))
+        places = np.flatnonzero(self._selected(runs, frames.payload[plain]))
+        gaps_us = runs.gaps_us
+        gaps_us[runs.begins[runs.fresh]] = NO_GAP_US
+        rows = np.concatenate((found, plain[runs.order[places]]))
+        return rows, np.concatenate((np.full(len(found), NO_GAP_US), gaps_us[places]))
+
+    def latest_us(self) -> Iterable[tuple[int, int]]:
+        """Give each identifier and when it was heard last."""
+        return zip(self._idents.idents.tolist(), self._idents.last_us.tolist(), strict=True)
+
+    def _extend(self, count: int) -> None:
+        """Ask the rules what they suspect of identifiers that are new; there are `count` now."""
+        before = len(self._all)
+        self._below_us, self._above_us = grown(self._below_us, count), grown(self._above_us, count)
+        self._all, self._firsts = grown(self._all, count), grown(self._firsts, count)
+        self._bytes = grown(self._bytes, count)
+        self._above_us[before:] = NEVER_US
+        for number in range(before, count):
+            ident = int(self._idents.idents[number])
+            for rule in self._rules:
+                if rule.wants(ident):
+                    self._add(number, rule.selection(ident))
+
+    def _add(self, number: int, selection: FrameSelection) -> None:
+        below_us, above_us, first_bytes, firsts = selection
+        self._all[number] |= selection == FrameSelection()
+        self._firsts[number] |= firsts
+        self._bytes[number, sorted(first_bytes)] = True
+        if below_us is not None:
+            self._below_us[number] = max(self._below_us[number], below_us)
+        if above_us is not None:
+            self._above_us[number] = min(self._above_us[number], above_us)
+
+    def _selected(self, runs: Runs, payload: npt.NDArray[np.uint64]) -> Flags:
+        """Say which frames are selected, in the order of the runs."""
+        numbers, lengths = runs.numbers, runs.lengths
+        selected = np.repeat(self._all[numbers], lengths)
+        selected |= runs.gaps_us < np.repeat(self._below_us[numbers], lengths)
+        selected |= runs.gaps_us > np.repeat(self._above_us[numbers], lengths)
+        selected[runs.begins[runs.fresh & self._firsts[numbers]]] = True
+        if self._bytes[numbers].any():
+            low = (payload[runs.order] & np.uint64(0xFF)).astype(np.int64)
+            selected |= self._bytes[np.repeat(numbers, lengths), low]
+        return selected

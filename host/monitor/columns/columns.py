@@ -5,29 +5,26 @@ numpy comes with the extra `fast`; this module is imported only where it is ther
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.monitor.frames.ident import ERROR, EXTENDED, REMOTE, flagged_id
-from tickrig.host.monitor.frames.record import AnyFrame, Record
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import EXTENDED_MAX, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 from tickrig.wire.can_fd import FdFrame
 
 MOST_CHANNELS: Final = 256
 
+Ints = npt.NDArray[np.int64]
+
 
 class NoColumnsError(ValueError):
     """A log that is no columns, for it holds CAN FD: it is to be read frame by frame."""
-
-
-_Parts = tuple[npt.NDArray[Any], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,7 +38,6 @@ class Columns:
         payload: data as a little-endian number, zeros behind it.
         channel: place of the bus in `channels`.
         channels: names of the buses, in the order in which they appeared.
-        tally: what was no frame.
     """
 
     at_us: npt.NDArray[np.int64]
@@ -50,10 +46,9 @@ class Columns:
     payload: npt.NDArray[np.uint64]
     channel: npt.NDArray[np.uint8]
     channels: tuple[str, ...] = ()
-    tally: Tally = field(default_factory=Tally)
 
     @property
-    def parts(self) -> _Parts:
+    def parts(self) -> tuple[npt.NDArray[Any], ...]:
         """The arrays of the frames' properties."""
         return self.at_us, self.ident, self.dlc, self.payload, self.channel
 
@@ -115,47 +110,42 @@ class Rows:
         self.payload[row] = int.from_bytes(frame.data, "little")
         self.channel[row], self.known[row] = channel, True
 
-    def columns(self) -> _Parts:
-        """Return the columns of the rows that are known."""
-        parts = self.at_us, self.ident, self.dlc, self.payload, self.channel
-        return parts if self.known.all() else tuple(part[self.known] for part in parts)
+    def columns(self, channels: ChannelNames) -> Columns:
+        """Return the rows that are known as columns."""
+        columns = Columns(
+            self.at_us, self.ident, self.dlc, self.payload, self.channel, channels.names
+        )
+        return columns if self.known.all() else select(columns, np.flatnonzero(self.known))
 
 
-def joined(parts: Iterable[Rows], channels: ChannelNames, tally: Tally) -> Columns:
-    """Return the rows that are known as columns."""
-    kept = [Rows(0).columns(), *(rows.columns() for rows in parts)]
-    at_us, ident, dlc, payload, channel = map(np.concatenate, zip(*kept, strict=True))
-    return Columns(at_us, ident, dlc, payload, channel, channels.names, tally)
-
-
-def select(columns: Columns, rows: npt.NDArray[np.int64]) -> Columns:
+def select(columns: Columns, rows: Ints) -> Columns:
     """Return some rows."""
     at_us, ident, dlc, payload, channel = (part[rows] for part in columns.parts)
     return Columns(at_us, ident, dlc, payload, channel, columns.channels)
 
 
-def by_channel(columns: Columns) -> list[tuple[str, Columns]]:
-    """Return the frames of each bus that has any, in the order of their names."""
+def by_channel(columns: Columns) -> list[tuple[str, Ints, Columns]]:
+    """Return each bus that has any frames, in the order of the names, its rows and its frames."""
     present = np.flatnonzero(np.bincount(columns.channel)).tolist()
     if len(present) == 1:
-        return [(columns.channels[present[0]], columns)]
-    parts = [
-        (columns.channels[place], select(columns, np.flatnonzero(columns.channel == place)))
-        for place in present
-    ]
-    return sorted(parts, key=lambda part: part[0])
+        return [(columns.channels[present[0]], np.arange(len(columns)), columns)]
+    rows = {columns.channels[place]: np.flatnonzero(columns.channel == place) for place in present}
+    return [(channel, rows[channel], select(columns, rows[channel])) for channel in sorted(rows)]
 
 
-def records(columns: Columns, rows: npt.NDArray[np.int64]) -> list[Record]:
-    """Return rows as they were heard; who sent them is not in them."""
+def split_errors(columns: Columns) -> tuple[Columns, Columns]:
+    """Return the error frames, and the others."""
+    errors = columns.ident & ERROR != 0
+    if not errors.any():
+        return select(columns, np.empty(0, np.int64)), columns
+    return select(columns, np.flatnonzero(errors)), select(columns, np.flatnonzero(~errors))
+
+
+def records(columns: Columns) -> list[Record]:
+    """Return frames as they were heard; who sent them is not in them."""
     names = columns.channels
-    parts = zip(*(part[rows].tolist() for part in columns.parts), strict=True)
-    return [Record(at_us, names[channel], _frame(*frame)) for at_us, *frame, channel in parts]
-
-
-def frames_of(columns: Columns, rows: npt.NDArray[np.int64]) -> list[AnyFrame]:
-    """Return the frames of rows."""
-    return [record.frame for record in records(columns, rows)]
+    rows = zip(*(part.tolist() for part in columns.parts), strict=True)
+    return [Record(at_us, names[channel], _frame(*frame)) for at_us, *frame, channel in rows]
 
 
 def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
@@ -166,46 +156,3 @@ def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:
     if ident & REMOTE:
         return CanFrame(ident & EXTENDED_MAX, b"", True, extended, dlc)
     return CanFrame(ident & EXTENDED_MAX, data[:dlc], False, extended)
-
-
-Ints = npt.NDArray[np.int64]
-
-RADIX_MAX: Final = 0xFFFF
-"""numpy sorts 16 bits three times as fast as 32."""
-
-
-@dataclass(frozen=True, slots=True)
-class Runs:
-    """Rows sorted by identifier, those of one identifier in their order: a run for each.
-
-    Attributes:
-        order: the rows.
-        begins: where in `order` each run begins.
-        ends: where each ends, one behind its last.
-        idents: of each run, ascending.
-    """
-
-    order: Ints
-    begins: Ints
-    ends: Ints
-    idents: Ints
-
-    @classmethod
-    def of(cls, ident: npt.NDArray[np.uint32] | npt.NDArray[np.uint64]) -> Runs:
-        """Sort the rows of a column of identifiers, one row at least."""
-        keys: npt.NDArray[Any] = ident.astype(np.uint16) if ident.max() <= RADIX_MAX else ident
-        order = np.argsort(keys, kind="stable")
-        ordered = ident[order]
-        begins = np.flatnonzero(np.diff(ordered, prepend=~ordered[0]))
-        ends = np.append(begins[1:], len(ordered))
-        return cls(order, begins, ends, ordered[begins].astype(np.int64))
-
-    def gaps_us(self, at_us: Ints) -> Ints:
-        """Return the gap before each row of `order`; 0 where a run begins or time goes back."""
-        gaps = np.diff(at_us[self.order], prepend=0)
-        gaps[self.begins] = 0
-        return np.maximum(gaps, 0, out=gaps)
-
-    def sums(self, values: Ints) -> Ints:
-        """Add up values, in the order of `order`, run by run."""
-        return np.add.reduceat(values, self.begins)

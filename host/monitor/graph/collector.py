@@ -82,7 +82,7 @@ class Collector:
             self.take(record)
 
     def take_columns(self, columns: Columns) -> None:
-        """Take the values of slices in a whole log at once."""
+        """Take the values of slices in a block of a log."""
         for key, pairs in self._slices.items():
             chosen = columns.ident == key
             for cut, series in pairs:

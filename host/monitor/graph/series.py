@@ -56,10 +56,12 @@ class Series:
             del self.at_us[: -self.most], self.values[: -self.most]
 
     def extend(self, at_us: bytes, values: bytes) -> None:
-        """Add many samples to an empty series: 64-bit numbers and doubles of this machine."""
+        """Add many samples: 64-bit numbers and doubles of this machine."""
         times, numbers = array("q", at_us), array("d", values)
-        if all(map(isfinite, numbers)) and all(map(le, times, islice(times, 1, None))):
-            self.at_us, self.values = times, numbers
+        rises = not (times and self.at_us) or times[0] >= self.at_us[-1]
+        if rises and all(map(isfinite, numbers)) and all(map(le, times, islice(times, 1, None))):
+            self.at_us += times
+            self.values += numbers
             return
         for time_us, value in zip(times, numbers, strict=True):
             self.append(time_us, value)

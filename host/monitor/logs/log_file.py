@@ -6,9 +6,14 @@
 
 from __future__ import annotations
 
+import zlib
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
-from typing import BinaryIO, Final, Literal, cast
+from typing import TYPE_CHECKING, BinaryIO, Final, Literal, cast
+
+if TYPE_CHECKING:
+    from io import BufferedReader
 
 
 class LogFormat(StrEnum):
@@ -85,3 +90,31 @@ def open_log(path: Path, mode: Literal["rb", "wb"] = "rb") -> BinaryIO:
     import gzip  # noqa: PLC0415 - seldom wanted
 
     return cast("BinaryIO", gzip.open(path, mode))  # it is read and written like one
+
+
+def read_blocks(file: BinaryIO, path: Path, block_bytes: int) -> Iterator[bytes]:
+    """Read a log in text that was opened, so many bytes or little more at a time.
+
+    Of a compressed file that is cut or damaged all comes that can be read.
+
+    Raises:
+        LogError: behind that: where it is cut or damaged.
+        OSError: it cannot be read.
+    """
+    pieces, held, lines = list[bytes](), 0, 0
+    try:
+        some = cast("BufferedReader", file).read1  # `read` loses the end of a cut log
+        while data := some(block_bytes):
+            pieces.append(data)
+            held, lines = held + len(data), lines + data.count(b"\n")
+            if held >= block_bytes:
+                yield b"".join(pieces)
+                pieces, held = [], 0
+    except (EOFError, zlib.error, OSError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise
+        yield b"".join(pieces)
+        said = " ".join(str(error).split())
+        raise LogError(f"{path}: cut or damaged behind line {lines}: {said}") from error
+    if pieces:
+        yield b"".join(pieces)

@@ -16,15 +16,13 @@ Counter({'CAN XL frames': 1})
 from __future__ import annotations
 
 import re
-import zlib
 from collections.abc import Iterator
 from importlib import import_module
-from io import BufferedReader
 from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogError, LogFormat, log_format, open_log
+from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log, read_blocks
 from tickrig.host.monitor.logs.mark import lost_frames
 from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
 from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
@@ -245,11 +243,7 @@ class TextLogReader:
         """Read the file."""
         lines = LogLines()
         self.tally = lines.tally
-        try:
-            with open_log(self._path) as file:
-                some = cast("BufferedReader", file).read1  # `read` loses the end of a cut log
-                while data := some(BLOCK_BYTES):
-                    yield from lines.push(data)
-        except (EOFError, zlib.error) as error:
-            raise LogError(f"{self._path}: {error}") from error
+        with open_log(self._path) as file:
+            for data in read_blocks(file, self._path, BLOCK_BYTES):
+                yield from lines.push(data)
         yield from lines.finish()

@@ -10,7 +10,6 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
 from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.logs.notation import LOG_HEADER, csv_row, json_line
-from tickrig.wire.candump import LogLine
 
 BLOCK_LINES: Final = 256
 
@@ -80,8 +79,9 @@ def write_log(path: Path) -> LogWriter:
 
 def log_line(record: Record) -> str:
     """Write a frame as `candump -L` does; what we sent ends in T, as `candump -L -x` has it."""
-    line = str(LogLine(record.at_us, record.channel, record.frame))
-    return f"{line} T" if record.sent else line
+    at_us, channel, frame, sent = record
+    end = " T" if sent else ""
+    return f"({at_us // 1_000_000:010d}.{at_us % 1_000_000:06d}) {channel} {frame}{end}"
 
 
 _LINES: Final = {

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.monitor_setup import MonitorSetup
-from tickrig.host.canmon.sources import whole_log
+from tickrig.host.canmon.sources import block_log
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.refused import Refused
 
@@ -95,7 +95,7 @@ def test_a_mutated_log_is_no_traceback(
     seed: int, logs: list[tuple[str, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     chance = random.Random(seed)
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", chance.choice((0, 1 << 20)))
+    monkeypatch.setattr(block_log, "SMALL_BYTES", chance.choice((0, 1 << 20)))
     for name, content in logs:
         (path := tmp_path / name).write_bytes(mutated(chance, content))
         run(*(words := chance.choice(VERBS))[:1], path, *words[1:])

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import whole_log
+from tickrig.host.canmon.sources import block_log
 
 WELL = "(0000000001.000000) can0 705#7F\n"
 NOISE = "what?\n"
@@ -54,7 +54,7 @@ def test_a_large_log_is_no_exception(
     verb: list[str], log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     log.write_text(WELL + NOISE + CAN_XL, "ascii")
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     result = canmon(verb, log)
     assert result.exit_code == 4
     assert result.stderr.splitlines()[-1] == "Error: 2 lines or frames passed over"
@@ -81,7 +81,7 @@ def test_what_is_no_frame_by_its_nature_is_no_loss(log: Path) -> None:
 def test_what_is_no_frame_by_its_nature_breaks_no_loss_neither(
     small_bytes: int, log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", small_bytes)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", small_bytes)
     log.write_text("  can0  705   [1]  7F\n  ttyS0  <  SA:64\n", "ascii")
     result = canmon(["check", "--no-loss"], log)
     assert (result.exit_code, result.stdout) == (0, "")

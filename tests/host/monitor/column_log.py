@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows, joined
+from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.tally import Tally
 
 
-def columns(records: list[Record]) -> Columns:
+def blocks(records: list[Record], size: int) -> list[Columns]:
+    """Return frames in blocks of so many, as a reader of a log gives them."""
     names = ChannelNames()
-    return joined([Rows.of(records, names)], names, Tally())
+    cuts = range(0, len(records), size)
+    return [Rows.of(records[cut : cut + size], names).columns(names) for cut in cuts]

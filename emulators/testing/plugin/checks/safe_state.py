@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench import HARDWARE, Bench
 from tickrig.host.text.values import Setting
 
 SafeState = Mapping[str, Setting] | Callable[[Bench], object] | None
@@ -48,7 +48,7 @@ def _short(name: str, bench: Bench) -> str:
 
 def check_safe(bench: Bench, safe: SafeState) -> None:
     """Raise ValueError if something is asked for that the bench has not."""
-    for name in safe if isinstance(safe, Mapping) and bench.mode != "hardware" else ():
+    for name in safe if isinstance(safe, Mapping) and bench.mode != HARDWARE else ():
         bench.get(name)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench import HARDWARE, Bench
 from tickrig.emulators.testing.plugin.evidence.signal_names import fault_names
 from tickrig.emulators.testing.report.bench_report import PlannedFault
 from tickrig.host.text.page_text import seconds
@@ -79,7 +79,7 @@ class FaultPlan:
     @property
     def _by_hand(self) -> bool:
         """Whether an operator makes faults, who is never there to the microsecond."""
-        return self._mode.name == "hardware"
+        return self._mode.name == HARDWARE
 
     def _outcome_of(self, order: FaultOrder, effect: _Effect | None) -> PlannedFault:
         if effect is None:

@@ -26,7 +26,13 @@ SYSTEM: Final = (
 SCENARIO: Final = "it is a scenario: --scenario FILE plays it"
 TRACE: Final = "it is a trace: tickrig replay FILE, tickrig compare FILE"
 EDS: Final = "it is an EDS or DCF: a rig file names it as the type of a device, type = FILE"
+URDF: Final = (
+    "it is a URDF: a bus.yml names it, options: {tickrig: {urdf: FILE}}, and tickrig check of that"
+    " checks both"
+)
 _EDS: Final = re.compile(r"\s*\[(FileInfo|DeviceInfo|DeviceComissioning)\]", re.IGNORECASE)
+_HEAD: Final = 2_000
+"""Characters at its beginning by which a URDF is known."""
 _SCENARIO: Final = re.compile(r"(\s*(#.*)?\n)*\s*\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)")
 HIL: Final = {
     ("dut", "rrc", "port"): ("hardware", "rrc", "port"),
@@ -47,6 +53,9 @@ def no_rig_file(text: str) -> str:
         return TRACE
     if _EDS.match(text):
         return EDS
+    head = text[:_HEAD].lstrip("\ufeff \t\r\n")
+    if head.startswith("<") and "<robot" in head:
+        return URDF
     return SCENARIO if _SCENARIO.match(text) else ""
 
 

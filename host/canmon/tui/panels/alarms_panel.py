@@ -15,7 +15,7 @@ from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.check.alarms import HEAD, Alarms, State, render_alarms
+from tickrig.host.monitor.check.alarms import RULE, Alarms, State, render_alarms
 from tickrig.host.monitor.check.rules import SWITCHES, VALUES, Rules, parse_rules
 from tickrig.host.tui.line_view import Line, LineView, plain
 from tickrig.wire.can import Frames
@@ -59,8 +59,8 @@ class AlarmTask(Task):
         """Take what was heard."""
         if self._due_us == NEVER:
             return ()
-        for one, _ in records:
-            self.alarms.take(one)
+        for one in records:
+            self.alarms.take(*one)
         if now_us >= self._due_us:
             self._due_us = now_us + LOOK_US
             self.alarms.check_missing(self._model.now_us, self._model.lost)
@@ -91,6 +91,7 @@ class AlarmsPanel(Panel):
         heartbeat = {3 = "100ms±20%"}
         max_gap = {181 = "20ms"}
         known = ["080", "181-18F"]
+        rule = ["node 3 operational within 2s", "3.statusword.fault never"]
     """
     DEFAULT_CSS = """
     AlarmsPanel TextArea { display: none; height: 12; }
@@ -187,7 +188,7 @@ def rules_toml(words: Mapping[str, Any]) -> str:
 
 
 def _styled(line: str) -> Line:
-    if line == HEAD or line.startswith("FINDINGS"):
+    if line.startswith((f"{RULE} ", "FINDINGS")):
         return plain(line, "bold")
     found = next((style for state, style in STYLES.items() if f" {state} " in line), "")
     return plain(line, found)

@@ -37,6 +37,9 @@ MODE_DISPLAY: Final = DriveObject(0x6061, 1)
 POSITION: Final = DriveObject(0x6064, 4)
 VELOCITY: Final = DriveObject(0x606C, 4)
 TORQUE: Final = DriveObject(0x6077, 2)
+READ: Final = (STATUSWORD, MODE_DISPLAY, POSITION, VELOCITY, TORQUE)
+"""In each period."""
+
 HOMING_METHOD: Final = DriveObject(0x6098, 1)
 SUPPORTED: Final = DriveObject(0x6502, 4, signed=False)
 
@@ -131,7 +134,7 @@ class DriveDriver:
 
     def cycle(self) -> Script[None]:
         """Read, then write, as is done in each period."""
-        for item in (STATUSWORD, MODE_DISPLAY, POSITION, VELOCITY, TORQUE):
+        for item in READ:
             yield from self._read(item)
         self.statusword, self.mode = self._value(STATUSWORD), self._value(MODE_DISPLAY)
         key = self._key(STATUSWORD)

@@ -216,14 +216,19 @@ class HomingMode(DriveMode):
 _POSITION: Final = DriveObject(0x607A, 4)
 _SPEED: Final = DriveObject(0x60FF, 4)
 _TORQUE: Final = DriveObject(0x6071, 2)
+_FREQUENCY: Final = DriveObject(0x6042, 2)
+_INTERPOLATED: Final = DriveObject(0x60C1, 4, sub=1)
+
+TARGETS: Final = (_POSITION, _SPEED, _TORQUE, _FREQUENCY, _INTERPOLATED)
+"""The set-points of all modes."""
 
 MODES: Final[Mapping[ModeNumber, Callable[[], DriveMode]]] = {
     ModeNumber.PROFILE_POSITION: lambda: ProfilePositionMode(_POSITION),
-    ModeNumber.VELOCITY: lambda: TargetMode(DriveObject(0x6042, 2), 0x70),
+    ModeNumber.VELOCITY: lambda: TargetMode(_FREQUENCY, 0x70),
     ModeNumber.PROFILE_VELOCITY: lambda: TargetMode(_SPEED),
     ModeNumber.PROFILE_TORQUE: lambda: TargetMode(_TORQUE),
     ModeNumber.HOMING: HomingMode,
-    ModeNumber.INTERPOLATED_POSITION: lambda: TargetMode(DriveObject(0x60C1, 4, sub=1), START),
+    ModeNumber.INTERPOLATED_POSITION: lambda: TargetMode(_INTERPOLATED, START),
     ModeNumber.CYCLIC_POSITION: lambda: TargetMode(_POSITION),
     ModeNumber.CYCLIC_VELOCITY: lambda: TargetMode(_SPEED),
     ModeNumber.CYCLIC_TORQUE: lambda: TargetMode(_TORQUE),

@@ -91,6 +91,24 @@ def test_a_joint_of_the_robot_without_a_node_is_warned_of(
     assert "no key 'motr'" in out[1]
 
 
+def test_drives_that_fill_the_bus_are_told(folder: Path) -> None:
+    write_bus(folder, f"{PLAIN.replace('sync_period', 'baudrate: 20 #')}")
+    status, out, _ = run("bus.yml")
+    assert (status, out[0].partition(": polling")[0]) == (
+        0,
+        "bus.yml:4: warning: [bus-load] 20 kbit/s: 411% of the bus in each period",
+    )
+    assert run("bus.yml", "--strict")[0] == 1
+
+
+@pytest.mark.parametrize("head", ["", '<?xml version="1.0"?>\n<!-- of xacro -->\n', "\ufeff"])
+def test_of_a_robot_it_says_what_can_be_checked(folder: Path, head: str) -> None:
+    (folder / "arm.urdf").write_text(head + ROBOT, "utf-8")
+    text = "it is a URDF: a bus.yml names it, options: {tickrig: {urdf: FILE}}"
+    status, out, _ = run("arm.urdf")
+    assert (status, out) == (1, [f"arm.urdf:1: {text}, and tickrig check of that checks both"])
+
+
 def test_a_finding_of_the_eds_is_told_once(folder: Path) -> None:
     write_bus(folder, NODE.replace("epos", "broken"))
     status, out, _ = run("bus.yml")

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from tests.host.canmon.wire import new_wire
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import whole_log
+from tickrig.host.canmon.sources import block_log
 
 DRIVE_EDS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
@@ -69,7 +69,7 @@ def test_options_go_beside_a_file(log: str, tmp_path: Path) -> None:
 
 
 def test_a_large_log_is_checked_the_same(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     result = check(log, "--no-emcy", *HEARTBEAT)
     assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n{LATE}\n")
 
@@ -123,7 +123,7 @@ def test_where_nothing_was_judged_nothing_is_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool, text: str
 ) -> None:
     if at_once:
-        monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+        monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     log = write(tmp_path / "run.log", text)
     report = tmp_path / "out.xml"
     result = check(log, "--no-emcy", "--junit", str(report))
@@ -290,7 +290,7 @@ def test_written_rules_are_held_against_standard_input() -> None:
 def test_written_rules_are_held_against_a_large_log(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     assert check(write(tmp_path / "run.log", WRITTEN), "--rule", "emcy never").stdout == FOUND
 
 

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import whole_log
+from tickrig.host.canmon.sources import block_log
 
 LOG = "".join(
     f"({n // 100}.{n % 100:02d}0000) can0 {0x181 + n % 2:03X}#{n:04X}\n" for n in range(150)
@@ -58,7 +58,7 @@ def test_of_an_empty_log_no_line_of_json_is_printed(tmp_path: Path) -> None:
 
 def test_a_large_log_has_the_same_statistics(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
     small = stats(log, "--jsonl")
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     large = stats(log, "--jsonl")
     assert (large.stdout, large.stderr) == (small.stdout, small.stderr)
 

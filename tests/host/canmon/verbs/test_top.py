@@ -6,7 +6,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.sources import whole_log
+from tickrig.host.canmon.sources import block_log
 
 LOG = "(1.000000) can0 181#00\n(1.100000) can0 181#01\n(1.150000) can0 701#05\n"
 
@@ -34,7 +34,7 @@ def test_a_log_file_ends_with_the_table(log: str) -> None:
 
 def test_a_large_log_has_the_same_table(log: str, monkeypatch: pytest.MonkeyPatch) -> None:
     small = top(log).stdout
-    monkeypatch.setattr(whole_log, "SMALL_BYTES", 0)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     assert top(log).stdout == small
 
 

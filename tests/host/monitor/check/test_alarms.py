@@ -6,12 +6,14 @@ from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.check.alarms import (
     GRACE_US,
     KEPT,
+    LATE_US,
     RECENT_US,
     Alarms,
     State,
     render_alarms,
 )
 from tickrig.host.monitor.check.rules import parse_rules
+from tickrig.host.monitor.decode.decoder import Decoder
 
 S = 1_000_000
 
@@ -126,3 +128,40 @@ FINDINGS, latest first: 1
 def test_alarms_are_shown_like_this() -> None:
     made = taken(alarms(no_emcy=True, no_reboot=True), "1.0 083#3081110000000000")
     assert "\n".join(render_alarms(made, 1_500_000)) == TABLE
+
+
+def written(rule: str, text: str, now_us: int) -> Alarms:
+    made, decoder = alarms(rule=[rule]), Decoder()
+    for record in hear(text):
+        made.take(record, decoder.take(record))
+    made.check_missing(now_us)
+    return made
+
+
+def test_a_written_rule_is_an_alarm() -> None:
+    made = written("emcy at most 1", "1 083#3081110000000000\n1.5 083#3081110000000000", 2 * S)
+    assert states(made, 2 * S) == [State.BROKEN]
+    assert [str(one)[:26] for one in made.findings] == ["(1.500000) emcy at most 1:"]
+    made.clear()
+    assert states(made, 2 * S) == [State.HOLDS]
+
+
+def test_what_a_written_rule_waits_for_is_missed_on_a_silent_bus() -> None:
+    made = written("node 3 operational within 2s", "1 703#00", 3 * S)
+    assert states(made, 3 * S + LATE_US) == [State.HOLDS]
+    assert states(made, 3 * S + LATE_US + 1) == [State.BROKEN]
+    assert [one.at_us for one in made.findings] == [3 * S]
+
+
+def test_a_period_that_is_not_kept_is_one_finding_however_long_it_lasts() -> None:
+    made = written("heartbeat of 3 every 100ms ±10%", "1 703#05\n1.1 703#05", S)
+    for now_us in range(3 * S, 6 * S, 100_000):
+        assert states(made, now_us) == [State.BROKEN]
+    assert len(made.findings) == 1
+
+
+def test_a_long_rule_does_not_push_its_state_off_the_screen() -> None:
+    made = written("heartbeat of 3 every 100ms ±10% while node 3 operational", "1 703#05", S)
+    head, line = render_alarms(made, S)[:2]
+    assert line.startswith("heartbeat of 3 every 100ms ±10% while n… holds ")
+    assert head.index("STATE") == line.index("holds")

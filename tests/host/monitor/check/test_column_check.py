@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.column_log import columns
+from tests.host.monitor.column_log import blocks
 from tests.host.monitor.strategies import traffic
 from tickrig.host.monitor.check.checker import Checker
-from tickrig.host.monitor.check.column_check import check_columns
+from tickrig.host.monitor.check.column_check import ColumnChecker
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.time_rules import HeartbeatTimes
@@ -34,10 +35,18 @@ def one_by_one(records: list[Record], rules: Rules) -> list[Finding]:
     return found + checker.end(records[-1].at_us if records else 0, ["a line is none"])
 
 
-@given(traffic())
-def test_a_log_at_once_has_the_same_findings_as_frame_by_frame(records: list[Record]) -> None:
-    found = check_columns(columns(records), ALL, BIT_RATE, ["a line is none"])
-    assert found == one_by_one(records, ALL)
+def in_blocks(records: list[Record], rules: Rules, size: int) -> list[Finding]:
+    checker = ColumnChecker(rules, BIT_RATE)
+    found = [finding for block in blocks(records, size) for finding in checker.take(block)]
+    return found + checker.end(["a line is none"])
+
+
+@pytest.mark.parametrize("size", [1, 7, 100])
+@given(records=traffic())
+def test_a_log_in_blocks_has_the_same_findings_as_frame_by_frame(
+    size: int, records: list[Record]
+) -> None:
+    assert in_blocks(records, ALL, size) == one_by_one(records, ALL)
 
 
 @given(
@@ -54,5 +63,4 @@ def test_boots_and_heartbeats_are_judged_the_same(steps: list[tuple[int, str]]) 
     for step_us, text in steps:
         at_us += step_us
         records.append(Record(at_us, "can0", CanFrame.parse(text)))
-    found = check_columns(columns(records), ALL, BIT_RATE, ["a line is none"])
-    assert found == one_by_one(records, ALL)
+    assert in_blocks(records, ALL, 5) == one_by_one(records, ALL)

@@ -6,13 +6,13 @@ from dataclasses import fields
 
 import pytest
 
-from tests.host.monitor.column_log import columns
+from tests.host.monitor.column_log import blocks
 from tests.host.monitor.record_log import hear
 from tickrig.emulators.fig120.demo import run_demo
 from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE
 from tickrig.emulators.fig120.stage import BIT_RATE, VirtualStage
 from tickrig.host.monitor.check.checker import Checker
-from tickrig.host.monitor.check.column_check import check_columns
+from tickrig.host.monitor.check.column_check import ColumnChecker
 from tickrig.host.monitor.check.rule import Finding, Rule
 from tickrig.host.monitor.check.rules import parse_rules
 from tickrig.host.monitor.frames.ident import EXTENDED
@@ -64,7 +64,9 @@ def findings(records: list[Record], lost: tuple[str, ...] = ()) -> list[Finding]
     checker = Checker(RULES, BIT_RATE)
     found = [finding for record in records for finding in checker.take(record)]
     found += checker.end(records[-1].at_us, lost)
-    assert check_columns(columns(records), RULES, BIT_RATE, lost) == found
+    in_blocks = ColumnChecker(RULES, BIT_RATE)
+    of_blocks = [finding for block in blocks(records, 50) for finding in in_blocks.take(block)]
+    assert of_blocks + in_blocks.end(lost) == found
     return found
 
 

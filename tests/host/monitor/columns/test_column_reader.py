@@ -1,19 +1,25 @@
 from __future__ import annotations
 
 import gzip
+import random
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest import mock
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.monitor.columns.column_reader import CandumpBlock, read_columns
-from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
+from tickrig.host.monitor.columns import column_reader
+from tickrig.host.monitor.columns.candump_block import CandumpBlock
+from tickrig.host.monitor.columns.column_reader import ColumnReader, read_columns
+from tickrig.host.monitor.columns.columns import ChannelNames, Columns, NoColumnsError, Rows
 from tickrig.host.monitor.frames.ident import flagged_id
 from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_reader import LogLines, read_log
+from tickrig.host.monitor.logs.log_reader import LogLines, LogReader, read_log
 from tickrig.host.monitor.logs.tally import Tally
+from tickrig.wire.can_fd import FdFrame
 
 HEX = "0123456789abcdefABCDEF"
 
@@ -56,9 +62,12 @@ def log(folder: Path, text: str) -> Path:
     return path
 
 
-def rows_of(columns: Columns) -> list[tuple[object, ...]]:
-    arrays = (columns.at_us, columns.ident, columns.dlc, columns.payload, columns.channel)
-    rows = zip(*(array.tolist() for array in arrays), strict=True)
+def rows_of(blocks: Iterable[Columns]) -> list[tuple[object, ...]]:
+    return [row for columns in blocks for row in _rows(columns)]
+
+
+def _rows(columns: Columns) -> list[tuple[object, ...]]:
+    rows = zip(*(array.tolist() for array in columns.parts), strict=True)
     return [(*row, columns.channels[place]) for *row, place in rows]
 
 
@@ -72,14 +81,22 @@ def rows_by_line(path: Path) -> tuple[list[tuple[object, ...]], Tally]:
     return rows, reader.tally
 
 
+@pytest.mark.parametrize("block_bytes", [1, 70, 1 << 20])
 @given(lines=st.lists(LINES, max_size=12), end=st.sampled_from(["", "\n"]))
-def test_columns_are_what_single_lines_give(lines: list[str], end: str) -> None:
-    with TemporaryDirectory() as folder:
+def test_columns_are_what_single_lines_give(block_bytes: int, lines: list[str], end: str) -> None:
+    with (
+        TemporaryDirectory() as folder,
+        mock.patch.object(column_reader, "BLOCK_BYTES", block_bytes),
+    ):
         path = log(Path(folder), "\n".join(lines) + end)
         columns = read_columns(path)
+        if any(isinstance(record.frame, FdFrame) for record in read_log(path)):
+            with pytest.raises(NoColumnsError):
+                rows_of(columns)
+            return
+        found = rows_of(columns)
         rows, tally = rows_by_line(path)
-    assert rows_of(columns) == rows
-    assert columns.tally == tally
+    assert (found, columns.tally) == (rows, tally)
 
 
 @pytest.mark.parametrize(
@@ -102,20 +119,47 @@ def test_lines_longer_than_a_block_and_files_without_end_are_whole(tmp_path: Pat
     line = "(0000000000.010000) can0 705#7F\n"
     path = log(tmp_path, line * 40_000 + "x" * (1 << 20) + "\n" + line[:-1])
     columns = read_columns(path)
-    assert (len(columns), columns.tally.bad_lines.first[0][0]) == (40_001, 40_001)
+    assert len(rows_of(columns)) == 40_001
+    assert columns.tally.bad_lines.first[0][0] == 40_001
 
 
-def test_a_compressed_log_that_was_cut_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "run.log.gz"
-    path.write_bytes(gzip.compress(b"(0000000000.010000) can0 705#7F\n")[:-9])
-    with pytest.raises(LogError, match="end-of-stream"):
-        read_columns(path)
+def until_damaged(reader: ColumnReader | LogReader) -> tuple[int, str]:
+    """Return how many frames come, and what is said behind them."""
+    frames = 0
+    try:
+        for found in reader:
+            frames += len(found) if isinstance(found, Columns) else 1
+    except LogError as error:
+        return frames, str(error)
+    return frames, ""
+
+
+@pytest.mark.parametrize("read", [read_columns, read_log])
+def test_of_a_compressed_log_that_was_cut_all_comes_that_is_there(
+    read: Callable[[Path], ColumnReader | LogReader], tmp_path: Path
+) -> None:
+    path, chance = tmp_path / "run.log.gz", random.Random(1)
+    lines = b"".join(
+        b"(%010d.000000) can0 705#%02X\n" % (n, chance.randrange(256)) for n in range(40_000)
+    )
+    whole = gzip.compress(lines)
+    path.write_bytes(whole[:-4])
+    said = "Compressed file ended before the end-of-stream marker was reached"
+    assert until_damaged(read(path)) == (
+        40_000,
+        f"{path}: cut or damaged behind line 40000: {said}",
+    )
+    path.write_bytes(whole[: len(whole) // 2])
+    frames, message = until_damaged(read(path))
+    assert (frames > 19_000, f"behind line {frames}: " in message) == (True, True)
+    path.write_bytes(whole[:-8] + b"\0" * 8)
+    assert until_damaged(read(path))[1].startswith(f"{path}: cut or damaged behind line 40000: CRC")
 
 
 def test_more_buses_than_a_byte_numbers_are_refused(tmp_path: Path) -> None:
     path = log(tmp_path, "".join(f"(0000000000.000000) can{n} 001#\n" for n in range(257)))
     with pytest.raises(LogError, match="more than 256 buses"):
-        read_columns(path)
+        list(read_columns(path))
 
 
 def test_other_formats_are_read_frame_by_frame(tmp_path: Path) -> None:

@@ -92,7 +92,8 @@ def test_a_log_as_columns_gives_the_same(tmp_path: Path) -> None:
     words = ("181[2:6]s*0.5", "00000181[0]", "281[0:4]f", "281[3]")
     one_by_one, at_once = collected(*words), collected(*words)
     one_by_one.take_all(read_log(path))
-    at_once.take_columns(read_columns(path))
+    for block in read_columns(path):
+        at_once.take_columns(block)
     assert one_by_one.series == at_once.series
     assert [list(one.values) for one in at_once.series[:3]] == [[-1, 1], [1], [1.5]]
     assert at_once.series[2].not_numbers == 1

@@ -43,6 +43,17 @@ def test_findings_are_shown_acknowledged_and_cleared() -> None:
     assert kept(panel) == {"rules": {"no_sdo_abort": True}}
 
 
+def test_a_written_rule_is_held_against_what_frames_mean() -> None:
+    async def act(desk: Desk[AlarmsPanel]) -> None:
+        desk.session.run(10_000)
+        desk.session.buses[BUS](CanFrame.parse("605#2F00100000000000"))
+        desk.session.run(10_000)
+        assert desk.lines()[1].split()[:4] == ["sdo.aborted", "never", "BROKEN", "1"]
+
+    panel = at_desk(AlarmsPanel, act, settings={"rules": {"rule": ["sdo.aborted never"]}})
+    assert kept(panel) == {"rules": {"rule": ["sdo.aborted never"]}}
+
+
 def test_rules_are_written_and_held() -> None:
     async def act(desk: Desk[AlarmsPanel]) -> None:
         assert desk.lines() == ["no rules: e writes some, F1 shows how"]

@@ -1,0 +1,115 @@
+"""How much of a bus the periods of its drives take: what is polled by SDO, and PDOs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+from tickrig.host.canopen.bus_file.bus_file import BusFile
+from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusPdo, BusSlave
+from tickrig.host.canopen.bus_file.notes import Notes
+from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.host.canopen.master.cia402.drive_driver import AXIS, CONTROLWORD, READ
+from tickrig.host.canopen.master.cia402.drive_mode import TARGETS, DriveObject
+from tickrig.host.canopen.master.cia402.drive_settings import is_drive, period_us_of
+from tickrig.host.canopen.master.process_image import EVENT_DRIVEN, Key, keys
+from tickrig.host.text.values import counted
+from tickrig.wire.can import data_frame
+from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
+from tickrig.wire.canopen.sdo.sdo import (
+    DownloadInitiateRequest,
+    DownloadInitiateResponse,
+    UploadInitiateRequest,
+    UploadInitiateResponse,
+)
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+
+MOST: Final = 0.8
+"""Part of a bus from which on periods are left out: what was asked is not answered in time."""
+
+Load = float
+"""Bits in a microsecond."""
+
+
+def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
+    """Return a finding if the periods of the drives take too much of the bus.
+
+    Frames are counted to the bit, with values of 0.
+    """
+    notes, master = Notes(), bus.master
+    if master is not None:
+        polled = [load for slave in bus.slaves.values() if (load := polling_load(slave, master))]
+        rate = master.baudrate / 1_000
+        sdo = sum(polled) / rate
+        pdos = sum(pdo_load(slave, master) for slave in bus.slaves.values()) / rate
+        if sdo + pdos > MOST:
+            text = _said(len(polled), sdo, pdos)
+            notes.note("bus-load", master.place, "", f"{master.baudrate} kbit/s: {text}")
+    return notes.all
+
+
+def _said(drives: int, sdo: Load, pdos: Load) -> str:
+    """Say what takes how much, and how many drives would not be too many."""
+    text = f"{sdo + pdos:.0%} of the bus in each period"
+    if not drives:
+        return f"{text} for PDOs"
+    fitting = max(0, int(drives * (MOST - pdos) / sdo))
+    what = f"polling of {counted(drives, 'drive')} by SDO {sdo:.0%}, PDOs {pdos:.0%}"
+    return f"{text}: {what}; {MOST:.0%} would do for {fitting} of them"
+
+
+def polling_load(slave: BusSlave, master: BusMaster) -> Load:
+    """Return what is asked of a drive, and told it, by SDO."""
+    period_us = period_us_of(slave) or master.sync_period_us
+    if not (is_drive(slave) and slave.boot and period_us):
+        return 0.0
+    there = {(row.index, row.sub) for row in slave.device.entries}
+    sent, received = _mapped(slave, transmit=True), _mapped(slave, transmit=False)
+    bits = 0
+    for axis in range(slave.num_channels):
+        for item in READ:
+            if (key := _key(item, axis)) in there - sent:
+                response = UploadInitiateResponse(*key, bytes(item.size), item.size)
+                bits += _bits(slave, UploadInitiateRequest(*key).encode(), response.encode())
+        targets = {_key(item, axis): item for item in TARGETS}
+        written = {_key(CONTROLWORD, axis): CONTROLWORD}
+        if not received & targets.keys():
+            written |= dict(list(targets.items())[:1])
+        for key, item in written.items():
+            if key in there - received:
+                request = DownloadInitiateRequest(*key, bytes(item.size), item.size)
+                bits += _bits(slave, request.encode(), DownloadInitiateResponse(*key).encode())
+    return bits / period_us
+
+
+def _key(item: DriveObject, axis: int) -> Key:
+    return item.index + AXIS * axis, item.sub
+
+
+def _mapped(slave: BusSlave, *, transmit: bool) -> set[Key]:
+    pdos = (pdo for pdo in slave.pdos if pdo.enabled and pdo.transmit is transmit)
+    return {key for pdo in pdos for key in keys(pdo)}
+
+
+def _bits(slave: BusSlave, request: bytes, response: bytes) -> int:
+    there = data_frame(REQUEST_COB_ID + slave.node_id, request)
+    back = data_frame(RESPONSE_COB_ID + slave.node_id, response)
+    return frame_bits(there) + frame_bits(back)
+
+
+def pdo_load(slave: BusSlave, master: BusMaster) -> Load:
+    """Return what PDOs take that come in periods."""
+    written_us = period_us_of(slave) or master.sync_period_us if is_drive(slave) else 0
+    return sum(_loads((pdo for pdo in slave.pdos if pdo.enabled), master, written_us))
+
+
+def _loads(pdos: Iterable[BusPdo], master: BusMaster, written_us: int) -> Iterator[Load]:
+    for pdo in pdos:
+        period_us = master.sync_period_us * max(1, pdo.transmission)
+        if pdo.transmission >= EVENT_DRIVEN:
+            period_us = 1_000 * pdo.event_timer_ms if pdo.transmit else written_us
+        size = sum(mapped.bits for mapped in pdo.mapping) + 7 >> 3
+        if period_us and 0 < size <= 8:
+            frame = data_frame(pdo.cob_id & CAN_ID_MASK, bytes(size))
+            yield frame_bits(frame) / period_us

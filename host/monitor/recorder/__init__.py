@@ -1,0 +1,1 @@
+"""Recording in parts: rotation, limits of disk space, what came before a trigger, an index."""
