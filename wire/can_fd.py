@@ -14,7 +14,7 @@ from bisect import bisect_left
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
+from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX, CanFrame
 from tickrig.wire.can_bits import INTERFRAME_BITS, NEXT, STUFFED
 from tickrig.wire.errors import FieldError, FramingError
 
@@ -180,3 +180,13 @@ def _stuff(last: int, run: int, stream: str) -> tuple[int, int, int]:
         if run == 5:
             last, run, stuffed = 1 - bit, 1, stuffed + 1
     return last, run, stuffed
+
+
+def parse_sent(text: str) -> CanFrame | FdFrame:
+    """Read a frame in candump's compact notation, of CAN FD where it has `##`.
+
+    Raises:
+        FramingError: not a frame in this notation.
+        FieldError: an identifier or length that there is not.
+    """
+    return FdFrame.parse(text) if "##" in text else CanFrame.parse(text)

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 BUS: Final = "bus"
 NODES: Final = "nodes"
 _OPTIONS: Final = tuple(field.name for field in fields(BusOptions))
-_WHOLE: Final = ("bitrate",)
+_WHOLE: Final = ("bitrate", "data_bitrate")
+_SWITCHES: Final = ("fd",)
 _LISTS: Final = ("source", "dbc", "timing", "bus_kwargs")
 
 
@@ -117,6 +118,9 @@ def _check(bus: Mapping[str, Any]) -> None:
         elif name in _WHOLE:
             if type(value) is not int or value < 1:
                 raise SettingError((name,), f"{value!r} is not a number of bit/s")
+        elif name in _SWITCHES:
+            if type(value) is not bool:
+                raise SettingError((name,), f"{value!r} is neither true nor false")
         elif name in _OPTIONS and not _is_text(value):
             raise SettingError((name,), f"{value!r} is no text")
 

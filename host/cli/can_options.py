@@ -34,6 +34,8 @@ UNNAMED: Final = '"None"'
 """In what python-can says where no interface is named."""
 
 _PLAIN: Final = ("interface", "channel", "bitrate")
+_BIT_RATE: Final = re.compile(r"([0-9]{1,9})([kM]?)", re.ASCII)
+_FACTORS: Final = {"": 1, "k": 1_000, "M": 1_000_000}
 
 _KEY_VALUE: Final = re.compile(r"([A-Za-z_][\w-]*)=(\S*)", re.ASCII)
 
@@ -47,6 +49,8 @@ class BusOptions:
     bitrate: int | None = None
     timing: tuple[str, ...] = ()
     bus_kwargs: tuple[str, ...] = ()
+    fd: bool = False
+    data_bitrate: int | None = None
 
     def __bool__(self) -> bool:
         """Say whether a bus outside is asked for."""
@@ -57,7 +61,36 @@ class BusOptions:
         words = [f"--{name}={value}" for name in _PLAIN if (value := getattr(self, name))]
         for option, values in zip(GREEDY, (self.timing, self.bus_kwargs), strict=True):
             words += [option, *values] if values else []
-        return words
+        words += ["--fd"] * self.fd
+        return words + [f"--data-bitrate={self.data_bitrate}"] * bool(self.data_bitrate)
+
+
+def bit_s(text: str) -> int:
+    """Read a bit rate: 500000, 500k, 1M.
+
+    Raises:
+        ValueError: it is none.
+
+    >>> bit_s("500k"), bit_s("1M"), bit_s("125000")
+    (500000, 1000000, 125000)
+    """
+    match = _BIT_RATE.fullmatch(text)
+    if match is None or not int(match[1]):
+        raise ValueError(f"{text!r} is not a bit rate like 500000, 500k or 1M")
+    return int(match[1]) * _FACTORS[match[2]]
+
+
+class BitRate(click.ParamType[int]):
+    """A bit rate on the command line."""
+
+    name = "bit rate"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Read it."""
+        try:
+            return bit_s(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
 
 
 class BusCommand(click.Command):
@@ -113,7 +146,9 @@ bus_options: Final[Decorator] = add_options(
         help="Driver of python-can, as socketcan, udp_multicast, slcan.",
     ),
     click.option("-c", "--channel", metavar="CHANNEL", help="Channel of it, as can0."),
-    click.option("-b", "--bitrate", type=int, metavar="BITRATE", help="Bit rate in bit/s."),
+    click.option(
+        "-b", "--bitrate", type=BitRate(), metavar="BITRATE", help="Bit rate in bit/s; 500k."
+    ),
     click.option(
         "--timing",
         multiple=True,
@@ -128,6 +163,18 @@ bus_options: Final[Decorator] = add_options(
     ),
 )
 """Add the fields of `BusOptions` as options; the command's class is `BusCommand`."""
+
+
+fd_options: Final[Decorator] = add_options(
+    click.option("--fd", is_flag=True, help="Have the driver send and receive CAN FD."),
+    click.option(
+        "--data-bitrate",
+        type=BitRate(),
+        metavar="BITRATE",
+        help="Of data of CAN FD frames with BRS; for the load, and with --fd for the driver.",
+    ),
+)
+"""Add the fields of `BusOptions` that are of CAN FD, beside `bus_options`."""
 
 
 def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, str | None]:
@@ -180,6 +227,9 @@ def _given(options: BusOptions) -> Mapping[str, Any]:
         key: value for key in _PLAIN if (value := getattr(options, key)) is not None
     }
     given.update(_pairs("--bus-kwargs", options.bus_kwargs, parse_setting))
+    if options.fd:
+        given["fd"] = True
+        given |= {"data_bitrate": options.data_bitrate} if options.data_bitrate else {}
     if options.timing:
         given["timing"] = _timing(_pairs("--timing", options.timing, int))
     return given

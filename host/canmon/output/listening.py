@@ -20,6 +20,7 @@ from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import time_option
 from tickrig.host.cli.start import TERMINATING
+from tickrig.host.monitor.traffic.bit_rates import BitRates
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
@@ -86,6 +87,14 @@ def bit_rate_of(words: Sequence[str], options: BusOptions) -> int | None:
     buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
     named = (word.bitrate for word in buses if word.bitrate is not None)
     return next(named, None) if options.bitrate is None else options.bitrate
+
+
+def bit_rates_of(words: Sequence[str], options: BusOptions) -> BitRates:
+    """Return both bit rates that the options or a SOURCE word name, as can0@500k/2M."""
+    buses = (word for word in map(parse_source, words) if isinstance(word, BusSpec))
+    named = (word.data_bitrate for word in buses if word.data_bitrate is not None)
+    fast = next(named, None) if options.data_bitrate is None else options.data_bitrate
+    return BitRates(bit_rate_of(words, options), fast)
 
 
 def follow(  # noqa: PLR0913 - how, on a screen and without

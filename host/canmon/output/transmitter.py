@@ -18,6 +18,9 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 
+FD_WITHOUT_ASKING: Final = ("socketcan", "tickrig", "udp_multicast", "virtual")
+"""Interfaces that take CAN FD however they were opened, or say themselves that they do not."""
+
 SEND_TIMEOUT_S: Final = 1
 """How long a full queue of the driver may stay full."""
 
@@ -42,14 +45,18 @@ class Transmitter:
         bus_word = parse_source(word)
         if not isinstance(bus_word, BusSpec):
             raise Refused(f"{word!r} is no bus; frames are sent on can0 or slcan:/dev/ttyACM0@500k")
-        self._bus, interface, self.name = open_bus(merged(bus_word, options))
+        whole = merged(bus_word, options)
+        self._bus, interface, self.name = open_bus(whole)
+        self._takes_fd = whole.fd or interface in FD_WITHOUT_ASKING
         self._source: BusSource | None = None
         if receives:
             reader = reader_of(self._bus, interface, self.name)
             self._source = BusSource([reader], [bus_word.chosen])
 
     def send(self, frame: CanFrame | FdFrame) -> None:
-        """Send a frame; SourceFailed if the bus is gone or takes none for 1 s."""
+        """Send a frame; SourceFailed if the bus is gone, takes none for 1 s or no CAN FD."""
+        if isinstance(frame, FdFrame) and not self._takes_fd:
+            raise SourceFailed(f"cannot send {frame} on {self.name}: CAN FD wants --fd")
         send_on(self._bus, self.name, frame)
 
     def poll(self, timeout_us: int) -> list[Record]:

@@ -11,7 +11,7 @@ from can.util import load_config
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
-from tickrig.host.canmon.sources.socket_reader import SocketReader
+from tickrig.host.canmon.sources.socket_reader import SocketReader, let_fd
 from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
 from tickrig.host.cli.refused import BusUnavailable
@@ -45,6 +45,8 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
         bus, interface, channel = open_raw(_with_interface(options))
     except BusUnavailable as error:
         raise SourceFailed(error.message) from None
+    if interface == DEFAULT:
+        let_fd(bus)
     return bus, interface, channel_name(interface if channel is None else channel)
 
 
@@ -148,6 +150,8 @@ def merged(word: BusSpec, options: BusOptions) -> BusOptions:
         channel=word.channel or options.channel,
         bitrate=word.bitrate or options.bitrate,
         bus_kwargs=(*local(word.interface), *options.bus_kwargs),
+        fd=options.fd or word.data_bitrate is not None,
+        data_bitrate=word.data_bitrate or options.data_bitrate,
     )
 
 

@@ -65,9 +65,9 @@ class SocketReader:
         self._socket: Any = bus.socket  # on Windows a socket has no recvmsg, and no such bus
         self.lost, self.tally = 0, Tally()
         self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
-        for option in (CAN_RAW_FD_FRAMES, CAN_RAW_XL_FRAMES):
-            with suppress(OSError):  # older kernels have no such frames
-                self._socket.setsockopt(SOL_CAN_RAW, option, 1)
+        let_fd(bus)
+        with suppress(OSError):  # older kernels have no such frames
+            self._socket.setsockopt(SOL_CAN_RAW, CAN_RAW_XL_FRAMES, 1)
         self._socket.setblocking(False)
 
     def read(self, timeout_us: int, /) -> list[Record]:
@@ -105,6 +105,12 @@ class SocketReader:
             self.tally.passed_over[CAN_XL] += 1
             return ()
         return (Record(at_us, self.name, _fd_frame(*_FD_FRAME.unpack(data)), sent),)
+
+
+def let_fd(bus: Any) -> None:
+    """Have a bus of SocketCAN send and hear CAN FD frames, where the kernel has them."""
+    with suppress(OSError):
+        bus.socket.setsockopt(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)
 
 
 def _fd_frame(flagged: int, length: int, flags: int, data: bytes) -> FdFrame:

@@ -1,7 +1,7 @@
 """What a SOURCE word names.
 
 >>> parse_source("slcan:/dev/ttyACM0@500k")
-BusSpec(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None)
+BusSpec(interface='slcan', channel='/dev/ttyACM0', bitrate=500000, chosen=None, data_bitrate=None)
 >>> parse_source("can0,123:7FF").chosen.passes(0x123)
 True
 >>> parse_source("serial:/dev/ttyUSB0@57600,rtc-lite").protocol
@@ -31,7 +31,8 @@ UDP_GROUP: Final = "239.74.163.2"
 """The IPv4 group of python-can's udp_multicast."""
 
 _BUS: Final = re.compile(
-    r"(?:(?P<interface>[A-Za-z]\w*):)?(?P<channel>[^@]*)(?:@(?P<bitrate>[0-9]{1,9}[kM]?))?"
+    r"(?:(?P<interface>[A-Za-z]\w*):)?(?P<channel>[^@]*)"
+    r"(?:@(?P<bitrate>[0-9]{1,9}[kM]?)(?:/(?P<fast>[0-9]{1,9}[kM]?))?)?"
 )
 _LINE: Final = re.compile(
     r"serial:(?P<port>.+?)(?:@(?P<baud>[0-9]{1,9}[kM]?))?"
@@ -50,12 +51,16 @@ class FileSpec:
 
 @dataclass(frozen=True, slots=True)
 class BusSpec:
-    """A bus, and which frames of it are wanted; what is None the options say."""
+    """A bus, and which frames of it are wanted; what is None the options say.
+
+    One with a data bit rate is one of CAN FD.
+    """
 
     interface: str | None = None
     channel: str | None = None
     bitrate: int | None = None
     chosen: CandumpFilter | None = None
+    data_bitrate: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +114,7 @@ def _bus(name: str, filters: str) -> BusSpec:
     match = _BUS.fullmatch(name)
     if match is None or not name:
         raise Refused(f"SOURCE {name!r} is not a bus as can0 or slcan:/dev/ttyACM0@500k, nor a log")
-    interface, channel, bitrate = match.group("interface", "channel", "bitrate")
+    interface, channel, bitrate, fast = match.group("interface", "channel", "bitrate", "fast")
     if name in INTERFACES:
         interface, channel = name, ""
     if interface == "udp":
@@ -119,6 +124,7 @@ def _bus(name: str, filters: str) -> BusSpec:
         channel or None,
         _bit_s(bitrate) if bitrate else None,
         _chosen(filters),
+        _bit_s(fast) if fast else None,
     )
 
 

@@ -13,6 +13,7 @@ from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.listening import (
     bit_rate_of,
+    bit_rates_of,
     listen,
     patience_us,
     report,
@@ -175,7 +176,7 @@ def command(  # noqa: PLR0913 - options
         frames.reopen()
     try:
         if not isinstance(frames, BlockLog):
-            held = DecodedCheck(rules, bit_rate, decoder, around)
+            held = DecodedCheck(rules, bit_rates_of(words, bus), decoder, around)
             _one_by_one(frames, words, held, verdict, span_us)
     finally:
         frames.close()

@@ -134,7 +134,8 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
                  1 a failure     4 something was inconclusive or blocked
                  2 usage         5 nothing was judged
     """  # noqa: D301 - click wants the backspace
-    bus = BusOptions(**{name: options.pop(name) for name in BusOptions.__dataclass_fields__})
+    named = BusOptions.__dataclass_fields__.keys() & options.keys()
+    bus = BusOptions(**{name: options.pop(name) for name in named})
     options["level"] = _level(options)
     if options["lists"]:
         _list(options["only"], options["eds"])

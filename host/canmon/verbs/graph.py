@@ -20,7 +20,7 @@ from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
 from tickrig.host.canmon.verbs.source_command import explained, strict_option
-from tickrig.host.cli.can_options import BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.options import PATH, time_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.collector import Collector
@@ -134,6 +134,7 @@ SIZE: Final = (100, 28)
 @span_option
 @strict_option
 @bus_options
+@fd_options
 def command(source: str, signals: Sequence[str], **options: Any) -> None:
     """Draw curves of SOURCE: in the terminal, or to files.
 

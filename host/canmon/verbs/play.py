@@ -13,7 +13,7 @@ from tickrig.host.canmon.errors import SourceFailed, until_unread
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canmon.sources.opening import log_path
-from tickrig.host.cli.can_options import BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.log_reader import LogReader, read_log
@@ -39,6 +39,7 @@ _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 @click.option("--step", is_flag=True, help="Wait for Enter before each frame.")
 @click.option("--wait-rx", metavar="ID", help="Begin when this CAN-ID, as 581, is received.")
 @bus_options
+@fd_options
 def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     """Send the frames of LOG again, with the gaps that were recorded.
 

@@ -12,7 +12,7 @@ from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
-from tickrig.host.cli.can_options import BusOptions, bus_options
+from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.transmit.frame_fields import (
     FrameFields,
@@ -23,6 +23,7 @@ from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.transmit_list import TransmitRow
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame, parse_sent
 from tickrig.wire.candump import LogLine
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
@@ -41,8 +42,12 @@ if TYPE_CHECKING:
 @eds_option
 @click.option("-q", "--quiet", is_flag=True, help="Do not print what is sent.")
 @bus_options
+@fd_options
 def command(bus: str, frames: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     """Send frames on BUS: by bytes as 123#DEADBEEF, or a PDO by the names of its objects.
+
+    123##1AABB is a CAN FD frame; the digit is 1 for BRS, 2 for ESI, 3 for both.
+    SocketCAN takes it as it is, other drivers want --fd.
 
     Objects that are not named have the value of the EDS, else 0. What is sent
     is printed as candump logs it. Bits of a byte are counted with
@@ -69,7 +74,7 @@ def command(bus: str, frames: Sequence[str], eds: Sequence[str], **options: Any)
         click.echo(f"{missed} periods passed whole and were left out", err=True)
 
 
-def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame]:
+def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame | FdFrame]:
     """Return the frames; words with `=` belong to the PDO before them."""
     texts: list[str] = []
     for word in words:
@@ -79,7 +84,7 @@ def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame]:
             texts.append(word)
     named = PdoFrames(read_eds_files(eds))
     try:
-        return [CanFrame.parse(text) if "#" in text else named.frame(text) for text in texts]
+        return [parse_sent(text) if "#" in text else named.frame(text) for text in texts]
     except (ValueError, WireError) as error:
         raise Refused(str(error)) from None
 
@@ -108,7 +113,7 @@ def _period_us(every: str | None, count: int | None) -> int:
 
 
 def _cyclic(
-    frames: Sequence[CanFrame], period_us: int, count: int, fields: FrameFields
+    frames: Sequence[CanFrame | FdFrame], period_us: int, count: int, fields: FrameFields
 ) -> list[TransmitRow]:
     try:
         return [TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]

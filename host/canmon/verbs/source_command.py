@@ -8,13 +8,13 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.cli.can_options import BusCommand, bus_options
+from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
 from tickrig.host.cli.options import Decorator, add_options
 
 SOURCE_HELP = """\b
 SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
          can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
-         slcan:/dev/ttyACM0@500k   interface:channel@bitrate; virtual:bench, udp
+         slcan:/dev/ttyACM0@500k   interface:channel@bitrate; can0@500k/2M is CAN FD; udp
          serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
          run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4, trace
          -                         standard input: what candump or canmon dump prints"""
@@ -36,7 +36,7 @@ def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.
         options: what else the verb has, in the order of its help.
     """
     source = click.argument("source", nargs=-1)
-    add = add_options(source, *options, strict_option, bus_options)
+    add = add_options(source, *options, strict_option, bus_options, fd_options)
 
     def decorate(function: Callable[..., Any]) -> click.Command:
         return explained(click.command(cls=BusCommand)(add(function)))

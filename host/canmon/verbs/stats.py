@@ -9,7 +9,7 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.listening import (
-    bit_rate_of,
+    bit_rates_of,
     count_blocks,
     follow,
     report,
@@ -21,6 +21,7 @@ from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.traffic.bit_rates import BitRates
 from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
 from tickrig.host.monitor.views.statistics import (
     bus_json,
@@ -64,24 +65,26 @@ def command(
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    bit_rate = bit_rate_of(source, bus)
+    rates = bit_rates_of(source, bus)
     log = block_log(source)
     snapshot = count_blocks(log)
     frames = (log if snapshot else None) or open_source(source, bus)
     try:
         if not isinstance(frames, BlockLog):
-            snapshot = _one_by_one(frames, source, span_us)
+            snapshot = _one_by_one(frames, source, span_us, rates)
     finally:
         frames.close()
     assert snapshot
     with until_unread():
-        for line in (_jsonl if jsonl else _tables)(snapshot, by, bit_rate):
+        for line in (_jsonl if jsonl else _tables)(snapshot, by, rates.nominal):
             click.echo(line)
     report(frames, strict)
 
 
-def _one_by_one(source: Source, words: Sequence[str], span_us: int | None) -> Snapshot:
-    traffic = Traffic()
+def _one_by_one(
+    source: Source, words: Sequence[str], span_us: int | None, rates: BitRates
+) -> Snapshot:
+    traffic = Traffic(rates)
 
     def take(records: Sequence[Record]) -> None:
         for record in records:

@@ -11,7 +11,7 @@ import click
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.listening import (
-    bit_rate_of,
+    bit_rates_of,
     count_blocks,
     follow,
     report,
@@ -73,7 +73,7 @@ def command(  # noqa: PLR0913 - options
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    chosen, model = read_filter(wanted), TopModel(bit_rate_of(source, bus))
+    chosen, model = read_filter(wanted), TopModel(bit_rates_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
     meaning = FilteredDecoder(None if plain else make_decoder(eds, dbc), chosen)
     take: Take = model.take

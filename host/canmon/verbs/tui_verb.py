@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.monitor_setup import MonitorSetup
-from tickrig.host.canmon.output.listening import report
+from tickrig.host.canmon.output.listening import bit_rates_of, report
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     eds_paths,
@@ -91,7 +91,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
         setup = MonitorSetup.read(workspace).under(said)
         objects = read_eds_paths(setup.eds)
         with refusing_dbc():
-            model = Model(objects, setup.dbc, setup.options.bitrate)
+            model = Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
         session = open_session(setup.source, setup.options, model)
         try:
             panels = make_panels(session, say)

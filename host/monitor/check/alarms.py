@@ -71,6 +71,7 @@ class Alarms:
     Args:
         rules: what must hold.
         bit_rate: bits a second, for the load.
+        data_bit_rate: of data of CAN FD frames with BRS.
 
     Attributes:
         findings: the latest, oldest first.
@@ -82,6 +83,7 @@ class Alarms:
 
     rules: Rules
     bit_rate: int | None = None
+    data_bit_rate: int | None = None
     findings: deque[Finding] = field(init=False)
     judged: bool = field(init=False)
     _checker: Checker = field(init=False)
@@ -95,7 +97,7 @@ class Alarms:
 
     def clear(self) -> None:
         """Begin anew."""
-        self._checker = Checker(self.rules, self.bit_rate)
+        self._checker = Checker(self.rules, self.bit_rate, self.data_bit_rate)
         self._alarms = {name: Alarm(name) for name in self.rules.names()}
         self.findings = deque(maxlen=KEPT)
         self._begin_us, self.judged = None, False

@@ -10,6 +10,7 @@ from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.check.surroundings import Surroundings
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.traffic.bit_rates import BitRates
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoder import Decoder
@@ -24,15 +25,13 @@ class DecodedCheck:
 
     Args:
         rules: what must hold.
-        bit_rate: bits a second, for the load.
+        rates: bit rates of the buses, for the load.
         decoder: None where no rule asks.
         around: frames that are shown before and after what such a rule finds.
     """
 
-    def __init__(
-        self, rules: Rules, bit_rate: int | None, decoder: Decoder | None, around: int
-    ) -> None:
-        self._checker, self._decoder = Checker(rules, bit_rate), decoder
+    def __init__(self, rules: Rules, rates: BitRates, decoder: Decoder | None, around: int) -> None:
+        self._checker, self._decoder = Checker(rules, *rates), decoder
         self._around = Surroundings(around, (one.name for one in rules.expressions))
         self._latest_us = 0
 

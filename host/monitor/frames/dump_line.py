@@ -7,7 +7,7 @@
 >>> lines.line(Record(1_250_000, "can0", CanFrame.parse("185#R5")))
 ' (000.250000)  can0  185   [5]  remote request'
 >>> DumpLines(extra=True).line(Record(0, "can0", FdFrame.parse("185##1AABB")))
-'  can0  RX B -  185   [02]  AA BB'
+'  can0  RX B -  185  [02]  AA BB'
 
 >>> from tickrig.host.monitor.decode.decoded import Decoded
 >>> from tickrig.host.monitor.frames.record import LineRecord
@@ -63,8 +63,8 @@ class DumpLines:
         self._width = max(self._width, len(ident))
         direction = f"  {'TX' if record.sent else 'RX'} {_flags(record.frame)}" * self._extra
         stamp = self.stamp(record.at_us)
-        data = f"{_data(record.frame):<{DATA_WIDTH}}   {text}" if text else _data(record.frame)
-        return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}   {data}"
+        data = f"{_data(record.frame):<{DATA_WIDTH + 1}}   {text}" if text else _data(record.frame)
+        return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}  {data}"
 
     def stamp(self, at_us: int) -> str:
         """Return what stands before what was heard at this time."""
@@ -99,13 +99,14 @@ def _ident(frame: AnyFrame) -> str:
 
 
 def _data(frame: AnyFrame) -> str:
+    """Return length and data; a length of two digits begins a column earlier."""
     data = frame.data.hex(" ").upper()
     if isinstance(frame, ErrorFrame):
-        return f"[{len(frame.data)}]  {data}   ERRORFRAME"
+        return f" [{len(frame.data)}]  {data}   ERRORFRAME"
     if frame.remote:
-        return f"[{frame.dlc}]  remote request"
-    digits = 2 if isinstance(frame, FdFrame) else 1
-    return f"[{len(frame.data):0{digits}d}] {' ' * bool(data)}{data}"
+        return f" [{frame.dlc}]  remote request"
+    length = f"[{len(frame.data):02d}]" if isinstance(frame, FdFrame) else f" [{len(frame.data)}]"
+    return f"{length} {' ' * bool(data)}{data}"
 
 
 def seconds_text(span_us: int, digits: int) -> str:

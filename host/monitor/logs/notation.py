@@ -18,7 +18,7 @@ from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
-from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame
+from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame, parse_sent
 from tickrig.wire.errors import WireError
 
 _CODED: Final = re.compile(r"(.+#(?:[0-9A-Fa-f]{16}|R8))_[9A-Fa-f]")
@@ -34,10 +34,8 @@ def parse_frame(notation: str) -> AnyFrame:
     if error := _ERROR.fullmatch(notation):
         data = bytes.fromhex(error[2]).ljust(8, b"\0")
         return ErrorFrame(int(error[1], 16) & ERROR_CLASS_MASK, data)
-    if "##" in notation:
-        return FdFrame.parse(notation)
     coded = _CODED.fullmatch(notation)
-    return CanFrame.parse(coded[1] if coded else notation)
+    return parse_sent(coded[1] if coded else notation)
 
 
 VERSION: Final = 1

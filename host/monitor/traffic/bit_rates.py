@@ -38,4 +38,4 @@ class BitRates(NamedTuple):
         return nominal + fast
 
 
-UNRATED: Final = BitRates()
+NO_RATES: Final = BitRates()

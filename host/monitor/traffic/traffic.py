@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 
 from tickrig.host.monitor.frames.ident import fd_ident, ident_of
 from tickrig.host.monitor.frames.record import AnyFrame, Record
-from tickrig.host.monitor.traffic.bit_rates import UNRATED, BitRates
+from tickrig.host.monitor.traffic.bit_rates import NO_RATES, BitRates
 from tickrig.host.monitor.traffic.controller import ErrorRow, ErrorStatistics
 from tickrig.host.monitor.traffic.tally import IdRow, Tally
 from tickrig.wire.can import CanFrame
@@ -220,7 +220,7 @@ class Traffic:
         rates: bit rates of all buses, for CAN FD.
     """
 
-    def __init__(self, rates: BitRates = UNRATED) -> None:
+    def __init__(self, rates: BitRates = NO_RATES) -> None:
         self._buses: dict[str, BusTally] = {}
         self._rates = rates
         self._last_us = 0

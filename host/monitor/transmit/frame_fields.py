@@ -17,9 +17,11 @@ from typing import Final
 import crcmod
 
 _COUNTER: Final = re.compile(
-    r"([0-7])(?:\.([0-7])\+([1-8]))?:([0-9]{1,3})\.\.([0-9]{1,3})", re.ASCII
+    r"([0-9]{1,2})(?:\.([0-7])\+([1-8]))?:([0-9]{1,3})\.\.([0-9]{1,3})", re.ASCII
 )
-_CHECKSUM: Final = re.compile(r"([0-7]):([a-z0-9-]+)(?::([0-7])\.\.([0-7]))?", re.ASCII)
+_CHECKSUM: Final = re.compile(
+    r"([0-9]{1,2}):([a-z0-9-]+)(?::([0-9]{1,2})\.\.([0-9]{1,2}))?", re.ASCII
+)
 
 ALGORITHMS: Final[Mapping[str, Callable[[bytes], int]]] = {
     "xor": lambda data: reduce(xor, data, 0),

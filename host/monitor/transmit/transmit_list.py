@@ -15,8 +15,11 @@ from typing import Final
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_checksum, parse_counter
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.text.values import parse_time_us
-from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.instant import NEVER
+
+AnyFrames = tuple[CanFrame | FdFrame, ...]
 
 ONCE: Final = 0
 """As a period: a row that is sent when somebody says so."""
@@ -45,7 +48,7 @@ class TransmitRow:
     """
 
     name: str
-    frame: CanFrame
+    frame: CanFrame | FdFrame
     period_us: int = ONCE
     fields: FrameFields = field(default_factory=FrameFields)
     due_us: int = NEVER
@@ -79,13 +82,13 @@ class TransmitRow:
         """Send it no more."""
         self.due_us = NEVER
 
-    def once(self) -> Frames:
+    def once(self) -> AnyFrames:
         """Return it, to be sent now."""
         data = self.fields.put(self.frame.data, self.sent)
         self.sent += 1
         return (self.frame._replace(data=data),)
 
-    def tick(self, now_us: int) -> Frames:
+    def tick(self, now_us: int) -> AnyFrames:
         """Return it if it is due."""
         if now_us < self.due_us:
             return ()
@@ -131,12 +134,12 @@ class TransmitList:
         self._check_armed()
         self.rows[number].enable(now_us)
 
-    def once(self, number: int) -> Frames:
+    def once(self, number: int) -> AnyFrames:
         """Return a row, to be sent now; ValueError if it is not armed."""
         self._check_armed()
         return self.rows[number].once()
 
-    def tick(self, now_us: int) -> Frames:
+    def tick(self, now_us: int) -> AnyFrames:
         """Return what is due, in the order of the rows."""
         return tuple(frame for row in self.rows for frame in row.tick(now_us))
 

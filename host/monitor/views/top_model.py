@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from tickrig.host.monitor.frames.ident import any_ident
 from tickrig.host.monitor.frames.quantity import load_text
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.traffic.bit_rates import NO_RATES, BitRates
 from tickrig.host.monitor.traffic.line_traffic import LineRow, LineTraffic, line_table
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot, Traffic
@@ -191,16 +192,16 @@ class TopModel:
     """Traffic and the view of it.
 
     Args:
-        bit_rate: of the buses, None if it is not known.
+        rates: bit rates of the buses.
 
     Attributes:
         traffic: what was heard.
         view: how it is shown.
     """
 
-    def __init__(self, bit_rate: int | None = None) -> None:
-        self.traffic, self._serial = Traffic(), LineTraffic()
-        self.view = View(styled=True, bit_rate=bit_rate, keys=True)
+    def __init__(self, rates: BitRates = NO_RATES) -> None:
+        self.traffic, self._serial, self.rates = Traffic(rates), LineTraffic(), rates
+        self.view = View(styled=True, bit_rate=rates.nominal, keys=True)
         self._held: tuple[Snapshot, tuple[LineRow, ...]] | None = None
         self._now_us = 0
         self._meanings: dict[tuple[str, int], Decoded] = {}

@@ -37,7 +37,7 @@ class AlarmTask(Task):
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self.alarms = Alarms(Rules(), self.bit_rate)
+        self.alarms = Alarms(Rules(), self.bit_rate, model.top.rates.fast)
         self._due_us = NEVER
 
     @property
@@ -52,7 +52,7 @@ class AlarmTask(Task):
 
     def hold(self, rules: Rules) -> None:
         """Hold other rules from now on; ValueError for a limit of the load without a bit rate."""
-        self.alarms = Alarms(rules, self.bit_rate)
+        self.alarms = Alarms(rules, self.bit_rate, self._model.top.rates.fast)
         self._due_us = NEVER if rules == Rules() else 0
 
     def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:

@@ -20,13 +20,15 @@ from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.transmit_list import (
     ON,
+    AnyFrames,
     RowText,
     TransmitList,
     parse_row_text,
     render_transmit,
 )
 from tickrig.host.tui.line_view import plain
-from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 
 
 def read_row(settings: Mapping[str, Any]) -> RowText:
@@ -72,7 +74,7 @@ class TransmitTask(Task):
         self.words: list[RowText] = []
         self.list = TransmitList()
         self._pdos = PdoFrames(eds)
-        self._out: list[CanFrame] = []
+        self._out: list[CanFrame | FdFrame] = []
 
     @property
     def due_us(self) -> int:
@@ -107,7 +109,7 @@ class TransmitTask(Task):
         self.list.armed = armed
         self._out += self.list.once(number)
 
-    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
         """Return what is due."""
         out, self._out = self._out, []
         return (*out, *self.list.tick(now_us))

@@ -23,9 +23,12 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import AnyRecord, Record
+from tickrig.host.monitor.traffic.bit_rates import BitRates
+from tickrig.host.monitor.transmit.transmit_list import AnyFrames
 from tickrig.host.monitor.views.top_model import TopModel
 from tickrig.host.monitor.views.trace import Trace
-from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -42,6 +45,7 @@ class Model:
         eds: what files say, by node-ID.
         dbc: DBC files.
         bit_rate: of the buses, None if it is not known.
+        data_bit_rate: of data of CAN FD frames with BRS, likewise.
 
     Attributes:
         eds: what files say, by node-ID.
@@ -52,7 +56,7 @@ class Model:
         frames: how many were taken, error frames among them.
         now_us: the time at the source.
         lost: frames that were there and did not get here.
-        unread: what came and is no frame of classic CAN.
+        unread: what came and is no frame of CAN or CAN FD.
         failed: why the source ended before its time; empty if it did not.
         ended: no more will come.
     """
@@ -62,11 +66,12 @@ class Model:
         eds: Mapping[int, EdsObjects] | None = None,
         dbc: Sequence[Path] = (),
         bit_rate: int | None = None,
+        data_bit_rate: int | None = None,
     ) -> None:
         self.eds = dict(eds or {})
         self.decoder = make_decoder(self.eds, dbc)
         self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
-        self.top = TopModel(bit_rate)
+        self.top = TopModel(BitRates(bit_rate, data_bit_rate))
         self.trace = Trace()
         self.frames = self.now_us = self.lost = self.unread = 0
         self.failed, self.ended = "", False
@@ -92,7 +97,7 @@ class Model:
 
 POLL_US: Final = 20_000
 
-Send = Callable[[CanFrame], None]
+Send = Callable[[CanFrame | FdFrame], None]
 """Sends a frame on one bus; SourceFailed if it cannot."""
 
 
@@ -110,7 +115,7 @@ class Task(Protocol):
         """When it next wants to be called without a frame; `NEVER` if not."""
         return NEVER
 
-    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
         """Take what was heard, those that this program sent among it; return what to send.
 
         Args:
@@ -223,7 +228,7 @@ class Session:
             if self.source.ended:
                 self._stop.wait(POLL_US / 1e6)
 
-    def _take(self, records: Sequence[AnyRecord]) -> list[tuple[str, CanFrame]]:
+    def _take(self, records: Sequence[AnyRecord]) -> list[tuple[str, CanFrame | FdFrame]]:
         self._echo = []
         self._watch.take(records)
         decoded_frames = self.model.take(records)
@@ -241,7 +246,7 @@ class Session:
         self.withheld += len(wanted)
         return []
 
-    def _send(self, channel: str, frame: CanFrame) -> None:
+    def _send(self, channel: str, frame: CanFrame | FdFrame) -> None:
         if not self.armed:  # somebody has stopped all meanwhile
             self.withheld += 1
             return
@@ -283,7 +288,7 @@ def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Ses
     return Session(source, model, {name: partial(_send, bus) for name, bus in opened.items()})
 
 
-def _send(bus: OpenBus, frame: CanFrame) -> None:
+def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:
     """Send on a bus as it was opened last."""
     from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415 - python-can is slow
 

@@ -14,6 +14,7 @@ from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 NODE = 5
@@ -51,8 +52,9 @@ class RigSession(Session):
         model = Model(described, bit_rate=bit_rate)
         super().__init__(RigSource(host), model, {BUS: self._put}, lambda: host.now_us)
 
-    def _put(self, frame: CanFrame) -> None:
+    def _put(self, frame: CanFrame | FdFrame) -> None:
         self.frames.append(str(frame))
+        assert isinstance(frame, CanFrame), "a rig has classic CAN"
         self._host.send((frame,))
 
     def run(self, span_us: int) -> None:

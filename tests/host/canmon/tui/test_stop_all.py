@@ -5,6 +5,7 @@ from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 from tickrig.host.monitor.transmit.transmit_list import parse_row_text
 from tickrig.wire.can import CanFrame
+from tickrig.wire.can_fd import FdFrame
 
 
 def sending(frames: int) -> RigSession:
@@ -23,7 +24,7 @@ def test_what_is_due_already_is_not_sent_after_a_stop() -> None:
     session = sending(3)
     put = session.buses[BUS]
 
-    def stopping(frame: CanFrame) -> None:
+    def stopping(frame: CanFrame | FdFrame) -> None:
         put(frame)
         session.disarm()
 
@@ -34,9 +35,9 @@ def test_what_is_due_already_is_not_sent_after_a_stop() -> None:
 
 def test_a_bus_that_fails_is_not_tried_again() -> None:
     session = sending(3)
-    tried: list[CanFrame] = []
+    tried: list[CanFrame | FdFrame] = []
 
-    def failing(frame: CanFrame) -> None:
+    def failing(frame: CanFrame | FdFrame) -> None:
         tried.append(frame)
         raise SourceFailed("can0 is down")
 

@@ -46,7 +46,7 @@ def test_raw_lines_are_those_of_candump(log: str) -> None:
         " (000.100000)  can1  RX - -  00000605   [1]  40",
         " (000.200000)  can0  RX - -       123   [5]  remote request",
         " (000.300000)  can0  RX - -  20000088   [8]  00 00 01 00 00 00 00 00   ERRORFRAME",
-        " (000.400000)  can0  RX B -       123   [02]  AA BB",
+        " (000.400000)  can0  RX B -       123  [02]  AA BB",
         " (001.000000)  can0  RX - -       123   [0] ",
     ]
 

@@ -58,7 +58,7 @@ def test_without_the_data_bit_rate_the_load_is_at_most_what_is_said() -> None:
 
 
 def test_the_table_shows_64_bytes_and_their_bits() -> None:
-    model = TopModel(500_000)
+    model = TopModel(BitRates(500_000))
     model.take([Record(0, "can0", WIDE), Record(1_000, "can0", WIDE._replace(data=bytes(64)))])
     bytes_shown = model.final(0)[-1]
     assert bytes_shown.startswith("123#")

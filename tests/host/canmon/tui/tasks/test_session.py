@@ -12,6 +12,7 @@ from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, 
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.instant import NEVER
 
 
@@ -95,7 +96,7 @@ def test_a_task_that_is_due_is_called_without_a_frame(session: Session) -> None:
 
 
 def test_a_bus_that_takes_nothing_disarms(wire: Wire) -> None:
-    def refuse(frame: CanFrame) -> None:
+    def refuse(frame: CanFrame | FdFrame) -> None:
         raise SourceFailed("cannot send on can0: no buffer space")
 
     real = wire_session(wire)
@@ -111,9 +112,9 @@ def test_a_bus_that_takes_nothing_disarms(wire: Wire) -> None:
 
 
 def test_who_leaves_does_not_wait_for_what_is_due(wire: Wire) -> None:
-    sent: list[CanFrame] = []
+    sent: list[CanFrame | FdFrame] = []
 
-    def send(frame: CanFrame) -> None:
+    def send(frame: CanFrame | FdFrame) -> None:
         sent.append(frame)
         left.close()
 
