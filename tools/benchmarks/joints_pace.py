@@ -75,6 +75,10 @@ class Joints:
             self._send(0x200 + node_id, data)
         begun_s = time.monotonic()
         self._send(0x80, b"")
+        return self.hear(begun_s, until_s)
+
+    def hear(self, begun_s: float, until_s: float) -> tuple[int, float]:
+        """Count TPDOs up to a time; say how long after another one the last came."""
         heard, last_s = 0, 0.0
         while (left_s := until_s - time.monotonic()) > 0:
             message = self._bus.recv(left_s)
@@ -125,15 +129,17 @@ def measure(count: int, cycles: int, path: Path) -> None:
             for number in range(cycles)
         ]
         share = (processor_s(emulator.pid) - spent_s) / (time.monotonic() - begun_s)
+        late, _ = joints.hear(time.monotonic(), time.monotonic() + 10 * CYCLE_S)
         emulator.send_signal(signal.SIGINT)
         ended = emulator.stderr.read().splitlines()[-1]
-    told(count, came, share)
+    told(count, came, late, share)
     print(f"|  the emulator: {ended} | | |")
 
 
-def told(count: int, came: list[tuple[int, float]], share: float) -> None:
-    """Print what came of a run."""
-    heard, whole = sum(heard for heard, _ in came), sum(heard == count for heard, _ in came)
+def told(count: int, came: list[tuple[int, float]], late: int, share: float) -> None:
+    """Print what came of a run, in its cycles and behind the last of them."""
+    heard = sum(heard for heard, _ in came) + late
+    whole = sum(heard == count for heard, _ in came)
     percentiles(
         f"{count} joints, {heard} of {count * len(came)} TPDOs, in {whole} of {len(came)} cycles"
         f" before the next SYNC, {share:.2f} of a core: last TPDO",
