@@ -14,6 +14,8 @@ from tickrig.wire.canopen.eds.eds_file import shorten
 
 _HEX: Final = re.compile(r"[0-9A-Fa-f]{1,8}[hH]")
 _QUOTED: Final = re.compile(r"0[xX][0-9A-Fa-f]+")
+FOLLOWING: Final = frozenset({"direction", "no-value", "not-mappable", "read-only", "value-limits"})
+"""Rules that a wrong key of the same line breaks, too: it was another entry that was meant."""
 UNSIGNED8, UNSIGNED16, UNSIGNED32 = 0xFF, 0xFFFF, 0xFFFF_FFFF
 
 
@@ -45,8 +47,15 @@ class Notes:
 
     @property
     def all(self) -> tuple[RuleFinding, ...]:
-        """All of them in the order of the lines."""
-        return tuple(sorted(self._found.values(), key=lambda one: (one.file, one.line)))
+        """All of them in the order of the lines, without those of `FOLLOWING` that follow."""
+        found = self._found.values()
+        slips = {(one.file, one.line) for one in found if one.rule.name == "unknown-key"}
+        told = (
+            one
+            for one in found
+            if one.rule.name not in FOLLOWING or (one.file, one.line) not in slips
+        )
+        return tuple(sorted(told, key=lambda one: (one.file, one.line)))
 
 
 class Section:

@@ -168,6 +168,19 @@ def test_findings_of_one_line_come_in_its_order(tmp_path: Path) -> None:
     assert told == keys
 
 
+@pytest.mark.parametrize(
+    "entry",
+    [
+        "sdo: [{index: 0x1018, subindex: 1, value: 1}]",
+        "sdo: [{index: 0x6060, valu: 3}]",
+        "tpdo: {1: {mapping: [{index: 0x6098, subindex: 3}]}}",
+    ],
+)
+def test_what_follows_from_a_key_that_nobody_knows_is_not_told(entry: str, tmp_path: Path) -> None:
+    bus = read_bus_file(write_bus(tmp_path, f"{NODE}  {entry}\n"))
+    assert [one.rule.name for one in bus.findings] == ["unknown-key"]
+
+
 def test_what_is_for_us_is_handed_on_with_its_lines(tmp_path: Path) -> None:
     text = NODE + "  tickrig:\n    motor:\n      inertia_kg_m2: 1e-4\n"
     slave = read_bus_file(write_bus(tmp_path, text)).slaves["axis"]
