@@ -183,7 +183,7 @@ class NetworkSlave:
         self.booting, self.outcome = False, outcome
         if outcome.status.good:
             self.state = self.state or NmtState.PRE_OPERATIONAL
-            self._begin_error_control()
+            self._begin_guarding()
         self._booted(self)
 
     def _may_try_again(self) -> bool:
@@ -192,10 +192,9 @@ class NetworkSlave:
             return True
         return self._now_us - self.began_us < self._boot_time_us
 
-    def _begin_error_control(self) -> None:
+    def _begin_guarding(self) -> None:
+        """Ask in periods; of heartbeats the boot-up has awaited one, and they are watched."""
         slave = self.assignment
-        if slave.heartbeat_us:
-            self._silent_us = self._now_us + slave.heartbeat_us
-        elif slave.guard_us and slave.life_time_factor:
+        if slave.guard_us and slave.life_time_factor and not slave.heartbeat_us:
             self._guard_us = self._now_us + slave.guard_us
             self._unanswered = 0

@@ -6,12 +6,38 @@ import pytest
 
 from tickrig.device.canopen.ds402.state import automaton
 from tickrig.host.canopen.master.cia402.drive_state import (
+    MODE_BITS,
     TRANSITIONS,
+    Controlword,
     DriveState,
+    Statusword,
     lead,
     next_state,
     state_of,
 )
+
+
+def test_the_bits_are_those_of_the_standard() -> None:
+    assert [int(bit) for bit in Controlword] == [1 << at for at in range(10)]
+    assert [bit.name for bit in Controlword] == [
+        *("SWITCH_ON", "ENABLE_VOLTAGE", "QUICK_STOP", "ENABLE_OPERATION"),
+        *("MODE_4", "MODE_5", "MODE_6", "FAULT_RESET", "HALT", "MODE_9"),
+    ]
+    assert MODE_BITS == 0b10_0111_0000
+    enabled = lead(MODE_BITS, DriveState.SWITCHED_ON, DriveState.OPERATION_ENABLED)
+    assert enabled == MODE_BITS | 0b1111
+    assert {bit.name: int(bit) for bit in Statusword} == {
+        "TARGET_REACHED": 1 << 10,
+        "MODE_12": 1 << 12,
+        "MODE_13": 1 << 13,
+    }
+
+
+def test_a_state_is_named_by_its_words() -> None:
+    assert DriveState.of("Switched on") is DriveState.SWITCHED_ON
+    assert DriveState.of(DriveState.FAULT) is DriveState.FAULT
+    with pytest.raises(ValueError, match=r"no state 'Switchd on'; did you mean 'Switched on'\?"):
+        DriveState.of("Switchd on")
 
 
 @pytest.mark.parametrize("state", automaton.DriveState)

@@ -9,6 +9,7 @@ from tickrig.host.canopen.master.nmt_master import NmtMaster
 from tickrig.host.canopen.master.process_data import ProcessData
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.instant import NEVER
 
 DEVICE_TYPE = "4300100092010200"
 
@@ -199,3 +200,61 @@ def test_a_lost_slave_may_reset_all_and_the_master_which_begins_anew() -> None:
     assert desk.nmt.slaves[3].outcome is None
     assert desk.at(91_000) == []  # nobody watches it now
     assert not desk.nmt.halted
+
+
+def test_of_a_slave_that_nobody_has_heard_nothing_is_known() -> None:
+    slave = Desk(SlaveAssignment(2)).nmt.slaves[2]
+    assert (slave.state, slave.outcome, slave.booting, slave.good) == (None, None, False, False)
+    assert (slave.lost, slave.began_us, slave.due_us) == (0, 0, NEVER)
+    assert (slave.steps, slave.events, slave.emergencies) == ([], [], [])
+
+
+def test_a_slave_that_reports_boot_up_is_pre_operational() -> None:
+    desk = Desk(SlaveAssignment(2))
+    desk.at(0)
+    desk.at(1_000, "702#00")
+    assert desk.nmt.slaves[2].state is NmtState.PRE_OPERATIONAL
+
+
+def told(desk: Desk) -> list[str]:
+    return [str(step) for _, step in desk.nmt.slaves[2].events]
+
+
+def test_a_guarded_slave_is_lost_each_time_it_falls_silent() -> None:
+    desk = Desk(SlaveAssignment(2, guard_us=100_000, life_time_factor=3))
+    desk.at(0)
+    for begun_us in (0, 1_000_000):
+        desk.now_us = begun_us
+        assert desk.boot(2) == ["702#R1", "000#0102"]
+        desk.at(begun_us, "702#05")
+        assert desk.at(begun_us + 100_000) == ["702#R1"]
+        desk.at(begun_us + 100_500, "702#85")
+        assert desk.at(begun_us + 200_000) == ["702#R1"]
+        desk.at(begun_us + 200_500, "702#84")  # not toggled: that is no answer
+        assert desk.at(begun_us + 300_000) == ["702#R1"]
+        assert desk.at(begun_us + 400_000) == ["000#8102"]
+        assert desk.at(begun_us + 500_000) == ["702#R1"]  # and once only
+    lost = "guarding: none within 300 ms; lost; reset node is sent, once"
+    assert told(desk) == [lost, "boot-up: heard; booted anew", lost]
+
+
+def test_a_boot_time_is_over_when_it_is_over() -> None:
+    desk = Desk(SlaveAssignment(2, mandatory=True), boot_time_us=400_000)
+    desk.at(0)
+    for now_us in (100_000, 200_000, 300_000):
+        assert desk.at(now_us)[-1] == "602#4000100000000000"
+    assert not desk.nmt.halted
+    desk.at(400_000)
+    assert desk.nmt.halted
+
+
+def test_a_boot_up_that_all_are_reset_in_is_forgotten() -> None:
+    slaves = SlaveAssignment(2, mandatory=True, heartbeat_us=50_000), SlaveAssignment(3)
+    desk = Desk(*slaves, resets_all=True)
+    desk.at(0)
+    desk.at(0, f"582#{DEVICE_TYPE}")
+    desk.at(1_000, "702#7F")
+    assert desk.at(2_000, "703#00") == ["603#4000100000000000"]
+    assert desk.at(51_000) == ["000#8100"]
+    desk.at(51_000)
+    assert desk.at(52_000, "703#00") == ["603#4000100000000000"]
