@@ -238,6 +238,17 @@ def test_a_guarded_slave_is_lost_each_time_it_falls_silent() -> None:
     assert told(desk) == [lost, "boot-up: heard; booted anew", lost]
 
 
+def test_a_guarded_slave_that_never_answers_is_lost_as_often_as_it_boots() -> None:
+    desk = Desk(SlaveAssignment(2, guard_us=100_000, life_time_factor=3))
+    desk.at(0)
+    for begun_us in (0, 1_000_000):
+        desk.now_us = begun_us
+        desk.boot(2)
+        for late_us in (100_000, 200_000):
+            assert desk.at(begun_us + late_us) == ["702#R1"]
+        assert desk.at(begun_us + 300_000) == ["000#8102"]
+
+
 def test_a_boot_time_is_over_when_it_is_over() -> None:
     desk = Desk(SlaveAssignment(2, mandatory=True), boot_time_us=400_000)
     desk.at(0)
