@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-MODELS: Final = ("f-palette", "motor-core-unit", "epos", "rtc-echo")
+MODELS: Final = ("f-palette", "f-palette-boot", "motor-core-unit", "epos", "rtc-echo")
 """Names of `models.MODELS`."""
 
 AUTO: Final = "auto"
@@ -17,6 +17,7 @@ NODE_FAULTS: Final = ("power_off", "unplugged")
 _DRIVE: Final = ("short_circuit", "encoder_unplugged", "shaft_blocked", "motor_phase_open")
 MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
     "f-palette": ("internal_failure", "input_overcurrent", "output_overload"),
+    "f-palette-boot": ("internal_failure", "input_overcurrent", "output_overload"),
     "motor-core-unit": _DRIVE,
     "epos": _DRIVE,
 }

@@ -11,7 +11,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import application_of, make_dictionary
-from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
+from tickrig.device.canopen.models import epos, f_palette, f_palette_boot, motor_core_unit
 from tickrig.emulators.canopen.eds import DeviceDescription
 from tickrig.wire.canopen.eds.object_table import BIT_RATES, DeviceInfo
 
@@ -56,6 +56,13 @@ _MODELS: Final = (
         f_palette.NODE_ID,
         f_palette.dictionary,
         f_palette.make_application,
+    ),
+    Model(
+        "f-palette-boot",
+        "f-palette with a boot loader that takes its program (1F50h)",
+        f_palette_boot.NODE_ID,
+        f_palette_boot.dictionary,
+        f_palette_boot.make_application,
     ),
     Model(
         "motor-core-unit",

@@ -222,7 +222,7 @@ class Dialogue:
         match self._step:
             case SdoRequest() as request:
                 self._say(Abort(request.index, request.sub, AbortCode.TIMEOUT).encode())
-                self._go_on(SdoTimeout(request.index, request.sub))
+                self._go_on(SdoTimeout(request.index, request.sub, self._sdo_timeout_us))
             case AwaitState() as wait:
                 self._go_on(StateTimeout(f"{wait.state.name} was not reported"))
             case _:

@@ -37,10 +37,15 @@ class SdoAborted(SdoFailed):
 
 
 class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it
-    """A transfer to which nobody answered."""
+    """A transfer to which nobody answered.
 
-    def __init__(self, index: int, sub: int) -> None:
+    Attributes:
+        timeout_us: how long an answer was waited for.
+    """
+
+    def __init__(self, index: int, sub: int, timeout_us: int = 0) -> None:
         super().__init__(f"{index:04X}h:{sub:02X} was not answered", index, sub)
+        self.timeout_us = timeout_us
 
 
 class StateTimeout(TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it

@@ -111,7 +111,9 @@ def _keep_to_group(sock: socket.socket) -> None:
             sock.recv(1, socket.MSG_DONTWAIT)
 
 
-SEND_TIMEOUT_S = 1
+SEND_TIMEOUT_US: Final = 1_000_000
+AGAIN_S: Final = 0.001
+"""A queue without room is tried again so soon: that of SocketCAN has ten places."""
 PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
@@ -174,12 +176,22 @@ class CanLink:
             LinkClosed: the bus is gone, or took none for 1 s.
         """
         for frame in traffic:
-            try:
-                self._bus.send(to_message(frame), 0 if self._drops else SEND_TIMEOUT_S)
-            except (can.CanError, OSError, ValueError) as error:
-                if not (self._drops and _is_full(error)):
-                    raise LinkClosed(f"cannot send on {self._name}: {error}") from error
+            deadline_us = self.now_us + SEND_TIMEOUT_US
+            while not self._sent(frame, deadline_us):
+                time.sleep(AGAIN_S)
+
+    def _sent(self, frame: CanFrame, deadline_us: int) -> bool:
+        """Send a frame; False if the queue of its driver has no room for now."""
+        try:
+            self._bus.send(to_message(frame), 0 if self._drops else SEND_TIMEOUT_US / 1e6)
+        except (can.CanError, OSError, ValueError) as error:
+            if self._drops and _is_full(error):
                 self.lost += 1
+            elif _has_no_room(error) and self.now_us < deadline_us:
+                return False
+            else:
+                raise LinkClosed(f"cannot send on {self._name}: {error}") from error
+        return True
 
     def receive(self, timeout_us: int, /) -> Frames:
         """Wait for a first frame, then take all that are there.
@@ -255,6 +267,12 @@ def _is_full(error: Exception) -> bool:
     if isinstance(error, can.CanOperationError):
         return error.error_code in (None, errno.ENOBUFS, errno.EAGAIN)
     return isinstance(error, OSError) and error.errno in (errno.ENOBUFS, errno.EAGAIN)
+
+
+def _has_no_room(error: Exception) -> bool:
+    """Say whether the queue of the driver is full; each of its frames that leaves makes room."""
+    code = getattr(error, "error_code", None) or getattr(error, "errno", None)
+    return code in (errno.ENOBUFS, errno.EAGAIN)
 
 
 def _error_state(message: can.Message) -> ErrorState | None:

@@ -85,7 +85,7 @@ class Dictionary(Part):
     (5, 0)
     """
 
-    __slots__ = ("_entries", "_places", "by_multiplexer", "description")
+    __slots__ = ("_entries", "_only", "_places", "by_multiplexer", "description")
 
     def __init__(
         self,
@@ -99,6 +99,16 @@ class Dictionary(Part):
         self.description, self._places = description, description.places
         self._entries = list(map(Entry, description.entries))
         self.by_multiplexer: dict[bytes, Entry] = {}
+        self._only: frozenset[int] | None = None
+
+    def restrict(self, only: frozenset[int] | None) -> None:
+        """Let SDOs find no other objects than some, as those of a boot loader.
+
+        Args:
+            only: their indices; None for all that there are.
+        """
+        self._only = only
+        self.by_multiplexer.clear()
 
     def copy(self) -> Dictionary:
         """Return the same objects with their default values, for another slave."""
@@ -157,8 +167,9 @@ class Dictionary(Part):
         if entry is None:
             index = int.from_bytes(multiplexer[:2], "little")
             entry = self.find(index, multiplexer[2])
-            if entry is None:
-                known = index in self.objects
+            there = self._only is None or index in self._only
+            if entry is None or not there:
+                known = there and index in self.objects
                 raise SdoAbort(AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT)
             if entry.description.readable:
                 self.by_multiplexer[multiplexer] = entry

@@ -14,12 +14,14 @@ class Nonvolatile:
         node_id: node-ID stored by LSS, None if none was.
         bit_rate_index: bit timing index stored by LSS, None if none was.
         version: counts every change, so that an emulator knows when to write its file.
+        program: downloaded (1F50h), empty where it was cleared; None for the one it was made with.
     """
 
     parameters: dict[int, bytes] = field(default_factory=dict)
     node_id: int | None = None
     bit_rate_index: int | None = None
     version: int = 0
+    program: bytes | None = None
 
     def changed(self) -> None:
         """Note that something was stored or erased."""

@@ -76,11 +76,17 @@ def dictionary() -> Dictionary:
 
 @cache
 def _template() -> Dictionary:
+    objects = object_table(PROFILE)
+    return Dictionary(objects, objects.objects)
+
+
+def object_table(profile: CommunicationProfile) -> ObjectTable:
+    """Return the objects of such a module, with these communication objects."""
     objects = ObjectTable()
-    add_communication(objects, PROFILE)
+    add_communication(objects, profile)
     _add_digital(objects)
     _add_analogue(objects)
-    return Dictionary(objects, objects.objects)
+    return objects
 
 
 def make_application(node: CanopenSlave, slot: int) -> Ds401:

@@ -101,14 +101,20 @@ def parse_memory(node: Mapping[str, Any]) -> Nonvolatile:
     for name, data in node["parameters"].items():
         index, sub = name.split(":")
         parameters[int(index, 16) << 8 | int(sub, 16)] = bytes.fromhex(data)
+    program = node.get("program")
     return Nonvolatile(
-        parameters, _number(node["node_id"], NODE_IDS), _number(node["bit_rate_index"], range(10))
+        parameters,
+        _number(node["node_id"], NODE_IDS),
+        _number(node["bit_rate_index"], range(10)),
+        program=None if program is None else bytes.fromhex(program),
     )
 
 
 def memory_values(memory: Nonvolatile) -> dict[str, Any]:
     """Return what a node has stored, as JSON has it."""
+    program = {} if memory.program is None else {"program": memory.program.hex().upper()}
     return {
+        **program,
         "node_id": memory.node_id,
         "bit_rate_index": memory.bit_rate_index,
         "parameters": {

@@ -25,6 +25,7 @@ VERBS: Final = {
     "compare": (f"{HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node"),
     "store": (f"{HERE}.store_verb:store", "Store parameters of NODE (1010h)"),
     "restore": (f"{HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)"),
+    "program": (f"{HERE}.program_verb:command", "Download FILE into NODE by block transfer"),
 }
 ANSWER_US: Final = 500_000
 

@@ -40,7 +40,7 @@ def differences(
         try:
             found = session.bus.read(objects.node_id, *entry, objects.size(entry))
         except SdoAborted as error:
-            why = failure_text(error, session.timeout_us, lambda at: "").removeprefix(": ")
+            why = failure_text(error, lambda at: "").removeprefix(": ")
             yield Difference(entry, wanted, None, why)
             continue
         if not same(row, wanted, found):

@@ -135,7 +135,7 @@ def net_session(call: NetCall, node_id: int | None = None) -> Iterator[NetSessio
             yield session
             ended = True
     except SdoFailed as error:
-        raise NodeFailed(_with_work(failure_text(error, call.timeout_us), session)) from None
+        raise NodeFailed(_with_work(failure_text(error), session)) from None
     except NodeFailed as error:
         raise NodeFailed(_with_work(error.message, session)) from None
     except LinkClosed as error:
@@ -152,7 +152,7 @@ def _with_work(text: str, session: NetSession) -> str:
     return f"{text}; {progress}" if progress else text
 
 
-def failure_text(error: SdoFailed, timeout_us: int, title: Title = write_entry) -> str:
+def failure_text(error: SdoFailed, title: Title = write_entry) -> str:
     """Say why a transfer failed, in words."""
     at = title((error.index, error.sub))
     match error:
@@ -161,17 +161,15 @@ def failure_text(error: SdoFailed, timeout_us: int, title: Title = write_entry) 
         case SdoAborted():
             return f"{at}: refused: {describe_abort(error.code)}"
         case SdoTimeout():
-            return f"{at}: no answer within {timeout_us // 1_000} ms"
+            return f"{at}: no answer within {error.timeout_us // 1_000} ms"
     return str(error)
 
 
 @contextmanager
-def of_node(
-    session: NetSession, node_id: int, title: Title = write_entry, timeout_us: int = 0
-) -> Iterator[None]:
+def of_node(node_id: int, title: Title = write_entry) -> Iterator[None]:
     """Name the node, and the object, in what goes wrong in the block; NodeFailed then."""
     try:
         yield
     except SdoFailed as error:
-        text = failure_text(error, timeout_us or session.timeout_us, title)
+        text = failure_text(error, title)
         raise NodeFailed(f"node {node_id}: {text}") from None

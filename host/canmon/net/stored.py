@@ -28,7 +28,7 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
         node_id: the node.
         sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others as its maker says.
     """
-    with of_node(session, node_id, timeout_us=PATIENCE_US):
+    with of_node(node_id):
         data = session.bus.read(node_id, STORE, sub)
         if not data[:1] or not data[0] & ON_COMMAND:
             raise NodeFailed(
@@ -41,7 +41,7 @@ def save(session: NetSession, node_id: int, sub: int) -> None:
 
 def load_defaults(session: NetSession, node_id: int, sub: int) -> None:
     """Have a node forget what was stored; it counts from its next reset."""
-    with of_node(session, node_id, timeout_us=PATIENCE_US):
+    with of_node(node_id):
         session.bus.write(node_id, RESTORE, sub, b"load", PATIENCE_US)
     say(f"node {node_id}: restored; the defaults count from its next reset")
 

@@ -315,8 +315,8 @@ def test_many_values_follow_one_option() -> None:
     ("words", "completed"),
     [
         ("--st", "plain,--store\n"),
-        ("--model f-p", "plain,f-palette\n"),
-        ("--node 5=f-p", "plain,5=f-palette\nfile,5=f-p\n"),
+        ("--model f-p", "plain,f-palette\nplain,f-palette-boot\n"),
+        ("--node 5=f-p", "plain,5=f-palette\nplain,5=f-palette-boot\nfile,5=f-p\n"),
         ("--profile n", "plain,none\n"),
     ],
 )

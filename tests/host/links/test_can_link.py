@@ -111,6 +111,29 @@ def test_a_link_that_drops_goes_on_when_the_bus_takes_nothing(code: int | None) 
     link.close()
 
 
+class NarrowBus(FullBus):
+    """A bus whose queue has room now and then, as SocketCAN's of ten frames."""
+
+    def __init__(self) -> None:
+        super().__init__(errno.ENOBUFS)
+        self.taken: list[int] = []
+        self._calls = 0
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        self._calls += 1
+        if self._calls % 3:
+            super().send(msg, timeout)
+        self.taken.append(msg.arbitration_id)
+
+
+def test_a_queue_without_room_is_waited_for() -> None:
+    bus = NarrowBus()
+    link = CanLink(bus, "narrow")
+    link.send(frames("080# 081# 082#"))
+    assert bus.taken == [0x80, 0x81, 0x82]
+    link.close()
+
+
 @pytest.mark.parametrize(("code", "drops"), [(errno.ENETDOWN, True), (None, False)])
 def test_a_bus_that_is_gone_ends_it(code: int | None, drops: bool) -> None:
     link = CanLink(FullBus(code), "full", drops=drops)

@@ -46,13 +46,13 @@ def command(call: NetCall, node: int, other: str, eds: Path | None) -> None:
     with net_session(call, node) as session, until_unread():
         other_id = _node_id(other)
         file = eds if other_id else Path(other)
-        with of_node(session, node):
+        with of_node(node):
             objects = known_objects(session, node, file, what="--eds" if other_id else "FILE")
         if other_id:
             values, where = _of_node(session, objects, other_id), f"at node {other_id}"
         else:
             values, where = _of_file(objects), "in the file"
-        with of_node(session, node, objects.title):
+        with of_node(node, objects.title):
             for one in differences(session, objects, values):
                 found += 1
                 click.echo(one_line(line(objects, one, where)))
@@ -83,7 +83,7 @@ def _of_node(session: NetSession, objects: NodeObjects, other_id: int) -> Values
     rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
     if not rows:
         raise Refused("which objects? give the EDS of both nodes (--eds FILE)")
-    with of_node(session, other_id, objects.title):
+    with of_node(other_id, objects.title):
         found = values_of(session, other_id, rows)
     shift = objects.node_id - other_id
     for at, data in found.items():

@@ -55,10 +55,10 @@ def command(  # noqa: PLR0913, PLR0917 - options
     canmon net can0 dcf 5 drive.dcf --store --yes
     """  # noqa: D301 - click wants the backspace
     with net_session(call, node) as session:
-        with of_node(session, node):
+        with of_node(node):
             objects = known_objects(session, node, file, what="FILE", strict=not other_device)
         values = _values(objects, skip)
-        with of_node(session, node, objects.title):
+        with of_node(node, objects.title):
             changed = values if whole else _changed(session, objects, values)
             steps = list(writes(changed, _number_of(session, node), _writable(objects)))
         if dry_run or not steps:
@@ -114,7 +114,7 @@ def _write(
     session.work.plan(*titles, *(["store"] if store else []))
     for number, (at, data) in enumerate(steps):
         session.work.ending = disabled(steps[:number], steps[number:])
-        with of_node(session, objects.node_id, objects.title):
+        with of_node(objects.node_id, objects.title):
             session.bus.write(objects.node_id, *at, data)
         session.work.done()
     session.work.ending = ""

@@ -44,9 +44,9 @@ def command(
     """  # noqa: D301 - click wants the backspace
     refused: list[Entry] = []
     with net_session(call, node) as session, until_unread():
-        with of_node(session, node):
+        with of_node(node):
             objects = known_objects(session, node, eds)
-        with of_node(session, node, objects.title):
+        with of_node(node, objects.title):
             for entry in _wanted(objects, names):
                 line = _read(session, objects, entry, as_json)
                 refused += [] if line else [entry]
@@ -70,7 +70,7 @@ def _read(session: NetSession, objects: NodeObjects, entry: Entry, as_json: bool
     try:
         data = session.bus.read(node_id, *entry, objects.size(entry))
     except SdoAborted as error:
-        text = failure_text(error, session.timeout_us, objects.title)
+        text = failure_text(error, objects.title)
         say(one_line(f"node {node_id}: {text}"))
         return None
     if not as_json:

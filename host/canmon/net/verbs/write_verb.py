@@ -40,7 +40,7 @@ def command(call: NetCall, node: int, values: Sequence[str], eds: Path | None, y
     """  # noqa: D301 - click wants the backspace
     pairs = list(map(_split, values))
     with net_session(call, node) as session:
-        with of_node(session, node):
+        with of_node(node):
             objects = known_objects(session, node, eds)
         writes = [(objects.find(name), text) for name, text in pairs]
         made = [(entry, text, encoded(objects, entry, text)) for entry, text in writes]
@@ -63,7 +63,7 @@ def _split(word: str) -> tuple[str, str]:
 
 def _write(session: NetSession, objects: NodeObjects, entry: Entry, data: bytes) -> None:
     node_id = objects.node_id
-    with of_node(session, node_id, objects.title):
+    with of_node(node_id, objects.title):
         try:
             session.bus.write(node_id, *entry, data)
         except SdoAborted as error:

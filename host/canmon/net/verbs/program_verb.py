@@ -1,0 +1,161 @@
+"""The verb `net program`: firmware into a node."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.host.canmon.net.group import NetCall
+from tickrig.host.canmon.net.node_objects import Entry
+from tickrig.host.canmon.net.progress_bar import ProgressBar
+from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
+from tickrig.host.canopen.commissioning.program import COMMANDS, Program, ProgramFailed
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.monitor.decode.sdo.transfer import write_entry
+
+MOST_BYTES: Final = 256 << 20
+"""A larger file is no firmware."""
+IDENTIFICATION: Final = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
+NAMES: Final = {
+    0x1F50: "program data",
+    0x1F51: "program control",
+    0x1F56: "program software identification",
+    0x1F57: "flash status",
+}
+RISK: Final = "The program stops: a drive lets go of its motor, what hangs on it may fall"
+HALF: Final = (
+    "the node has no whole program; a transfer cannot go on in its middle:"
+    " the same command begins it anew"
+)
+
+
+@click.command()
+@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("file", type=PATH, required=False)
+@click.option("--number", type=click.IntRange(1, 254), default=1, metavar="N", help="Program.  [1]")
+@click.option("--control", type=click.Choice(list(COMMANDS)), help="Command its program alone.")
+@click.option("--expect", metavar="ID", help="1F56h of FILE, in hex; if it is there, all is done.")
+@click.option("--no-start", is_flag=True, help="Leave it stopped.")
+@click.option("--tries", type=click.IntRange(1, 99), default=3, metavar="N", help="Transfers.  [3]")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def command(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall,
+    node: int,
+    file: Path | None,
+    number: int,
+    control: str | None,
+    expect: str | None,
+    no_start: bool,
+    tries: int,
+    yes: bool,
+) -> None:
+    """Download FILE into NODE by block transfer (CiA 302-3); without FILE say what it runs.
+
+    Stop and clear (1F51h), download (1F50h), wait for the flash (1F57h), identification
+    (1F56h), start. Steps that are done are left out, so the same command again goes on
+    where it ended; a transfer that broke off begins anew, which CiA 301 leaves no
+    choice in. Blocks that are lost are sent again.
+
+    \b
+    canmon net can0 program 5
+    canmon net can0 program 5 firmware.bin --expect 1A2B3C4D
+    canmon net can0 program 5 --control start
+    """  # noqa: D301 - click wants the backspace
+    if file is not None and control is not None:
+        raise Refused("FILE or --control: which? give one")
+    data = b"" if file is None else _read(file)
+    wanted = None if expect is None else _identification(expect)
+    with net_session(call, node) as session:
+        program = Program(session.bus, node, number, lambda text: say(f"node {node}: {text}"))
+        with of_node(node, _title):
+            status = program.status()
+        try:
+            with of_node(node, _title):
+                if file is not None:
+                    click.echo(f"node {node}: {status}")
+                    if wanted is not None and (status.control, status.identification) == (
+                        1,
+                        wanted,
+                    ):
+                        say(f"node {node}: it runs what is expected; nothing is to be done")
+                        return
+                    what = f"{len(data)} bytes of {file.name} into program {number} of node {node}"
+                    session.confirm(what, yes=yes, risk=RISK)
+                    _download(session, program, data, wanted, tries=tries, start=not no_start)
+                elif control is not None:
+                    risk = RISK if control != "start" else "This may turn a motor: the program runs"
+                    what = f"program {number} of node {node}: {control}"
+                    session.confirm(what, yes=yes, risk=risk)
+                    program.command(COMMANDS[control])
+                    session.bus.gather(session.timeout_us)
+            click.echo(f"node {node}: {program.status()}")
+        except ProgramFailed as error:
+            raise NodeFailed(f"node {node}: {error}") from None
+
+
+def _title(entry: Entry) -> str:
+    """Name an object of a program."""
+    return f"{write_entry(entry)} {NAMES.get(entry[0], '')}".rstrip()
+
+
+def _read(file: Path) -> bytes:
+    """Read the firmware; Refused if it cannot be, is empty or too large."""
+    try:
+        with file.open("rb") as opened:
+            data = opened.read(MOST_BYTES + 1)
+    except OSError as error:
+        refuse_path("FILE", error)
+    if not data:
+        raise Refused(f"FILE {file}: it is empty")
+    if len(data) > MOST_BYTES:
+        raise Refused(f"FILE {file}: more than {MOST_BYTES >> 20} MiB: no firmware")
+    return data
+
+
+def _identification(text: str) -> int:
+    match = IDENTIFICATION.fullmatch(text)
+    if match is None:
+        raise Refused(f"--expect {text!r} is no identification of up to 8 hex digits, as 1A2B3C4D")
+    return int(match[1], 16)
+
+
+def _download(  # noqa: PLR0913 - steps
+    session: NetSession,
+    program: Program,
+    data: bytes,
+    wanted: int | None,
+    *,
+    tries: int,
+    start: bool,
+) -> None:
+    """Take each step, with what is left behind if it is the last one."""
+    work = session.work
+    work.plan("stop", "clear", "download", "identification", *(["start"] if start else []))
+    program.stop()
+    work.done()
+    program.clear()
+    work.done()
+    work.ending = HALF
+    bar = ProgressBar(len(data), lambda: session.bus.now_us)
+    try:
+        program.download(data, bar.take, tries)
+    finally:
+        bar.end()
+    work.done()
+    say(f"{len(data)} bytes written")
+    work.ending = "the program is written, and not started"
+    found = program.status().identification
+    if wanted is not None and found != wanted:
+        said = "none" if found is None else f"{found:08X}h"
+        raise ProgramFailed(f"its identification (1F56h) is {said}, {wanted:08X}h was expected")
+    work.done()
+    if start:
+        program.start()
+        work.done()
+    work.ending = ""
