@@ -32,6 +32,7 @@ def blocks(page: str, language: str) -> list[str]:
         "docs/canmon-decode.md",
         "docs/canmon-logs.md",
         "docs/canmon-model.md",
+        "docs/canmon-recording.md",
         "docs/canopen.md",
         "docs/canopen-master.md",
         "docs/conform.md",

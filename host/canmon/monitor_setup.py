@@ -10,14 +10,11 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self, TypeGuard
+from typing import Any, Final, Protocol, Self, TypeGuard
 
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.canmon.workspace import SettingError, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
-
-if TYPE_CHECKING:
-    from tickrig.host.canmon.tui.panels.panel import Panel
 
 BUS: Final = "bus"
 NODES: Final = "nodes"
@@ -161,6 +158,23 @@ FRAME: Final = (BUS, NODES)
 """Sections that are no panel's."""
 
 
+class Kept(Protocol):
+    """What has settings in a workspace, as a panel."""
+
+    @property
+    def section(self) -> str:
+        """Its table."""
+        ...
+
+    def load(self, settings: Mapping[str, Any], /) -> None:
+        """Take settings; SettingError if one is wrong."""
+        ...
+
+    def save(self) -> dict[str, Any]:
+        """Return all its settings."""
+        ...
+
+
 class PanelSettings:
     """Recalls settings, and keeps them.
 
@@ -170,7 +184,7 @@ class PanelSettings:
         panels: whose settings they are.
     """
 
-    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[Panel]) -> None:
+    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[Kept]) -> None:
         self.workspace, self._setup, self._panels = workspace, setup, tuple(panels)
         self._conflict = ""
 

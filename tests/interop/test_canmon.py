@@ -205,6 +205,31 @@ def test_a_bus_that_was_removed_and_made_again_is_opened_again(
     run("ip", "link", "delete", "vcan9")
 
 
+def test_a_recorder_goes_on_when_its_bus_is_back(vcan: Bus, tmp_path: Path) -> None:
+    add = ["ip", "link", "add", "dev", "vcan9", "type", "vcan"]
+    if subprocess.run(add, check=False).returncode:
+        pytest.skip("only root makes buses")
+    run("ip", "link", "set", "vcan9", "up")
+    words = ["dump", "vcan9", "-l", str(tmp_path / "run.log"), "--rotate", "1M", "--strict"]
+    part = tmp_path / "run-00001.log"
+    with listening([*CANMON, *words], tmp_path, "dump") as canmon:
+        run("cangen", "vcan9", "-g", "0", "-n", "500", "-I", "123", "-L", "8", "-D", "i")
+        wait(lambda: part.exists() and part.read_text("ascii").count(" 123#") == 500)
+        run("ip", "link", "delete", "vcan9")
+        wait(lambda: "# vcan9 is gone: " in part.read_text("ascii"))
+        run(*add)
+        run("ip", "link", "set", "vcan9", "up")
+        wait(lambda: "# vcan9 is back after " in part.read_text("ascii"))
+        run("cansend", "vcan9", "7FF#")
+        wait(lambda: part.read_text("ascii").endswith(" 7FF#\n"))
+        assert canmon.end() == 4
+        assert canmon.said.endswith("Error: a bus was away 1 time\n")
+    run("ip", "link", "delete", "vcan9")
+    assert len(list(read_log(part))) == 501
+    index = (tmp_path / "run.index.jsonl").read_text("ascii")
+    assert re.findall(r'"ev":"(\w+)"', index) == ["open", "gone", "back", "file", "end"]
+
+
 def test_candump_reads_what_it_logs(vcan: Bus, tmp_path: Path) -> None:
     log = tmp_path / "run.log"
     with listening([*CANMON, "dump", vcan.channel, "-l", str(log)], tmp_path, "dump") as canmon:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,12 +15,16 @@ from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormatError, log_format
+from tickrig.host.monitor.logs.log_writer import write_log
 from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.recorder.plan import Plan
 from tickrig.host.monitor.recorder.recorder import Recorder
+from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
+    from tickrig.host.monitor.frames.record import AnyRecord
     from tickrig.host.monitor.recorder.trigger import FilterTrigger, Trigger
 
 
@@ -98,3 +103,25 @@ def check_not_read(path: Path, source: Sequence[str]) -> None:
     read = (parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec))
     if path.exists() and any(one.exists() and one.samefile(path) for one in read):
         raise Refused(f"{path} is read, so it cannot be written")
+
+
+def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
+    """Write frames into a new log; say how many, and what could not be held.
+
+    Raises:
+        ValueError: it is there already, or cannot be written.
+    """
+    frames = [record for record in records if isinstance(record, Record)]
+    if path.exists():
+        raise ValueError(f"{path} is there already: choose another name")
+    try:
+        with closing(write_log(path)) as writer:
+            for frame in frames:
+                writer.write(frame)
+    except OSError as error:
+        with suppress(OSError):
+            path.unlink(missing_ok=True)
+        raise ValueError(f"{path}: {error.strerror}") from None
+    lines = len(records) - len(frames)
+    left_out = [f"{counted(lines, 'line')} of serial ports left out"] if lines else []
+    return [f"{counted(len(frames), 'frame')} written to {path}", *left_out, *writer.messages()]

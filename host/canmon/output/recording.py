@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.output.log_file import LogFile
-from tickrig.host.cli.options import Decorator, add_options
+from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.recorder.plan import AtLimit, Plan, read_plan
 
@@ -44,6 +45,8 @@ recording_options: Final[Decorator] = add_options(
 )
 """Add what `Recording` takes."""
 
+WORDS_METAVAR: Final = "FILE [--rotate 100M] [--disk 2G] [--trigger emcy]"
+
 NAMES: Final = ("rotate", "disk", "at_limit", "trigger", "pre", "post")
 
 
@@ -54,6 +57,7 @@ class Recording:
         path: of the file.
         options: by their names.
         bit_rate: of the bus, for a limit of the load among the rules.
+        parts: it is in parts, whatever the options say.
 
     Attributes:
         plan: what it shall be.
@@ -64,9 +68,11 @@ class Recording:
         Refused: one that is wrong.
     """
 
-    def __init__(self, path: Path, options: dict[str, Any], bit_rate: int | None) -> None:
+    def __init__(
+        self, path: Path, options: dict[str, Any], bit_rate: int | None, parts: bool = False
+    ) -> None:
         words: Sequence[str] = options["trigger"]
-        self.plan = read_recording_plan(path, options)
+        self.plan = read_recording_plan(path, options, parts)
         self.triggers = [_trigger(word, bit_rate) for word in words]
         self.decodes = any(not word.endswith(RULE_FILE) for word in words)
 
@@ -85,7 +91,29 @@ class Recording:
         return LogFile(self.plan, source, live, self.triggers, wanted)
 
 
-def read_recording_plan(path: Path, options: dict[str, Any]) -> Plan:
+def read_recording(words: str, bit_rate: int | None) -> Recording:
+    """Read a recording in parts as people write it: a file and options; Refused if it is none."""
+    try:
+        command = click.Command("record", params=_params())
+        context = command.make_context("record", shlex.split(words))
+    except (click.ClickException, click.exceptions.Exit) as error:
+        text = error.format_message() if isinstance(error, click.ClickException) else "--help"
+        raise Refused(f"{text.rstrip('.')}: write {WORDS_METAVAR}") from None
+    except ValueError as error:
+        raise Refused(f"{words!r}: {error}") from None
+    return Recording(context.params.pop("file"), context.params, bit_rate, parts=True)
+
+
+def _params() -> list[click.Parameter]:
+    @click.argument("file", type=PATH)
+    @recording_options
+    def record() -> None:
+        """Hold the options."""
+
+    return click.command(record).params
+
+
+def read_recording_plan(path: Path, options: dict[str, Any], parts: bool = False) -> Plan:
     """Read what options say of the files; Refused if one is wrong."""
     try:
         return read_plan(
@@ -96,6 +124,7 @@ def read_recording_plan(path: Path, options: dict[str, Any]) -> Plan:
             pre=options["pre"],
             post=options["post"],
             waits=bool(options["trigger"]),
+            parts=parts,
         )
     except ValueError as error:
         text = str(error)
@@ -124,11 +153,13 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
 def _rules(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
     from tickrig.host.monitor.check.alarms import Alarms  # noqa: PLC0415
-    from tickrig.host.monitor.check.rules import parse_rules  # noqa: PLC0415
+    from tickrig.host.monitor.check.rules import Rules, parse_rules  # noqa: PLC0415
     from tickrig.host.monitor.recorder.trigger import RuleTrigger  # noqa: PLC0415
 
     try:
         rules = parse_rules(tomllib.loads(Path(word).read_text("utf-8")), load_rule)
+        if rules == Rules(bit_rate=rules.bit_rate):
+            raise ValueError("it has no rule")
         return RuleTrigger(Path(word).name, Alarms(rules, bit_rate))
     except OSError as error:
         raise Refused(f"--trigger {word}: {error.strerror}") from error

@@ -14,9 +14,12 @@ from textual.binding import Binding, BindingType
 from textual.screen import ModalScreen, Screen
 from textual.widgets import Input, TabbedContent, TabPane
 
+from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
+from tickrig.host.canmon.output.recording import WORDS_METAVAR
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.status_line import StatusLine
+from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.tui.framed_app import FramedApp
@@ -28,6 +31,8 @@ class ExportScreen(ModalScreen[str]):
 
     Args:
         name: what stands in the field.
+        title: what it is for.
+        example: what is shown in an empty one.
     """
 
     DEFAULT_CSS = """
@@ -36,14 +41,16 @@ class ExportScreen(ModalScreen[str]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", "leave")]
 
-    def __init__(self, name: str) -> None:
+    def __init__(
+        self, name: str, title: str = "keep all settings in", example: str = "bench.toml"
+    ) -> None:
         super().__init__()
-        self._text = name
+        self._text, self._title, self._example = name, title, example
 
     def compose(self) -> ComposeResult:
         """Lay out the field."""
-        field = Input(self._text, placeholder="bench.toml")
-        field.border_title = "keep all settings in"
+        field = Input(self._text, placeholder=self._example)
+        field.border_title = self._title
         yield field
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
@@ -68,6 +75,7 @@ class Monitor(FramedApp):
         session: what is heard, and how to send; it is started by whoever runs the app.
         panels: the tabs.
         panel_settings: keeps their settings; without one nothing is kept until it is exported.
+        recorder: what records; a new one unless given.
     """
 
     TITLE = "canmon"
@@ -83,15 +91,24 @@ class Monitor(FramedApp):
         Binding("f9", "stop", "stop all", priority=True, key_display="F9"),
         *[Binding(f"{n}", f"tab({n})", f"tab {n}", show=False) for n in range(1, 10)],
         Binding("w", "export", "save as"),
+        Binding("f8", "record", "record", key_display="F8"),
+        Binding("f4", "trigger", "trigger", key_display="F4"),
     ]
 
     def __init__(
-        self, session: Session, panels: Sequence[Panel], panel_settings: PanelSettings | None = None
+        self,
+        session: Session,
+        panels: Sequence[Panel],
+        panel_settings: PanelSettings | None = None,
+        recorder: RecorderTask | None = None,
     ) -> None:
         super().__init__()
+        self.recorder = recorder or RecorderTask(session)
         self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
-        self.panel_settings = panel_settings or PanelSettings(Workspace(), MonitorSetup(), panels)
+        self.panel_settings = panel_settings or PanelSettings(
+            Workspace(), MonitorSetup(), [*panels, self.recorder]
+        )
 
     def compose(self) -> ComposeResult:
         """Lay out the tabs."""
@@ -99,7 +116,7 @@ class Monitor(FramedApp):
             for number, panel in enumerate(self.panels, 1):
                 with TabPane(f"{number} {panel.title}", id=_tab(panel)):
                     yield panel
-        yield StatusLine(self.session)
+        yield StatusLine(self.session, self.recorder)
         yield KeyFooter()
 
     def on_mount(self) -> None:
@@ -120,10 +137,14 @@ class Monitor(FramedApp):
             self.session.close()
             sys.setswitchinterval(before_s)
         self.session.check()
+        for word in self.recorder.end():
+            click.echo(word, err=True)
         if trouble := self.panel_settings.save():
             click.echo(trouble, err=True)
         if self.return_code:
             raise SystemExit(self.return_code)
+        if self.recorder.failed:
+            raise SourceFailed(self.recorder.failed)
 
     def save(self) -> None:
         """Keep the settings."""
@@ -176,6 +197,29 @@ class Monitor(FramedApp):
                 self.notify(str(error), severity="error")
                 return
             self.notify(f"settings are kept in {name}")
+
+    def action_record(self) -> None:
+        """Ask what to record, or end the recording."""
+        if self.recorder.running:
+            self.notify("\n".join(self.recorder.end()), markup=False)
+        elif not self.session.source.live:
+            self.notify("all of a log is there: canmon conv writes it into another")
+        else:
+            screen = ExportScreen(self.recorder.words, "record into", WORDS_METAVAR)
+            self.push_screen(screen, self._record)
+
+    def _record(self, words: str | None) -> None:
+        if words:
+            try:
+                self.recorder.start(words)
+            except ValueError as error:
+                self.notify(str(error), severity="error", markup=False)
+
+    def action_trigger(self) -> None:
+        """Record what was kept and what comes."""
+        if not self.recorder.running:
+            self.notify("nothing waits for a trigger: F8 records, as run.log --pre 5s")
+        self.recorder.trigger()
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         """Offer the tabs, and the keys of the frame and of the panel on the screen, by name."""

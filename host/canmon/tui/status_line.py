@@ -10,6 +10,7 @@ from textual.events import Click
 from textual.strip import Strip
 from textual.widget import Widget
 
+from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask
 from tickrig.host.canmon.tui.tasks.session import Session
 from tickrig.host.monitor.frames.quantity import load_text
 from tickrig.host.tui.line_view import Line
@@ -25,13 +26,14 @@ class StatusLine(Widget):
 
     Args:
         session: what it is about.
+        recorder: what records.
     """
 
     DEFAULT_CSS = "StatusLine { height: 1; background: $boost; }"
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, recorder: RecorderTask) -> None:
         super().__init__(id="status")
-        self._session = session
+        self._session, self._recorder = session, recorder
         self._counts = [0]
         self.line: Line = ()
 
@@ -47,7 +49,7 @@ class StatusLine(Widget):
         """Return the line: who may send, the buses, counts, what is wrong."""
         session, model = self._session, self._session.model
         self._counts = [*self._counts[-10:], model.frames]
-        line = [ARMED if session.armed else LISTENING]
+        line = [ARMED if session.armed else LISTENING, *self._recorder.light()]
         for bus in model.top.traffic.buses(model.now_us):
             load = load_text(bus.load.latest.bits, model.top.view.bit_rate)
             line.append((f" {bus.channel} {load}", ""))
@@ -59,6 +61,7 @@ class StatusLine(Widget):
         line.append((f"  lost {model.lost}", ALARM if model.lost else ""))
         line += [(f"  passed over {model.unread}", ALARM)] if model.unread else []
         line += [(f"  sent {session.sent}", "")] if session.sent else []
+        line += [(f"  {', '.join(model.away)} is gone", ALARM)] if model.away else []
         trouble = session.trouble or model.failed
         line += [(f"  {trouble}", ALARM)] if trouble else []
         line += [("  end of the log", "")] if model.ended and not trouble else []

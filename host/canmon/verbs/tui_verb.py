@@ -17,7 +17,7 @@ from tickrig.host.canmon.verbs.decode_options import (
     read_eds_paths,
     refusing_dbc,
 )
-from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
@@ -34,13 +34,15 @@ if TYPE_CHECKING:
         "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
     ),
     decode_options,
+    reopen_option,
 )
-def command(
+def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
     path: Path | None,
     eds: Sequence[str],
     dbc: Sequence[Path],
+    reopen: bool,
     strict: bool,
     **options: Any,
 ) -> None:
@@ -57,7 +59,8 @@ def command(
     canmon tui run.log
     ssh robot canmon dump can0 --jsonl | canmon tui -
 
-    Keys: 1 to 9 tabs, F1 help, ctrl+p commands, A arm, F9 stop all, q quit.
+    Keys: 1 to 9 tabs, F1 help, ctrl+p commands, A arm, F9 stop all, F8 record,
+    F4 trigger, q quit.
 
     {source}
     """  # noqa: D301 - click wants the backspace
@@ -68,6 +71,8 @@ def command(
     if not sys.stdout.isatty():
         monitor.session.source.close()
         raise Refused("canmon tui needs a terminal; canmon top prints a table without one")
+    if reopen:
+        monitor.session.source.reopen()
     try:
         monitor.run_session()
     finally:
@@ -84,6 +89,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
     from tickrig.host.canmon.monitor_setup import PanelSettings  # noqa: PLC0415 - an extra
+    from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask  # noqa: PLC0415 - slow
     from tickrig.host.canmon.tui.tasks.session import Model, open_session  # noqa: PLC0415 - slow
 
     try:
@@ -95,11 +101,12 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
         session = open_session(setup.source, setup.options, model)
         try:
             panels = make_panels(session, say)
-            panel_settings = PanelSettings(workspace, setup, panels)
+            recorder = RecorderTask(session)
+            panel_settings = PanelSettings(workspace, setup, [*panels, recorder])
             panel_settings.load()
         except BaseException:
             session.source.close()
             raise
     except WorkspaceError as error:
         raise Refused(str(error)) from None
-    return Monitor(session, panels, panel_settings)
+    return Monitor(session, panels, panel_settings, recorder)

@@ -67,6 +67,7 @@ class Plan:
         disk_bytes: all parts together are no larger.
         at_limit: what happens there.
         around: what is kept before a trigger, and recorded behind it; None to record all.
+        parts: it is in parts, though no setting asks for that.
     """
 
     path: Path
@@ -75,12 +76,13 @@ class Plan:
     disk_bytes: int | None = None
     at_limit: AtLimit = AtLimit.OLDEST
     around: tuple[Span, Span] | None = None
+    parts: bool = False
 
     @property
     def numbered(self) -> bool:
         """Whether it has parts and an index."""
         limits = (self.rotate_bytes, self.rotate_us, self.disk_bytes)
-        return self.around is not None or any(one is not None for one in limits)
+        return self.parts or self.around is not None or any(one is not None for one in limits)
 
     @property
     def index(self) -> Path:
@@ -116,6 +118,7 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     pre: str | None = None,
     post: str | None = None,
     waits: bool = False,
+    parts: bool = False,
 ) -> Plan:
     """Read what people say of a recording.
 
@@ -127,6 +130,7 @@ def read_plan(  # noqa: PLR0913 - all that people may say
         pre: before a trigger.
         post: behind it.
         waits: it waits for a trigger, also where nothing is said of `pre` and `post`.
+        parts: it is in parts, also where nothing else asks for that.
 
     Raises:
         ValueError: one that is none, too small, or goes with none of the others.
@@ -149,6 +153,7 @@ def read_plan(  # noqa: PLR0913 - all that people may say
         disk_bytes=disk_bytes,
         at_limit=AtLimit(at_limit or AtLimit.OLDEST),
         around=around,
+        parts=parts,
     )
     kind = log_format(path)
     if kind is LogFormat.BLF and path.suffix.lower() == COMPRESSED:

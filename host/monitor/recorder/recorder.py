@@ -69,6 +69,7 @@ class Recorder:
         now_us: the time.
         triggers: what it waits for, where the plan has it wait.
         wanted: which frames are recorded; None for all. Triggers see all of them.
+        lost: how many frames the source lost before.
 
     Attributes:
         plan: what the recording is.
@@ -87,13 +88,14 @@ class Recorder:
         now_us: int = 0,
         triggers: Sequence[Trigger] = (),
         wanted: FilterTrigger | None = None,
+        lost: int = 0,
     ) -> None:
         self.plan, self._triggers, self._wanted = plan, triggers, wanted
         self._files = Files(plan, now_us)
         before, self._behind = plan.around or (None, DEFAULT_SPAN)
         self._before = None if before is None else PreTrigger(before)
         self._window: _Window | None = None
-        self._lost = self._missing = self._look_us = 0
+        self._lost, self._missing, self._look_us = lost, 0, 0
         self.failed, self.triggers, self._closed = "", 0, False
 
     @property

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import Input, Static
 
+from tickrig.host.canmon.output.log_file import write_records
+from tickrig.host.canmon.tui.controls import PromptLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import choice, text_of, truth
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
@@ -17,6 +20,7 @@ from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.decode.filter import Filter, FilterError, parse_filter
 from tickrig.host.monitor.frames.dump_line import Stamp
+from tickrig.host.monitor.logs.log_file import SUFFIXES
 from tickrig.host.monitor.views.trace import DisplayFilter, Latest, Ring
 from tickrig.host.tui.line_view import Line, LineView, line_text
 from tickrig.wire.can import Frames
@@ -37,6 +41,8 @@ class TracePanel(Panel):
     what it means. Bytes that differ from those before are coloured. Frames that this program sent
     have a coloured CAN-ID. It follows the latest frame while that is in view.
 
+    `s` saves the frames that pass the filter, the latest 100,000 at the most, as a log.
+
     A filter: `node=3 and (pdo or emcy)`, `181-18F`, `sdo[6040h]`, `statusword.fault`,
     `123:7FF,#FF`.
     """
@@ -53,6 +59,7 @@ class TracePanel(Panel):
         Binding("b", "bits", "bits"),
         Binding("t", "stamp", "time"),
         Binding("c", "clear", "clear"),
+        Binding("s", "write", "save"),
         Binding("escape", "leave", "leave the filter", show=False),
     ]
 
@@ -74,6 +81,7 @@ class TracePanel(Panel):
         yield Static(id="wrong", markup=False)
         yield Static(id="head", markup=False)
         yield LineView()
+        yield PromptLine()
 
     def on_mount(self) -> None:
         """Show the filter if there is one."""
@@ -205,6 +213,17 @@ class TracePanel(Panel):
             self._display_filter.clear()
         self.paused = None
         self.refresh_view()
+
+    def action_write(self) -> None:
+        """Ask for a file, and write the frames that pass the filter into it."""
+        self.query_one(PromptLine).prompt(f"a log: {' '.join(SUFFIXES)}", "trace.log", self._write)
+
+    def _write(self, text: str) -> None:
+        with self.session.lock:
+            passed = (self.paused[0] if self.paused else self._display_filter.passed).copy()
+        rows = passed.rows(passed.first, passed.count)
+        for said in write_records(Path(text), [row.record for row in rows]):
+            self.notify(said, markup=False)
 
     def _follows(self, view: LineView) -> bool:
         return view.follows and self.paused is None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
@@ -23,6 +24,7 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import AnyRecord, Record
+from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.traffic.bit_rates import BitRates
 from tickrig.host.monitor.transmit.transmit_list import AnyFrames
 from tickrig.host.monitor.views.top_model import TopModel
@@ -59,6 +61,7 @@ class Model:
         unread: what came and is no frame of CAN or CAN FD.
         failed: why the source ended before its time; empty if it did not.
         ended: no more will come.
+        away: buses that went away and are not back.
     """
 
     def __init__(
@@ -75,6 +78,7 @@ class Model:
         self.trace = Trace()
         self.frames = self.now_us = self.lost = self.unread = 0
         self.failed, self.ended = "", False
+        self.away: Sequence[str] = ()
 
     def take(self, records: Sequence[AnyRecord]) -> list[DecodedFrame]:
         """Take what was heard; return the frames with what they mean."""
@@ -96,6 +100,7 @@ class Model:
 
 
 POLL_US: Final = 20_000
+MARKS_KEPT: Final = 1_000
 
 Send = Callable[[CanFrame | FdFrame], None]
 """Sends a frame on one bus; SourceFailed if it cannot."""
@@ -144,6 +149,7 @@ class Session:
     Attributes:
         lock: of the model and the tasks.
         tasks: what hears and sends.
+        marks: which buses went away or came back, until a task takes them.
         armed: frames are sent.
         sent: how many were.
         withheld: how many were not, because it was not armed.
@@ -160,6 +166,7 @@ class Session:
         self.source, self.model, self.buses = source, model, dict(buses or {})
         self.lock = threading.RLock()
         self.tasks: list[Task] = []
+        self.marks: deque[Mark] = deque(maxlen=MARKS_KEPT)
         self.armed, self.trouble = False, ""
         self.sent = self.withheld = 0
         self._clock, self._watch = clock, Stopwatch()
@@ -215,10 +222,12 @@ class Session:
         due_us = min((task.due_us for task in self.tasks), default=NEVER)
         records = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
         with self.lock:
-            out = self._take([*self._echo, *records])
             model, source = self.model, self.source
+            self.marks.extend(source.marks)
+            out = self._take([*self._echo, *records])
             model.lost, model.unread = source.lost, source.unread
             model.failed, model.ended = source.failed, source.ended
+            model.away = source.away
         for channel, frame in out:
             self._send(channel, frame)
 

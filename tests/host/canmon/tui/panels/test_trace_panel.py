@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from textual.widgets import Input, Static
 
 from tests.host.canmon.tui.pilot import (
     drive_session,
@@ -19,6 +21,7 @@ from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.host.tui.line_view import LineView
 
 
@@ -221,3 +224,47 @@ def test_a_wrong_setting_is_told(settings: dict[str, object], reason: str) -> No
     with pytest.raises(SettingError, match=reason):
         TracePanel(session).load(settings)
     session.close()
+
+
+async def save_as(monitor: Monitor, pilot: Any, name: Path) -> None:
+    await pilot.press("s")
+    monitor.query_one("#answer", Input).value = str(name)
+    await pilot.press("enter")
+    await pilot.pause()
+
+
+def test_what_passes_the_filter_is_saved_as_a_log(wire: Wire, tmp_path: Path) -> None:
+    session = wire_session(wire)
+
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        hear(session, wire, "701#00", "181#01", "702#00")
+        await save_as(monitor, pilot, tmp_path / "all.log")
+        panel_of(monitor).apply_filter("heartbeat or boot-up")
+        await save_as(monitor, pilot, tmp_path / "some.blf")
+        said = [note.message for note in monitor._notifications]
+        assert said[:2] == [
+            f"3 frames written to {tmp_path}/all.log",
+            f"2 frames written to {tmp_path}/some.blf",
+        ]
+
+    on_monitor(session, act)
+    all_of, some = (list(read_log(tmp_path / name)) for name in ("all.log", "some.blf"))
+    assert [str(one.frame) for one in all_of] == ["701#00", "181#01", "702#00"]
+    assert [(one.at_us, one.frame) for one in some] == [
+        (one.at_us, one.frame) for one in (all_of[0], all_of[2])
+    ]
+
+
+def test_a_trace_is_saved_over_nothing_and_a_mistake_is_told(wire: Wire, tmp_path: Path) -> None:
+    (tmp_path / "kept.log").write_text("precious")
+    session = wire_session(wire)
+    mistakes = {"kept.log": "is there already", "a.xyz": "name ends in", "no/a.log": "No such file"}
+
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        for name, text in mistakes.items():
+            await save_as(monitor, pilot, tmp_path / name)
+            assert text in str(monitor.query_one("#ask #wrong", Static).content)
+            await pilot.press("escape")
+
+    on_monitor(session, act)
+    assert (tmp_path / "kept.log").read_text() == "precious"
