@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -32,6 +32,7 @@ from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.decoded_check import DecodedCheck
 from tickrig.host.monitor.check.junit import junit
+from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import (
     SWITCHES,
     VALUES,
@@ -134,6 +135,7 @@ MOST_AROUND: Final = 1_000
         help="Frames before and after what a RULE finds.",
     ),
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
+    click.option("--sarif", "sarif_path", type=PATH, metavar="FILE", help="Write a SARIF report."),
     click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
     reopen_option,
 )
@@ -145,6 +147,7 @@ def command(  # noqa: PLR0913 - options
     span_us: int | None,
     around: int,
     report_path: Path | None,
+    sarif_path: Path | None,
     jsonl: bool,
     reopen: bool,
     strict: bool,
@@ -168,7 +171,7 @@ def command(  # noqa: PLR0913 - options
     bus = BusOptions(**{name: options[name] for name in NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     decoder = make_decoder(eds, dbc) if rules.expressions else None
-    verdict = Verdict(jsonl, kept=report_path is not None)
+    verdict = Verdict(jsonl, kept=bool(report_path or sarif_path))
     log = None if decoder else block_log(words)
     log = _in_blocks(log, rules, bit_rate, verdict) if log else None
     frames = log or open_source(words, bus)
@@ -182,7 +185,9 @@ def command(  # noqa: PLR0913 - options
         frames.close()
     unjudged = "" if verdict.frames else _no_frame(frames, words)
     suite, why = " ".join(words), frames.failed or unjudged
-    _write(report_path, junit(suite, rules.names(), verdict.findings, why))
+    judged = suite, rules.names(), verdict.findings, why
+    _write("--junit", report_path, junit, judged)
+    _write("--sarif", sarif_path, _sarif, judged)
     if not why or verdict.counts:
         click.echo(verdict.summary(), err=True)
     report(frames, strict)
@@ -252,10 +257,20 @@ def _one_by_one(
     verdict.take(held.end(end_us, lost, end_us if has_clock else latest_us))
 
 
-def _write(path: Path | None, text: str) -> None:
+Judged = tuple[str, list[str], list[Finding], str]
+
+
+def _write(option: str, path: Path | None, text: Callable[..., str], judged: Judged) -> None:
+    """Write a report where one is wanted."""
     if path is None:
         return
     try:
-        path.write_text(text, "utf-8")
+        path.write_text(text(*judged), "utf-8")
     except OSError as error:
-        refuse_path("--junit", error)
+        refuse_path(option, error)
+
+
+def _sarif(suite: str, names: list[str], findings: list[Finding], why: str) -> str:
+    from tickrig.host.monitor.check.sarif import sarif  # noqa: PLC0415 - seldom wanted
+
+    return sarif(suite, names, findings, why)

@@ -227,17 +227,19 @@ def parse_rule(text: str, name: str = "") -> Expression:
     Raises:
         RuleError: it is none; says the column.
     """
-    parser = RuleParser(text)
-    demand, _, _ = parser.rule()
+    demand, _, _ = RuleParser(text).rule()
+    name = name or " ".join(text.split())
+    if not name.isprintable():
+        raise RuleError(text, 1, f"its name {name!r} cannot be printed")
     ranges = {match[3] for match in _NODES.finditer(text)}
     if not isinstance(demand, EACH_NODE) or not ranges or re.search(r"\bnot\b|!", text):
-        return Expression(name or text.strip(), (text,))
+        return Expression(name, (text,))
     if len(ranges) > 1:
         said = " and ".join(sorted(ranges))
         raise RuleError(text, 1, f"nodes {said}: a rule that is made for each node names one range")
     first, _, last = next(iter(ranges)).partition("-")
     nodes = range(int(first), int(last) + 1)
     return Expression(
-        name or text.strip(),
+        name,
         tuple(_NODES.sub(rf"\g<1>\g<2>{node}", text) for node in nodes),
     )

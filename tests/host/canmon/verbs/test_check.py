@@ -317,3 +317,36 @@ def test_a_written_rule_knows_what_an_eds_says(tmp_path: Path) -> None:
     assert check(log, *words, "--eds", f"5={DRIVE_EDS}").stdout.splitlines() == [
         "(1.100000) dlc: tpdo1 of node 5 has 2 B, 6 is right by its mapping [can0 185#3802]"
     ]
+
+
+def test_findings_are_written_as_sarif(tmp_path: Path) -> None:
+    log, report = write(tmp_path / "a b.log", WRITTEN), tmp_path / "out.sarif"
+    words = ("--rule", "quiet: emcy never", "--rule", "dlc", "--nodes", "9")
+    assert check(log, *words, "--sarif", str(report)).exit_code == 1
+    said = json.loads(report.read_text("utf-8"))
+    (run,) = said["runs"]
+    assert said["version"] == "2.1.0"
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == ["nodes", "quiet", "dlc"]
+    assert run["invocations"] == [{"executionSuccessful": True}]
+    quiet, nodes = run["results"]
+    head, *around = FOUND.replace("emcy never", "quiet").splitlines()
+    assert quiet["message"]["text"].splitlines() == [head.partition("quiet: ")[2], *around]
+    assert quiet["properties"] == {"t": 1.05, "ch": "can0", "frame": "083#3081110000000000"}
+    assert (quiet["ruleId"], quiet["ruleIndex"], quiet["level"]) == ("quiet", 1, "error")
+    place = quiet["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
+    assert place.endswith("/a%20b.log")
+    assert nodes["message"] == {"text": "node 9 was never heard"}
+    assert nodes["properties"] == {"t": 1.11}
+
+
+def test_sarif_does_not_say_that_an_empty_log_is_well(tmp_path: Path) -> None:
+    log, report = write(tmp_path / "run.log", ""), tmp_path / "out.sarif"
+    assert check(log, "--rule", "dlc", "--sarif", str(report)).exit_code == 5
+    (run,) = json.loads(report.read_text("utf-8"))["runs"]
+    (said,) = run["invocations"]
+    note = said["toolExecutionNotifications"][0]["message"]["text"]
+    assert (said["executionSuccessful"], run["results"]) == (False, [])
+    assert note == f"nothing was judged: no frame in {log}"
+    assert check(log, "--rule", "dlc", "--sarif", "no/x").stderr == (
+        "Error: --sarif no/x: No such file or directory\n"
+    )

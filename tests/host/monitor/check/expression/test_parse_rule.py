@@ -75,6 +75,13 @@ def test_a_rule_has_the_name_that_it_is_given() -> None:
     assert parse_rules(both).names() == ["lengths", "sync never"]
 
 
+def test_a_name_is_one_line_that_can_be_printed() -> None:
+    assert parse_rules({"rule": "emcy\n of 3\tnever"}).names() == ["emcy of 3 never"]
+    for name in ("a\nb", "\udcff", "\0"):
+        with pytest.raises(RuleError, match=r"its name .* cannot be printed"):
+            parse_rules({"rule": {name: "dlc"}})
+
+
 NAMED = dict(zip(("one", "two", "three"), (NoEmcy, NoSdoAbort, NoErrorFrames), strict=True))
 
 

@@ -1,0 +1,62 @@
+"""Findings as SARIF 2.1.0 (OASIS), which code hosts and editors show."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from typing import Final
+from urllib.parse import quote
+
+from tickrig.host.monitor.check.rule import Finding
+
+SCHEMA: Final = (
+    "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+)
+
+
+def sarif(
+    source: str, names: Sequence[str], findings: Iterable[Finding], unjudged: str = ""
+) -> str:
+    """Return the report.
+
+    A finding has no line: a log is read as frames. Its time, bus and frame are properties; the
+    frames around it stand behind its text.
+
+    Args:
+        source: what was checked, as a file or bus.
+        names: of all rules.
+        findings: in their order.
+        unjudged: why rules without a finding cannot be said to hold; empty if they can.
+    """
+    uri = quote(source.encode("utf-8", "surrogateescape"))
+    places = {name: place for place, name in enumerate(names)}
+    driver = {"name": "canmon check", "rules": [{"id": name} for name in names]}
+    run = {
+        "tool": {"driver": driver},
+        "invocations": [_invocation(unjudged)],
+        "results": [_result(uri, finding, places[finding.rule]) for finding in findings],
+    }
+    report = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+    return json.dumps(report, ensure_ascii=False, indent=1) + "\n"
+
+
+def _invocation(unjudged: str) -> dict[str, object]:
+    said: dict[str, object] = {"executionSuccessful": not unjudged}
+    if unjudged:
+        note = {"level": "error", "message": {"text": unjudged}}
+        said["toolExecutionNotifications"] = [note]
+    return said
+
+
+def _result(uri: str, finding: Finding, place: int) -> dict[str, object]:
+    properties: dict[str, object] = {"t": finding.at_us / 1e6}
+    if finding.record is not None:
+        properties |= {"ch": finding.record.channel, "frame": str(finding.record.frame)}
+    return {
+        "ruleId": finding.rule,
+        "ruleIndex": place,
+        "level": "error",
+        "message": {"text": str(finding).partition(f"{finding.rule}: ")[2]},
+        "locations": [{"physicalLocation": {"artifactLocation": {"uri": uri}}}],
+        "properties": properties,
+    }
