@@ -27,6 +27,8 @@ class LogFormat(StrEnum):
     CSV = "csv"
     MF4 = "mf4"
     TRACE = "trace"
+    PCAPNG = "pcapng"
+    PCAP = "pcap"
 
 
 SUFFIXES: Final = {
@@ -40,6 +42,8 @@ SUFFIXES: Final = {
     ".csv": LogFormat.CSV,
     ".mf4": LogFormat.MF4,
     ".trace": LogFormat.TRACE,
+    ".pcapng": LogFormat.PCAPNG,
+    ".pcap": LogFormat.PCAP,
 }
 
 COMPRESSED: Final = ".gz"

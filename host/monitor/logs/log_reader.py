@@ -193,6 +193,8 @@ BLOCK_BYTES: Final = 1 << 13
 CAN_LOG: Final = "tickrig.host.monitor.logs.can_log"
 """python-can is slow to import: this module is when a log needs it."""
 
+CAPTURE: Final = "tickrig.host.monitor.logs.pcap.pcap_reader"
+
 READERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogReader"),
     LogFormat.JSONL: (__name__, "TextLogReader"),
@@ -202,6 +204,8 @@ READERS: Final = {
     LogFormat.TRC: (CAN_LOG, "CanLogReader"),
     LogFormat.MF4: (CAN_LOG, "CanLogReader"),
     LogFormat.TRACE: ("tickrig.host.monitor.logs.trace_log", "TraceLogReader"),
+    LogFormat.PCAPNG: (CAPTURE, "PcapReader"),
+    LogFormat.PCAP: (CAPTURE, "PcapReader"),
 }
 """Module and class of the reader of each format."""
 

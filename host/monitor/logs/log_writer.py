@@ -19,6 +19,8 @@ CAN_LOG_WRITER: Final = "tickrig.host.monitor.logs.can_log_writer"
 
 MARKS: Final = "marks of gaps and triggers left out"
 
+CAPTURE_WRITER: Final = "tickrig.host.monitor.logs.pcap.pcapng_writer"
+
 WRITERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogWriter"),
     LogFormat.JSONL: (__name__, "TextLogWriter"),
@@ -28,6 +30,8 @@ WRITERS: Final = {
     LogFormat.TRC: (CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.MF4: (CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.TRACE: ("tickrig.host.monitor.logs.trace_log", "TraceLogWriter"),
+    LogFormat.PCAPNG: (CAPTURE_WRITER, "PcapngWriter"),
+    LogFormat.PCAP: (CAPTURE_WRITER, "PcapngWriter"),
 }
 """Module and class of the writer of each format."""
 

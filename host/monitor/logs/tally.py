@@ -17,7 +17,9 @@ CAN_XL: Final = "CAN XL frames"
 SERIAL_LINES: Final = "lines of a serial port"
 OTHER_LINES: Final = "lines with other events"
 OTHER_OBJECTS: Final = "objects that are no frames"
-NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS)
+BAD_PACKETS: Final = "packets that are no frames"
+OTHER_PACKETS: Final = "packets of other links"
+NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)
 """What a log may hold beside frames."""
 
 

@@ -1,0 +1,1 @@
+"""Captures of Wireshark, tshark and tcpdump: pcapng read and written, pcap read."""
