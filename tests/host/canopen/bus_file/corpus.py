@@ -132,7 +132,15 @@ CORPUS: Final = (
     Case("driver-value", NODE + "  polling: 1\n", 5, "'1' is not true or false"),
     Case("driver-value", NODE + "  period: fast\n", 5, "'fast' is not a whole number above 0"),
     Case("driver-value", NODE + "  period: []\n", 5, "a list is not a whole number above 0"),
-    Case("driver-value", NODE + "  switching_state: 99\n", 5, "'99' is not a state to go to: 2..6"),
+    *(
+        Case(
+            "driver-value",
+            NODE + f"  switching_state: {number}\n",
+            5,
+            f"'{number}' is not a state to go to: 2..6, 5 is Operation enabled",
+        )
+        for number in (1, 7, 8, 99)
+    ),
     Case("driver-value", NODE + "  position_mode: 42\n", 5, "'42' is not a mode of CiA 402"),
     Case("driver-value", NODE + "  homing_timeout_seconds: -1\n", 5, "'-1' is not a whole"),
     Case("scale", NODE + "  scale_pos_to_dev: 0\n", 5, "scale_pos_to_dev: 0 times "),

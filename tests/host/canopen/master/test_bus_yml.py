@@ -92,3 +92,13 @@ def test_a_joint_is_unplugged_by_its_name_and_comes_back(tmp_path: Path) -> None
         master.run_for("2s")
         assert master.slave("left").good
         master.perform(master.joints["left"].init())
+
+
+def test_a_test_waits_for_the_emcy_of_a_joint(tmp_path: Path) -> None:
+    nodes = "  left: {node_id: 2}\n  right: {node_id: 3}\n"
+    with system(tmp_path, nodes) as (bench, master):
+        left, right = master.slave("left"), master.slave("right")
+        assert not master.wait_until(lambda: bool(left.emergencies), "100ms")
+        bench["left"].fault("encoder_unplugged")
+        assert master.wait_until(lambda: 0x7305 in left.emergencies, "1s")
+        assert (bench["left"].get("error_code"), right.emergencies) == (0x7305, [])
