@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.listening import follow, report, span_option
+from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
+from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.verbs.source_command import source_command
@@ -20,6 +21,10 @@ from tickrig.host.monitor.decode.board_text import board_json, render_board
 from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import Record
+
+if TYPE_CHECKING:
+    from tickrig.host.monitor.columns.column_nodes import ColumnNodes
+    from tickrig.host.monitor.columns.columns import Columns
 
 MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
@@ -54,10 +59,14 @@ def command(
 
     {source}
     """  # noqa: D301 - click wants the backspace
-    view = NodesView(read_eds_files(eds))
-    frames = open_source(source, BusOptions(**options))
+    found = read_eds_files(eds)
+    view, log = NodesView(found), block_log(source)
+    whole = log is not None and view.decoder.standard and take_blocks(log, view.take_block)
+    frames = (log if whole else None) or open_source(source, BusOptions(**options))
     try:
-        follow(frames, source, view.take, span_us, None if jsonl else view.painted)
+        if not isinstance(frames, BlockLog):
+            view = view if log is None else NodesView(found)
+            follow(frames, source, view.take, span_us, None if jsonl else view.painted)
         with until_unread():
             for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
                 click.echo(line)
@@ -71,17 +80,29 @@ class NodesView:
 
     Args:
         eds: what files say, by node-ID; these nodes are on the board from the beginning.
+
+    Attributes:
+        decoder: of what is taken.
     """
 
     def __init__(self, eds: dict[int, EdsObjects]) -> None:
-        self._decoder = make_decoder(eds)
-        self._board = NodeBoard(self._decoder, {node: found.name for node, found in eds.items()})
+        self.decoder = make_decoder(eds)
+        self._board = NodeBoard(self.decoder, {node: found.name for node, found in eds.items()})
+        self._columns: ColumnNodes | None = None
         self._watch = Stopwatch()
+
+    def take_block(self, columns: Columns) -> None:
+        """Take a block of a log."""
+        if self._columns is None:
+            from tickrig.host.monitor.columns.column_nodes import ColumnNodes  # noqa: PLC0415 - numpy
+
+            self._columns = ColumnNodes(self.decoder, self._board)
+        self._columns.take(columns)
 
     def take(self, records: Sequence[Record]) -> None:
         """Take what was heard."""
         for record in records:
-            self._board.take(record, self._decoder.take(record))
+            self._board.take(record, self.decoder.take(record))
         self._watch.take(records)
 
     def lines(self, *, live: bool) -> list[str]:

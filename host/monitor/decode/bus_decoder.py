@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from enum import IntEnum
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
@@ -15,7 +16,7 @@ from tickrig.host.monitor.decode.node_memory import (
     NodeMemory,
 )
 from tickrig.host.monitor.decode.object_text import ObjectText
-from tickrig.host.monitor.decode.pdos import PDO_OBJECTS, Pdo, PdoTable, pdos_of
+from tickrig.host.monitor.decode.pdos import PDO_OBJECTS, Pdo, PdoLayout, PdoTable, pdos_of
 from tickrig.host.monitor.decode.sdo.transfer import Direction, Outcome, Transfer, write_entry
 from tickrig.host.monitor.decode.services import (
     decode_emcy,
@@ -49,6 +50,17 @@ PRE_DEFINED: Final[dict[int, Route]] = {
 }
 
 
+class Effect(IntEnum):
+    """Which frames with a CAN-ID can change what is known of nodes."""
+
+    NONE = 0
+    LATEST = 1
+    """The latest of each length, until one of `EACH` comes or a boot-up: a TPDO with a mapping."""
+    ALONE = 2
+    """Each, but it changes nothing that a PDO does, unless it is a boot-up: error control, EMCY."""
+    EACH = 3
+
+
 class BusDecoder:
     """Decodes the frames of one bus, in the order in which they were heard.
 
@@ -57,10 +69,13 @@ class BusDecoder:
 
     Args:
         eds: what files say, by node-ID.
+
+    Attributes:
+        changes: how often what a CAN-ID means may have changed.
     """
 
     def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
-        self._eds = eds
+        self._eds, self.changes = eds, 0
         self._memories: dict[int, NodeMemory] = {}
         self._channels: dict[tuple[int, int], SdoChannel] = {}
         self._guarded: set[int] = set()
@@ -78,6 +93,18 @@ class BusDecoder:
         if route is None:
             route = self._routes[frame.can_id] = self._route(frame.can_id)
         return route(at_us, frame)
+
+    def effect(self, can_id: int) -> Effect:
+        """Say which frames with a CAN-ID can change what is known of nodes, as it is used now."""
+        route = self._routes.get(can_id) or self._route(can_id)
+        if isinstance(route, partial):
+            alone = route.func in (self._error_control, _emcy)
+            each = Effect.ALONE if alone else Effect.EACH
+            return Effect.NONE if route.func is _unmapped else each
+        layout = getattr(route, "__self__", None)
+        if isinstance(layout, PdoLayout):
+            return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
+        return Effect.NONE if layout is None and route is not decode_nmt else Effect.EACH
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the SDO transfers that run."""
@@ -180,6 +207,7 @@ class BusDecoder:
     def _refresh(self, pdos: Iterable[Pdo]) -> None:
         """Read again what is known of some PDOs."""
         for pdo in pdos:
+            self.changes += 1
             for can_id in self._pdos.update(pdo, self.memory(pdo.node)):
                 self._routes.pop(can_id, None)
 
@@ -208,6 +236,7 @@ class BusDecoder:
         return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
 
     def _configure(self, can_id: int, route: Route) -> None:
+        self.changes += 1
         self._configured[can_id] = route
         self._routes.pop(can_id, None)
 

@@ -58,6 +58,11 @@ class Decoder:
         self._first: tuple[FrameDecoder, ...] = (*first, *map(DbcFile, dbc))
         self._buses: dict[str, BusDecoder] = {}
 
+    @property
+    def standard(self) -> bool:
+        """Whether nothing but the standard, EDS and traffic tell what frames mean."""
+        return not self._first
+
     def take(self, record: Record) -> Decoded:
         """Decode a frame, and learn from it."""
         frame = record.frame
@@ -73,7 +78,7 @@ class Decoder:
             return Decoded("raw")
         bus = self._buses.get(record.channel)
         if bus is None:
-            bus = self._bus(record.channel)
+            bus = self.bus(record.channel)
         return bus.take(record.at_us, frame)
 
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
@@ -82,9 +87,10 @@ class Decoder:
 
     def memory(self, channel: str, node: int) -> NodeMemory:
         """Return what is known of a node."""
-        return self._bus(channel).memory(node)
+        return self.bus(channel).memory(node)
 
-    def _bus(self, channel: str) -> BusDecoder:
+    def bus(self, channel: str) -> BusDecoder:
+        """Return what decodes a bus."""
         bus = self._buses.get(channel)
         if bus is None:
             bus = self._buses[channel] = BusDecoder(self._eds)

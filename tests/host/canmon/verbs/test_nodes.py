@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 from tests.host.canmon.terminal import PROGRAM
 from tests.host.monitor.decode.drive_trace import TRACE
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.sources import block_log
 
 EPOS = Path(__file__).parents[4] / "examples" / "eds" / "epos.eds"
 
@@ -25,6 +26,14 @@ def test_of_a_log_file_the_final_state_is_shown() -> None:
     head, row, *_ = result.stdout.splitlines()
     assert head.split("  ")[0] == "NODE"
     assert row.split()[:5] == ["5", "EPOS", "pre-operational", "->", "stopped"]
+
+
+def test_a_large_log_has_the_same_board(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = [str(TRACE), "--eds", f"7={EPOS}", "--jsonl"]
+    small = nodes(*words)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
+    large = nodes(*words)
+    assert (large.stdout, large.stderr, large.exit_code) == (small.stdout, small.stderr, 0)
 
 
 def test_each_node_is_a_json_object() -> None:
