@@ -55,7 +55,10 @@ class PortConnections:
     def keep(self, component: RtComponent) -> None:
         """Want those of a component again that is about to go."""
         profiles = (
-            connector.profile for port in component.ports.values() for connector in port.connectors
+            connector.profile
+            for port in component.ports.values()
+            for connector in port.connectors
+            if connector.joins_components
         )
         self.wanted += (_entry(profile) for profile in profiles)
 

@@ -13,6 +13,8 @@ from tickrig.wire.instant import NEVER
 if TYPE_CHECKING:
     from tickrig.host.rtc.component import RtComponent
 
+MoveListener = Callable[["RtComponent", LifeCycleState, ReturnCode], object]
+
 SECOND_US: Final = 1_000_000
 MAX_RATE_HZ: Final = 1_000_000
 MIN_RATE_HZ: Final = 1e-6
@@ -38,6 +40,8 @@ class ExecutionContext:
         rate_hz: periods a second.
         period_us: one period.
         running: between start and stop.
+        on_move: called with a component, its state and what the callback of the move returned,
+            after each move that it made or, after on_reset, could not make; Created if it left.
 
     Raises:
         ValueError: a rate that is not in the range.
@@ -53,6 +57,7 @@ class ExecutionContext:
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
         self._participants: tuple[Participant, ...] = ()
         self._by_id: dict[int, Participant] = {}
+        self.on_move: list[MoveListener] = []
 
     @property
     def now_us(self) -> int:

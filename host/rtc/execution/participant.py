@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.rtc.component_action import ComponentAction, failed
+from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 
 if TYPE_CHECKING:
@@ -59,10 +60,12 @@ class Participant:
         if self.state is not _ERROR:
             self.wanted = _ERROR
 
-    def notify(self, callback: Callback) -> None:
-        """Run a callback that belongs to no state; if it fails, Error comes next."""
-        if self._call(callback) is not _OK:
+    def notify(self, callback: Callback) -> ReturnCode:
+        """Run a callback and return its code; if it fails, Error comes next."""
+        code = self._call(callback)
+        if code is not _OK:
             self.abort()
+        return code
 
     def pre(self) -> None:
         """First pass of a period: make the move that is wanted."""
@@ -70,7 +73,9 @@ class Participant:
             self.notify(self._update_configuration)
         if (wanted := self.wanted) is not None:
             self.wanted = None
-            _MOVES[self.state, wanted](self)
+            code = _MOVES[self.state, wanted](self)
+            if self._context.on_move:
+                self._report(code)
 
     def do(self) -> None:
         """Second pass of a period: the work of the state."""
@@ -87,35 +92,44 @@ class Participant:
 
     def leave(self) -> None:
         """Leave Active at once, as a component that ends does; the state is Created."""
-        if self.state is _ACTIVE:
-            self._call(self.component.on_deactivated)
-        self.state, self.wanted = _CREATED, None
+        code = self._call(self.component.on_deactivated) if self.state is _ACTIVE else _OK
+        left, self.state, self.wanted = self.state is not _CREATED, _CREATED, None
+        if left and self._context.on_move:
+            self._report(code)
 
     def _update_configuration(self, ec: ExecutionContext) -> ReturnCode:
         self.component.configuration.update()
         return _OK
 
-    def _activate(self) -> None:
-        self.state = _ACTIVE
-        self.notify(self.component.on_activated)
+    def _report(self, code: ReturnCode) -> None:
+        component, listeners = self.component, self._context.on_move
+        call_listeners(component.instance_name, listeners, component, self.state, code)
 
-    def _deactivate(self) -> None:
-        if self._call(self.component.on_deactivated) is _OK:
+    def _activate(self) -> ReturnCode:
+        self.state = _ACTIVE
+        return self.notify(self.component.on_activated)
+
+    def _deactivate(self) -> ReturnCode:
+        code = self._call(self.component.on_deactivated)
+        if code is _OK:
             self.state = _INACTIVE
         else:
             self._enter_error()
+        return code
 
-    def _abort_active(self) -> None:
+    def _abort_active(self) -> ReturnCode:
         self._call(self.component.on_deactivated)
-        self._enter_error()
+        return self._enter_error()
 
-    def _enter_error(self) -> None:
+    def _enter_error(self) -> ReturnCode:
         self.state = _ERROR
-        self._call(self.component.on_aborting)
+        return self._call(self.component.on_aborting)
 
-    def _reset(self) -> None:
-        if self._call(self.component.on_reset) is _OK:
+    def _reset(self) -> ReturnCode:
+        code = self._call(self.component.on_reset)
+        if code is _OK:
             self.state = _INACTIVE
+        return code
 
     def _call(self, callback: Callback) -> ReturnCode:
         try:  # `guarded`, without a call for each callback
@@ -124,7 +138,7 @@ class Participant:
             return failed(self.component.instance_name, callback)
 
 
-_MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[Participant], None]]] = {
+_MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[Participant], ReturnCode]]] = {
     (_INACTIVE, _ACTIVE): Participant._activate,
     (_INACTIVE, _ERROR): Participant._enter_error,
     (_ACTIVE, _INACTIVE): Participant._deactivate,

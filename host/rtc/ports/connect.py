@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.connector_options import ConnectorOptions
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
-from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile, automatic_id
 from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServiceConnector, ServicePort
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 
@@ -16,7 +16,12 @@ Properties = Mapping[str, str]
 
 
 def connect(
-    first: AnyPort, second: AnyPort, properties: Properties | None = None, *, name: str = ""
+    first: AnyPort,
+    second: AnyPort,
+    properties: Properties | None = None,
+    *,
+    name: str = "",
+    connector_id: str = "",
 ) -> ConnectorBase:
     """Join an OutPort and an InPort, or two service ports; their order does not matter.
 
@@ -24,43 +29,63 @@ def connect(
         first: a port.
         second: the other one.
         properties: `dataport.*` of data ports; see `ConnectorOptions.parse`.
-        name: of the connector; made of those of the ports if left out.
+        name: of the connector; that of its ID if left out.
+        connector_id: unique in a system; made of the names of the ports if left out.
 
     Raises:
-        RtcRefused: ports that do not fit, are joined already, or properties that cannot be.
+        RtcRefused: ports that do not fit, are joined already, an ID that one of them has
+            already, or properties that cannot be.
     """
     if first is second:
         raise RtcRefused(f"{first.full_name} is one port; a connector joins two")
     if first.connector_to(second):
         message = f"{first.full_name} and {second.full_name} are connected"
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
-    connector = _connector(first, second, properties or {}, name)
+    for port in (first, second) if connector_id else ():
+        refuse_known_id(port, connector_id)
+    connector = _connector(first, second, properties or {}, Names(name, connector_id))
     connector.begin()
     return connector
 
 
-def _connector(first: AnyPort, second: AnyPort, properties: Properties, name: str) -> ConnectorBase:
+def refuse_known_id(port: AnyPort, connector_id: str) -> None:
+    """Raise RtcRefused (PRECONDITION_NOT_MET) if a port has a connector of this ID."""
+    if port.find_connector(connector_id):
+        message = f"{port.full_name} has a connector {connector_id!r} already"
+        raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
+
+
+class Names(NamedTuple):
+    """What a caller wants a connector to be called; empty where that does not matter."""
+
+    name: str
+    connector_id: str
+
+
+def _connector(
+    first: AnyPort, second: AnyPort, properties: Properties, names: Names
+) -> ConnectorBase:
     match first, second:
         case OutPort(), InPort():
-            return _data_connector(first, second, properties, name)
+            return _data_connector(first, second, properties, names)
         case InPort(), OutPort():
-            return _data_connector(second, first, properties, name)
+            return _data_connector(second, first, properties, names)
         case ServicePort(), ServicePort():
-            return _service_connector(first, second, properties, name)
+            return _service_connector(first, second, properties, names)
     kinds = f"{first.port_type} {first.full_name}, {second.port_type} {second.full_name}"
     raise RtcRefused(f"{kinds} do not fit: an OutPort and an InPort, or service ports do")
 
 
 def _profile(
-    first: AnyPort, second: AnyPort, properties: Properties, name: str
+    first: AnyPort, second: AnyPort, properties: Properties, names: Names
 ) -> ConnectorProfile:
     ports = (first.full_name, second.full_name)
-    connector_id = "_".join(ports)
-    return ConnectorProfile(name or connector_id, connector_id, ports, properties)
+    connector_id = names.connector_id or automatic_id(ports)
+    return ConnectorProfile(names.name or connector_id, connector_id, ports, properties)
 
 
 def _data_connector(
-    out: OutPort[Any], in_: InPort[Any], properties: Properties, name: str
+    out: OutPort[Any], in_: InPort[Any], properties: Properties, names: Names
 ) -> ConnectorBase:
     if out.data_type is not in_.data_type:
         raise RtcRefused(
@@ -69,16 +94,16 @@ def _data_connector(
         )
     options = ConnectorOptions.parse(properties)
     stated = {"dataport.data_type": out.data_type.idl_id(), **options.stated, **properties}
-    return Connector(_profile(out, in_, stated, name), (out, in_), options)
+    return Connector(_profile(out, in_, stated, names), (out, in_), options)
 
 
 def _service_connector(
-    first: ServicePort, second: ServicePort, properties: Properties, name: str
+    first: ServicePort, second: ServicePort, properties: Properties, names: Names
 ) -> ConnectorBase:
     pairs = (*_pairs(first, second), *_pairs(second, first))
     if not pairs:
         raise RtcRefused(f"{first.full_name} and {second.full_name} share no interface type")
-    return ServiceConnector(_profile(first, second, properties, name), (first, second), pairs)
+    return ServiceConnector(_profile(first, second, properties, names), (first, second), pairs)
 
 
 def _pairs(

@@ -98,7 +98,7 @@ class Connector(ConnectorBase, Generic[T]):
     def __init__(
         self,
         profile: ConnectorProfile,
-        ports: tuple[AnyPort, AnyPort],
+        ports: tuple[AnyPort, ...],
         options: ConnectorOptions,
     ) -> None:
         super().__init__(profile, ports)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
-from tickrig.host.text.log import log_of
-
-_LOG: Final = log_of(__name__)
+from tickrig.host.rtc.listeners import call_listeners
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +16,8 @@ class ConnectorProfile:
     Attributes:
         name: for people.
         connector_id: unique in a system.
-        ports: full names of both ports, the one that provides first.
+        ports: full names of both ports, the one that provides first; a peer's as its engine
+            calls it.
         properties: what holds for it, `dataport.*` of data ports.
     """
 
@@ -26,6 +25,11 @@ class ConnectorProfile:
     connector_id: str
     ports: tuple[str, str]
     properties: Mapping[str, str]
+
+
+def automatic_id(ports: tuple[str, str]) -> str:
+    """Return the ID of a connector for which its caller gave none: runs are the same."""
+    return "_".join(ports)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,26 +72,32 @@ class ConnectorBase:
 
     Attributes:
         profile: how it is described.
+        ports: those of `profile.ports` that are here: both, or one that is joined with a peer's.
         joined: between begin and end.
     """
 
-    def __init__(self, profile: ConnectorProfile, ports: tuple[AnyPort, AnyPort]) -> None:
-        self.profile, self._ports, self.joined = profile, ports, False
+    def __init__(self, profile: ConnectorProfile, ports: tuple[AnyPort, ...]) -> None:
+        self.profile, self.ports, self.joined = profile, ports, False
+
+    @property
+    def joins_components(self) -> bool:
+        """Whether both its ports are here, each of a component; those of probes are of none."""
+        return len(self.ports) == 2 and all(port.owner for port in self.ports)
 
     def begin(self) -> None:
         """Give it to both ports, then notify their listeners."""
         self.joined = True
-        for port in self._ports:
+        for port in self.ports:
             port.attach(self)
-        for port in self._ports:
+        for port in self.ports:
             port.notify(port.on_connect, self.profile)
 
     def end(self) -> None:
         """Take it from both ports, then notify their listeners; ending it twice is no error."""
         joined, self.joined = self.joined, False
-        for port in self._ports if joined else ():
+        for port in self.ports if joined else ():
             port.detach(self)
-        for port in self._ports if joined else ():
+        for port in self.ports if joined else ():
             port.notify(port.on_disconnect, self.profile)
 
 
@@ -129,6 +139,18 @@ class Port(Generic[C]):
         properties = {"port.port_type": self.port_type, **self._properties()}
         return PortProfile(self.full_name, self._interfaces(), connectors, properties)
 
+    def find_connector(self, connector_id: str) -> C | None:
+        """Look for a connector by its ID.
+
+        Args:
+            connector_id: as its profile has it.
+
+        Returns:
+            The connector, None if the port has no such one.
+        """
+        found = (own for own in self.connectors if own.profile.connector_id == connector_id)
+        return next(found, None)
+
     def connector_to(self, other: AnyPort) -> C | None:
         """Look for the connector that joins it with another port.
 
@@ -156,11 +178,7 @@ class Port(Generic[C]):
 
     def notify(self, listeners: list[Listener], profile: ConnectorProfile) -> None:
         """Call listeners with the profile of a connector; what one raises is logged."""
-        for listener in tuple(listeners):
-            try:
-                listener(profile)
-            except Exception:  # as callbacks of a component: one must not end the others
-                _LOG.exception("%s: a listener raised", self.full_name)
+        call_listeners(self.full_name, listeners, profile)
 
     def _properties(self) -> Mapping[str, str]:
         return {}

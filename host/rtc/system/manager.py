@@ -10,6 +10,7 @@ from typing import Final, TypeVar
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.component_types import COMPONENT_TYPES, installed_type
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
@@ -18,6 +19,8 @@ from tickrig.host.rtc.system.name_service import NameService
 from tickrig.host.rtc.system.schedule import Schedule
 
 R = TypeVar("R", bound=RtComponent)
+
+ComponentListener = Callable[[RtComponent], object]
 
 DEFAULT_RATE_HZ: Final = 1_000.0
 
@@ -36,6 +39,8 @@ class Manager(Schedule):
 
     Attributes:
         names: its components, such as `localhost/ConsoleIn0.rtc`.
+        on_added: called with each component that is added, once it has its name.
+        on_removed: called with each component that ended, once its name is free.
     """
 
     def __init__(self, host: str = "localhost") -> None:
@@ -44,6 +49,8 @@ class Manager(Schedule):
         self._host = host
         self._registered: dict[str, type[RtComponent]] = {}
         self._components: dict[str, RtComponent] = {}
+        self.on_added: list[ComponentListener] = []
+        self.on_removed: list[ComponentListener] = []
 
     @property
     def types(self) -> tuple[str, ...]:
@@ -59,12 +66,12 @@ class Manager(Schedule):
     def connectors(self) -> tuple[ConnectorProfile, ...]:
         """All connectors between its components, each once."""
         ports = [port for component in self.components for port in component.ports.values()]
-        own = {port.full_name for port in ports}
+        own = set(ports)
         profiles = {
-            connector.profile.connector_id: connector.profile
+            connector: connector.profile
             for port in ports
             for connector in port.connectors
-            if own.issuperset(connector.profile.ports)
+            if connector.joins_components and own.issuperset(connector.ports)
         }
         return tuple(profiles.values())
 
@@ -134,6 +141,7 @@ class Manager(Schedule):
             raise RtcRefused(f"on_initialize of {name} returned {code.name}", code)
         self._components[name] = component
         self.names.bind(self.path(name), component)
+        call_listeners(name, self.on_added, component)
         return component
 
     def delete(self, name: str) -> None:
@@ -187,7 +195,13 @@ class Manager(Schedule):
         return port
 
     def connect(
-        self, first: str, second: str, properties: Properties | None = None, *, name: str = ""
+        self,
+        first: str,
+        second: str,
+        properties: Properties | None = None,
+        *,
+        name: str = "",
+        connector_id: str = "",
     ) -> ConnectorProfile:
         """Join two ports.
 
@@ -197,14 +211,20 @@ class Manager(Schedule):
             properties: what is to hold for the connector, such as
                 `{"dataport.subscription_type": "new"}`; the rest is as OpenRTM has it.
             name: of the connector, for people.
+            connector_id: its ID; made of the names of the ports if left out.
 
         Returns:
             The connector as it was made.
 
         Raises:
-            RtcRefused: no such port, ports that do not fit, or properties that cannot be.
+            RtcRefused: no such port, ports that do not fit, an ID that another connector has,
+                or properties that cannot be.
         """
-        connector = connect(self.port(first), self.port(second), properties, name=name)
+        if connector_id and connector_id in (other.connector_id for other in self.connectors):
+            message = f"a connector {connector_id!r} is there already"
+            raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
+        ports = self.port(first), self.port(second)
+        connector = connect(*ports, properties, name=name, connector_id=connector_id)
         if isinstance(connector, Connector):
             self.add_connector(connector)
         return connector.profile
@@ -345,6 +365,7 @@ class Manager(Schedule):
                 self.remove_context(context)
             self.names.unbind(self.path(name))
             del self._components[name]
+            call_listeners(name, self.on_removed, component)
 
     def _leave(self, component: RtComponent) -> None:
         """Take a component that could not be initialized out of its context."""

@@ -16,7 +16,7 @@ from tickrig.host.rtc.ports.data_port import DataPort
 from tickrig.host.rtc.ports.port import ConnectorProfile
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
-from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
+from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System, given_id
 
 RTS: Final = "http://www.openrtp.org/namespaces/rts"
 EXT: Final = "http://www.openrtp.org/namespaces/rts_ext"
@@ -190,7 +190,9 @@ def _connection(node: ET.Element, word: str) -> ConnectionEntry:
             properties["dataport.publisher.push_rate"] = str(1 / interval_s)
     for extra in node.findall(f"{{{EXT}}}Properties"):
         properties[extra.get(f"{{{EXT}}}name", "")] = extra.get(f"{{{EXT}}}value", "")
-    return ConnectionEntry((source, target), node.get(_rts("name"), ""), properties)
+    ports, connector_id = (source, target), node.get(_rts("connectorId"), "")
+    name, given = node.get(_rts("name"), ""), given_id(connector_id, (source, target))
+    return ConnectionEntry(ports, name, properties, given)
 
 
 def _port(node: ET.Element, name: str) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.configuration import DEFAULT
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.ports.port import ConnectorProfile, automatic_id
 from tickrig.host.rtc.states import LifeCycleState, RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 
@@ -39,11 +40,19 @@ class ComponentEntry:
 
 @dataclass(frozen=True, slots=True)
 class ConnectionEntry:
-    """A connector of a system, by the full names of its ports."""
+    """A connector of a system, by the full names of its ports.
+
+    Attributes:
+        ports: the one that provides first.
+        name: for people.
+        properties: what holds for it.
+        connector_id: its ID, empty if it is that of its ports.
+    """
 
     ports: tuple[str, str]
     name: str = ""
     properties: Mapping[str, str] = field(default_factory=dict)
+    connector_id: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +71,7 @@ def describe(manager: Manager) -> System:
     shared: dict[int, str] = {}
     return System(
         tuple(_entry(component, shared) for component in manager.components),
-        tuple(ConnectionEntry(c.ports, c.name, dict(c.properties)) for c in manager.connectors),
+        tuple(_connection(profile) for profile in manager.connectors),
     )
 
 
@@ -95,6 +104,16 @@ def _entry(component: RtComponent, shared: dict[int, str]) -> ComponentEntry:
     )
 
 
+def _connection(profile: ConnectorProfile) -> ConnectionEntry:
+    ports, given = profile.ports, given_id(profile.connector_id, profile.ports)
+    return ConnectionEntry(ports, profile.name, dict(profile.properties), given)
+
+
+def given_id(connector_id: str, ports: tuple[str, str]) -> str:
+    """Return the ID of a connector, empty if it is the one that it has without a caller's."""
+    return "" if connector_id == automatic_id(ports) else connector_id
+
+
 def _make(manager: Manager, system: System, made: list[str]) -> None:
     contexts: dict[str, ExecutionContext] = {}
     for entry in system.components:
@@ -103,7 +122,8 @@ def _make(manager: Manager, system: System, made: list[str]) -> None:
         made.append(entry.name)
         _configure(component, entry)
     for connection in system.connections:
-        manager.connect(*connection.ports, connection.properties, name=connection.name)
+        names = {"name": connection.name, "connector_id": connection.connector_id}
+        manager.connect(*connection.ports, connection.properties, **names)
     for context in contexts.values():
         context.start()
     manager.activate(*(entry.name for entry in system.components if entry.active))

@@ -13,6 +13,7 @@ int_param0 = "5"
 
 [[connection]]
 ports = ["ConsoleIn0.out", "ConsoleOut0.in"]
+connector_id = "9c1f"     # made of the names of the ports if left out
 
 [connection.properties]
 "dataport.subscription_type" = "new"
@@ -37,7 +38,12 @@ _COMPONENT: Final[Mapping[str, type]] = {
     "configuration_set": str,
     "configuration": dict,
 }
-_CONNECTION: Final[Mapping[str, type]] = {"ports": list, "name": str, "properties": dict}
+_CONNECTION: Final[Mapping[str, type]] = {
+    "ports": list,
+    "name": str,
+    "connector_id": str,
+    "properties": dict,
+}
 _FIELDS: Final[Mapping[str, str]] = {"type": "type_name"}
 
 
@@ -134,6 +140,8 @@ def _connection_lines(system: System) -> Iterator[str]:
         yield "[[connection]]"
         yield f"ports = [{', '.join(map(_quoted, entry.ports))}]"
         yield f"name = {_quoted(entry.name)}"
+        if entry.connector_id:
+            yield f"connector_id = {_quoted(entry.connector_id)}"
         yield ""
         if entry.properties:
             yield "[connection.properties]"

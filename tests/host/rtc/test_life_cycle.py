@@ -216,6 +216,43 @@ def test_reset_works_after_a_reset_that_failed() -> None:
     assert bench.period() == ["on_activated", "on_execute", "on_state_update"]
 
 
+@pytest.mark.parametrize(
+    ("operation", "state", "failing", "moved"),
+    [
+        ("activate", "INACTIVE", "", [("ACTIVE", OK)]),
+        ("activate", "INACTIVE", "on_activated", [("ACTIVE", ERROR), ("ERROR", OK)]),
+        ("deactivate", "ACTIVE", "", [("INACTIVE", OK)]),
+        ("deactivate", "ACTIVE", "on_deactivated", [("ERROR", ERROR)]),
+        ("reset", "ERROR", "", [("INACTIVE", OK)]),
+        ("reset", "ERROR", "on_reset", [("ERROR", ERROR)]),
+        ("abort", "ACTIVE", "", [("ERROR", OK)]),
+        ("none", "ACTIVE", "on_execute", [("ERROR", OK)]),
+    ],
+)
+def test_who_listens_learns_how_each_move_ended(
+    operation: str, state: str, failing: str, moved: list[tuple[str, ReturnCode]]
+) -> None:
+    bench, seen = Bench(**({failing: ERROR} if failing else {})), list[tuple[str, ReturnCode]]()
+    bench.bring(state)
+    bench.ec.on_move.append(lambda component, now, code: seen.append((now.name, code)))
+    assert ask(bench, operation) is OK
+    bench.period()
+    bench.period()
+    assert seen == moved
+    bench.spy.exit()
+    assert [name for name, _ in seen[len(moved) :]] == ["CREATED"]
+
+
+def test_a_listener_of_moves_that_raises_is_logged_and_stops_nobody(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    bench = Bench()
+    bench.ec.on_move.append(lambda component, now, code: 1 / 0)
+    bench.bring("ACTIVE")
+    assert bench.period() == ["on_execute", "on_state_update"]
+    assert [record.getMessage() for record in caplog.records] == ["Spy0: a listener raised"]
+
+
 def test_initialize_only_from_created() -> None:
     spy = Spy()
     assert spy.initialize() is OK

@@ -10,7 +10,9 @@ from tickrig.host.rtc import (
     LifeCycleState,
     Manager,
     ReturnCode,
+    RtComponent,
     RtcRefused,
+    connect,
 )
 from tickrig.host.rtc.components import ConsoleIn, SeqIn, SeqOut
 from tickrig.wire.instant import NEVER
@@ -154,6 +156,73 @@ def test_a_component_that_deletes_itself_is_gone_at_the_end_of_the_tick() -> Non
         "on_finalize",
     ]
     assert manager.components == ()
+
+
+def test_who_listens_learns_of_each_component_that_comes_or_goes() -> None:
+    manager, seen = make_manager(), list[str]()
+
+    def came(component: RtComponent) -> None:
+        assert manager.find(component.instance_name) is component
+        seen.append(f"+{component.instance_name}")
+
+    def went(component: RtComponent) -> None:
+        assert manager.free_name("ConsoleIn") == component.instance_name
+        assert not component.alive
+        seen.append(f"-{component.instance_name}")
+
+    manager.on_added.append(came)
+    manager.on_removed.append(went)
+    manager.create("ConsoleIn")
+    manager.delete("ConsoleIn0")
+    spy = Spy()
+    spy.results["on_initialize"] = ERROR
+    with pytest.raises(RtcRefused):
+        manager.add(spy)
+    assert seen == ["+ConsoleIn0", "-ConsoleIn0"]
+
+
+def test_a_listener_that_raises_is_logged_and_stops_nobody(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    manager, seen = make_manager(), list[str]()
+    for listeners in (manager.on_added, manager.on_removed):
+        listeners.append(lambda component: 1 / 0)
+        listeners.append(lambda component: seen.append(component.instance_name))
+    manager.create("ConsoleIn")
+    manager.run_for(PERIOD_US)
+    manager.delete("ConsoleIn0")
+    assert seen == ["ConsoleIn0", "ConsoleIn0"]
+    assert [record.getMessage() for record in caplog.records] == [
+        "ConsoleIn0: a listener raised",
+        "ConsoleIn0: a listener raised",
+    ]
+
+
+def test_a_connector_has_the_id_of_its_caller() -> None:
+    manager = Chain().manager
+    manager.create("ConsoleOut")
+    profile = manager.connect("ConsoleIn0.out", "ConsoleOut1.in", connector_id="9c1f")
+    assert (profile.name, profile.connector_id) == ("9c1f", "9c1f")
+    connector = manager.port("ConsoleOut1.in").find_connector("9c1f")
+    assert connector is not None
+    assert connector.ports == (manager.port("ConsoleIn0.out"), manager.port("ConsoleOut1.in"))
+    connector.end()
+    assert manager.port("ConsoleOut1.in").find_connector("9c1f") is None
+    assert [one.connector_id for one in manager.connectors] == ["ConsoleIn0.out_ConsoleOut0.in"]
+
+
+@pytest.mark.parametrize("known", ["9c1f", "ConsoleIn0.out_ConsoleOut0.in"])
+def test_an_id_is_given_once(known: str) -> None:
+    manager = Chain().manager
+    for name in ("ConsoleIn", "ConsoleOut", "ConsoleOut"):
+        manager.create(name)
+    manager.connect("ConsoleIn0.out", "ConsoleOut1.in", connector_id="9c1f")
+    with pytest.raises(RtcRefused, match=f"a connector '{known}' is there already") as refused:
+        manager.connect("ConsoleIn1.out", "ConsoleOut2.in", connector_id=known)
+    assert refused.value.code is ReturnCode.PRECONDITION_NOT_MET
+    with pytest.raises(RtcRefused, match=f"has a connector '{known}' already"):
+        connect(manager.port("ConsoleIn0.out"), manager.port("ConsoleOut2.in"), connector_id=known)
+    assert len(manager.connectors) == 2
 
 
 def test_a_component_that_does_not_initialize_is_not_there() -> None:

@@ -46,6 +46,20 @@ def configured() -> Chain:
     return chain
 
 
+@pytest.mark.parametrize("form", ["toml", "xml"])
+def test_the_id_of_a_caller_is_saved_and_restored(form: str) -> None:
+    manager = Chain().manager
+    manager.create("ConsoleOut")
+    manager.connect("ConsoleIn0.out", "ConsoleOut1.in", connector_id="9c1f-\u3042")
+    saved = (
+        parse_toml(write_toml(describe(manager)))
+        if form == "toml"
+        else parse_rts_profile(write_rts_profile(manager))
+    )
+    assert [one.connector_id for one in saved.connections] == ["", "9c1f-\u3042"]
+    assert restored(saved).connectors == manager.connectors
+
+
 def restored(system: System) -> Manager:
     manager = make_manager()
     restore(manager, system)
