@@ -58,11 +58,16 @@ class Checker:
         if decoded is None or not self._expressions:
             return self._taken(record)
         found = self.advance(record.at_us) + self._taken(record)
-        return found + [one for rule in self._expressions for one in rule.take(record, decoded)]
+        for rule in self._expressions:
+            finding = rule.take(record, decoded)
+            if finding is not None:
+                found.append(finding)
+        return found
 
     def advance(self, now_us: int) -> list[Finding]:
         """Return what has not come in time, where no frame tells the time."""
-        return [one for rule in self._expressions for one in rule.advance(now_us)]
+        late = [rule for rule in self._expressions if rule.due_us < now_us]
+        return [one for rule in late for one in rule.advance(now_us)]
 
     def _taken(self, record: Record) -> list[Finding]:
         at_us, channel, frame, _ = record

@@ -8,9 +8,9 @@ from typing import Final
 
 from tickrig.host.monitor.decode.decoded import Decoded, Signal
 from tickrig.host.monitor.decode.filter_terms import Test, signal_reader
-from tickrig.host.monitor.frames.ident import ERROR, ident_of
+from tickrig.host.monitor.frames.ident import ERROR, any_ident
 from tickrig.host.monitor.frames.record import Record
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ Sender = tuple[str, int]
 def sender_of(record: Record) -> Sender:
     """Return where a frame came from; error frames are one."""
     frame = record.frame
-    return record.channel, ident_of(frame) if isinstance(frame, CanFrame) else ERROR
+    return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
 
 
 def said(decoded: Decoded) -> str:

@@ -4,6 +4,8 @@ import pytest
 
 from tests.host.monitor.check.expression.held import MAPPED, broken, findings
 from tests.host.monitor.record_log import hear
+from tickrig.host.monitor.frames.record import Record
+from tickrig.wire.can_fd import FdFrame
 
 
 def test_a_state_that_is_reached_in_time_is_right() -> None:
@@ -141,3 +143,10 @@ def test_guarding_is_answered() -> None:
     assert broken(rule, "1 703#R\n1.01 703#05\n2 703#R\n2.03 703#85") == [
         "2.02 guard of node 3: guarding request: not answered in 20.000 ms"
     ]
+
+
+def test_frames_of_can_fd_have_their_periods_apart() -> None:
+    frames = [(1_000, "181##1AA"), (1_005, "182##1AA"), (1_010, "181##1AA"), (1_015, "182##1AA")]
+    records = [Record(at * 1_000, "can0", FdFrame.parse(text)) for at, text in frames]
+    assert findings("id >= 181 every 10ms ±1ms", records) == []
+    assert len(findings("id >= 181 every 5ms ±1ms", records)) == 2
