@@ -16,7 +16,7 @@ SOURCE   can0                      a bus of SocketCAN, or of the interface that 
          can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
          slcan:/dev/ttyACM0@500k   interface:channel@bitrate; can0@500k/2M is CAN FD; udp
          serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
-         run.log run.blf run.asc.gz  log files: candump, jsonl, asc, blf, trc, csv, mf4, pcapng, trace
+         run.log run.blf run.asc.gz  logs: candump, jsonl, asc, blf, trc, csv, mf4, pcapng, trace
          -                         standard input: what candump or canmon dump prints"""
 """For the help text of a verb that takes SOURCE words."""
 

@@ -22,7 +22,8 @@ from can.io.blf import BLFParseError
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.blf_damage import BlfReader, has_end, missing_end
 from tickrig.host.monitor.logs.can_record import to_record
-from tickrig.host.monitor.logs.log_file import LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.fd_lines import told_by_flags
+from tickrig.host.monitor.logs.log_file import NO_MF4, LogError, LogFormat, open_log
 from tickrig.host.monitor.logs.notation import UNNAMED
 from tickrig.host.monitor.logs.tally import OTHER_LINES, OTHER_OBJECTS, Tally
 
@@ -86,6 +87,11 @@ class WatchedLines(Iterator[str]):
         else:
             self._tally.bad_lines.add(self._number, line.rstrip("\r\n"))
 
+    @property
+    def line(self) -> str:
+        """The latest line; empty once it was taken."""
+        return self._line
+
     def taken(self) -> None:
         """Note that the latest line came to a frame."""
         self._line = ""
@@ -114,7 +120,7 @@ BROKEN: Final = (
 """What python-can's readers raise in files that they do not understand."""
 
 UNSAID: Final = logging.NullHandler()
-"""For what python-can logs of each bad line of TRC: it is counted here."""
+"""For what python-can logs of bad lines: they are counted here."""
 
 _TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: lambda lines: can.ASCReader(lines, relative_timestamp=False),
@@ -155,7 +161,7 @@ class CanLogReader:
                 elif self._kind is LogFormat.BLF:
                     yield from self._blf(BlfReader(file))
                 else:
-                    yield from can.MF4Reader(file)
+                    yield from self._mf4(file)
             except LogError:
                 raise
             except BROKEN as error:
@@ -168,17 +174,26 @@ class CanLogReader:
         return " ".join(str(error).split()) or type(error).__name__
 
     def _text(self, file: BinaryIO) -> Iterator[can.Message]:
-        logging.getLogger("can.io.trc").addHandler(UNSAID)
+        for name in ("can.io.trc", "can.io.asc"):
+            logging.getLogger(name).addHandler(UNSAID)
         with io.TextIOWrapper(file, "utf-8", errors="replace") as text:
             lines = WatchedLines(text, self._kind, self.tally)
             reader = _TEXT[self._kind](lines)
             while not lines.ended:
                 try:
                     for message in reader:
+                        if message.is_fd and self._kind is LogFormat.ASC:
+                            told_by_flags(message, lines.line)
                         lines.taken()
                         yield message
                 except BROKEN as error:
                     lines.refused(error)
+
+    def _mf4(self, file: BinaryIO) -> can.MF4Reader:
+        try:
+            return can.MF4Reader(file)
+        except NotImplementedError as error:
+            raise LogError(f"{self._path}: {NO_MF4}") from error
 
     def _blf(self, reader: BlfReader) -> Iterator[can.Message]:
         count = 0

@@ -17,7 +17,7 @@ from can.io.blf import FILE_HEADER_SIZE
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_can
 from tickrig.host.monitor.logs.fd_lines import fd_asc_event, fd_trc_line
-from tickrig.host.monitor.logs.log_file import COMPRESSED, LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.log_file import COMPRESSED, NO_MF4, LogError, LogFormat, open_log
 from tickrig.host.monitor.logs.mark import Mark
 from tickrig.wire.can_error import ErrorFrame
 
@@ -209,7 +209,7 @@ class CanLogWriter:
         except NotImplementedError as error:
             self._file.close()
             path.unlink()
-            raise LogError(f"{path}: {' '.join(str(error).split())}") from error
+            raise LogError(f"{path}: {NO_MF4}") from error
 
     def write(self, record: Record, /) -> None:
         """Add a frame."""

@@ -48,6 +48,9 @@ SUFFIXES: Final = {
 
 COMPRESSED: Final = ".gz"
 
+NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
+"""Said where it is not there."""
+
 TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV)
 """Formats of lines that `LogLines` reads."""
 

@@ -18,6 +18,7 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormatError, log_format
 from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.host.monitor.logs.log_writer import write_log
+from tickrig.host.monitor.logs.notation import parse_frame
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -325,9 +326,9 @@ def test_noise_never_raises_anything_else(noise: bytes) -> None:
 
 @pytest.mark.skipif(not ASAMMDF, reason="no asammdf here: pip install python-can[mf4]")
 def test_mf4_holds_all_there_is(tmp_path: Path) -> None:
-    words = ("705#7F", "00000605#0011223344556677", "123#R5", "123#")
+    words = ("705#7F", "00000605#0011223344556677", "123#R5", "123#", "123##3" + "11" * 64)
     frames = [
-        *(Record(START_US + 10 * n, "can1", CanFrame.parse(word)) for n, word in enumerate(words)),
+        *(Record(START_US + 10 * n, "can1", parse_frame(word)) for n, word in enumerate(words)),
         Record(START_US + 2_000_000, "can0", ErrorFrame(0x88, bytes(8))),
     ]
     writer = write_log(tmp_path / "run.mf4")
@@ -340,11 +341,12 @@ def test_mf4_holds_all_there_is(tmp_path: Path) -> None:
 @pytest.mark.skipif(ASAMMDF, reason="asammdf is here")
 def test_mf4_without_its_library_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "run.mf4"
-    with pytest.raises(LogError, match="asammdf"):
+    said = r"run\.mf4: MF4 needs asammdf: pip install 'python-can\[mf4\]'$"
+    with pytest.raises(LogError, match=said):
         write_log(path)
     assert not path.exists()
     path.write_bytes(b"MDF     4.10")
-    with pytest.raises(LogError, match="asammdf"):
+    with pytest.raises(LogError, match=said):
         list(read_log(path))
 
 

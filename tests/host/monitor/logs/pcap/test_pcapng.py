@@ -283,7 +283,7 @@ def until_damage(path: Path) -> tuple[list[Record], str]:
     found: list[Record] = []
     try:
         for record in read_log(path):
-            found.append(record)  # noqa: PERF402 - what came before it ends counts
+            found.append(record)
     except LogError as error:
         return found, str(error)
     return found, ""
