@@ -26,6 +26,7 @@ VERBS: Final = {
     "store": (f"{HERE}.store_verb:store", "Store parameters of NODE (1010h)"),
     "restore": (f"{HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)"),
     "program": (f"{HERE}.program_verb:command", "Download FILE into NODE by block transfer"),
+    "boot": (f"{HERE}.boot_verb:command", "Boot NODE as an NMT master does (CiA 302-2)"),
 }
 ANSWER_US: Final = 500_000
 

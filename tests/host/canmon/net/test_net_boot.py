@@ -1,0 +1,123 @@
+"""`canmon net boot` on rigs in virtual time: the boot-up of CiA 302-2, step by step."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.environment import ROOT
+from tests.host.canmon.net.test_net_configuration import drive_dcf
+from tests.host.canmon.net.test_net_verbs import net
+
+RIG = """\
+[device.drive]
+type = "epos"
+node_id = 5
+"""
+BUS = ROOT / "examples" / "bus" / "bus.yml"
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> str:
+    path = tmp_path / "bench.toml"
+    path.write_text(RIG)
+    return str(path)
+
+
+def steps(text: str) -> list[str]:
+    """Return the steps without their times, which do not go back."""
+    found = [re.fullmatch(r"(\d+\.\d{6}) (.*)", line) for line in text.splitlines()]
+    assert all(found)
+    times = [match[1] for match in found if match]
+    assert times == sorted(times)
+    return [match[2] for match in found if match]
+
+
+def test_each_step_is_told(rig: str, tmp_path: Path) -> None:
+    file = drive_dcf(tmp_path / "x.dcf", at_101700=100)
+    path = Path(file)
+    text = re.sub(
+        r"(?s)\[(?!1017\])(\w+)\](.*?)(?=\n\[|$)", _without_value, path.read_text("utf-8")
+    )
+    path.write_text(text, "utf-8")
+    result = net(rig, "boot", "5", "--eds", file, "--explain", "--start")
+    assert result.exit_code == 0, result.output
+    assert steps(result.stdout) == [
+        "1000h:00 device type: 00020192h; as expected",
+        "1018h:02 product code: 00006210h; as expected",
+        "1017h:00 := 0064h: taken; goes on",
+        "heartbeat: Pre-operational; goes on",
+    ]
+    assert result.stderr.splitlines() == [
+        "node 5: booted",
+        "NMT start to node 5. This may turn a motor: a drive that is Operational obeys RPDOs",
+        "node 5: started",
+    ]
+
+
+def _without_value(match: re.Match[str]) -> str:
+    return re.sub(r"\nParameterValue=[^\n]*", "", match[0])
+
+
+def test_nothing_but_an_answer_is_expected_unless_told(rig: str) -> None:
+    result = net(rig, "boot", "5", "--explain")
+    assert result.exit_code == 0, result.output
+    assert steps(result.stdout) == ["1000h:00 device type: 00020192h; not looked at"]
+    assert "nothing is expected of the node but that it answers" in result.stderr
+    assert net(rig, "boot", "5").stdout == ""
+
+
+def test_what_a_bus_yml_expects_is_done(rig: str) -> None:
+    path = Path(rig)
+    path.write_text(RIG.replace("node_id = 5", "node_id = 2"))
+    result = net(rig, "boot", "2", "--bus", str(BUS), "--explain")
+    assert result.exit_code == 0, result.output
+    told = steps(result.stdout)
+    assert told[0] == "1000h:00 device type: 00020192h; as expected"
+    assert "6098h:00 := 23h: taken; goes on" in told
+    assert told[-1] == "heartbeat: Pre-operational; goes on"
+    assert "This may turn a motor: homing method" in result.stderr
+
+
+def test_another_device_ends_with_its_letter(rig: str) -> None:
+    other = ROOT / "tests" / "golden" / "canopen" / "r1.eds"
+    result = net(rig, "boot", "5", "--eds", str(other), "--explain")
+    assert result.exit_code == 1
+    assert steps(result.stdout)[-1].endswith("1000h device type is another than expected")
+    assert result.stderr.splitlines()[-1].startswith("Error: node 5: error status C: 1000h device")
+
+
+def test_who_is_kept_alive_is_looked_at_and_not_reset(rig: str) -> None:
+    result = net(rig, "boot", "5", "--explain", "--keep-alive")
+    assert result.exit_code == 0, result.output
+    assert steps(result.stdout)[1:] == [
+        "state by guarding: Pre-operational; goes on",
+        "boot-up after reset communication: boot-up; goes on",
+    ]
+
+
+def test_a_silent_node_has_status_b(tmp_path: Path) -> None:
+    path = tmp_path / "bench.toml"
+    path.write_text(RIG + '[fault]\ndrive = "power_off@50ms"\n')
+    result = net(str(path), "boot", "5", "--explain")
+    assert result.exit_code == 1
+    assert steps(result.stdout)[0] == "1000h:00 device type: no answer; asked again"
+    assert "error status B: 1000h device type cannot be read" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("--bus", "nosuch.yml"), "--bus nosuch.yml: No such file"),
+        (("--eds", "nosuch.eds"), "--eds nosuch.eds: No such file"),
+        (("--bus", "a.yml", "--eds", "a.eds"), "--bus or --eds: which? give one"),
+        (("--bus", str(BUS)), "has no slave 5; its slaves: "),
+    ],
+)
+def test_what_cannot_be_is_one_line(rig: str, words: tuple[str, ...], why: str) -> None:
+    result = net(rig, "boot", "5", *words)
+    assert result.exit_code == 2, result.output
+    (told,) = (line for line in result.stderr.splitlines() if line.startswith("Error:"))
+    assert why in told
