@@ -120,7 +120,7 @@ BROKEN: Final = (
 """What python-can's readers raise in files that they do not understand."""
 
 UNSAID: Final = logging.NullHandler()
-"""For what python-can logs of bad lines: they are counted here."""
+"""For what python-can logs of lines and objects: what is not read of them is counted here."""
 
 _TEXT: Final[dict[LogFormat, Any]] = {
     LogFormat.ASC: lambda lines: can.ASCReader(lines, relative_timestamp=False),
@@ -154,6 +154,8 @@ class CanLogReader:
         return channel_name(channel)
 
     def _messages(self) -> Iterator[can.Message]:
+        for name in ("can.io.trc", "can.io.asc", "can.io.blf"):
+            logging.getLogger(name).addHandler(UNSAID)
         with open_log(self._path) as file:
             try:
                 if self._kind in _TEXT:
@@ -174,8 +176,6 @@ class CanLogReader:
         return " ".join(str(error).split()) or type(error).__name__
 
     def _text(self, file: BinaryIO) -> Iterator[can.Message]:
-        for name in ("can.io.trc", "can.io.asc"):
-            logging.getLogger(name).addHandler(UNSAID)
         with io.TextIOWrapper(file, "utf-8", errors="replace") as text:
             lines = WatchedLines(text, self._kind, self.tally)
             reader = _TEXT[self._kind](lines)

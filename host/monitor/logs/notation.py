@@ -117,8 +117,8 @@ def _event(said: dict[str, Any], tally: Tally) -> str:
 
 def _name(channel: object) -> str:
     name = str(channel)
-    if name.split() != [name]:
-        raise ValueError(f"channel {name!r} is not a name without blanks")
+    if name.split() != [name] or len(name) > LONGEST_NAME:
+        raise ValueError(f"channel {name!r} is not a name of 1 to 32 characters without blanks")
     return name
 
 
@@ -145,6 +145,9 @@ def _quoted(text: str) -> str:
 
 LOG_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 DUMP_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
+LONGEST_NAME: Final = 32
+"""Characters of the name of a bus, as in the lines of a candump log."""
+
 UNNAMED: Final = "can0"
 """What a bus without a name or number is called."""
 

@@ -17,6 +17,7 @@ CAN_XL: Final = "CAN XL frames"
 SERIAL_LINES: Final = "lines of a serial port"
 OTHER_LINES: Final = "lines with other events"
 OTHER_OBJECTS: Final = "objects that are no frames"
+NO_TIME: Final = "frames with what is no time"
 BAD_PACKETS: Final = "packets that are no frames"
 OTHER_PACKETS: Final = "packets of other links"
 NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)

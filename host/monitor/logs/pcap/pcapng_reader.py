@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from typing import BinaryIO, Final, NamedTuple
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogError
+from tickrig.host.monitor.logs.log_file import END_S, LogError
+from tickrig.host.monitor.logs.notation import LONGEST_NAME
 from tickrig.host.monitor.logs.pcap.block_format import (
     BLOCK_BYTES,
     DIRECTION,
@@ -30,17 +31,18 @@ from tickrig.host.monitor.logs.pcap.block_format import (
     options,
 )
 from tickrig.host.monitor.logs.pcap.can_packet import LINK_TYPE, parse_packet
-from tickrig.host.monitor.logs.tally import BAD_PACKETS, OTHER_PACKETS, Tally
+from tickrig.host.monitor.logs.tally import BAD_PACKETS, NO_TIME, OTHER_PACKETS, Tally
 from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
 
 MOST_BYTES: Final = 1 << 24
 """Of a block: more is damage."""
 
-LONGEST_NAME: Final = 32
 CUT: Final = "it is cut"
 _READ_BYTES: Final = 1 << 16
 _MICROS: Final = 1_000_000
 _USUAL_BYTES: Final = 48
+_END_US: Final = END_S * _MICROS
+_END_HIGH: Final = _END_US >> 32
 
 
 class Interface(NamedTuple):
@@ -139,6 +141,8 @@ class PcapngReader:
             known = idents.get(ident) or self._ident(ident)
             if known is None or length > MAX_DATA_BYTES or number >= len(names):
                 break
+            if high >= _END_HIGH:
+                break
             at_us = high << 32 | low
             frame = new(CanFrame, (known[0], content[:length], False, known[1], 0))
             add(new(Record, (at_us, names[number], frame, False)))
@@ -222,6 +226,9 @@ class PcapngReader:
         self._tally.lost += drops
         if count is not None:
             self._at_us = max(0, count * _MICROS // where.parts + where.offset_us)
+        if self._at_us >= _END_US:
+            self._tally.passed_over[NO_TIME] += 1
+            return
         frame = parse_packet(data[:size])
         if frame is None or isinstance(frame, str):
             self._tally.passed_over[frame or BAD_PACKETS] += 1

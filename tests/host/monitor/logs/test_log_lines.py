@@ -111,6 +111,7 @@ def test_frames_of_can_xl_are_passed_over_and_counted() -> None:
         '{"v":1,"t":1e400,"ch":"can0","id":1,"x":0,"data":""}',
         '{"v":1,"t":-1.5,"ch":"can0","id":1,"x":0,"data":""}',
         '{"v":1,"t":1e12,"ch":"can0","id":1,"x":0,"data":""}',
+        '{"v":1,"t":1.5,"ch":"' + "a" * 33 + '","id":1,"x":0,"data":""}',
         '{"v":1,"t":NaN,"ch":"can0","id":1,"x":0,"data":""}',
         '{"v":1,"t":1,"ch":"can 0","id":1,"x":0,"data":""}',
         '{"v":1,"t":1,"ch":"can0","id":2048,"x":0,"data":""}',
