@@ -7,6 +7,7 @@ from typing import Final
 
 from tickrig.host.monitor.check.expression.demand import Demand
 from tickrig.host.monitor.check.expression.scope import Scope
+from tickrig.host.monitor.check.expression.slice_parser import Slice, with_slices
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.filter_terms import KINDS, MissingSignals, signal_place
@@ -28,12 +29,19 @@ class ExpressionRule:
         demand: what must hold.
         scopes: when; always where there are none.
         paths: the signals that it names.
+        slices: those of them that are bits of frames.
     """
 
     def __init__(
-        self, name: str, demand: Demand, scopes: Sequence[Scope], paths: Iterable[str]
+        self,
+        name: str,
+        demand: Demand,
+        scopes: Sequence[Scope],
+        paths: Iterable[str],
+        slices: Sequence[Slice],
     ) -> None:
         self.name, self._demand, self._scopes = name, demand, tuple(scopes)
+        self._slices = tuple(slices)
         self._missing = MissingSignals(paths)
         self._looks, self._names = bool(self._missing), set[str]()
         self._running, self._began, self._found = False, False, False
@@ -45,6 +53,8 @@ class ExpressionRule:
 
     def take(self, record: Record, decoded: Decoded) -> Finding | None:
         """Return how a frame breaks it."""
+        if self._slices:
+            decoded = with_slices(record, decoded, self._slices)
         if self._looks:
             self._look_for_signals(decoded)
         # without a scope nothing is asked once it runs: a third of the time of a rule

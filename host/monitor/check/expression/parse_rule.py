@@ -2,7 +2,8 @@
 
 ```
 rule   = event demand (scope) ...
-event  = a filter, see `decode.filter`; `dlc` alone is `all frames dlc`
+event  = a filter, see `decode.filter`, with 181[2:4] or 181[0.3] as a signal, see
+         `graph.signal_spec`; `dlc` alone is `all frames dlc`
 demand = never | always | once | at most 3 [per 1s] | at least 3
        | in {1, 8130h, 5..9, word} | in 1..5 | steps under 5 | counts | changes within 1s
        | every 10ms ±10% | every 9ms..11ms | every 5ms.. | every ..20ms
@@ -39,6 +40,7 @@ from tickrig.host.monitor.check.expression.quantity_parser import (
     RuleError,
 )
 from tickrig.host.monitor.check.expression.scope import After, Before, Scope, While
+from tickrig.host.monitor.check.expression.slice_parser import Slice
 from tickrig.host.monitor.check.expression.time_demands import (
     Answered,
     Every,
@@ -67,6 +69,7 @@ EACH_NODE: Final = (Every, FirstWithin, Latency, Count, Rate)
 """Demands that are made of each node where several are named; the others tell them apart."""
 
 _NODES: Final = re.compile(r"\b(of|node)(\s+)([0-9]{1,3}-[0-9]{1,3})(?![\w.])")
+_OF: Final = re.compile(r"\s+of\s")
 _OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
 
 
@@ -77,8 +80,8 @@ class RuleParser(QuantityParser):
         text: the rule.
     """
 
-    def rule(self) -> tuple[Demand, list[Scope], set[str]]:
-        """Return demand, scopes, and the signals that are named; RuleError if it is no rule."""
+    def rule(self) -> tuple[Demand, list[Scope], set[str], list[Slice]]:
+        """Return demand, scopes, signals and slices that are named; RuleError if it is no rule."""
         self._named: set[str] = set()
         demand = self._demand(self._subject())
         scopes = []
@@ -88,7 +91,7 @@ class RuleParser(QuantityParser):
             raise self._error(
                 f"{self._came()} behind the end; wanted {', '.join(SCOPES)}, or no more"
             )
-        return demand, scopes, self._named
+        return demand, scopes, self._named, list(self._slices.items())
 
     def _subject(self) -> Event:
         if self._next.text != "dlc" or self._tokens[1].text in COMPARISONS:
@@ -118,7 +121,8 @@ class RuleParser(QuantityParser):
         self._signals, self._nodes = self._signals | signals, self._nodes | nodes
         last = taken[-1]
         text = self._text[taken[0].column - 1 : last.column - 1 + len(last.text)]
-        is_signal = any(words[0] in path for path in paths) and words[1:2] in ([], ["of"])
+        name = _OF.split(text)[0]
+        is_signal = any(path == name or path.endswith(f".{name}") for path in paths)
         return Event(text, test, paths, is_signal, has_node)
 
     def _condition(self) -> Event:
@@ -227,7 +231,7 @@ def parse_rule(text: str, name: str = "") -> Expression:
     Raises:
         RuleError: it is none; says the column.
     """
-    demand, _, _ = RuleParser(text).rule()
+    demand, *_ = RuleParser(text).rule()
     name = name or " ".join(text.split())
     if not name.isprintable():
         raise RuleError(text, 1, f"its name {name!r} cannot be printed")

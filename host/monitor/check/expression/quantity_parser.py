@@ -6,8 +6,9 @@ import re
 from typing import Final
 
 from tickrig.host.monitor.check.expression.parse_values import time_us, tolerance_us, values_of
+from tickrig.host.monitor.check.expression.slice_parser import SliceParser
 from tickrig.host.monitor.check.expression.value_demands import Values
-from tickrig.host.monitor.decode.filter import FilterError, FilterParser
+from tickrig.host.monitor.decode.filter import FilterError
 from tickrig.host.monitor.decode.filter_terms import number
 
 
@@ -22,7 +23,7 @@ SCOPES: Final = ("after", "before", "while")
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
 
-class QuantityParser(FilterParser):
+class QuantityParser(SliceParser):
     """Takes quantities from the words of a rule.
 
     Args:

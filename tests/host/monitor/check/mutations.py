@@ -25,6 +25,7 @@ RULES: Final = (
     *("sync every 9ms..11ms", "sync to tpdo1 of 3 under 2ms", "sdo answered within 50ms"),
     *("guard answered within 20ms", "guard toggle", "dlc", "dlc of 3-5", "sdo[6040h] dlc"),
     *("boot-up of 3 once", "emcy at most 3", "emcy at most 3 per 1s", "emcy at least 1"),
+    *("181[2:4]s*0.01 in -5..5", "183[0.3] never", "183[2:6] steps under 5"),
     *("sync counts", "3.position_actual_value steps under 100", "speed changes within 1s"),
     *("not (181-18F or 080) never", "123:7FF,400~700 never", "node=3 and (pdo or emcy) never"),
     *("sdo.aborted never before node 3 operational", "no fault: 3.statusword.fault never"),
@@ -41,7 +42,18 @@ known = "080,181-18F"
 """
 PIECES: Final = (
     *("", "never", "in", "{", "}", "..", "±", "+-", "10%", "1e400", "nan", "inf", "-1", "0x"),
-    *("9" * 400, "99999999999999s", "0ms", "0.000000001us", "(", ")", "not", "!", "of", "of of"),
+    *(
+        "9" * 400,
+        "99999999999999s",
+        "0ms",
+        "0.000000001us",
+        "(",
+        ")",
+        "not",
+        "!",
+        "of",
+        "181[",
+    ),
     *("node", "128", "0", "3-1", "1-127", "[", "]", "\x00", "\udc80", "\u2028", "\n", "'", ": "),
     *("while", "after", "before", "per", "to", "dlc = 8", "#FF", "\u0661", "²", "é", "_", ".", "h"),
 )

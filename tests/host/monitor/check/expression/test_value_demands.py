@@ -101,3 +101,27 @@ def test_a_value_that_does_not_change_is_found_once() -> None:
 def test_a_rule_whose_signal_never_came_does_not_hold(rule: str, said: str) -> None:
     found = broken(rule, MAPPED + f"1 {ENABLED}")
     assert found == [f"1 {said}"]
+
+
+UNMAPPED = "unmapped of node 1: no mapping was heard "
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("181[2:4] in ..500", f"{UNMAPPED}181[2:4]=1000; 181[2:4] in ..500 is right"),
+        ("181[2:4]s*0.01 > 9.5 never", f"{UNMAPPED}181[2:4]s*0.01=10"),
+        ("181[0.3] never", f"{UNMAPPED}181[0.3]=1"),
+        ("181 and 181[0.3] = 1 never", f"{UNMAPPED}181[0.3]=1"),
+        ("181[2:4] steps under 100", "181[2:4] is 1000 after 100, a step of 100 is right"),
+        ("not (181[2:4]+5 < 1000) and 181 never", f"{UNMAPPED}181[2:4]+5=1005"),
+    ],
+)
+def test_bits_of_frames_that_nobody_mapped_are_values(rule: str, said: str) -> None:
+    text = "1 181#00006400\n2 181#0800E803\n3 182#FFFFFFFF\n4 181#08"
+    assert broken(rule, text) == [f"2 {said}"]
+
+
+def test_a_slice_of_29_bits_is_another_one() -> None:
+    assert len(broken("18FF0001[0] in 0..1", "1 18FF0001#02\n2 181#02")) == 1
+    assert broken("00000181[0] never", "1 181#02") == ["1 no signal 00000181[0] came"]
