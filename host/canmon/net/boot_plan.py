@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NodeObjects
-from tickrig.host.canmon.net.risks import nmt_risk, write_risk
+from tickrig.host.canmon.risks import nmt_risk, write_risk
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
@@ -78,7 +78,7 @@ def risk(assignment: SlaveAssignment) -> str:
         return nmt_risk(NmtCommand.RESET_NODE, assignment.device_type or None)
     objects = NodeObjects(assignment.node_id)
     objects.learn(DEVICE_TYPE, assignment.device_type.to_bytes(4, "little"))
-    return write_risk(objects, [(write.index, write.sub) for write in assignment.writes])
+    return write_risk(objects.is_drive, [(write.index, write.sub) for write in assignment.writes])
 
 
 def changes(assignment: SlaveAssignment) -> list[str]:

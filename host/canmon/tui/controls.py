@@ -44,6 +44,9 @@ class ChoiceView(LineView):
         chosen: the number of the chosen line, from 0.
     """
 
+    class Chosen(Message):
+        """Somebody has chosen a line."""
+
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "choose(-1)", "up", show=False),
         Binding("down", "choose(1)", "down", show=False),
@@ -77,6 +80,7 @@ class ChoiceView(LineView):
         if not self.top <= self.chosen < self.top + self.rows:
             top = self.chosen if self.chosen < self.top else self.chosen - self.rows + 1
             self.scroll_to(y=top, animate=False, immediate=True, force=True)
+        self.post_message(self.Chosen())
 
     def action_choose(self, steps: int) -> None:
         """Choose a line further down, or up."""

@@ -32,7 +32,7 @@ def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list
     lines = [GAP.join(line[column].ljust(widths[column]) for column in used) for line in cells]
     if not rows:
         lines = ["no node was heard"]
-    lines += _history(rows)
+    lines += emcy_history(rows)
     return [_cut(line.rstrip(), width) for line in lines[:height]]
 
 
@@ -82,7 +82,8 @@ def _emcy(row: NodeStatus) -> str:
     return f"{now} [{row.emcy_count}]"
 
 
-def _history(rows: Sequence[NodeStatus]) -> list[str]:
+def emcy_history(rows: Sequence[NodeStatus]) -> list[str]:
+    """Return an empty line, a head, and the EMCYs of all nodes, the latest first; or nothing."""
     found = sorted((emcy.at_us, row.node, emcy.text) for row in rows for emcy in row.emcys)
     lines = [f"{at_us / 1e6:.6f}  node {node}  {text}" for at_us, node, text in reversed(found)]
     return ["", "EMCY, latest first", *lines] if lines else []

@@ -63,6 +63,7 @@ class NodeStatus:
         drive_state: of CiA 402, empty while no statusword was heard.
         name: the device name it told.
         present: it has sent anything that is known to be its own.
+        pdos: the latest of each of its PDOs, by kind.
     """
 
     channel: str
@@ -82,6 +83,7 @@ class NodeStatus:
     drive_state: str = ""
     name: str = ""
     present: bool = False
+    pdos: dict[str, Decoded] = field(default_factory=dict)
     _reset_requested: bool = False
     _gaps: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
 
@@ -207,6 +209,9 @@ class NodeBoard:
             return
         elif kind.startswith("tpdo"):
             self._process_data(record.channel, node, decoded)
+        elif kind.startswith("rpdo"):
+            if (status := self._nodes.get((record.channel, node))) is not None:
+                status.pdos[kind] = decoded
         elif kind == "sdo":
             self._transfers(record.channel, node, decoded)
         elif kind == "emcy":
@@ -241,7 +246,7 @@ class NodeBoard:
 
     def _process_data(self, channel: str, node: int, decoded: Decoded) -> None:
         status = self._status(channel, node)
-        status.present = True
+        status.present, status.pdos[decoded.kind] = True, decoded
         for signal in decoded.signals:
             if signal.name == STATUSWORD and isinstance(signal.value, int):
                 status.drive_state = drive_state(signal.value)

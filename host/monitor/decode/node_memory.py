@@ -31,12 +31,14 @@ class EdsObjects:
         values: power-on values, as bytes on the wire, likewise.
         name: of the device, empty where the file has none.
         findings: what is wrong in the file, whose objects are then not used.
+        vendor: who makes the device, empty where the file does not say it.
     """
 
     texts: Mapping[Entry, ObjectText] = field(default_factory=dict)
     values: Mapping[Entry, bytes] = field(default_factory=dict)
     name: str = ""
     findings: tuple[Finding, ...] = ()
+    vendor: str = ""
 
 
 def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
@@ -63,6 +65,7 @@ def eds_objects(
         },
         device.info.product_name or name,
         findings,
+        device.info.vendor_name,
     )
 
 

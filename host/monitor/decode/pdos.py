@@ -247,7 +247,7 @@ def _layout(pdo: Pdo, memory: NodeMemory) -> Layout | None:
         return PdoLayout((pdo.kind, pdo.node, source), note=note) if source else None
     if count in MPDO:
         return MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
-    entries = _entries(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
+    entries = mapped_objects(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
     if (STATUSWORD, 16) in {((item.index, item.sub), item.bits) for item in entries}:
         memory.maps_statusword()
     missing = f"and {mapping:04X}h:{len(entries) + 1:02X}, which was not heard"
@@ -257,7 +257,7 @@ def _layout(pdo: Pdo, memory: NodeMemory) -> Layout | None:
     return PdoLayout((pdo.kind, pdo.node, source), fields, bits, note)
 
 
-def _entries(memory: NodeMemory, mapping: int, count: int) -> list[MappedObject]:
+def mapped_objects(memory: NodeMemory, mapping: int, count: int) -> list[MappedObject]:
     """Return the mapped objects up to the first that is not known."""
     entries = []
     for sub in range(1, count + 1):

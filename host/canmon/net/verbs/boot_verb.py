@@ -10,8 +10,8 @@ import click
 
 from tickrig.host.canmon.net.boot_plan import changes, nothing_expected, of_bus_file, of_eds, risk
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.risks import nmt_risk
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
+from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canopen.master.assignment import SlaveAssignment
 from tickrig.host.canopen.master.boot_slave import BootOutcome, SlaveBoot
 from tickrig.host.canopen.master.boot_status import BootStatus

@@ -10,10 +10,10 @@ import click
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import Entry, NodeObjects, known_objects
 from tickrig.host.canmon.net.node_values import differences, line
-from tickrig.host.canmon.net.risks import write_risk
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
 from tickrig.host.canmon.net.stored import save
 from tickrig.host.canmon.net.values import shown
+from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, disabled, writes
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.cli.messages import say
@@ -65,7 +65,9 @@ def command(  # noqa: PLR0913, PLR0917 - options
             return
         what = f"{counted(len(changed), 'object')} of {file.name} to node {node}"
         what += ", then stored" if store else ""
-        session.confirm(what, yes=yes, risk=write_risk(objects, [at for at, _ in changed.items()]))
+        session.confirm(
+            what, yes=yes, risk=write_risk(objects.is_drive, [at for at, _ in changed.items()])
+        )
         _write(session, objects, steps, store=store)
 
 

@@ -7,8 +7,8 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.risks import nmt_risk
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
+from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed
 from tickrig.host.canopen.master.boot_talk import state_text
 from tickrig.host.cli.messages import say

@@ -14,10 +14,10 @@ from tickrig.host.canopen.commissioning.network_scan import NetworkScan, NodeFou
 from tickrig.host.canopen.master.boot_talk import state_text
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import time_option
+from tickrig.host.monitor.views.node_card import profile_text
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
 
-PROFILES: Final = {401: "I/O", 402: "drive", 405: "PLC", 406: "encoder", 410: "inclinometer"}
 NOBODY: Final = 1
 WAIT_US: Final = 500_000
 
@@ -62,16 +62,7 @@ def _line(node: NodeFound) -> str:
 
 
 def _kind(device_type: int | None) -> str:
-    """Say which profile a device type names.
-
-    >>> _kind(0x20192), _kind(0x0), _kind(None)
-    ('CiA 402 drive', 'no profile', 'no 1000h')
-    """
-    if device_type is None:
-        return "no 1000h"
-    profile = device_type & 0xFFFF
-    name = PROFILES.get(profile, "")
-    return f"CiA {profile} {name}".rstrip() if profile else "no profile"
+    return "no 1000h" if device_type is None else profile_text(device_type)
 
 
 def _identity(node: NodeFound) -> str:

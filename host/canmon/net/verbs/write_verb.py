@@ -9,9 +9,9 @@ import click
 
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import Entry, NodeObjects, known_objects
-from tickrig.host.canmon.net.risks import write_risk
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
 from tickrig.host.canmon.net.values import encoded, limits
+from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
@@ -45,7 +45,7 @@ def command(call: NetCall, node: int, values: Sequence[str], eds: Path | None, y
         writes = [(objects.find(name), text) for name, text in pairs]
         made = [(entry, text, encoded(objects, entry, text)) for entry, text in writes]
         titles = [f"{objects.title(entry)} = {text}" for entry, text, _ in made]
-        risk = write_risk(objects, [entry for entry, _, _ in made])
+        risk = write_risk(objects.is_drive, [entry for entry, _, _ in made])
         session.confirm(f"writes to node {node}: {', '.join(titles)}", yes=yes, risk=risk)
         session.work.plan(*titles)
         for title, (entry, _, data) in zip(titles, made, strict=True):

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import text_of
@@ -111,7 +112,7 @@ class DictionaryPanel(Panel):
         """Show the next node that was heard or has an EDS."""
         if self._known:
             place = self._known.index(self.node) if self.node in self._known else -steps
-            self._show(self._known[(place + steps) % len(self._known)])
+            self.show_node(self._known[(place + steps) % len(self._known)])
 
     def action_go(self) -> None:
         """Ask for a node-ID."""
@@ -136,13 +137,16 @@ class DictionaryPanel(Panel):
         if row is not None and self.may_send():
             kind = ", ".join(filter(None, [row.kind or "bytes in hex", row.text.unit]))
             question = f"{write_entry(row.entry)} {row.text.name} ({kind})"
+            if risk := self._risk(row):
+                question += f"\n{risk}. Enter writes it, Escape does not"
             self.query_one(PromptLine).prompt(question, "", lambda text: self._write(row, text))
 
     def action_filter(self) -> None:
         """Ask for a part of a name, or the begin of an index."""
         self.query_one(PromptLine).prompt("name or index", self.filter_text, self._filter)
 
-    def _show(self, node: Node) -> None:
+    def show_node(self, node: Node) -> None:
+        """Show the objects of a node."""
         self._wanted_node = node[1]
         self.change(lambda: self._choose(node))
 
@@ -154,7 +158,12 @@ class DictionaryPanel(Panel):
         if not text.isdecimal() or not 1 <= int(text) <= 127:
             raise ValueError(f"{text!r} is no node-ID 1 to 127")
         bus = self.node[0] if self.node else self.session.next_bus("")
-        self._show((bus, int(text)))
+        self.show_node((bus, int(text)))
+
+    def _risk(self, row: ObjectRow) -> str:
+        node = self.node
+        drive = node is not None and self.session.model.decoder.memory(*node).is_drive
+        return write_risk(drive, [row.entry])
 
     def _filter(self, text: str) -> None:
         self.filter_text = text

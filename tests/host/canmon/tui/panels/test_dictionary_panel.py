@@ -45,6 +45,18 @@ def test_an_object_is_found_read_and_written() -> None:
     at_desk(DictionaryPanel, act, session=record())
 
 
+def test_before_an_object_is_written_it_is_said_what_may_move() -> None:
+    async def act(desk: Desk[DictionaryPanel]) -> None:
+        await desk.press("A", "slash")
+        await desk.answer("6040")
+        await desk.press("e")
+        assert desk.static("#question").splitlines()[1:] == [
+            "This may turn a motor: controlword. Enter writes it, Escape does not"
+        ]
+
+    at_desk(DictionaryPanel, act, session=record())
+
+
 def test_all_that_is_shown_is_read_and_a_watched_object_is_marked() -> None:
     async def act(desk: Desk[DictionaryPanel]) -> None:
         await desk.press("A", "R")

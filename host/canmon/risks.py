@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from tickrig.host.canmon.net.node_objects import Entry, NodeObjects
+from tickrig.host.monitor.decode.node_memory import Entry
 from tickrig.wire.canopen.nmt import NmtCommand
 
 DRIVE_AREA: Final = range(0x6000, 0xA000)
@@ -29,12 +29,12 @@ IO_PROFILE: Final = 401
 SEVERAL: Final = 0xFFFF
 
 
-def write_risk(objects: NodeObjects, entries: Iterable[Entry]) -> str:
-    """Say what writing objects may move."""
+def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
+    """Say what writing objects may move at a node, a drive of CiA 402 or another one."""
     indices = [index for index, _ in entries]
     profile = [index for index in indices if index in DRIVE_AREA]
     told = [name for index in profile if (name := COMMANDS.get((index - 0x6000) % AXIS))]
-    if told and objects.is_drive:
+    if told and is_drive:
         return f"This may turn a motor: {', '.join(dict.fromkeys(told))}"
     if profile:
         return f"This may move what the node drives: {_listed(profile)} is of its device profile"
