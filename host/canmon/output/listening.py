@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING, Final, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Final, ParamSpec, TypeVar
 
 import click
 
@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from tickrig.host.monitor.columns.columns import Columns
     from tickrig.host.monitor.frames.record import AnyRecord
     from tickrig.host.monitor.traffic.traffic import Snapshot
+
+
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 
 class FramesLost(click.ClickException):
@@ -54,16 +58,44 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
         raise FramesLost(", ".join(missing))
 
 
+class Interruptions:
+    """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it."""
+
+    def __init__(self) -> None:
+        self._held = self._came = False
+
+    def received(self, number: int, frame: FrameType | None) -> None:
+        """Take a signal."""
+        self._came = True
+        if not self._held:
+            raise KeyboardInterrupt
+
+    def behind(self, act: Callable[Given, Result]) -> Callable[Given, Result]:
+        """Return what does the same, and is not cut short: an interruption ends it behind that."""
+
+        def whole(*arguments: Given.args, **named: Given.kwargs) -> Result:
+            self._held = True
+            try:
+                result = act(*arguments, **named)
+            finally:
+                self._held = False
+            if self._came:
+                raise KeyboardInterrupt
+            return result
+
+        return whole
+
+
 @contextmanager
-def until_interrupted() -> Iterator[None]:
+def until_interrupted() -> Iterator[Interruptions]:
     """End the block at Ctrl-C, and at the signals that end a program, and go on behind it."""
-
-    def received(number: int, frame: FrameType | None) -> NoReturn:
-        raise KeyboardInterrupt
-
-    before = {number: signal.signal(number, received) for number in TERMINATING}
+    interruptions = Interruptions()
+    numbers = list(TERMINATING)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else somebody ignores it
+        numbers.append(signal.SIGINT)
+    before = {number: signal.signal(number, interruptions.received) for number in numbers}
     try:
-        yield
+        yield interruptions
     except KeyboardInterrupt:
         pass
     finally:

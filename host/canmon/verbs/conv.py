@@ -55,8 +55,12 @@ def command(  # noqa: PLR0913 - options
     chosen = read_filter(wanted)
     decoder = None if chosen is None else make_decoder(eds, dbc)
     meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
-    with closing(frames), closing(LogFile(Plan(path=log), source)) as out, until_interrupted():
-        pass_on(frames, meaning, out.take)
+    with (
+        closing(frames),
+        closing(LogFile(Plan(path=log), source)) as out,
+        until_interrupted() as signals,
+    ):
+        pass_on(frames, meaning, signals.behind(out.take))
     report(frames, strict, meaning.messages())
 
 

@@ -155,8 +155,10 @@ def command(  # noqa: PLR0913 - options
                 keys = TriggerKeys("-" not in source)
                 held.enter_context(keys.watching())
                 take = _with_keys(log, keys)
-        with until_interrupted(), until_unread():
-            pass_on(frames, meaning, take, count, quiet_ms)
+        with until_interrupted() as signals, until_unread():
+            # a block of a log is written whole; who prints may wait for its reader for ever
+            whole = take if recording is None else signals.behind(take)
+            pass_on(frames, meaning, whole, count, quiet_ms)
     report(frames, strict, meaning.messages())
 
 

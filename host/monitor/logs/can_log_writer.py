@@ -136,7 +136,8 @@ class BlfWriter(can.BLFWriter):
 
     def on_message_received(self, msg: can.Message) -> None:
         """Write a frame."""
-        self.early += msg.timestamp < self._begin(msg.timestamp)
+        start = self.start_timestamp
+        self.early += msg.timestamp < (self._begin(msg.timestamp) if start is None else start)
         super().on_message_received(msg)
 
     def mark(self, mark: Mark) -> None:

@@ -9,7 +9,6 @@ from tickrig.host.canmon.output.recording import read_recording
 from tickrig.host.canmon.tui.settings import text_of
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Session, Task
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.logs.log_file import LogError, LogFormatError
 from tickrig.host.monitor.recorder.recorder import Recorder, State
 from tickrig.host.text.values import counted
 from tickrig.wire.can import Frames
@@ -80,8 +79,6 @@ class RecorderTask(Task):
                 session.marks.clear()
         except Refused as error:
             raise ValueError(error.message) from None
-        except (LogError, LogFormatError) as error:
-            raise ValueError(str(error)) from None
         except OSError as error:
             raise ValueError(f"{error.filename}: {error.strerror}") from None
         self.words = words

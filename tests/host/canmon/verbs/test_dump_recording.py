@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -255,3 +256,22 @@ def test_a_signal_is_a_trigger(feeding: Callable[..., Feeding], tmp_path: Path) 
     assert recorder.end() == 0
     assert numbers(tmp_path, "run-*.log") == list(range(994, 1_010))
     assert "trigger: SIGUSR1" in (tmp_path / "run-00001.log").read_text()
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("name", ["run.log", "run.blf"])
+def test_a_recorder_that_is_interrupted_writes_its_block_whole(
+    feeding: Callable[..., Feeding], tmp_path: Path, name: str, number: int
+) -> None:
+    recorder = feeding("-l", str(tmp_path / name), "--rotate", "1G")
+    part = tmp_path / name.replace("run", "run-00001")
+    recorder.feed(*map(line, range(5_000)))
+    wait(part.exists)
+    recorder.child.send_signal(number)
+    with suppress(BrokenPipeError):
+        recorder.feed(*map(line, range(5_000, 20_000)))
+    assert recorder.child.wait(PATIENCE_S) == 0
+    (said,) = [said for said in index_of(tmp_path / "run.index.jsonl") if said["ev"] == "file"]
+    assert numbers(tmp_path, part.name) == list(range(said["frames"]))
+    assert "cut" not in said
