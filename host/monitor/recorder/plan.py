@@ -158,6 +158,8 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     kind = log_format(path)
     if kind is LogFormat.BLF and path.suffix.lower() == COMPRESSED:
         raise ValueError(f"{path}: blf is compressed by itself, it is not written with .gz")
+    if kind is LogFormat.PCAP:
+        raise ValueError(f"{path}: pcap is read alone; a name in .pcapng is written")
     if plan.numbered and kind is LogFormat.MF4:
         raise ValueError(f"{path}: mf4 is written as a whole at its end; record .blf or .log")
     return plan

@@ -111,6 +111,7 @@ def test_the_recording_ends_at_its_limit_and_nothing_is_wrong(tmp_path: Path) ->
         (["--rotate", "1M", "-l", "{folder}/no/run.log"], 3, "run.index.jsonl: No such file"),
         (["--rotate", "1M", "-l", "{folder}/run.xyz"], 2, "a log's name ends in"),
         (["--rotate", "1M", "-l", "{folder}/run.mf4"], 2, "mf4 is written as a whole"),
+        (["--rotate", "1M", "-l", "{folder}/run.pcap"], 2, "pcap is read alone"),
         (["--rotate", "1M", "-l", "{folder}/run.blf.gz"], 2, "blf is compressed by itself"),
     ],
 )

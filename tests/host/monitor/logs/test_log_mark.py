@@ -24,7 +24,7 @@ MARKS = (
     back(START_US + 500_000, "can0", 500_000),
     triggered(START_US, "ü\nemcy"),
 )
-HELD = ["run.log", "run.log.gz", "run.jsonl", "run.asc", "run.trc", "run.blf"]
+HELD = ["run.pcapng", "run.log", "run.log.gz", "run.jsonl", "run.asc", "run.trc", "run.blf"]
 LEFT_OUT = ["run.csv", "run.trace"]
 
 
@@ -113,7 +113,18 @@ def readable(reader: LogReader) -> tuple[list[Record], str]:
     return found, ""
 
 
-@pytest.mark.parametrize("name", ["run.log", "run.log.gz", "run.asc.gz", "run.jsonl.gz", "run.blf"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "run.log",
+        "run.log.gz",
+        "run.asc.gz",
+        "run.jsonl.gz",
+        "run.blf",
+        "run.pcapng",
+        "run.pcapng.gz",
+    ],
+)
 def test_all_that_was_flushed_is_read_of_a_log_whose_writer_was_killed(
     name: str, tmp_path: Path
 ) -> None:

@@ -28,7 +28,16 @@ from tickrig.host.monitor.logs.mark import back, gone
 from tickrig.host.monitor.recorder.plan import Plan, read_plan
 from tickrig.host.monitor.recorder.recorder import Recorder, State
 
-FORMATS = ["run.log", "run.jsonl", "run.csv", "run.asc", "run.trc", "run.blf", "run.log.gz"]
+FORMATS = [
+    "run.pcapng",
+    "run.log",
+    "run.jsonl",
+    "run.csv",
+    "run.asc",
+    "run.trc",
+    "run.blf",
+    "run.log.gz",
+]
 
 
 def test_one_file_has_no_index(tmp_path: Path) -> None:
