@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from typing import BinaryIO, Final, NamedTuple
+from io import BufferedReader
+from typing import BinaryIO, Final, NamedTuple, cast
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import END_S, LogError
@@ -98,9 +99,9 @@ class PcapngReader:
         Raises:
             LogError: it is cut or damaged, after all frames before that.
         """
-        more = True
+        more, some = True, cast("BufferedReader", file).read1  # `read` loses the end of a cut log
         while more:
-            data = file.read(self._wanted)
+            data = some(self._wanted)
             begun += data
             records: list[Record] = []
             begun = begun[self._take(begun, records) :]
