@@ -108,7 +108,7 @@ class NetSession:
                 say(text)
             return
         if not (sys.stdin.isatty() and sys.stderr.isatty()):
-            raise Refused(f"{text} Nobody is here to be asked: give --yes")
+            raise Refused(f"{text.removesuffix('.')}. Nobody is here to be asked: give --yes")
         say(text)
         if not click.confirm("Go on?", default=False, err=True):
             raise Refused("not begun")

@@ -30,6 +30,7 @@ PATIENCE_US: Final = 60_000_000
 ANSWER_US: Final = 10_000_000
 """How long a node that clears its flash may take to answer."""
 
+LOOKS: Final = 3
 SILENCE_US: Final = 500_000
 """What a node answers to segments behind an abort has come by then."""
 
@@ -153,11 +154,25 @@ class Program:
                 disturbed = isinstance(error, SdoTimeout) or getattr(error, "code", 0) in AGAIN
                 if not disturbed or number == tries:
                     raise
+                self._bus.gather(SILENCE_US)
+                if not self._is_there():
+                    raise
                 self._say(f"the transfer broke off ({error}); begun anew, {number + 1} of {tries}")
                 on_progress(0)
-                self._bus.gather(SILENCE_US)
         self._await_flash(allowed=(0,))
         return number
+
+    def _is_there(self) -> bool:
+        """Say whether the node answers at all; a frame or two may be lost."""
+        for _ in range(LOOKS):
+            try:
+                self._read(CONTROL)
+            except SdoTimeout:
+                continue
+            except SdoAborted:
+                return True
+            return True
+        return False
 
     def _transfer(self, data: bytes, on_progress: OnProgress) -> None:
         at = (DATA, self._number)

@@ -113,7 +113,7 @@ def test_a_node_that_dies_in_the_middle_is_told(rig: str, file: str) -> None:
         opened.write('[fault]\nmodule = "power_off@450ms"\n')
     result = net(rig, "program", "17", file, "--tries", "2")
     assert result.exit_code == 1
-    assert "begun anew, 2 of 2" in result.stderr
+    assert "begun anew" not in result.stderr, "nobody answers"
     told = result.stderr.splitlines()[-1]
     assert "Error: node 17: 1F50h:01 program data: no answer within 10000 ms" in told
     assert "the node has no whole program" in told

@@ -5,12 +5,14 @@ from __future__ import annotations
 from binascii import crc32
 from typing import Any
 
+import canopen
 import pytest
 from durand import DatatypeEnum, Node, Variable
 from durand.network import NetworkABC
 
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
+from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.testing.conformance.foreign.durand_slave import DurandSlave
 from tickrig.host.canopen.block_download import download_blocks
 from tickrig.host.canopen.commissioning.program import Program, ProgramFailed, ProgramStatus
@@ -46,6 +48,12 @@ class Target:
     def flashed(self) -> bytes:
         """Return what the node has taken."""
         return self.taken[-1] if self.taken else self.ours.nonvolatile.program or b""
+
+    def transferred(self) -> list[str]:
+        """Return the frames of block transfer."""
+        sdo = [text for text in self.bench.frames if text[:3] in ("605", "585")]
+        first = next(place for place, text in enumerate(sdo) if text.startswith("605#C6"))
+        return sdo[first:]
 
 
 def stopped(seed: int = 0) -> Target:
@@ -196,3 +204,18 @@ def refusing_blocks(target: Target) -> Any:
         return run(node_id, script, timeout_us)
 
     return refuse
+
+
+def test_the_client_of_the_canopen_library_says_the_same() -> None:
+    ours, other = stopped(), stopped()
+    ours.program._transfer(firmware(2_000), lambda done: None)
+    network = SimNetwork(other.bench.rig, other.bench.wire.end())
+    objects = canopen.ObjectDictionary()  # type: ignore[no-untyped-call]  # of the library
+    node = canopen.RemoteNode(NODE, objects)
+    network.add_node(node)
+    with node.sdo.open(
+        0x1F50, 1, "wb", size=2_000, block_transfer=True, request_crc_support=True
+    ) as stream:
+        stream.write(firmware(2_000))
+    assert ours.flashed() == other.flashed() == firmware(2_000)
+    assert ours.transferred() == other.transferred()
