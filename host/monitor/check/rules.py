@@ -49,7 +49,8 @@ class Rules:
         max_gaps: identifiers and the longest gap of each, microseconds.
         known: all identifiers that may come, None for any.
         others: what makes further rules, those of installed packages.
-        expressions: rules about what frames mean; they need a decoder.
+        expressions: rules about what frames mean. `Checker` holds them where it is given decoded
+            frames; a whole log at once is not held against them.
     """
 
     max_load: float | None = None

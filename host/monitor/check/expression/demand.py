@@ -29,9 +29,11 @@ class Demand:
 
     Attributes:
         due_us: until when something must have come.
+        judged: a frame came that it counts; where it counts none, False.
     """
 
     due_us: int = NEVER
+    judged: bool = False
 
     def begin(self, at_us: int) -> None:
         """Begin, or begin anew after a pause."""

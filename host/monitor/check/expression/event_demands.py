@@ -79,7 +79,7 @@ class Count(Demand):
         """Count a frame."""
         if not self._event.matches(record, decoded):
             return None
-        self._count += 1
+        self._count, self.judged = self._count + 1, True
         if self._most is None or self._count != self._most + 1:
             return None
         return (

@@ -18,6 +18,10 @@ MOST_NAMES: Final = 1_000
 """So many names of signals are kept, to tell what a misspelt one may mean."""
 
 
+UNMAPPED: Final = "unmapped"
+NO_MAPPING: Final = "; PDOs came that nobody mapped: name them by --eds"
+
+
 class ExpressionRule:
     """One rule, for one node where it was written for several.
 
@@ -30,20 +34,24 @@ class ExpressionRule:
         scopes: when; always where there are none.
         paths: the signals that it names.
         slices: those of them that are bits of frames.
+        mapped: it speaks of what PDOs carry, or of PDOs by their numbers.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what a rule is made of
         self,
         name: str,
         demand: Demand,
         scopes: Sequence[Scope],
         paths: Iterable[str],
         slices: Sequence[Slice],
+        *,
+        mapped: bool,
     ) -> None:
         self.name, self._demand, self._scopes = name, demand, tuple(scopes)
         self._slices = tuple(slices)
         self._missing = MissingSignals(paths)
-        self._looks, self._names = bool(self._missing), set[str]()
+        self._mapped, self._unmapped = mapped, False
+        self._looks, self._names = mapped or bool(self._missing), set[str]()
         self._running, self._began, self._found = False, False, False
 
     @property
@@ -56,7 +64,7 @@ class ExpressionRule:
         if self._slices:
             decoded = with_slices(record, decoded, self._slices)
         if self._looks:
-            self._look_for_signals(decoded)
+            self._look(decoded)
         # without a scope nothing is asked once it runs: a third of the time of a rule
         if (self._scopes or not self._running) and not self._in_force(record, decoded):
             return None
@@ -81,7 +89,8 @@ class ExpressionRule:
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
             texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
-        return [Finding(end_us, self.name, text) for text in texts]
+        hint = "" if self._demand.judged or not self._unmapped else NO_MAPPING
+        return [Finding(end_us, self.name, text + hint) for text in texts]
 
     def _in_force(self, record: Record, decoded: Decoded) -> bool:
         self._began = True
@@ -95,9 +104,12 @@ class ExpressionRule:
                 self._demand.pause()
         return running
 
-    def _look_for_signals(self, decoded: Decoded) -> None:
+    def _look(self, decoded: Decoded) -> None:
+        """See which signals come, until all have, and whether PDOs come that nobody mapped."""
+        if self._mapped and decoded.kind == UNMAPPED:
+            self._unmapped = True
         self._missing.take(decoded)
-        self._looks = bool(self._missing)
+        self._looks = bool(self._missing) or (self._mapped and not self._unmapped)
         if len(self._names) < MOST_NAMES:
             self._names.update(signal.name for signal in decoded.signals)
 

@@ -218,7 +218,9 @@ class Expression:
 
 
 def _made(name: str, text: str) -> ExpressionRule:
-    return ExpressionRule(name, *RuleParser(text).rule())
+    demand, scopes, paths, slices = RuleParser(text).rule()
+    mapped = "pdo" in text or any("." in path for path in paths)
+    return ExpressionRule(name, demand, scopes, paths, slices, mapped=mapped)
 
 
 def parse_rule(text: str, name: str = "") -> Expression:

@@ -24,7 +24,6 @@ class Every(Demand):
     def __init__(self, event: Event, low_us: int, high_us: int | None) -> None:
         self._event, self._low_us, self._high_us = event, low_us, high_us
         self._last: dict[Sender, tuple[int, int | None]] = {}
-        self._came = False
 
     def begin(self, at_us: int) -> None:
         """Measure from the next frame."""
@@ -36,7 +35,7 @@ class Every(Demand):
             self._forget(record.channel, decoded.node)
         if not self._event.matches(record, decoded):
             return None
-        self._came = True
+        self.judged = True
         sender = sender_of(record)
         before = self._last.get(sender)
         self._last[sender] = record.at_us, decoded.node
@@ -49,7 +48,7 @@ class Every(Demand):
         """Say that it stopped or never came."""
         if not running or self._high_us is None:
             return
-        if not self._came:
+        if not self.judged:
             yield f"{self._event.text} never came"
         for at_us, node in self._last.values():
             if end_us - at_us > self._high_us:

@@ -296,7 +296,7 @@ def test_written_rules_are_held_against_a_large_log(
 
 def test_written_rules_are_held_against_a_bus() -> None:
     with new_wire() as wire, wire.calling("083#3081110000000000"):
-        result = check(wire.word, "--for", "2s", "--rule", "emcy at most 2", "--around", "0")
+        result = check(wire.word, "--for", "500ms", "--rule", "emcy at most 2", "--around", "0")
     assert result.exit_code == 1
     assert "emcy came 3 times, at most 2 is right [" in result.stdout
 

@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+import re
+import tomllib
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -124,3 +128,20 @@ def test_any_text_is_a_rule_or_refused(text: str) -> None:
         parse_rule(text)
     except RuleError:
         return
+
+
+PAGE = (Path(__file__).parents[5] / "docs" / "canmon-model.md").read_text("utf-8")
+WRITTEN = PAGE.partition("### Rules that are written out")[2].partition("\n- ")[0]
+ROWS = re.findall(r"^\| (`.*?) \|", WRITTEN, re.MULTILINE)
+
+
+def test_each_rule_of_the_page_is_one() -> None:
+    rules = [rule for row in ROWS for rule in re.findall(r"`([^`]*)`", row) if "..." not in rule]
+    assert len(rules) > 25
+    for rule in rules:
+        assert parse_rule(rule).name == rule
+
+
+def test_the_file_of_the_page_is_read() -> None:
+    text = PAGE.partition("```toml\n")[2].partition("```")[0]
+    assert parse_rules(tomllib.loads(text)).names()[-2:] == ["drive enables", "lengths"]

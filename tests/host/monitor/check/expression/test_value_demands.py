@@ -125,3 +125,21 @@ def test_bits_of_frames_that_nobody_mapped_are_values(rule: str, said: str) -> N
 def test_a_slice_of_29_bits_is_another_one() -> None:
     assert len(broken("18FF0001[0] in 0..1", "1 18FF0001#02\n2 181#02")) == 1
     assert broken("00000181[0] never", "1 181#02") == ["1 no signal 00000181[0] came"]
+
+
+HINT = "; PDOs came that nobody mapped: name them by --eds"
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("tpdo1 of 3 every 10ms ±10%", "tpdo1 of 3 never came"),
+        ("tpdo1 of 3 at least 2", "tpdo1 of 3 came 0 times, at least 2 is right"),
+        ("3.statusword.fault never", "no signal 3.statusword.fault came"),
+    ],
+)
+def test_it_is_told_that_a_pdo_has_no_name_without_its_mapping(rule: str, said: str) -> None:
+    text = f"1 {ENABLED}\n1.5 183#"
+    assert broken(rule, text) == [f"1.5 {said}{HINT}"]
+    assert not any(HINT in line for line in broken(rule, f"{MAPPED}{text}\n2 281#"))
+    assert not any(HINT in line for line in broken(rule, "1 703#05"))
