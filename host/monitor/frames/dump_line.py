@@ -1,6 +1,5 @@
 """Frames as lines of text, as candump shows them.
 
->>> from tickrig.wire.can import CanFrame
 >>> lines = DumpLines(Stamp.ZERO)
 >>> lines.line(Record(1_000_000, "can0", CanFrame.parse("705#7F")))
 ' (000.000000)  can0  705   [1]  7F'
@@ -22,6 +21,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final, assert_never
 
 from tickrig.host.monitor.frames.record import ARROWS, AnyFrame, Record
+from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_FLAG, ErrorFrame
 from tickrig.wire.can_fd import FdFrame
 
@@ -61,7 +61,9 @@ class DumpLines:
         """Return the line, with what the frame means behind it."""
         ident = _ident(record.frame)
         self._width = max(self._width, len(ident))
-        direction = f"  {'TX' if record.sent else 'RX'} {_flags(record.frame)}" * self._extra
+        direction = ""
+        if self._extra:
+            direction = f"  {'TX' if record.sent else 'RX'} {_flags(record.frame)}"
         stamp = self.stamp(record.at_us)
         data = f"{_data(record.frame):<{DATA_WIDTH + 1}}   {text}" if text else _data(record.frame)
         return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}  {data}"
@@ -101,12 +103,13 @@ def _ident(frame: AnyFrame) -> str:
 def _data(frame: AnyFrame) -> str:
     """Return length and data; a length of two digits begins a column earlier."""
     data = frame.data.hex(" ").upper()
+    if isinstance(frame, CanFrame):
+        if frame.remote:
+            return f" [{frame.dlc}]  remote request"
+        return f" [{len(frame.data)}] {' ' * bool(data)}{data}"
     if isinstance(frame, ErrorFrame):
         return f" [{len(frame.data)}]  {data}   ERRORFRAME"
-    if frame.remote:
-        return f" [{frame.dlc}]  remote request"
-    length = f"[{len(frame.data):02d}]" if isinstance(frame, FdFrame) else f" [{len(frame.data)}]"
-    return f"{length} {' ' * bool(data)}{data}"
+    return f"[{len(frame.data):02d}] {' ' * bool(data)}{data}"
 
 
 def seconds_text(span_us: int, digits: int) -> str:

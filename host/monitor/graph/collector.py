@@ -10,6 +10,7 @@ from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.series import Series
 from tickrig.host.monitor.graph.signal_spec import EXTENDED, FrameSlice, ObjectName, SignalSpec
+from tickrig.wire.can import MAX_DATA_BYTES
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
@@ -86,6 +87,8 @@ class Collector:
         for key, pairs in self._slices.items():
             chosen = columns.ident == key
             for cut, series in pairs:
+                if cut.data_bytes > MAX_DATA_BYTES:
+                    continue  # columns hold classic frames
                 whole = chosen & (columns.dlc >= cut.data_bytes)
                 values = cut.values(columns.payload[whole])
                 series.extend(columns.at_us[whole].tobytes(), values.tobytes())

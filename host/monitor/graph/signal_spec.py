@@ -36,10 +36,12 @@ FORM: Final = (
 _NUMBER: Final = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _NOTATION: Final = re.compile(
     r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
-    r"\[([0-7])(?::([1-8])|\.([0-7])(?:\+([0-9]{1,2}))?)?\]"
+    r"\[([0-9]{1,2})(?::([0-9]{1,2})|\.([0-7])(?:\+([0-9]{1,2}))?)?\]"
     rf"([usf]?)(b?)(?:([*/])(-?{_NUMBER}))?([+-]{_NUMBER})?",
     re.ASCII,
 )
+MOST_BITS: Final = 64
+FRAME_BITS: Final = 8 * 64
 _FLOATS: Final = {32: "f", 64: "d"}
 
 
@@ -50,7 +52,7 @@ class FrameSlice:
     Attributes:
         can_id: identifier of the frame.
         extended: a 29-bit identifier.
-        first_bit: 0..63; bit 0 is the lowest of byte 0.
+        first_bit: 0..511, in classic CAN to 63; bit 0 is the lowest of byte 0.
         bits: 1..64.
         kind: `u` unsigned, `s` signed, `f` float.
         big_endian: the first byte is the highest; whole bytes only.
@@ -162,8 +164,11 @@ def _width(text: str, first_bit: int, end: str | None, bit: str | None, bits: st
         width = int(end) * 8 - first_bit
     elif bit:
         width = int(bits or 1)
-    if not 1 <= width <= 64 - first_bit:
-        raise ValueError(f"{text!r} has {width} bits from bit {first_bit}; a frame has 64")
+    if not 1 <= width <= MOST_BITS or first_bit + width > FRAME_BITS:
+        raise ValueError(
+            f"{text!r} has {width} bits from bit {first_bit}; a signal has 1 to {MOST_BITS}"
+            f" of the {FRAME_BITS} that a frame has, in classic CAN of 64"
+        )
     return width
 
 

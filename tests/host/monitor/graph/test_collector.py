@@ -114,7 +114,7 @@ def test_what_is_no_number_has_no_curve() -> None:
         ("181[0]@0", "is not [LABEL=]SIGNAL[@AXIS]"),
         ("3.", "'3.' is neither an object, as 3.position, nor a slice"),
         ("200.position", "'200.position' is neither an object"),
-        ("a=181[9]", "'181[9]' is not ID[BYTES]TYPE"),
+        ("a=181[x]", "'181[x]' is not ID[BYTES]TYPE"),
     ],
 )
 def test_what_is_no_signal_is_refused(text: str, said: str) -> None:

@@ -34,6 +34,15 @@ def test_a_slice_is_cut_out_and_scaled(text: str, value: float) -> None:
     assert parse_slice(text).value(DATA) == pytest.approx(value, rel=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("123[63]", 0x2A), ("123[60:64]", 0x2A000000), ("123[56:64]sb", 0x2A), ("123[63.1+5]", 21)],
+)
+def test_a_slice_reaches_into_64_bytes(text: str, value: int) -> None:
+    assert parse_slice(text).value(bytes(63) + b"\x2a") == value
+    assert parse_slice(text).value(bytes(8)) is None
+
+
 def test_floats_may_be_big_endian() -> None:
     assert parse_slice("181[0:4]fb").value(struct.pack(">f", 2.5)) == 2.5
     assert parse_slice("181[0:8]fb").value(struct.pack(">d", 2.5)) == 2.5
@@ -53,9 +62,11 @@ def test_an_identifier_of_eight_digits_is_extended() -> None:
     ("text", "said"),
     [
         ("181", "is not ID[BYTES]TYPE"),
-        ("181[8]", "is not ID[BYTES]TYPE"),
+        ("181[100]", "is not ID[BYTES]TYPE"),
         ("181[4:4]", "has 0 bits from bit 32"),
-        ("181[7.4+5]", "has 5 bits from bit 60; a frame has 64"),
+        ("181[63.4+5]", "has 5 bits from bit 508; a signal has 1 to 64 of the 512"),
+        ("181[64]", "has 8 bits from bit 512"),
+        ("181[0:9]", "has 72 bits from bit 0; a signal has 1 to 64"),
         ("181[0:2]f", "has 16 bits; a float has 4 or 8 whole bytes"),
         ("181[0.4+8]b", "big-endian takes whole bytes"),
         ("181[0]*0", "has the factor 0"),
