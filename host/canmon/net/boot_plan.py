@@ -18,6 +18,8 @@ from tickrig.host.text.values import counted
 from tickrig.wire.canopen.nmt import NmtCommand
 
 HEARTBEAT: Final = (0x1017, 0)
+U16_BYTES: Final = 2
+U32: Final = 0xFFFF_FFFF
 PERIODS: Final = 3
 """So many periods of its heartbeat are waited for it."""
 
@@ -60,14 +62,18 @@ def of_eds(path: Path, node_id: int) -> SlaveAssignment:
         return int.from_bytes(power_on.get(at, b""), "little")
 
     writable = {at for at, row in objects.rows.items() if row.writable}
-    period_ms = int.from_bytes(values.get(HEARTBEAT, b""), "little")
+    try:
+        steps = writes(values, number, writable)
+    except ValueError as error:
+        raise Refused(f"--eds {path}: {error}") from None
+    period_ms = int.from_bytes(values.get(HEARTBEAT, b"")[:U16_BYTES], "little")
     return SlaveAssignment(
         node_id,
-        writes=tuple(ObjectWrite(*at, data) for at, data in writes(values, number, writable)),
+        writes=tuple(ObjectWrite(*at, data) for at, data in steps),
         heartbeat_us=PERIODS * period_ms * 1_000,
-        device_type=number((0x1000, 0)),
-        vendor_id=number((0x1018, 1)),
-        product_code=number((0x1018, 2)),
+        device_type=number((0x1000, 0)) & U32,
+        vendor_id=number((0x1018, 1)) & U32,
+        product_code=number((0x1018, 2)) & U32,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final
 
 from tickrig.host.canopen.conform.safety.write_order import PDOS, Write, in_order
@@ -89,17 +89,22 @@ def writes(
     values: Mapping[Address, bytes],
     number: Callable[[Address], int],
     writable: Collection[Address],
-) -> Iterator[tuple[Address, bytes]]:
-    """Yield what to write, one after the other; the date of the configuration comes last.
+) -> list[Write]:
+    """Return what to write, one after the other; the date of the configuration comes last.
 
     Args:
         values: what the node shall hold.
         number: reads an object of the node, as an unsigned number.
         writable: objects that can be written; a step between is left out for others.
+
+    Raises:
+        ValueError: a COB-ID, or a number of mapped objects, that is none.
     """
     last = {at: data for at, data in values.items() if at[0] == CONFIGURED}
     first = {at: values[at] for at in sorted(values) if at not in last}
-    for at, data in in_order(first, number):
-        if at in writable:
-            yield at, data
-    yield from last.items()
+    try:
+        found = [(at, data) for at, data in in_order(first, number) if at in writable]
+    except (OverflowError, ValueError):
+        reason = "a COB-ID of more than 32 bits, or more than 255 mapped objects"
+        raise ValueError(reason) from None
+    return [*found, *last.items()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -15,6 +15,7 @@ from tickrig.host.canmon.net.stored import save
 from tickrig.host.canmon.net.values import shown
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, disabled, writes
+from tickrig.host.canopen.conform.safety.write_order import Write
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
@@ -60,7 +61,7 @@ def command(  # noqa: PLR0913, PLR0917 - options
         values = _values(objects, skip)
         with of_node(node, objects.title):
             changed = values if whole else _changed(session, objects, values)
-            steps = list(writes(changed, _number_of(session, node), _writable(objects)))
+            steps = _steps(session, objects, changed, file)
         if dry_run or not steps:
             return
         what = f"{counted(len(changed), 'object')} of {file.name} to node {node}"
@@ -91,24 +92,27 @@ def _changed(session: NetSession, objects: NodeObjects, values: Values) -> Value
     return {one.entry: one.wanted for one in found}
 
 
-def _writable(objects: NodeObjects) -> set[Entry]:
-    return {at for at, row in objects.rows.items() if row.writable}
+def _steps(session: NetSession, objects: NodeObjects, changed: Values, file: Path) -> list[Write]:
+    """Return what is written; Refused if the file asks for what cannot be."""
+    writable = {at for at, row in objects.rows.items() if row.writable}
 
-
-def _number_of(session: NetSession, node_id: int) -> Callable[[Entry], int]:
     def number(at: Entry) -> int:
         try:
-            return int.from_bytes(session.bus.read(node_id, *at), "little")
+            data = session.bus.read(objects.node_id, *at, objects.size(at))
         except SdoFailed:
             return 0
+        return int.from_bytes(data, "little")
 
-    return number
+    try:
+        return writes(changed, number, writable)
+    except ValueError as error:
+        raise Refused(f"FILE {file}: {error}") from None
 
 
 def _write(
     session: NetSession,
     objects: NodeObjects,
-    steps: Sequence[tuple[Entry, bytes]],
+    steps: Sequence[Write],
     *,
     store: bool,
 ) -> None:

@@ -225,3 +225,14 @@ def test_what_cannot_be_is_one_line(
     told = [line for line in result.stderr.splitlines() if line.startswith("Error:")]
     assert len(told) == bool(status)
     assert why in "".join(told)
+
+
+def test_a_cob_id_of_more_than_32_bits_is_told(rig: str, tmp_path: Path) -> None:
+    path = Path(drive_dcf(tmp_path / "x.dcf"))
+    text = path.read_text("utf-8")
+    wide = r"(?s)(\[1800sub1\].*?)DataType=0x0007(.*?)ParameterValue=\w+"
+    path.write_text(re.sub(wide, r"\1DataType=0x001B\2ParameterValue=0x123456789", text), "utf-8")
+    for words in (("dcf", "5", str(path)), ("boot", "5", "--eds", str(path))):
+        result = net(rig, *words)
+        assert result.exit_code == 2, result.output
+        assert "a COB-ID of more than 32 bits, or more than 255 mapped" in result.stderr
