@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from tickrig.host.monitor.check.expression.demand import Demand, Fault
 from tickrig.host.monitor.check.expression.event import Event, Sender, said, sender_of
 from tickrig.host.monitor.decode.decoded import Decoded
+from tickrig.host.monitor.decode.sdo.transfer import Outcome
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.instant import NEVER
@@ -180,6 +181,8 @@ class Latency(Waiting):
 class Answered(Waiting):
     """Requests are answered in time: of an SDO client, and of a master that guards.
 
+    One that is sent again is measured from the first.
+
     Args:
         event: the requests.
         most_us: how long it may take.
@@ -190,12 +193,15 @@ class Answered(Waiting):
         self._event = event
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
-        """Close what is answered, then begin."""
+        """Close what is answered, or left for another request; then begin."""
         is_sdo = decoded.kind == "sdo"
         if not (is_sdo or decoded.kind in ("guard", "heartbeat", "boot-up")):
             return None
         pair = f"{record.channel} {'sdo' if is_sdo else 'guard'}", decoded.node
-        self._close(pair)
+        left = any(one.outcome is Outcome.UNANSWERED for one in decoded.transfers)
+        before = self._open.get(pair) if left else None
+        if left or not decoded.asks:
+            self._close(pair)
         if decoded.asks and self._event.matches(record, decoded):
             self._await(pair, record, f"{said(decoded)}: not answered")
-        return None
+        return f"{before[1]} before the next request" if before else None

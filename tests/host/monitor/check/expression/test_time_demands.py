@@ -150,3 +150,15 @@ def test_frames_of_can_fd_have_their_periods_apart() -> None:
     records = [Record(at * 1_000, "can0", FdFrame.parse(text)) for at, text in frames]
     assert findings("id >= 181 every 10ms ±1ms", records) == []
     assert len(findings("id >= 181 every 5ms ±1ms", records)) == 2
+
+
+def test_a_request_that_is_sent_again_is_measured_from_the_first() -> None:
+    again = "\n".join(f"{1 + n / 25} {ASKED}" for n in range(4))
+    assert [line[:5] for line in broken(SDO, f"{again}\n2 080#")] == ["1.05 ", "1.13 "]
+
+
+def test_another_request_tells_that_the_one_before_was_not_answered() -> None:
+    text = f"1 {ASKED}\n1.02 603#4001100000000000\n1.03 583#4F01100000000000"
+    assert broken(SDO, text) == [
+        "1.02 sdo of node 3: upload of 1000h:00 asked for: not answered before the next request"
+    ]
