@@ -14,6 +14,7 @@ from tickrig.host.cli.start import TERMINATING
 
 if TYPE_CHECKING:
     from tickrig.host.control.requests import RequestDispatcher
+    from tickrig.host.control.server import ControlServer
 
 
 class Waiting(Protocol):
@@ -42,8 +43,10 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 
 
 @contextmanager
-def serving_control(path: Path, dispatcher: RequestDispatcher, clock: Waiting) -> Iterator[None]:
-    """Serve a control socket whenever the clock waits.
+def serving_control(
+    path: Path, dispatcher: RequestDispatcher, clock: Waiting
+) -> Iterator[ControlServer]:
+    """Serve a control socket whenever the clock waits; the server is given to whoever has more.
 
     Args:
         path: of the socket.
@@ -61,6 +64,6 @@ def serving_control(path: Path, dispatcher: RequestDispatcher, clock: Waiting) -
         refuse_path("control", error)
     clock.serve = server.serve
     try:
-        yield
+        yield server
     finally:
         server.close()

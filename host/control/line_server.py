@@ -7,7 +7,7 @@ import select
 import socket
 import time
 from collections.abc import Callable
-from typing import Final
+from typing import Final, Protocol
 
 MAX_LINE: Final = 4_096
 MAX_CLIENTS: Final = 32
@@ -18,6 +18,14 @@ IDLE_S: Final = 60.0
 
 Answer = Callable[[bytes], bytes]
 """Answers a line, given without its end; the answer has one."""
+
+
+class Readable(Protocol):
+    """What has a descriptor, as a socket; `select` says when that can be read."""
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        ...
 
 
 class LineServer:
@@ -45,6 +53,16 @@ class LineServer:
         self._listener, self._begin, self._refuse = listener, begin, refuse
         self._max_line, self._clock = max_line, clock
         self._clients: dict[socket.socket, _Client] = {}
+        self._attached: dict[Readable, Callable[[], None]] = {}
+
+    def attach(self, source: Readable, ready: Callable[[], None]) -> None:
+        """Serve something else, too.
+
+        Args:
+            source: what has a descriptor; -1 once it is closed.
+            ready: called in a round in which that can be read.
+        """
+        self._attached[source] = ready
 
     def serve(self, wait_us: int) -> None:
         """Do one round; wait for something to do, but not longer than `wait_us`."""
@@ -52,14 +70,19 @@ class LineServer:
         readers = [client.connection for client in clients if client.wants_more]
         writers = [client.connection for client in clients if client.has_unsent]
         wait_us = 0 if any(client.has_line for client in clients) else max(0, wait_us)
-        ready = select.select([self._listener, *readers], writers, [], wait_us / 1e6)
+        attached = [source for source in self._attached if source.fileno() >= 0]
+        sources = [self._listener, *readers, *attached]
+        ready = select.select(sources, writers, [], wait_us / 1e6)
         for connection in ready[1]:
             self._clients[connection].flush()
             self._clients[connection].active_s = self._clock()
-        for connection in ready[0]:
-            if connection is not self._listener:
+        for connection in readers:
+            if connection in ready[0]:
                 self._clients[connection].read()
                 self._clients[connection].active_s = self._clock()
+        for source in attached:
+            if source in ready[0]:
+                self._attached[source]()
         self._answer()
         if self._listener in ready[0]:
             self._accept()

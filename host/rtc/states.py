@@ -55,9 +55,16 @@ class RtcRefused(ValueError):  # noqa: N818 - what the model did
 
 
 class PortStatus(IntEnum):
-    """Result of a write (OpenRTM-aist 1.x, DataPortStatus); what cannot come is left out."""
+    """Result of a write (OpenRTM-aist 1.x, DataPortStatus); what cannot come is left out.
+
+    Only ports that are joined with those of peers give PORT_ERROR, BUFFER_EMPTY and
+    CONNECTION_LOST.
+    """
 
     PORT_OK = 0
+    PORT_ERROR = 1
     BUFFER_FULL = 3
+    BUFFER_EMPTY = 4
     BUFFER_TIMEOUT = 5
     INVALID_ARGS = 10
+    CONNECTION_LOST = 12

@@ -50,8 +50,8 @@ def _port_lines(port: Any, *, long: bool) -> Iterator[str]:
     for interface in port["interfaces"]:
         yield f"    {interface['polarity'].lower()} {interface['name']} ({interface['type']})"
     for connector in port["connectors"]:
-        (other,) = [name for name in connector["ports"] if name != port["name"]]
-        yield f"    connected to {other}"
+        others = [name for name in connector["ports"] if name != port["name"]]
+        yield f"    connected to {(others or connector['ports'])[0]}"
         if long:
             properties = {"name": connector["name"], **connector["properties"]}
             yield from (f"      {key} = {value}" for key, value in properties.items())
