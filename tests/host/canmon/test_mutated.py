@@ -5,6 +5,7 @@ By hand it was run over 100 000 of them.
 
 from __future__ import annotations
 
+import gzip
 import random
 import re
 from contextlib import suppress
@@ -19,6 +20,7 @@ from tickrig.host.canmon.monitor_setup import MonitorSetup
 from tickrig.host.canmon.sources import block_log
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.refused import Refused
+from tickrig.host.monitor.columns import column_reader
 
 TOKENS = (
     *(b"inf", b"nan", b"-1", b"1e400", b"999999999999", b"1.0", b"", b"\xff\xfe", b"\0", b"#"),
@@ -100,6 +102,38 @@ def test_a_mutated_log_is_no_traceback(
         (path := tmp_path / name).write_bytes(mutated(chance, content))
         run(*(words := chance.choice(VERBS))[:1], path, *words[1:])
         run("conv", path, tmp_path / f"to_{chance.choice(TARGETS)}")
+
+
+LARGE = (
+    *VERBS[5:10],
+    ["check", "--no-emcy", "--no-reboot", "--max-gap", "185=20ms", "--nodes", "5"],
+)
+MORE = b"""\
+(1600000002.000000) can0 705#05
+(1600000002.001000) can1 085#1081110000000000
+(1600000002.002000) can0 20000004#0020000000006080
+(1600000002.003000) can0 18FF0001#0102
+(1600000002.004000) can1 705#R
+(1600000002.100000) can0 705#05 R
+"""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_mutated_log_in_blocks_is_as_frame_by_frame(
+    seed: int, logs: list[tuple[str, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chance, path = random.Random(seed), tmp_path / "run.log"
+    content = mutated(chance, logs[0][1] + MORE)
+    verb, *options = chance.choice(LARGE)
+    if chance.random() < 0.2:
+        path, packed = tmp_path / "run.log.gz", gzip.compress(content, 1, mtime=0)
+        content = packed[: chance.randrange(len(packed))] if chance.random() < 0.5 else packed
+    path.write_bytes(content)
+    small = CliRunner().invoke(main, [verb, str(path), *options], catch_exceptions=False)
+    monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
+    monkeypatch.setattr(column_reader, "BLOCK_BYTES", chance.choice((1, 300, 1 << 20)))
+    large = CliRunner().invoke(main, [verb, str(path), *options], catch_exceptions=False)
+    assert (large.exit_code, large.output) == (small.exit_code, small.output)
 
 
 def test_a_mutated_dbc_file_is_no_traceback(tmp_path: Path) -> None:

@@ -86,7 +86,7 @@ def test_the_board_of_a_log_in_blocks_is_as_frame_by_frame(
     for number, (frame, step_us) in enumerate(zip(frames, steps_us, strict=False)):
         at_us += step_us
         if isinstance(frame, CanFrame) and frame.remote:
-            frame = frame._replace(remote_length=1)  # noqa: PLW2901 - as a log says it
+            frame = frame._replace(data=b"", remote_length=1)  # noqa: PLW2901 - as a log says it
         records.append(Record(max(0, at_us), f"can{number // bus_of % 2}", frame))
     assert in_blocks(records, eds, size) == one_by_one(records, eds)
 
