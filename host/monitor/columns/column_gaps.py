@@ -8,6 +8,7 @@ only up to the length that it ends at, and an exact quantile would take the log 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -26,6 +27,9 @@ BUCKET_BITS: Final = 12
 BUCKET_MASK: Final = (1 << BUCKET_BITS) - 1
 """All buckets there are."""
 
+MERGED: Final = 1 << 16
+"""Counts at least that are added up at once."""
+
 LONGEST_US: Final = np.iinfo(np.int64).max
 
 
@@ -40,6 +44,7 @@ class ColumnGaps:
         self.latest_us = self._frames = self._total_us = np.empty(0, np.int64)
         self._min_us = self._max_us = self._wander_us = self.latest_us
         self._keys, self._counts = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._new: list[tuple[Ints, Ints]] = []
 
     def take(self, runs: Runs, count: int) -> None:
         """Count the gaps of a block; there are `count` identifiers now."""
@@ -59,9 +64,10 @@ class ColumnGaps:
         shortest = np.minimum.reduceat(gaps_us, runs.begins)
         self._min_us[numbers] = np.minimum(self._min_us[numbers], shortest)
 
-    def rows(self) -> list[Gaps]:
-        """Return what was counted of each identifier."""
-        return [self._row(number) for number in range(len(self._frames))]
+    def rows(self) -> Iterator[Gaps]:
+        """Yield what was counted of each identifier."""
+        self._merge()
+        yield from map(self._row, range(len(self._frames)))
 
     def _grow(self, count: int) -> None:
         self.latest_us, self._frames = grown(self.latest_us, count), grown(self._frames, count)
@@ -93,12 +99,19 @@ class ColumnGaps:
         begins = np.flatnonzero(np.diff(places, prepend=-1))
         found, counts = places[begins], np.diff(begins, append=len(places))
         keys = runs.numbers[found >> BUCKET_BITS] << BUCKET_BITS | found & BUCKET_MASK
-        places = np.searchsorted(self._keys, keys)
-        strange = np.append(self._keys, -1)[places] != keys
-        self._counts[places[~strange]] += counts[~strange]
-        if strange.any():
-            self._keys = np.insert(self._keys, places[strange], keys[strange])
-            self._counts = np.insert(self._counts, places[strange], counts[strange])
+        self._new.append((keys, counts))
+        if sum(len(new) for new, _ in self._new) > max(MERGED, len(self._keys)):
+            self._merge()
+
+    def _merge(self) -> None:
+        """Add up what is new; seldom enough that it takes no longer where buckets are many."""
+        keys = np.concatenate([self._keys, *(new for new, _ in self._new)])
+        counts = np.concatenate([self._counts, *(new for _, new in self._new)])
+        order = np.argsort(keys, kind="stable")  # it merges what is sorted already
+        keys, counts = keys[order], counts[order]
+        begins = np.flatnonzero(np.diff(keys, prepend=-1))
+        self._keys, self._new = keys[begins], []
+        self._counts = np.add.reduceat(counts, begins) if len(begins) else counts
 
     def _row(self, number: int) -> Gaps:
         gaps = Gaps()
