@@ -24,7 +24,7 @@ from tickrig.host.monitor.logs.blf_damage import BlfReader, has_end, missing_end
 from tickrig.host.monitor.logs.can_record import to_record
 from tickrig.host.monitor.logs.fd_lines import told_by_flags
 from tickrig.host.monitor.logs.log_file import NO_MF4, LogError, LogFormat, open_log
-from tickrig.host.monitor.logs.notation import UNNAMED
+from tickrig.host.monitor.logs.notation import LONGEST_NAME, UNNAMED
 from tickrig.host.monitor.logs.tally import OTHER_LINES, OTHER_OBJECTS, Tally
 
 _SILENT: Final = {
@@ -210,8 +210,8 @@ class CanLogReader:
 
 
 def channel_name(channel: object) -> str:
-    """Return the name of a bus; some formats have numbers alone."""
+    """Return the name of a bus, no longer than logs hold; some formats have numbers alone."""
     name = "_".join(str(channel).split())
     if channel is None or not name:
         return UNNAMED
-    return f"can{name}" if name.isdecimal() else name
+    return (f"can{name}" if name.isdecimal() else name)[:LONGEST_NAME]

@@ -109,3 +109,13 @@ def test_rows_of_python_can_with_more_than_eight_bytes_are_can_fd(tmp_path: Path
 def test_a_trace_of_a_rig_holds_no_can_fd_and_says_so(tmp_path: Path) -> None:
     said = written(tmp_path / "run.trace", [Record(0, "can0", FdFrame(1))])
     assert said == ["run.trace: a trace holds one bus, without errors; left out: 1 CAN FD frames"]
+
+
+def test_a_name_of_a_bus_is_no_longer_than_a_log_holds(tmp_path: Path) -> None:
+    head = "date Fri Jul 10 06:17:32 AM 2015\nbase hex\ninternal events logged\n"
+    text = f"{head}   0.1 {'9' * 40}  705  Rx   d 1 7F\n"
+    (tmp_path / "run.asc").write_text(text)
+    (record,) = read_log(tmp_path / "run.asc")
+    assert len(record.channel) == 32
+    written(tmp_path / "run.log", [record])
+    assert list(read_log(tmp_path / "run.log")) == [record]
