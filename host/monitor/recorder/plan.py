@@ -27,8 +27,8 @@ MIN_DISK_BYTES: Final = 1 << 20
 RESERVE_BYTES: Final = 256 << 10
 """Room that is kept free: for frames that are on their way to a file."""
 
-MAX_PRE_FRAMES: Final = 200_000
-"""Ten seconds of the busiest bus of 1 Mbit/s, some 50 MiB."""
+MAX_PRE_FRAMES: Final = 150_000
+"""Eight seconds of the busiest bus of 1 Mbit/s, some 50 MiB."""
 
 DISK_PARTS: Final = 4
 """Where disk space is limited a file is no larger than this part of it: the oldest can go."""

@@ -6,6 +6,7 @@ import os
 import shlex
 import sys
 import termios
+from collections.abc import Callable
 from pathlib import Path
 
 import pexpect
@@ -64,6 +65,14 @@ class Terminal:
                 return
             self._read()
         raise AssertionError(f"no {text!r} in\n{self.text()}")
+
+    def wait_until(self, done: Callable[[], bool]) -> None:
+        """Wait until something is done, and read meanwhile."""
+        for _ in range(int(PATIENCE_S / SLICE_S)):
+            if done():
+                return
+            self._read()
+        raise AssertionError(self.written)
 
     def resize(self, columns: int, lines: int) -> None:
         """Give the window another size."""

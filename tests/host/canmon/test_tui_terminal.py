@@ -121,3 +121,43 @@ def test_settings_are_kept_and_recalled(bus: can.BusABC, tmp_path: Path) -> None
     terminal.wait_for("181       [1] 10000001")
     by_key(terminal)
     assert terminal.end() == 0
+
+
+F8 = "\x1b[19~"
+
+
+def test_a_recording_is_ended_when_somebody_leaves(bus: can.BusABC, tmp_path: Path) -> None:
+    terminal = Terminal("tui", *BUS)
+    terminal.wait_for("LISTEN-ONLY")
+    terminal.child.send(F8)
+    terminal.wait_for("record into")
+    terminal.child.send("\x15")  # all that stands in the field goes
+    terminal.child.send(f"{tmp_path}/run.log\r")
+    terminal.wait_for("REC")
+    tell(bus, 0xA5)
+    terminal.wait_for("1 frame ")
+    by_key(terminal)
+    assert terminal.end() == 0
+    assert "1 frame in 1 file; " in terminal.written
+    (part,) = tmp_path.glob("run-*.log")
+    assert part.read_text("ascii").endswith(" 181#A5\n")
+    assert '"ev":"end"' in (tmp_path / "run.index.jsonl").read_text("ascii")
+
+
+def test_enter_triggers_a_recording_of_dump(bus: can.BusABC, tmp_path: Path) -> None:
+    index = tmp_path / "run.index.jsonl"
+    terminal = Terminal("dump", *BUS, "-l", str(tmp_path / "run.log"), "--pre", "5", "-n", "2")
+    terminal.wait_until(index.exists)
+    tell(bus, 0xA5)
+
+    def triggered() -> bool:
+        terminal.child.send("\r")
+        return '"ev":"trigger"' in index.read_text("ascii")
+
+    terminal.wait_until(triggered)
+    tell(bus, 0xA6)
+    assert terminal.end() == 0
+    (part,) = tmp_path.glob("run-*.log")
+    frames = [text.split()[-1] for text in part.read_text("ascii").splitlines()]
+    assert [text for text in frames if text.startswith("181")] == ["181#A5", "181#A6"]
+    assert "# trigger: key" in part.read_text("ascii").splitlines()

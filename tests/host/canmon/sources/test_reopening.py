@@ -14,6 +14,7 @@ from queue import SimpleQueue
 
 import pytest
 
+from tests.host.canmon.terminal import Terminal
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.live_source import LiveSource
 from tickrig.host.canmon.sources.reopening_reader import REOPEN_US, ReopeningReader
@@ -236,3 +237,22 @@ def test_dump_waits_for_an_adapter_that_was_unplugged(tmp_path: Path) -> None:
     assert said[:2] == [gone[2:], back[2:]]
     assert said[2].startswith(f"{adapter.link}: it was away once, ")
     assert said[-1] == "Error: a bus was away 1 time"
+
+
+@pytest.mark.realtime
+def test_top_tells_which_bus_is_gone(tmp_path: Path) -> None:
+    adapter = Adapter(tmp_path / "adapter")
+    bus = [f"slcan:{adapter.link}", "--bus-kwargs", "sleep_after_open=0", "timeout=0.01"]
+    terminal = Terminal("top", "-b", "500000", "--reopen", *bus, columns=140)
+    adapter.opened()
+    adapter.send(b"t70517F\r")
+    terminal.wait_for("705")
+    adapter.unplug()
+    terminal.wait_for(f"GONE: {adapter.link}")
+    adapter.plug()
+    adapter.opened()
+    adapter.send(b"t706105\r")
+    terminal.wait_for("706")
+    terminal.child.send("q")
+    assert terminal.end() == 0
+    assert f"{adapter.link}: it was away once, " in terminal.written

@@ -276,3 +276,13 @@ def test_a_recorder_that_is_interrupted_writes_its_block_whole(
     (said,) = [said for said in index_of(tmp_path / "run.index.jsonl") if said["ev"] == "file"]
     assert numbers(tmp_path, part.name) == list(range(said["frames"]))
     assert "cut" not in said
+
+
+def test_nothing_is_missing_of_many_frames_and_memory_stays_small(tmp_path: Path) -> None:
+    """`tools/soak-record` does so with ten million."""
+    tool = Path(__file__).parents[4] / "tools" / "soak-record"
+    words = ["--frames", "100000", "--rotate", "1M", "--dir", str(tmp_path)]
+    done = subprocess.run(
+        [sys.executable, tool, *words], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout.splitlines()[-1]) == (0, "none is missing"), done.stderr

@@ -22,7 +22,7 @@ RUN = Path("run.log")
         ({"disk": "much"}, "disk 'much' is no size: write 64k, 100M or 2G"),
         ({"at_limit": "end"}, "at-limit goes with disk"),
         ({"pre": "-1"}, "pre '-1' is neither frames as 2000 nor a time as 500ms"),
-        ({"pre": "200001"}, "pre '200001': at most 200000 frames are kept"),
+        ({"pre": "150001"}, "pre '150001': at most 150000 frames are kept"),
         ({"post": "1d"}, "post '1d' is neither frames"),
     ],
 )
