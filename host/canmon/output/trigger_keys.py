@@ -23,7 +23,7 @@ class TriggerKeys:
     """
 
     def __init__(self, typed: bool) -> None:
-        self._typed = typed and os.isatty(STDIN)
+        self._typed = typed and sys.platform != "win32" and os.isatty(STDIN)
         self._signals = 0
 
     @contextmanager

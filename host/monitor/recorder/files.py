@@ -186,10 +186,7 @@ class Files:
             if path.is_file():
                 found = recovered(path)
                 index.write(FILE, now_us, file=name, **found)
-                self._said.append(
-                    f"{name} was not ended by its recorder: {found['frames']} frames can be read,"
-                    f" the last of {found['to']} s; what came behind it is missing"
-                )
+                self._said.append(f"{name} was not ended by its recorder: {_readable(found)}")
             else:
                 index.write(REMOVED, now_us, file=name)
 
@@ -225,3 +222,11 @@ class Files:
         index.write(REMOVED, self._latest_us, file=name)
         self.removed += 1
         return True
+
+
+def _readable(found: dict[str, object]) -> str:
+    """Say what can be read of a file that was not ended."""
+    if found["frames"] is None:
+        return f"it has {found['bytes']} bytes; what came behind them is missing"
+    last = "" if found["to"] is None else f", the last of {found['to']} s"
+    return f"{found['frames']} frames can be read{last}; what came behind is missing"

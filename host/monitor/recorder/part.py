@@ -18,6 +18,9 @@ from tickrig.host.monitor.logs.mark import BACK, TRIGGER, Mark
 BLOCK_US: Final = 1_000_000
 """How much of a compressed log is lost where this program is killed."""
 
+READ_BYTES: Final = 32 << 20
+"""Of a file that is read when a recording goes on: a few seconds."""
+
 USUAL_BYTES: Final = 64
 """Of a frame, until there are some."""
 
@@ -118,12 +121,16 @@ class Part:
 def recovered(path: Path) -> dict[str, object]:
     """Return what an index says of a file that its recorder could not end: what can be read.
 
+    A large one is not read: frames come meanwhile, and wait.
+
     Raises:
         OSError: it cannot be read.
     """
-    frames, first_us, last_us = 0, 0, 0
+    size, frames, first_us, last_us = path.stat().st_size, 0, 0, 0
+    if size > READ_BYTES:
+        return {"from": None, "to": None, "frames": None, "bytes": size, "cut": True}
     with suppress(LogError):
         for frames, record in enumerate(read_log(path), 1):  # noqa: B007 - counted
             first_us, last_us = first_us or record.at_us, record.at_us
     said = {"from": first_us / 1e6, "to": last_us / 1e6} if frames else {"from": None, "to": None}
-    return {**said, "frames": frames, "bytes": path.stat().st_size, "cut": True}
+    return {**said, "frames": frames, "bytes": size, "cut": True}

@@ -237,7 +237,7 @@ def test_a_killed_recorder_leaves_what_it_wrote_and_the_next_says_what_is_missin
     assert again.said.startswith(
         f"{part.name} was not ended by its recorder: {count} frames can be read, the last of "
     )
-    assert "what came behind it is missing" in again.said
+    assert "; what came behind is missing" in again.said
     assert readable(tmp_path / name.replace("run", "run-00002")) == 1
 
 

@@ -164,6 +164,30 @@ def test_what_a_killed_recorder_wrote_is_put_into_the_index(name: str, tmp_path:
     assert numbers(read_log(plan.part(2))) == [20_000]
 
 
+def test_a_large_file_that_was_not_ended_is_not_read(tmp_path: Path) -> None:
+    plan = read_plan(tmp_path / "run.log", rotate=["1G"])
+    plan.index.write_text('{"v":1,"ev":"open","t":0,"file":"run-00001.log"}\n')
+    with plan.part(1).open("wb") as file:
+        file.truncate(40 << 20)
+    recorder = Recorder(plan)
+    recorder.close()
+    assert recorder.messages()[0] == (
+        "run-00001.log was not ended by its recorder: it has 41943040 bytes;"
+        " what came behind them is missing"
+    )
+    (said,) = events(plan, "file")
+    assert (said["frames"], said["bytes"]) == (None, 40 << 20)
+
+
+def test_an_empty_file_that_was_not_ended_is_told(tmp_path: Path) -> None:
+    plan = read_plan(tmp_path / "run.log", rotate=["1G"])
+    plan.index.write_text('{"v":1,"ev":"open","t":0,"file":"run-00001.log"}\n')
+    plan.part(1).touch()
+    recorder = Recorder(plan)
+    recorder.close()
+    assert recorder.messages()[0].endswith(": 0 frames can be read; what came behind is missing")
+
+
 def _sound(plan: Plan) -> list[dict[str, Any]]:
     lines = plan.index.read_text("utf-8").splitlines()
     return [json.loads(line) for line in lines if line.endswith("}")]
