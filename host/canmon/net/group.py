@@ -14,19 +14,19 @@ from tickrig.host.cli.options import time_option
 HERE: Final = "tickrig.host.canmon.net.verbs"
 VERBS: Final = {
     "scan": (f"{HERE}.scan_verb:command", "Say which nodes are there."),
-    "nmt": (f"{HERE}.nmt_verb:command", "Start, stop or reset a node, or all nodes."),
+    "nmt": (f"{HERE}.nmt_verb:command", "Send an NMT command to NODE, or to all."),
     "lss": (
         f"{HERE}.lss_verb:command",
         "Configure node-ID and bit rate of nodes by LSS (CiA 305).",
     ),
-    "read": (f"{HERE}.read_verb:command", "Read objects of a node."),
-    "write": (f"{HERE}.write_verb:command", "Write objects of a node."),
-    "dcf": (f"{HERE}.dcf_verb:command", "Write what the DCF or XDC FILE configures into NODE"),
-    "compare": (f"{HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node"),
-    "store": (f"{HERE}.store_verb:store", "Store parameters of NODE (1010h)"),
-    "restore": (f"{HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)"),
-    "program": (f"{HERE}.program_verb:command", "Download FILE into NODE by block transfer"),
-    "boot": (f"{HERE}.boot_verb:command", "Boot NODE as an NMT master does (CiA 302-2)"),
+    "read": (f"{HERE}.read_verb:command", "Read objects of NODE."),
+    "write": (f"{HERE}.write_verb:command", "Write objects of NODE."),
+    "dcf": (f"{HERE}.dcf_verb:command", "Write what the DCF or XDC FILE configures into NODE."),
+    "compare": (f"{HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node."),
+    "store": (f"{HERE}.store_verb:store", "Store parameters of NODE (1010h)."),
+    "restore": (f"{HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)."),
+    "program": (f"{HERE}.program_verb:command", "Download FILE into NODE by block transfer."),
+    "boot": (f"{HERE}.boot_verb:command", "Boot NODE as an NMT master does (CiA 302-2)."),
 }
 ANSWER_US: Final = 500_000
 
@@ -78,6 +78,9 @@ def command(
     canmon net can0 write 5 heartbeat_time=100
     canmon net can0 nmt start 5
     canmon net can0 lss --fastscan --node-id 5 --store
+    canmon net can0 dcf 5 drive.dcf --dry-run     what differs; without it, it is written
+    canmon net can0 program 5 firmware.bin
+    canmon net can0 boot 5 --bus bus.yml --explain
 
     \b
     Exit status  0 all is done            2 usage

@@ -25,6 +25,7 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.emulators.testing.conformance.slave import Slave
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.net import session
+from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds
 
 Net = Callable[..., Result]
@@ -196,6 +197,39 @@ def test_a_refusal_in_the_middle_says_which_pdo_is_disabled(rig: str, tmp_path: 
     told = result.stderr.splitlines()[-1]
     assert "1800h:01 tpdo1_communication_parameter.cob_id: refused: invalid value" in told
     assert told.endswith("the PDO of 1800h stays disabled")
+
+
+def test_ctrl_c_in_the_middle_says_which_pdo_is_disabled(
+    rig: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, write, calls = drive_dcf(tmp_path / "x.dcf", at_180002=1), NodeBus.write, list[int]()
+
+    def press(bus: NodeBus, node_id: int, index: int, sub: int, data: bytes) -> None:
+        calls.append(index)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        write(bus, node_id, index, sub, data)
+
+    monkeypatch.setattr(NodeBus, "write", press)
+    result = net(rig, "dcf", "5", file)
+    assert result.exit_code == 130
+    told = result.stderr.splitlines()[-1]
+    assert told.startswith("interrupted; done: 1800h:01 tpdo1_communication_parameter.cob_id = 0x8")
+    assert "; not done: 1800h:02 tpdo1_communication_parameter.transmission_type = 1" in told
+    assert told.endswith("; the PDO of 1800h stays disabled")
+
+
+def test_a_node_that_dies_in_the_middle_is_told(
+    rig: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Path(rig).open("a") as opened:
+        opened.write('[fault]\nleft = "power_off@300ms"\n')
+    file = drive_dcf(tmp_path / "x.dcf", at_180002=1, at_101700=7)
+    result = net(rig, "dcf", "5", file, "--all")
+    assert result.exit_code == 1
+    told = result.stderr.splitlines()[-1]
+    assert "no answer within 500 ms; done: " in told
+    assert "; not done: " in told
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from tests.environment import ROOT
 from tests.page_runner import PageRunner
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.net.group import VERBS
+from tickrig.host.cli.start import load
 
 PAGE = ROOT / "docs" / "canmon-net.md"
 
@@ -43,3 +44,9 @@ def test_what_the_page_shows_happens(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_the_page_has_all_verbs() -> None:
     told = re.findall(r"^\| `([a-z]+)", PAGE.read_text("utf-8"), re.MULTILINE)
     assert set(VERBS) <= set(told)
+
+
+def test_the_list_of_verbs_says_what_their_help_says() -> None:
+    for path, short in VERBS.values():
+        told = " ".join((load(path).help or "").split())
+        assert told.startswith(short.removesuffix(".")), path
