@@ -14,7 +14,7 @@ from tickrig.host.monitor.decode.filter import FilterParser
 from tickrig.host.monitor.decode.filter_terms import COMPARISONS, Test, number, signal_test
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.graph.signal_spec import EXTENDED, FrameSlice, parse_slice
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 _TYPE: Final = re.compile(r"[usfb*/+-]\S*")
@@ -72,7 +72,7 @@ class SliceParser(FilterParser):
 def with_slices(record: Record, decoded: Decoded, slices: Iterable[Slice]) -> Decoded:
     """Return what a frame says, with the slices that are of it."""
     frame = record.frame
-    if not isinstance(frame, CanFrame) or frame.remote:
+    if isinstance(frame, ErrorFrame) or frame.remote:
         return decoded
     key = frame.can_id | EXTENDED if frame.extended else frame.can_id
     values = [(name, cut.value(frame.data)) for name, cut in slices if cut.key == key]

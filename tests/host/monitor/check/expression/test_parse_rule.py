@@ -48,7 +48,7 @@ WANTED = f"wanted {', '.join(DEMANDS)}, or 'and', 'or'"
         ("emcy at most many", 14, "'many' is no count, as 3"),
         ("emcy at most 99999 per 1s", 24, "at most 99999: at most 10000 can be counted in a time"),
         ("181[2:4 never", 14, "']' is missing"),
-        ("sync or 181[9] never", 9, "'181[9]' is not ID[BYTES]TYPE*FACTOR+OFFSET, as 181[2:6]s"),
+        ("sync or 181[x] never", 9, "'181[x]' is not ID[BYTES]TYPE*FACTOR+OFFSET, as 181[2:6]s"),
         ("181[2:4] > fast never", 12, "'fast' is no number"),
         ("emcy never today", 12, "'today' behind the end; wanted after, before, while, or no more"),
         ("tpdo1 of 3-5 to sdo of 4-5 under 1s", 1, "nodes 3-5 and 4-5: a rule that is made for"),

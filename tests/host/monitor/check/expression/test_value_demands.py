@@ -2,7 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.monitor.check.expression.held import MAPPED, broken
+from tests.host.monitor.check.expression.held import MAPPED, broken, findings
+from tickrig.host.monitor.frames.record import Record
+from tickrig.wire.can_fd import FdFrame
 
 FAULT = "3.statusword.fault never"
 ENABLED, FAULTY = "183#370264000000", "183#3F0264000000"
@@ -143,3 +145,10 @@ def test_it_is_told_that_a_pdo_has_no_name_without_its_mapping(rule: str, said: 
     assert broken(rule, text) == [f"1.5 {said}{HINT}"]
     assert not any(HINT in line for line in broken(rule, f"{MAPPED}{text}\n2 281#"))
     assert not any(HINT in line for line in broken(rule, "1 703#05"))
+
+
+def test_all_bytes_of_a_can_fd_frame_are_values() -> None:
+    frames = (FdFrame.parse(f"181##1{data * 12}") for data in ("01", "02"))
+    records = [Record(at_us, "can0", frame) for at_us, frame in enumerate(frames, 1)]
+    (found,) = findings("181[11] in {1}", records)
+    assert found.text == "fd: no CANopen service 181[11]=2; 181[11] in {1} is right"
