@@ -28,6 +28,10 @@ ANSWER_US: Final = 500_000
 """How long an answer to a command is waited for."""
 SCAN_US: Final = 20_000
 """How long answers to a question of a fastscan are waited for: several slaves may answer."""
+SILENCE_US: Final = 200_000
+"""Answers to a fastscan that failed have come by then."""
+PATIENCE: Final = (1, 2, 4)
+"""A fastscan is tried with so many times its wait."""
 SETTLE_US: Final = 5_000
 """After what nobody answers, so that slow slaves take it."""
 MOST_FOUND: Final = 127
@@ -103,21 +107,38 @@ class LssMaster:
     def fastscan(self) -> LssAddress | None:
         """Find a slave without a node-ID; it is in configuration then. None if there is none.
 
+        Where answers come too late for their questions it is begun anew, with twice the time.
+
         Raises:
-            LssFailed: slaves answered in a way that fits no address.
+            LssFailed: slaves answered in a way that fits no address, each time.
         """
-        if not self._scan(FastScan(0, FASTSCAN_RESET, 0, 0)):
+        failed: LssFailed | None = None
+        for factor in PATIENCE:
+            try:
+                found = self._fastscan(factor * self._scan_us)
+            except LssFailed as error:
+                failed = error
+                self._bus.gather(SILENCE_US)
+            else:
+                if found is None and failed is not None:
+                    break  # who had answered is gone
+                return found
+        assert failed is not None
+        raise failed
+
+    def _fastscan(self, wait_us: int) -> LssAddress | None:
+        if not self._scan(FastScan(0, FASTSCAN_RESET, 0, 0), max(wait_us, SILENCE_US)):
             return None
         found: list[int] = []
         for sub in range(4):
             number = 0
             for bit in BITS:
-                if not self._scan(FastScan(number, bit, sub, sub)):
+                if not self._scan(FastScan(number, bit, sub, sub), wait_us):
                     number |= 1 << bit
-            if not self._scan(FastScan(number, 0, sub, (sub + 1) % 4)):
+            if not self._scan(FastScan(number, 0, sub, (sub + 1) % 4), wait_us):
                 raise LssFailed(
                     f"fastscan: {number:08X}h as part {sub + 1} of the address is not confirmed;"
-                    f" a slave is gone, or needs longer than {self._scan_us // 1_000} ms to answer"
+                    f" a slave is gone, or needs longer than {wait_us // 1_000} ms to answer"
                 )
             found.append(number)
         return LssAddress(*found)
@@ -160,10 +181,10 @@ class LssMaster:
         """Have it store both; raises as `configure_node_id`."""
         self._configure(message(LssCommand.STORE))
 
-    def _scan(self, request: FastScan) -> bool:
+    def _scan(self, request: FastScan, wait_us: int) -> bool:
         """Say whether somebody answers; late answers of others belong to this question too."""
         self._bus.send(LSS_MASTER_COB_ID, request.encode())
-        return any(answer[0] == LssCommand.IDENTIFIED for answer in self._gather(self._scan_us))
+        return any(answer[0] == LssCommand.IDENTIFIED for answer in self._gather(wait_us))
 
     def _configure(self, request: bytes) -> None:
         answer = self._command(request)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 import pytest
@@ -16,7 +17,9 @@ from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.testing.conformance.foreign.durand_slave import DurandSlave
 from tickrig.emulators.testing.conformance.slave import Slave
 from tickrig.host.canopen.commissioning.lss_master import LssFailed, LssMaster
+from tickrig.wire.can import Frames
 from tickrig.wire.canopen.lss import LssAddress, LssMode
+from tickrig.wire.instant import NEVER
 
 R1 = LssAddress(0xAB01, 2, 0x3_0004, 0x5678)
 EPOS = LssAddress(0, 0x6210, 0x10000, 1)
@@ -156,5 +159,37 @@ def test_two_slaves_are_not_configured_as_one() -> None:
 def test_answers_that_fit_no_address_are_told() -> None:
     bench = NetBench(ours())
     bench.wire.faults.arm("drop", 0.1)
-    with pytest.raises(LssFailed, match="not confirmed; a slave is gone, or needs longer than 20"):
+    with pytest.raises(LssFailed, match="not confirmed; a slave is gone, or needs longer"):
         LssMaster(bench.bus).fastscan()
+
+
+def test_a_slave_that_answers_late_gets_more_time() -> None:
+    bench = NetBench(Late(ours()))
+    assert LssMaster(bench.bus, scan_us=10_000).fastscan() == EPOS
+
+
+class Late:
+    """A slave that says what it has to say 15 ms later.
+
+    Args:
+        slave: the slave.
+    """
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        self._slave, self._waiting = slave, deque[tuple[int, Frames]]()
+
+    tick_us = 1_000
+
+    @property
+    def due_us(self) -> int:
+        return min(self._slave.due_us, *(due_us for due_us, _ in self._waiting), NEVER)
+
+    def reset(self) -> None:
+        self._slave.reset()
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        if out := self._slave.tick(now_us, rx):
+            self._waiting.append((now_us + 15_000, out))
+        if self._waiting and self._waiting[0][0] <= now_us:
+            return self._waiting.popleft()[1]
+        return ()
