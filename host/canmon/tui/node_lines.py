@@ -158,7 +158,7 @@ def error_line(row: NodeStatus, now_us: int, width: int) -> Line:
     if row.sdo_errors:
         pieces.append((f"SDO {row.sdo_error}", WARNING))
     if row.late:
-        pieces.append((f"late {row.late} x", WARNING))
+        pieces.append((f"{row.late} late", WARNING))
     if row.emcy_count and not row.error_code:
         pieces.append((f"{row.emcy_count} EMCY, gone", DIM))
     return tuple(piece for one in pieces for piece in (one, ("; ", "")))[:-1]

@@ -51,6 +51,7 @@ _TEXTS: Final = {
     "no_sdo_abort": "No aborted SDO transfer.",
     "no_error_frames": "No error frame.",
     "no_reboot": "No node that was heard boots without an NMT reset.",
+    "no_lost_heartbeat": "No node that sent heartbeats stops, or misses one; periods are learnt.",
     "no_loss": "No frame lost, no line of a log that is none.",
 }
 

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from tickrig.host.monitor.check.rule import FrameSelection, Rule
-from tickrig.host.monitor.check.time_rules import BOOT_UP
+from tickrig.host.monitor.check.time_rules import BOOT_UP, ERROR_CONTROL_IDS
 from tickrig.host.monitor.frames.ident import ERROR, any_ident, ident_text, sender_of
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
 from tickrig.wire.canopen.emcy import Emcy, describe
-from tickrig.wire.canopen.nmt import ALL_NODES, ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand
+from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
 from tickrig.wire.canopen.sdo.abort import describe_abort
 from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand, index_sub
 from tickrig.wire.errors import WireError
@@ -121,7 +121,6 @@ def _text(record: Record) -> str:
 
 
 RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
-ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 0x80)
 
 
 class NodesPresent(Rule):

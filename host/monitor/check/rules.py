@@ -21,6 +21,7 @@ from tickrig.host.monitor.check.time_rules import (
     HeartbeatTimes,
     MaxGap,
     MaxLoad,
+    NoLostHeartbeat,
 )
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
 from tickrig.host.text.values import parse_time_us
@@ -43,6 +44,7 @@ class Rules:
         no_sdo_abort: no aborted SDO transfer.
         no_error_frames: no error frame.
         no_reboot: no boot-up of a node that was heard, without an NMT reset.
+        no_lost_heartbeat: no node that sent heartbeats falls silent.
         no_loss: no frame lost, no line of a log that is none.
         heartbeats: when those of some nodes come.
         nodes: nodes that must be heard.
@@ -59,6 +61,7 @@ class Rules:
     no_sdo_abort: bool = False
     no_error_frames: bool = False
     no_reboot: bool = False
+    no_lost_heartbeat: bool = False
     no_loss: bool = False
     heartbeats: tuple[HeartbeatTimes, ...] = ()
     nodes: tuple[int, ...] = ()
@@ -80,6 +83,7 @@ class Rules:
         made += [NoSdoAbort()] * self.no_sdo_abort
         made += [NoErrorFrames()] * self.no_error_frames
         made += [NoReboot()] * self.no_reboot
+        made += [NoLostHeartbeat()] * self.no_lost_heartbeat
         made += [Heartbeat(times) for times in self.heartbeats]
         made += [NodesPresent(self.nodes)] * bool(self.nodes)
         made += [MaxGap(*gap) for gap in self.max_gaps]
@@ -102,7 +106,14 @@ RuleValues = Mapping[str, object]
 
 LoadRule = Callable[[str], Callable[[], Rule]]
 
-SWITCHES: Final = ("no_emcy", "no_sdo_abort", "no_error_frames", "no_reboot", "no_loss")
+SWITCHES: Final = (
+    "no_emcy",
+    "no_sdo_abort",
+    "no_error_frames",
+    "no_reboot",
+    "no_lost_heartbeat",
+    "no_loss",
+)
 NUMBERS: Final = ("max_load", "bitrate")
 LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
 VALUES: Final = (*NUMBERS, *LISTS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
@@ -10,6 +11,7 @@ from tickrig.host.monitor.frames.ident import ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.traffic import WINDOW_US, Window
+from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 
 
@@ -38,6 +40,7 @@ class MaxLoad:
 
 
 BOOT_UP: Final = bytes([NmtState.INITIALISING])
+ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 0x80)
 
 
 class HeartbeatTimes(NamedTuple):
@@ -98,6 +101,79 @@ class Heartbeat(Rule):
     def _said(self, gap_us: int, bound: str, limit_us: int) -> str:
         node, said = self._times.node, f"{bound} {ms_text(limit_us)} is right"
         return f"node {node}: {ms_text(gap_us)} ms since its last heartbeat, {said}"
+
+
+LOST_AFTER: Final = 1.5
+"""A heartbeat is lost after so many of its periods, as on the node board."""
+LEAST_GAPS: Final = 2
+GAPS_KEPT: Final = 9
+GUARD_TOGGLE: Final = 0x80
+
+
+class _Beats:
+    """The heartbeats of one node on one bus.
+
+    Attributes:
+        gaps: between the latest of them.
+        last_us: when it was heard last; None after a boot-up.
+    """
+
+    def __init__(self) -> None:
+        self.gaps: deque[int] = deque(maxlen=GAPS_KEPT)
+        self.last_us: int | None = None
+
+    def overdue(self, at_us: int) -> tuple[int, int] | None:
+        """Return time since the last one and learnt period; None while it is in time."""
+        if self.last_us is None or len(self.gaps) < LEAST_GAPS:
+            return None
+        since_us, period_us = at_us - self.last_us, sorted(self.gaps)[len(self.gaps) // 2]
+        return (since_us, period_us) if since_us > LOST_AFTER * period_us else None
+
+
+class NoLostHeartbeat(Rule):
+    """No heartbeat of any node that sends one is lost; its period is learnt from three of them.
+
+    Answers to guarding requests are none: these have a toggle bit. A boot-up begins anew.
+    """
+
+    name = "no-lost-heartbeat"
+
+    def __init__(self) -> None:
+        self._beats: dict[tuple[str, int], _Beats] = {}
+        self._guarded: set[tuple[str, int]] = set()
+
+    def wants(self, ident: int, /) -> bool:
+        """Take the COB-IDs of error control."""
+        return ident in ERROR_CONTROL_IDS
+
+    def judge(self, record: Record, gap_us: int | None, /) -> str | None:
+        """Compare the gap with those before."""
+        frame = record.frame
+        assert isinstance(frame, CanFrame)
+        key = record.channel, frame.can_id - ERROR_CONTROL_COB_ID
+        if len(frame.data) == 1 and frame.data[0] & GUARD_TOGGLE:
+            self._guarded.add(key)
+        if key in self._guarded or frame.data == BOOT_UP:
+            self._beats.pop(key, None)
+            return None
+        beats = self._beats.setdefault(key, _Beats())
+        overdue = beats.overdue(record.at_us)
+        if beats.last_us is not None and record.at_us > beats.last_us:
+            beats.gaps.append(record.at_us - beats.last_us)
+        beats.last_us = record.at_us
+        return None if overdue is None else _lost(key, overdue)
+
+    def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
+        """Name the nodes that fell silent."""
+        for key, beats in sorted(self._beats.items()):
+            if (overdue := beats.overdue(end_us)) is not None:
+                yield _lost(key, overdue)
+
+
+def _lost(key: tuple[str, int], overdue: tuple[int, int]) -> str:
+    channel, node = key
+    since, period = map(ms_text, overdue)
+    return f"{channel} node {node}: no heartbeat for {since} ms, one each {period} ms before"
 
 
 class MaxGap(Rule):

@@ -160,28 +160,46 @@ class NodeDictionary:
 
 
 LEAST_NAME: Final = 12
+SHORT_NAME: Final = 16
+"""Names are made no shorter than this, however narrow the screen is."""
 MOST_NAME: Final = 36
 VALUE: Final = 20
+BESIDE_NAME: Final = 60
+"""What the other columns take."""
 
 
-def render_dictionary(rows: Sequence[ObjectRow], now_us: int) -> list[str]:
+def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) -> list[str]:
     """Return a head, and a line for each object; what went wrong stands in the place of its type.
 
     Args:
         rows: the objects.
         now_us: the time for which ages are told.
+        width: columns of the screen, which say how long names may be; 0 for any.
     """
     longest = max((len(row.text.name) for row in rows), default=0)
-    name = min(MOST_NAME, max(LEAST_NAME, longest))
+    most = max(SHORT_NAME, width - BESIDE_NAME) if width else MOST_NAME
+    name = min(most, max(LEAST_NAME, longest))
     head = f"{'OBJECT':<9} {'NAME':<{name}} {'VALUE':<{VALUE}} {'FROM':<4} {'AGE':>7}  TYPE"
     return [head, *(_line(row, name, now_us) for row in rows)]
+
+
+def shortened(name: str, width: int) -> str:
+    """Return a name of at most so many characters; its end tells entries apart, so it is kept.
+
+    >>> shortened("pre_defined_error_field.error_1", 20)
+    'pre_defin…ld.error_1'
+    """
+    if len(name) <= width:
+        return name
+    begin = (width - 1) // 2
+    return f"{name[:begin]}…{name[len(name) - (width - 1 - begin) :]}"
 
 
 def _line(row: ObjectRow, name: int, now_us: int) -> str:
     age = "" if row.at_us is None else f"{s_text(now_us - row.at_us)} s"
     cells = [
         f"{write_entry(row.entry):<9}",
-        f"{row.text.name[:name]:<{name}}",
+        f"{shortened(row.text.name, name):<{name}}",
         f"{row.value:<{VALUE}}",
         f"{row.origin:<4}",
         f"{age:>7}",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import Any, ClassVar, Final
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.widgets import Static, TextArea
+from textual.content import Content
+from textual.widgets import Static, TabbedContent, TextArea
 
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.tui.panels.panel import Panel
@@ -67,6 +69,19 @@ class AlarmTask(Task):
         return ()
 
 
+USUAL: Final = {
+    "no_emcy": True,
+    "no_error_frames": True,
+    "no_lost_heartbeat": True,
+    "no_loss": True,
+}
+"""What is held where nobody has written rules; bus-off is an error frame, too."""
+USUAL_LOAD: Final = {"max_load": 90}
+"""Beside it where the bit rate is known."""
+LEAST_WIDTH, INDENT = 40, 4
+BADGE_S: Final = 0.5
+BADGES: Final = {State.BROKEN: ("!", "bold red"), State.WAS_BROKEN: ("!", "yellow")}
+
 STYLES: Final = {State.BROKEN: "bold red", State.WAS_BROKEN: "yellow"}
 
 
@@ -81,6 +96,11 @@ class AlarmsPanel(Panel):
     The rules of `canmon check`, held against what is heard. A rule is BROKEN while something is
     missing, and for 2 s after a frame broke it; then it was broken, until somebody acknowledges.
     What has never come is missed after 2 s. Findings are below, the latest first.
+
+    Without rules of your own these are held: no EMCY, no error frame (nor bus-off), no lost
+    heartbeat of any node, no lost frame, and where the bit rate is known (-b) a load of at most
+    90 %. The title of the tab has a red `!` while a rule is broken, a yellow one until somebody
+    acknowledges.
 
     Rules are written as TOML, as for `canmon check`; F5 takes them, Escape leaves them:
 
@@ -109,8 +129,11 @@ class AlarmsPanel(Panel):
         super().__init__(session)
         self.held = AlarmTask(session.model)
         session.tasks.append(self.held)
-        self.rules_text = ""
+        words = {**USUAL, **(USUAL_LOAD if self.held.bit_rate else {})}
+        self.held.hold(parse_rules(words))
+        self.rules_text, self._own = rules_toml(words), False
         self._lines: list[str] = []
+        self._badge = ""
 
     def compose(self) -> ComposeResult:
         """Lay out rules and findings."""
@@ -118,9 +141,29 @@ class AlarmsPanel(Panel):
         yield Static(id="wrong", markup=False)
         yield TextArea(tab_behavior="focus")
 
+    def on_mount(self) -> None:
+        """Let the title of the tab tell, whichever tab is shown."""
+        self.set_interval(BADGE_S, self.refresh_badge)
+
+    def refresh_badge(self) -> None:
+        """Mark the title of the tab while a rule is broken, and until that is acknowledged."""
+        now_us = self.session.model.now_us
+        with self.session.lock:
+            states = {alarm.state(now_us) for alarm in self.held.alarms.rows()}
+        mark, style = next((BADGES[state] for state in BADGES if state in states), ("", ""))
+        tab = self.screen.query_one(TabbedContent).get_tab(f"tab-{self.section}")
+        title = tab.label_text.removesuffix("!") + mark
+        if tab.label_text != title or style != self._badge:
+            self._badge = style
+            tab.label = Content.styled(title, style)
+
     def snapshot(self, model: Model) -> None:
         """Keep how the rules stand."""
-        self._lines = render_alarms(self.held.alarms, model.now_us)
+        lines = render_alarms(self.held.alarms, model.now_us)
+        rules = lines.index("")  # behind it findings, which go on in the next line
+        width = max(LEAST_WIDTH, self.query_one(LineView).scrollable_content_region.width)
+        rest = [part for line in lines[rules:] for part in wrapped(line, width)]
+        self._lines = [*lines[:rules], *rest]
 
     def paint(self) -> None:
         """Show it."""
@@ -131,15 +174,19 @@ class AlarmsPanel(Panel):
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the rules."""
-        words = settings.get("rules", {})
+        if "rules" not in settings:
+            return
+        words = settings["rules"]
         if not isinstance(words, Mapping):
             raise SettingError(("rules",), "is no table of rules")
         with below("rules"):
             self.held.hold(parse_rules(words, load_rule))
-        self.rules_text = rules_toml(words)
+        self.rules_text, self._own = rules_toml(words), True
 
     def save(self) -> dict[str, Any]:
-        """Return them; those that do not hold are None, so that a workspace leaves them out."""
+        """Return those that somebody wrote; None takes one out of a workspace."""
+        if not self._own:
+            return {}
         rules = dict.fromkeys((*SWITCHES, *VALUES))
         return {"rules": {**rules, **tomllib.loads(self.rules_text)}}
 
@@ -170,7 +217,7 @@ class AlarmsPanel(Panel):
             wrong.update(str(error))
             wrong.display = True
             return
-        self.rules_text = area.text
+        self.rules_text, self._own = area.text, True
         self.action_leave()
 
     def action_leave(self) -> None:
@@ -178,6 +225,13 @@ class AlarmsPanel(Panel):
         self.query_one(TextArea).display = self.query_one("#wrong").display = False
         self.query_one(LineView).focus()
         self.refresh_view()
+
+
+def wrapped(line: str, width: int) -> list[str]:
+    """Return a line as several, where it is longer than the screen is wide."""
+    if len(line) <= width:
+        return [line]
+    return wrap(line, width, subsequent_indent=" " * INDENT, break_on_hyphens=False)
 
 
 def rules_toml(words: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -22,6 +22,9 @@ from tickrig.host.monitor.dictionary.node_dictionary import (
     render_dictionary,
 )
 from tickrig.host.tui.line_view import Line, plain
+
+MARK: Final = "* "
+"""Before an object that is watched."""
 
 
 class DictionaryPanel(Panel):
@@ -64,7 +67,7 @@ class DictionaryPanel(Panel):
         self._known: list[Node] = []
         self._rows: list[ObjectRow] = []
         self._lines: list[str] = []
-        self._state = ""
+        self._state, self._width = "", 0
 
     def compose(self) -> ComposeResult:
         """Lay out node, titles and objects."""
@@ -79,10 +82,11 @@ class DictionaryPanel(Panel):
         if self.node is None and self._known:
             matching = [node for node in self._known if node[1] == self._wanted_node]
             self._choose((matching or self._known)[0])
+        self._width = self.query_one(ChoiceView).scrollable_content_region.width - len(MARK)
         self._rows = []
         if self.node is not None:
             self._rows = self.client.objects(self.node).rows(self.filter_text)
-        self._lines = render_dictionary(self._rows, model.now_us)
+        self._lines = render_dictionary(self._rows, model.now_us, self._width)
         left = f"{self.client.left} transfers left" if self.client.left else self.client.result
         self._state = "   ".join([self._title(), *filter(None, [left])])
 
@@ -90,7 +94,7 @@ class DictionaryPanel(Panel):
         """Show them."""
         head, *_ = self._lines
         self.query_one("#node", TitleLine).show(self._state)
-        self.query_one("#head", TitleLine).show("  " + head)
+        self.query_one("#head", TitleLine).show(" " * len(MARK) + head)
         lines = [
             self._line(row, text) for row, text in zip(self._rows, self._lines[1:], strict=True)
         ]
@@ -193,5 +197,5 @@ class DictionaryPanel(Panel):
         return f"{self.node[0]} node {self.node[1]}{wanted}"
 
     def _line(self, row: ObjectRow, text: str) -> Line:
-        mark = "* " if row.entry in self.client.watched else "  "
+        mark = MARK if row.entry in self.client.watched else " " * len(MARK)
         return plain(mark + text, "red" if row.trouble else "")

@@ -61,11 +61,15 @@ class StatisticsPanel(Panel):
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
+        self._heads: list[Line] = []
         self._lines: list[Line] = []
 
     def compose(self) -> ComposeResult:
-        """Lay out the table."""
-        yield LineView()
+        """Lay out the heads, which stay, and the rows."""
+        heads = LineView(id="heads")
+        heads.can_focus = False
+        yield heads
+        yield LineView(id="rows")
 
     def snapshot(self, model: Model) -> None:
         """Keep the table as wide as the screen, and as long as it is."""
@@ -73,14 +77,15 @@ class StatisticsPanel(Panel):
         top.view = replace(top.view, keys=False)
         lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED, model.unread)
         heads = next((number for number, line in enumerate(lines, 1) if TITLE in line), 0)
-        self._lines = [
-            plain(line, "bold") if number < heads else ansi_line(line)
-            for number, line in enumerate(lines)
-        ]
+        self._heads = [plain(line, "bold") for line in lines[:heads]]
+        self._lines = [ansi_line(line) for line in lines[heads:]]
 
     def paint(self) -> None:
         """Show it."""
-        self.query_one(LineView).show(self._lines)
+        heads = self.query_one("#heads", LineView)
+        heads.styles.height = max(1, len(self._heads))
+        heads.show(self._heads)
+        self.query_one("#rows", LineView).show(self._lines)
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take order and what is shown."""

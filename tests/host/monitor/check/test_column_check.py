@@ -21,6 +21,7 @@ ALL = Rules(
     no_sdo_abort=True,
     no_error_frames=True,
     no_reboot=True,
+    no_lost_heartbeat=True,
     no_loss=True,
     heartbeats=(HeartbeatTimes(3, 80_000, 120_000),),
     nodes=(3, 5),

@@ -149,6 +149,32 @@ def test_a_reset_excuses_one_boot() -> None:
     assert [line[0] for line in broken(Rules(no_reboot=True), text)] == ["4"]
 
 
+LOST = Rules(no_lost_heartbeat=True)
+
+
+def test_a_heartbeat_that_is_lost_is_found_without_a_period() -> None:
+    text = "1.0 703#00\n1.2 703#7F\n1.3 703#05\n1.4 703#05\n1.55 703#05\n1.71 703#05"
+    assert broken(LOST, text, end_s=1.86) == [
+        "1.71 can0 node 3: no heartbeat for 160.000 ms, one each 100.000 ms before"
+    ]
+    assert broken(LOST, text, end_s=1.97)[1:] == [
+        "1.97 can0 node 3: no heartbeat for 260.000 ms, one each 150.000 ms before"
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1.0 703#00\n1.1 703#05\n1.2 703#05\n9.0 703#05",  # a period is not known yet
+        "1.0 703#05\n1.1 703#05\n1.2 703#05\n1.3 703#00\n9.0 703#05",  # it boots meanwhile
+        "1.0 703#05\n1.1 703#85\n1.2 703#05\n1.3 703#85\n9.0 703#05",  # it is guarded
+        "1.0 703#05\n1.0 703#05\n1.0 703#05\n9.0 703#05",  # a log with one time for all
+    ],
+)
+def test_what_is_no_lost_heartbeat_is_not_found(text: str) -> None:
+    assert broken(LOST, text) == []
+
+
 def test_a_second_that_is_too_busy_is_found_when_it_is_over() -> None:
     busy = "\n".join(f"{n / 100:.2f} 181#" for n in range(100))
     assert broken(Rules(max_load=49.5), f"{busy}\n1.5 181#", bit_rate=10_000) == [

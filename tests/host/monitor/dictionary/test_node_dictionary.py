@@ -3,6 +3,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+import pytest
+
 from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.decode.node_memory import read_eds_objects
@@ -89,3 +91,13 @@ def test_objects_are_shown_like_this() -> None:
         "0.2 605#2B41600000000000\n0.2 585#8041600002000106"
     )
     assert "\n".join(render_dictionary(made.rows(), 1_100_000)) == TABLE
+
+
+@pytest.mark.parametrize("width", [76, 116, 196])
+def test_names_are_as_long_as_the_screen_lets_them_be(width: int) -> None:
+    made = dictionary("", eds=True)
+    lines = render_dictionary(made.rows(), 0, width)
+    head = lines[0]
+    assert all(line[head.index("VALUE") - 1] == " " for line in lines)
+    assert max(map(len, lines)) <= width
+    assert any("…" in line for line in lines) is (width < 196)

@@ -3,7 +3,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from textual.widgets import TextArea
+from textual.widgets import TabbedContent, TextArea
 
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import BUS, RigSession
@@ -56,7 +56,6 @@ def test_a_written_rule_is_held_against_what_frames_mean() -> None:
 
 def test_rules_are_written_and_held() -> None:
     async def act(desk: Desk[AlarmsPanel]) -> None:
-        assert desk.lines() == ["no rules: e writes some, F1 shows how"]
         area = desk.panel.query_one(TextArea)
         await desk.press("e")
         area.text = "no_emcy = 1"
@@ -93,3 +92,55 @@ def test_a_limit_of_the_load_is_held_where_the_bit_rate_is_known() -> None:
     panel = AlarmsPanel(RigSession(bit_rate=1_000_000))
     panel.load({"rules": {"max_load": 50}})
     assert [alarm.rule for alarm in panel.held.alarms.rows()] == ["max-load"]
+
+
+USUAL = ["no-loss", "no-emcy", "no-error-frames", "no-lost-heartbeat"]
+
+
+@pytest.mark.parametrize(("bit_rate", "rules"), [(None, USUAL), (500_000, ["max-load", *USUAL])])
+def test_without_rules_the_usual_ones_are_held_and_none_is_kept(
+    bit_rate: int | None, rules: list[str]
+) -> None:
+    panel = AlarmsPanel(RigSession(bit_rate=bit_rate))
+    panel.load({})
+    assert [alarm.rule for alarm in panel.held.alarms.rows()] == rules
+    assert kept(panel) == {}
+
+
+def test_rules_that_were_taken_away_do_not_come_back() -> None:
+    async def act(desk: Desk[AlarmsPanel]) -> None:
+        area = desk.panel.query_one(TextArea)
+        await desk.press("e")
+        assert "no_lost_heartbeat = true" in area.text
+        area.text = ""
+        await desk.press("f5")
+        assert desk.lines() == ["no rules: e writes some, F1 shows how"]
+
+    panel = at_desk(AlarmsPanel, act)
+    assert kept(panel) == {"rules": {}}
+    again = AlarmsPanel(RigSession())
+    again.load(kept(panel))
+    assert again.held.alarms.rows() == []
+
+
+def test_the_title_of_the_tab_tells_that_a_rule_is_broken() -> None:
+    async def act(desk: Desk[AlarmsPanel]) -> None:
+        tab = desk.panel.screen.query_one(TabbedContent).get_tab("tab-alarms")
+        desk.session.run(10_000)
+        desk.panel.refresh_badge()
+        assert tab.label_text == "1 alarms"
+        desk.session.buses[BUS](CanFrame.parse("000#0105"))
+        desk.session.buses[BUS](CanFrame.parse("205#00"))  # too short: an EMCY
+        desk.session.run(10_000)
+        desk.panel.refresh_badge()
+        assert tab.label_text == "1 alarms!"
+        assert "bold red" in repr(tab.label)
+        desk.session.model.now_us += 3_000_000
+        desk.panel.refresh_badge()
+        assert "yellow" in repr(tab.label)
+        await desk.press("space")
+        desk.session.model.now_us += 3_000_000
+        desk.panel.refresh_badge()
+        assert tab.label_text == "1 alarms"
+
+    at_desk(AlarmsPanel, act)

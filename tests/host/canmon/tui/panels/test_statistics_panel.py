@@ -5,13 +5,20 @@ from typing import Any
 
 import pytest
 
-from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, shown, wire_session
+from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, wire_session
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui.line_view import LineView, line_text
+
+
+def shown(monitor: Monitor) -> list[str]:
+    """Return heads and rows as they are now."""
+    monitor.refresh_view()
+    views = monitor.shown.query(LineView)
+    return [line_text(line).rstrip() for view in views for line in view.lines]
 
 
 @pytest.fixture
@@ -56,7 +63,7 @@ def test_space_holds_it(wire: Wire) -> None:
         assert "181              1" in "\n".join(shown(monitor))
         await pilot.press("space")
         assert "181              2" in "\n".join(shown(monitor))
-        line = monitor.shown.query_one(LineView).lines[3]
+        line = monitor.shown.query_one("#rows", LineView).lines[0]
         assert [text for text, style in line if style == CHANGED] == ["02"]
 
     on_monitor(session, act)
@@ -81,3 +88,18 @@ def test_its_settings_come_back() -> None:
     assert panel.save() == settings
     with pytest.raises(SettingError, match="sort: 'size' is none of id, rate, jitter, gap, age"):
         panel.load({"sort": "size"})
+
+
+def test_heads_stay_when_rows_are_scrolled() -> None:
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        await pilot.press("3")
+        await pilot.pause()
+        shown(monitor)
+        await pilot.press("end")
+        await pilot.pause()
+        assert monitor.shown.query_one("#rows", LineView).top > 0
+        assert monitor.shown.query_one("#heads", LineView).top == 0
+        heads = monitor.shown.query_one("#heads", LineView)
+        assert line_text(heads.lines[-1]).startswith("CAN-ID")
+
+    on_monitor(drive_session(), act, size=(100, 14))
