@@ -63,3 +63,14 @@ def test_a_condition_holds_with_the_frame_that_makes_it_true() -> None:
     rule = "3.position_actual_value in ..99 while 3.statusword.operation_enabled"
     text = "1 183#330264000000\n2 183#370264000000"
     assert [line[0] for line in broken(rule, MAPPED + text)] == ["2"]
+
+
+def test_a_rule_that_holds_after_an_event_does_not_judge_it() -> None:
+    assert broken("boot-up of 3 never after boot-up of 3", "1 703#00\n2 703#05") == []
+    assert len(broken("boot-up of 3 never after boot-up of 3", "1 703#00\n2 703#00")) == 1
+
+
+def test_a_condition_that_lasts_is_told_again_in_the_next_scope() -> None:
+    rule = "3.statusword.fault never while node 3 operational"
+    text = "1 703#05\n2 183#3F0200000000\n3 703#04\n4 703#05\n5 183#3F0200000000"
+    assert [line[0] for line in broken(rule, MAPPED + text)] == ["2", "5"]

@@ -162,3 +162,21 @@ def test_another_request_tells_that_the_one_before_was_not_answered() -> None:
     assert broken(SDO, text) == [
         "1.02 sdo of node 3: upload of 1000h:00 asked for: not answered before the next request"
     ]
+
+
+def test_what_no_node_sends_belongs_to_the_frames_of_any() -> None:
+    assert broken("sync to heartbeat under 10ms", "1 080#\n1.005 703#05\n2 080#\n2.02 703#05") == [
+        "2.01 sync: no heartbeat in 10.000 ms"
+    ]
+
+
+def test_nodes_that_are_named_belong_together() -> None:
+    rule = "node=3 and boot-up to node=4 and heartbeat under 100ms"
+    assert broken(rule, "1 703#00\n1.05 704#05\n2 703#05") == []
+
+
+def test_nothing_is_waited_for_when_its_scope_is_over() -> None:
+    rule = "sync to tpdo1 of 3 under 2ms while node 3 operational"
+    assert (
+        broken(rule, MAPPED + "1 703#05\n1.1 080#\n1.101 703#04\n2 080#\n3 703#05\n4 703#05") == []
+    )

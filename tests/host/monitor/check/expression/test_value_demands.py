@@ -53,6 +53,7 @@ def test_an_emcy_of_another_code_is_found_and_its_end_is_not() -> None:
     found = broken("emcy of 5 in {8130h}", text)
     assert [line[:29] for line in found] == ["2 emcy of node 5: 8110h CAN o"]
     assert len(broken("emcy of 5 in {8100h..81FFh}", text)) == 0
+    assert len(broken("emcy of 5 in {0}", text)) == 2
     assert len(broken("emcy of 4 in {0}", text)) == 0
 
 
@@ -64,10 +65,13 @@ def test_a_kind_has_the_values_that_its_text_names() -> None:
 
 
 def test_a_counter_that_skips_or_stands_is_found() -> None:
-    text = "1 080#01\n2 080#02\n3 080#03\n4 080#01\n5 080#02\n6 080#02\n7 080#04"
+    text = "1 080#01\n2 080#02\n3 080#03\n4 080#01\n5 080#02\n6 080#02\n7 080#04\n8 080#01"
     assert broken("sync counts", text) == [
         "6 counter is 2 after 2, one more is right",
         "7 counter is 4 after 2, one more is right",
+    ]
+    assert broken("sync counts", "1 080#02\n2 080#03\n3 080#01\n4 080#02\n5 080#01") == [
+        "5 counter is 1 after 2, one more is right"
     ]
 
 
@@ -84,7 +88,7 @@ def test_a_value_that_jumps_is_found() -> None:
 
 def test_a_value_that_does_not_change_is_found_once() -> None:
     rule = "3.position_actual_value changes within 1s"
-    text = f"1 {ENABLED}\n1.9 {ENABLED}\n2.1 {ENABLED}\n3 {ENABLED}\n4 {FAR}\n4.5 {FAR}"
+    text = f"1 {ENABLED}\n2 {ENABLED}\n2.1 {ENABLED}\n3 {ENABLED}\n4 {FAR}\n4.5 {FAR}"
     assert broken(rule, MAPPED + text) == [
         "2.1 position_actual_value=100 has not changed for 1100.0 ms, at most 1000.0 is right"
     ]
