@@ -21,6 +21,7 @@ from tickrig.host.canmon.sources.reopening_reader import REOPEN_US, ReopeningRea
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.ident import CandumpFilter
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.can_log import channel_name
 from tickrig.host.monitor.logs.mark import BACK, GONE, Mark
 from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
@@ -181,6 +182,11 @@ class Adapter:
         self.link = link
         self.plug()
 
+    @property
+    def name(self) -> str:
+        """As frames have it."""
+        return channel_name(self.link)
+
     def plug(self) -> None:
         self._adapter, self._port = os.openpty()
         tty.setraw(self._port)
@@ -231,11 +237,11 @@ def test_dump_waits_for_an_adapter_that_was_unplugged(tmp_path: Path) -> None:
         child.wait()
     first, gone, back, last = out.read_text("ascii").splitlines()
     assert (first.endswith("705#7F"), last.endswith("705#05")) == (True, True)
-    assert gone.startswith(f"# {adapter.link} is gone: ")
-    assert back.startswith(f"# {adapter.link} is back after ")
+    assert gone.startswith(f"# {adapter.name} is gone: ")
+    assert back.startswith(f"# {adapter.name} is back after ")
     said = err.read_text("utf-8").splitlines()
     assert said[:2] == [gone[2:], back[2:]]
-    assert said[2].startswith(f"{adapter.link}: it was away once, ")
+    assert said[2].startswith(f"{adapter.name}: it was away once, ")
     assert said[-1] == "Error: a bus was away 1 time"
 
 
@@ -248,11 +254,11 @@ def test_top_tells_which_bus_is_gone(tmp_path: Path) -> None:
     adapter.send(b"t70517F\r")
     terminal.wait_for("705")
     adapter.unplug()
-    terminal.wait_for(f"GONE: {adapter.link}")
+    terminal.wait_for(f"GONE: {adapter.name}")
     adapter.plug()
     adapter.opened()
     adapter.send(b"t706105\r")
     terminal.wait_for("706")
     terminal.child.send("q")
     assert terminal.end() == 0
-    assert f"{adapter.link}: it was away once, " in terminal.written
+    assert f"{adapter.name}: it was away once, " in terminal.written
