@@ -22,7 +22,7 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.device_rtc.component import CanopenEcho
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.device.canopen.ds402.drive import Ds402
-from tickrig.device.canopen.models import epos, f_palette, motor_core_unit
+from tickrig.device.canopen.models import epos, f_palette, f_palette_boot, motor_core_unit
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.physical import InputSignal, OutputSignal
@@ -72,6 +72,7 @@ MACHINES: Final[dict[str, Callable[[], object]]] = {
     "CiA 402 drive": lambda: make_slave(make_dictionary({DRIVE}), 5, application=Ds402),
     "EPOS": lambda: epos.make_epos(5),
     "f-palette": lambda: f_palette.make_f_palette(5),
+    "f-palette-boot": lambda: f_palette_boot.make_f_palette_boot(5),
     "motor core unit": lambda: motor_core_unit.make_motor_core_unit(5),
     "DeviceRTC": lambda: make_device_rtc(CanopenEcho, 5),
     "application": lambda: Application.of(slave()),

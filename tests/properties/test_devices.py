@@ -24,6 +24,7 @@ from tickrig.device.canopen.ds401.module import Ds401
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
+from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
 from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rh3.base import Rh3Base
@@ -202,6 +203,7 @@ KINDS: dict[str, dict[str, Any]] = {
     "CiA 401 module": canopen(reference_io),
     "CiA 402 drive": canopen(reference_drive),
     "f-palette": canopen(partial(make_f_palette, 5)),
+    "f-palette-boot": canopen(partial(make_f_palette_boot, 5)),
     "motor core unit": canopen(partial(make_motor_core_unit, 5)),
     "EPOS": canopen(partial(make_epos, 5)),
     "DeviceRTC": canopen(partial(make_device_rtc, CanopenEcho, 5)),
