@@ -149,6 +149,18 @@ def test_can_fd_frames_are_those_of_candump(vcan: Bus, options: str, tmp_path: P
     assert [without_fdf(without_tx(line)) for line in candump.lines] == lines
 
 
+def test_candump_hears_the_can_fd_that_we_send_and_play(vcan: Bus, tmp_path: Path) -> None:
+    frames = ["123##1AABB", "00000123##3" + "5A" * 64, "7FF##0", "123#AABB"]
+    log = tmp_path / "run.log"
+    log.write_text("".join(f"(1.{n:06d}) can0 {frame}\n" for n, frame in enumerate(frames)))
+    with listening(["candump", "-L", vcan.channel], tmp_path, "theirs") as candump:
+        run(*CANMON, "send", vcan.channel, *frames)
+        run(*CANMON, "play", str(log), vcan.channel)
+        wait(lambda: len(candump.lines) == 2 * len(frames))
+        lines = [without_fdf(without_tx(line)) for line in candump.lines]
+    assert [line.split()[-1] for line in lines] == frames * 2
+
+
 def without_fdf(line: str) -> str:
     """The flag that a frame is of CAN FD, which newer kernels set, says no more than its ##."""
     return re.sub("##([4-7])", lambda found: f"##{int(found[1]) & 3}", line)

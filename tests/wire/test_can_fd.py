@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdBits, FdFrame, fd_bits
+from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdBits, FdFrame, fd_bits, parse_sent
 from tickrig.wire.errors import FieldError, FramingError
 
 DATA = st.sampled_from(FD_LENGTHS).flatmap(
@@ -101,3 +101,9 @@ def test_its_length_is_that_of_its_bits_written_out(frame: FdFrame) -> None:
 def test_the_longest_frames_have_the_known_bits_without_stuffing() -> None:
     """An identifier and data without five equal bits in a row: 17 + 5 + 512 + 32 + 13."""
     assert sum(fd_bits(FdFrame(0x555, b"\x55" * 64, flags=BRS))) == 17 + 5 + 512 + 32 + 13
+
+
+@pytest.mark.parametrize("text", ["705#7F", "00000605#R", "123##1AABB", "00000123##0"])
+def test_a_frame_to_send_is_of_the_kind_that_its_notation_says(text: str) -> None:
+    frame = parse_sent(text)
+    assert (str(frame), isinstance(frame, FdFrame)) == (text, "##" in text)

@@ -105,6 +105,8 @@ def test_frames_of_can_xl_are_passed_over_and_counted() -> None:
         "(0.5) can0 123##1" + "00" * 65,
         "(0.5) can0 123",
         "(.5) can0 123#",
+        "(0.5) can\xa0 123#",
+        "  can\x85  705   [1]  7F",
         "can0 123#",
         "{}",
         "[1]",
