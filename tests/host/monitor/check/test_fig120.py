@@ -40,6 +40,7 @@ RULES = parse_rules(
         "no_sdo_abort": True,
         "no_error_frames": True,
         "no_reboot": True,
+        "no_lost_heartbeat": True,
         "no_loss": True,
         "heartbeat": [f"{PALETTE}=100ms±10%", f"{MOTOR}=100ms±10%"],
         "nodes": f"{PALETTE},{MOTOR}",
@@ -126,14 +127,15 @@ def without_node(trace: list[Record], node: int) -> list[Record]:
 
 
 def test_a_heartbeat_that_is_missing_is_found(trace: list[Record]) -> None:
-    (found,) = findings(without(trace, 0x700 + MOTOR, 2 * S, 2 * S + 100_000))
-    assert found.rule == "heartbeat 32"
-    assert "200.0" in found.text
+    found = findings(without(trace, 0x700 + MOTOR, 2 * S, 2 * S + 100_000))
+    assert [one.rule for one in found] == ["no-lost-heartbeat", "heartbeat 32"]
+    assert all("200.0" in one.text for one in found)
 
 
 def test_a_node_that_dies_is_found(trace: list[Record]) -> None:
-    (found,) = findings(without(trace, 0x700 + PALETTE, 3 * S, 99 * S))
-    assert (found.rule, found.at_us) == ("heartbeat 16", trace[-1].at_us)
+    found = findings(without(trace, 0x700 + PALETTE, 3 * S, 99 * S))
+    assert [one.rule for one in found] == ["no-lost-heartbeat", "heartbeat 16"]
+    assert {one.at_us for one in found} == {trace[-1].at_us}
 
 
 def test_a_node_that_is_not_there_is_found(trace: list[Record]) -> None:
