@@ -25,7 +25,7 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log, read_blocks
 from tickrig.host.monitor.logs.mark import lost_frames
 from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
-from tickrig.host.monitor.logs.screen_line import BUS_NAME, ScreenClock, parse_screen_line
+from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
 from tickrig.host.monitor.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
@@ -67,7 +67,7 @@ class WholeLines:
 COMMENTS: Final = ("#", ";", "//")
 
 _LINE: Final = re.compile(
-    rf"\(([0-9]{{1,12}})\.([0-9]{{1,9}})\)\s+({BUS_NAME})\s+(\S+)(?:\s+([RT]))?", re.ASCII
+    r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
 )
 _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 

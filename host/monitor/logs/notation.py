@@ -38,6 +38,10 @@ def parse_frame(notation: str) -> AnyFrame:
     return parse_sent(coded[1] if coded else notation)
 
 
+LONGEST_NAME: Final = 32
+"""Characters of the name of a bus, as in the lines of a candump log."""
+_NAME: Final = re.compile(rf"\S{{1,{LONGEST_NAME}}}", re.ASCII)
+
 VERSION: Final = 1
 LINE_EVENT: Final = "line"
 """A line of a serial port, which no log of CAN holds."""
@@ -117,7 +121,7 @@ def _event(said: dict[str, Any], tally: Tally) -> str:
 
 def _name(channel: object) -> str:
     name = str(channel)
-    if name.split() != [name] or len(name) > LONGEST_NAME:
+    if not _NAME.fullmatch(name):
         raise ValueError(f"channel {name!r} is not a name of 1 to 32 characters without blanks")
     return name
 
@@ -145,9 +149,6 @@ def _quoted(text: str) -> str:
 
 LOG_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 DUMP_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
-LONGEST_NAME: Final = 32
-"""Characters of the name of a bus, as in the lines of a candump log."""
-
 UNNAMED: Final = "can0"
 """What a bus without a name or number is called."""
 

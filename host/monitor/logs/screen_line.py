@@ -25,15 +25,12 @@ HEAD: Final = 1 << 13
 LATE_US: Final = 10_000
 """Frames of several buses are shown out of order by less."""
 
-BUS_NAME: Final = r"[^\s\x1c-\x1f\x85\xa0]{1,32}"
-"""What a bus is called: no character that is blank, in ASCII or beyond."""
-
 _STAMP: Final = (
     r"\((?:(-?)([0-9]{1,12})|([0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}))"
     r"\.([0-9]{1,9})\)\s+"
 )
 _FRAME: Final = re.compile(
-    rf"(?:{_STAMP})?({BUS_NAME})\s+(?:([RT])X ([-B]) ([-E])\s+)?"
+    rf"(?:{_STAMP})?(\S{{1,32}})\s+(?:([RT])X ([-B]) ([-E])\s+)?"
     r"([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})\s+\[([0-9]{1,4})\](?:\s+(.*))?",
     re.ASCII,
 )
