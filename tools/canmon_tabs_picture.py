@@ -141,12 +141,19 @@ async def pictures(wanted: Collection[str] = ()) -> dict[str, str]:
     return drawn
 
 
+STILL: Final = 12
+"""After so many pictures the frames of the run are past: the rate is 0."""
+
+
 async def _draw(monitor: Monitor, panel: Panel, pilot: object) -> str:
     for badge in monitor.query("AlarmsPanel"):
         badge.refresh_badge()
     for _ in range(3):  # a size that has come needs another picture
         monitor.refresh_view()
         await pilot.pause()
+    for _ in range(STILL):
+        monitor.refresh_view()
+    await pilot.pause()
     return svg(monitor.screen._compositor.render_strips())
 
 

@@ -62,6 +62,7 @@ class TraceLines:
         meaning: what a frame means stands behind it.
         channel_width: characters of the bus; 0 for none.
         counts: how often an identifier came stands before it.
+        gaps: the time since the frame before it with the same identifier.
     """
 
     stamp: Stamp = Stamp.ZERO
@@ -70,10 +71,11 @@ class TraceLines:
     meaning: bool = True
     channel_width: int = 0
     counts: bool = False
+    gaps: bool = True
 
     def head(self) -> Line:
         """Return the titles of the columns."""
-        parts = [f"{'time s':>{self._stamp_width}}", f"{'gap ms':>8}"]
+        parts = [f"{'time s':>{self._stamp_width}}"] + [f"{'gap ms':>8}"] * self.gaps
         parts += [f"{'frames':>8}"] * self.counts
         parts += [f"{'bus':<{self.channel_width}}"] * bool(self.channel_width)
         parts += [f"{'CAN-ID':<9}", f"{'data':<{self._data_width}}"]
@@ -85,7 +87,8 @@ class TraceLines:
         record = row.record
         channel = f"{record.channel:<{self.channel_width}} " * bool(self.channel_width)
         counted = f"{count:>8} " * self.counts
-        begin = f"{self._stamp(row):>{self._stamp_width}} {ms_text(row.gap_us):>8} "
+        gap = f"{ms_text(row.gap_us):>8} " * self.gaps
+        begin = f"{self._stamp(row):>{self._stamp_width}} {gap}"
         pieces = [(begin, DIM), (counted + channel, ""), _ident(row), *self._data(row)]
         if self.meaning and row.decoded is not None:
             missing = self._data_width - sum(len(text) for text, _ in pieces[3:])

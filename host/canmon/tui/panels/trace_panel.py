@@ -27,6 +27,8 @@ from tickrig.wire.can import Frames
 
 STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
 CHANNEL_MAX: Final = 12
+GAPS_WIDTH: Final = 90
+"""A narrower screen has room for what frames mean, or for the gaps between them."""
 
 
 class TracePanel(Panel):
@@ -39,7 +41,8 @@ class TracePanel(Panel):
 
     Each frame with its time, the time since the one before it with the same CAN-ID, its bytes and
     what it means. Bytes that differ from those before are coloured. Frames that this program sent
-    have a coloured CAN-ID. It follows the latest frame while that is in view.
+    have a coloured CAN-ID. It follows the latest frame while that is in view. A window of less than
+    90 columns leaves out the gaps while it shows meanings.
 
     `s` saves the frames that pass the filter, the latest 100,000 at the most, as a log.
 
@@ -235,7 +238,11 @@ class TracePanel(Panel):
         first = passed.rows(0, 1) if passed.first == 0 else []
         origin_us = first[0].record.at_us if first else self._layout.origin_us
         self._layout = replace(
-            self._layout, channel_width=width, counts=self.overwrite, origin_us=origin_us
+            self._layout,
+            channel_width=width,
+            counts=self.overwrite,
+            origin_us=origin_us,
+            gaps=not self._layout.meaning or self.size.width >= GAPS_WIDTH,
         )
 
     def _title(self) -> str:

@@ -268,3 +268,18 @@ def test_a_trace_is_saved_over_nothing_and_a_mistake_is_told(wire: Wire, tmp_pat
 
     on_monitor(session, act)
     assert (tmp_path / "kept.log").read_text() == "precious"
+
+
+@pytest.mark.parametrize(("width", "gaps"), [(80, False), (120, True)])
+def test_a_narrow_window_has_meanings_in_the_place_of_gaps(width: int, gaps: bool) -> None:
+    async def act(monitor: Monitor, pilot: Any) -> None:
+        await pilot.pause()
+        lines = shown(monitor)
+        head = str(monitor.shown.query_one("#head", Static).content)
+        assert ("gap ms" in head) is gaps
+        assert lines[-1][head.index("data") - 1 :].startswith(" [")
+        await pilot.press("d")
+        shown(monitor)
+        assert "gap ms" in str(monitor.shown.query_one("#head", Static).content)
+
+    on_monitor(drive_session(), act, size=(width, 24))
