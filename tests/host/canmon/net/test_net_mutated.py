@@ -1,6 +1,6 @@
 """A small sample of mutated calls of `canmon net`: no traceback, and one line.
 
-By hand it was run over 20 000 of them.
+By hand it was run over 9 000 of them, of which two had found a COB-ID that was none.
 """
 
 from __future__ import annotations
