@@ -9,12 +9,11 @@ from typing import Any, Generic, Protocol, TypeVar
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.connector_options import DataflowType
 from tickrig.host.rtc.ports.data_port import OutPort
-from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.remote.buffers import LockedBuffer, SendBuffer
 from tickrig.host.rtc.remote.peer_end import Codec, PeerEnd
 from tickrig.host.rtc.remote.peer_state import PeerState, PeerWatch
 from tickrig.host.rtc.remote.peer_thread import PeerThread
-from tickrig.host.rtc.remote.send_buffer import SendBuffer
-from tickrig.host.rtc.states import PortStatus, RtcRefused
+from tickrig.host.rtc.states import PortStatus
 from tickrig.wire.rtc_types.idl import Struct
 
 T = TypeVar("T", bound=Struct)
@@ -118,18 +117,17 @@ class OutPortPullConnector(Connector[Any], Generic[T, P]):
         port: of ours.
         end: what was agreed with the peer.
         codec: makes what passes.
-        calls: those of the manager's thread.
 
     Raises:
         RtcRefused: the port has a connector of this ID, or properties that cannot be.
     """
 
-    def __init__(
-        self, port: OutPort[T], end: PeerEnd, codec: Codec[T, P], calls: CallQueue
-    ) -> None:
+    buffer: LockedBuffer[P]
+
+    def __init__(self, port: OutPort[T], end: PeerEnd, codec: Codec[T, P]) -> None:
         options = replace(end.options, dataflow=DataflowType.PULL)
         super().__init__(end.profile(port), (port,), options)
-        self._codec, self._calls = codec, calls
+        self.buffer, self._codec = LockedBuffer(options.outport), codec
 
     def write(self, value: T) -> PortStatus:
         """Take a value from the OutPort; INVALID_ARGS if it cannot be encoded."""
@@ -143,17 +141,9 @@ class OutPortPullConnector(Connector[Any], Generic[T, P]):
         """Take the next value, in any thread.
 
         Returns:
-            PORT_OK and what passes; else None with BUFFER_EMPTY, with BUFFER_TIMEOUT if the
-            manager's thread had no time, with CONNECTION_LOST after the end.
+            PORT_OK and what passes; else None with BUFFER_EMPTY, or with CONNECTION_LOST after
+            the end.
         """
-        try:
-            return self._calls.call(self._next)
-        except TimeoutError:
-            return PortStatus.BUFFER_TIMEOUT, None
-        except RtcRefused:
-            return PortStatus.CONNECTION_LOST, None
-
-    def _next(self) -> tuple[PortStatus, P | None]:
         if not self.joined:
             return PortStatus.CONNECTION_LOST, None
         payload = self.buffer.read()

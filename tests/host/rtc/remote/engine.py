@@ -40,11 +40,11 @@ class Servant:
 
     def kill(self) -> None:
         """End as a killed process does: all connections are cut."""
-        self.awake.set()
         for connection in (self._listener, *self._open):
             with contextlib.suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)
             connection.close()
+        self.awake.set()
 
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
@@ -212,7 +212,7 @@ class Pair:
         """Join the ports so that values are pulled."""
         here, there = self._ends("pull", properties)
         codec = cdr(self.out.data_type)
-        held = OutPortPullConnector(self.out, here, codec, self.near.calls)
+        held = OutPortPullConnector(self.out, here, codec)
         servant = self.near.serve(answer_get(held))
         reference = self.far.refer(servant, timeout_s)
         pulled = InPortPullConnector(

@@ -123,10 +123,19 @@ def test_after_the_end_of_a_connector_nothing_is_fetched(pair: Pair) -> None:
     assert (held.get(), pair.numbers) == ((PortStatus.CONNECTION_LOST, None), [])
 
 
-def test_a_system_that_ends_gives_nothing_more(pair: Pair) -> None:
-    held, _, _ = pair.pull()
-    answers: list[object] = []
-    pair.near.calls.close()
-    pair.far.thread.submit(lambda: answers.append(held.get()))
-    pair.until(lambda: answers)
-    assert answers == [(PortStatus.CONNECTION_LOST, None)]
+def test_a_full_buffer_says_so_to_the_writer(pair: Pair) -> None:
+    held, _, _ = pair.pull({"buffer.length": "1", "buffer.write.full_policy": "do_nothing"})
+    assert pair.out.write(long(1)) is OK
+    assert pair.out.write(long(2)) is PortStatus.BUFFER_FULL
+    assert len(held.buffer) == 1
+
+
+def test_a_system_that_has_ended_fetches_nothing_more(pair: Pair) -> None:
+    _, _, servant = pair.pull()
+    pair.out.write(long(1))
+    pair.far.calls.close()
+    for _ in range(3):
+        pair.near.step()
+        pair.far.step()
+    servant.kill()
+    assert pair.numbers == []

@@ -13,7 +13,6 @@ from tests.host.rtc.remote.engine import Pair, Reference, answer_put
 from tickrig.host.rtc import PortStatus, ReturnCode, RtcRefused
 from tickrig.host.rtc.commands.system_control import describe_component
 from tickrig.host.rtc.commands.texts import component_lines
-from tickrig.host.rtc.remote.call_queue import CallQueue
 from tickrig.host.rtc.remote.out_port import OutPortPushConnector
 from tickrig.host.rtc.remote.peer_end import PeerEnd, cdr
 from tickrig.host.rtc.remote.peer_state import PeerState
@@ -57,7 +56,7 @@ def test_values_arrive_unchanged_and_in_order(
 def test_a_peer_that_hangs_delays_nobody_and_the_policy_says_what_is_lost(
     pair: Pair, policy: str, status: PortStatus, left: list[int]
 ) -> None:
-    keys = {"buffer.length": "2", "buffer.write.full_policy": policy}
+    keys = {"outport.buffer.length": "2", "outport.buffer.write.full_policy": policy}
     pushed, _, servant = pair.push(keys)
     servant.awake.clear()
     assert pair.out.write(long(1)) is OK
@@ -119,7 +118,7 @@ def test_a_call_that_takes_too_long_is_no_answer(pair: Pair) -> None:
 def test_what_had_no_answer_is_put_again_unless_the_buffer_is_full(
     pair: Pair, policy: str, left: list[int]
 ) -> None:
-    keys = {"buffer.length": "2", "buffer.write.full_policy": policy}
+    keys = {"outport.buffer.length": "2", "outport.buffer.write.full_policy": policy}
     pushed, _, servant = pair.push(keys)
     servant.awake.clear()
     pair.out.write(long(1))
@@ -186,18 +185,29 @@ def test_sixty_four_values_wait_for_a_peer_unless_it_is_said(pair: Pair) -> None
     servant.awake.set()
 
 
-def test_a_system_that_has_no_time_is_not_waited_for(pair: Pair) -> None:
-    pair.far.calls.close()
-    pair.far.calls = CallQueue(timeout_us=10_000)
-    _, _, servant = pair.push()
-    answers: list[PortStatus] = []
-    reference, payload = pair.near.refer(servant), cdr(TimedLong).encode(long(1))
-    pair.near.thread.submit(lambda: answers.append(reference.put(payload)))
-    while not answers:
-        pair.near.step()
-    assert answers == [PortStatus.BUFFER_TIMEOUT]
+@pytest.mark.parametrize(
+    ("policy", "status", "left"),
+    [
+        ("overwrite", OK, [2, 3]),
+        ("do_nothing", PortStatus.BUFFER_FULL, [1, 2]),
+        ("block", PortStatus.BUFFER_TIMEOUT, [1, 2]),
+    ],
+)
+def test_a_system_that_has_no_time_is_not_waited_for(
+    pair: Pair, policy: str, status: PortStatus, left: list[int]
+) -> None:
+    keys = {"inport.buffer.length": "2", "inport.buffer.write.full_policy": policy}
+    _, put_into, servant = pair.push(keys)
     pair.far.step()
-    assert pair.numbers == []
+    reference, payloads = pair.near.refer(servant), [cdr(TimedLong).encode(long(n)) for n in (1, 2)]
+    assert [reference.put(payload) for payload in payloads] == [OK, OK]
+    assert not pair.in_.is_new  # not in the middle of what the manager does
+    assert reference.put(cdr(TimedLong).encode(long(3))) is status
+    pair.far.calls.serve(0)
+    assert len(put_into.buffer) == 2
+    assert reference.put(cdr(TimedLong).encode(long(4))) is status
+    pair.far.manager.run_for(PERIOD_US)
+    assert pair.numbers == left
 
 
 def test_a_system_that_has_ended_is_lost(pair: Pair) -> None:
