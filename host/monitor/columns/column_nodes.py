@@ -22,6 +22,8 @@ PIECE: Final = 1 << 10
 class ColumnNodes:
     """Feeds a node board with blocks; what it shows at their end is as frame by frame.
 
+    Of `NodeStatus.pdos`, which the verb does not show, only those that matter to it are there.
+
     Args:
         decoder: it must be `standard`.
         board: fed by nobody else.

@@ -24,7 +24,7 @@ MAPPED = {
                           (0x1A00, 2): bytes.fromhex("20006460")}, name="drive"),
     9: EdsObjects(name="never heard"),
 }  # fmt: skip
-TOLD = [field.name for field in fields(NodeStatus) if field.name != "memory"]
+TOLD = [field.name for field in fields(NodeStatus) if field.name not in {"memory", "pdos"}]
 
 Shown = tuple[list[str], list[str], list[list[object]]]
 
