@@ -12,6 +12,7 @@ from tickrig.host.canmon.errors import until_unread
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.frames.dump_line import decoded_text
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.text.values import counted
 
 
 class Verdict:
@@ -55,7 +56,7 @@ class Verdict:
         if not self.counts:
             return "all rules hold"
         counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
-        return f"{self.counts.total()} findings: {counts}"
+        return f"{counted(self.counts.total(), 'finding')}: {counts}"
 
 
 def finding_json(finding: Finding) -> str:

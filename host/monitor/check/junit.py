@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from typing import Final, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
+from tickrig.host.text.values import counted
+
 CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n\r"}
 """Characters that XML does not have."""
 
@@ -50,7 +52,7 @@ def _case(suite: str, name: str, found: Sequence[Judged], unjudged: str) -> str:
     if not found:
         error = f"><error message={_attribute(unjudged)}/></testcase>"
         return head + (error if unjudged else "/>")
-    message = f"{len(found)} findings, first: {found[0].text}"
+    message = f"{counted(len(found), 'finding')}, first: {found[0].text}"
     text = escape("\n".join(map(str, found)).translate(CONTROLS))
     return f"{head}><failure message={_attribute(message)}>{text}</failure></testcase>"
 

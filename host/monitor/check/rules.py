@@ -254,7 +254,9 @@ def _nodes(text: str) -> range:
     if not (first.isdecimal() and (last or first).isdecimal()):
         raise ValueError(f"nodes {text!r} is not like 3 or 3-7")
     nodes = range(int(first), int(last or first) + 1)
-    if not nodes or nodes[0] < 1 or nodes[-1] > _MAX_NODE:
+    if not nodes:
+        raise ValueError(f"nodes {text!r}: the lower node-ID stands first, as {last}-{first}")
+    if nodes[0] < 1 or nodes[-1] > _MAX_NODE:
         raise ValueError(f"nodes {text!r}: node-IDs are 1 to {_MAX_NODE}")
     return nodes
 

@@ -165,7 +165,8 @@ class FilterParser:
         nodes = range(int(match[1]), int(match[2] or match[1]) + 1) if match else range(0)
         if not nodes or nodes[0] < 1 or nodes[-1] > HIGHEST_NODE:
             came = repr(self._next.text) if self._next.text else "nothing"
-            raise self._error(f"{came} is no node-ID 1 to {HIGHEST_NODE}, as 3 or 3-5")
+            order = "; the lower one stands first" if match and not nodes else ""
+            raise self._error(f"{came} is no node-ID 1 to {HIGHEST_NODE}, as 3 or 3-5{order}")
         del self._tokens[0]
         self._nodes.add(nodes)
         return nodes

@@ -51,7 +51,7 @@ def test_a_bus_is_checked_for_a_time(heartbeats: None) -> None:
     ran = canmon(*words, "3")
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "all rules hold\n")
     ran = canmon(*words, "3-4")
-    assert (ran.returncode, ran.stderr) == (1, "1 findings: nodes: 1\n")
+    assert (ran.returncode, ran.stderr) == (1, "1 finding: nodes: 1\n")
     assert ran.stdout.endswith(" nodes: node 4 was never heard\n")
 
 

@@ -65,6 +65,14 @@ PLAIN: Final[dict[str, Callable[[Event], Demand]]] = {
     "dlc": Dlc,
     "toggle": Toggle,
 }
+BEHIND: Final = {
+    "after": "the demand, as tpdo1 of 3 within 2ms after sync",
+    "before": "the demand, as emcy never before sync",
+    "while": "the demand, as emcy never while node 3 stopped",
+    **dict.fromkeys(NMT_STATES, "a node, as node 3 stopped"),
+}
+"""Words that are no demand, and what they stand behind."""
+
 EACH_NODE: Final = (Every, FirstWithin, Latency, Count, Rate)
 """Demands that are made of each node where several are named; the others tell them apart."""
 
@@ -195,7 +203,10 @@ class RuleParser(QuantityParser):
         return Rate(event, count, self._time())
 
     def _allowed(self) -> str:
-        near = closest(self._next.text, [*DEMANDS, *SCOPES, *NMT_STATES]) if self._next.text else []
+        word = self._next.text
+        if word in BEHIND:
+            return f"it stands behind {BEHIND[word]}"
+        near = closest(word, [*DEMANDS, *SCOPES, *NMT_STATES]) if word else []
         meant = f"; did you mean {near[0]!r}?" if near else ""
         return f"wanted {', '.join(DEMANDS)}, or 'and', 'or'{meant}"
 

@@ -19,6 +19,8 @@ class RuleError(FilterError):
 
 
 SCOPES: Final = ("after", "before", "while")
+UNITS: Final = ("s", "ms", "us", "%")
+"""Of what has no blank before its unit."""
 
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
@@ -54,9 +56,16 @@ class QuantityParser(SliceParser):
     def _time(self) -> int:
         found = time_us(self._next.text)
         if found is None:
-            raise self._error(f"{self._came()} is no time, as 2s, 50ms or 250us")
+            raise self._error(f"{self._came()} is no time, as 2s, 50ms or 250us{self._blank()}")
         del self._tokens[0]
         return found
+
+    def _blank(self) -> str:
+        """Say so where a blank stands between a number and its unit."""
+        value, unit = self._tokens[0].text, self._tokens[1:2]
+        if number(value) is None or not unit or unit[0].text not in UNITS:
+            return ""
+        return f"; without a blank, as {value}{unit[0].text}"
 
     def _span(self) -> tuple[int, int | None]:
         """Take how far frames may be apart: `10ms ±10%`, `9ms..11ms`, `5ms..`, `..20ms`."""
@@ -71,7 +80,8 @@ class QuantityParser(SliceParser):
             raise self._error(f"{self._came()} behind the time; {wanted}")
         off_us = tolerance_us(self._next.text, low_us)
         if off_us is None:
-            raise self._error(f"{self._came()} is neither a share, as 10%, nor a time, as 500us")
+            wanted = "neither a share, as 10%, nor a time, as 500us"
+            raise self._error(f"{self._came()} is {wanted}{self._blank()}")
         del self._tokens[0]
         return max(0, low_us - off_us), low_us + off_us
 

@@ -179,6 +179,7 @@ def test_a_source_may_name_the_bit_rate() -> None:
         ((), 2, "no rule: give --no-emcy, --max-load or others, or a file rules.toml"),
         (("--max-load", "50"), 2, "a limit of the load needs the bit rate: give -b, as -b 500000"),
         (("--nodes", "x"), 2, "nodes 'x' is not like 3 or 3-7"),
+        (("--nodes", "3-1"), 2, "nodes '3-1': the lower node-ID stands first, as 1-3"),
         (("none.toml",), 2, "rules none.toml: No such file or directory"),
         (
             ("--no-emcy", "--junit", "no/out.xml"),
@@ -255,7 +256,7 @@ def test_written_rules_are_held_by_a_file_and_reported(tmp_path: Path) -> None:
     rules = write(tmp_path / "rules.toml", '[rule]\nquiet = "emcy never"\nform = "dlc"\n')
     report = tmp_path / "out.xml"
     result = check(log, rules, "--junit", str(report))
-    assert result.stderr == "1 findings: quiet: 1\n"
+    assert result.stderr == "1 finding: quiet: 1\n"
     cases = ET.fromstring(report.read_bytes()).iter("testcase")
     failed = {case.get("name"): case.findtext("failure") for case in cases}
     quiet = FOUND.replace("emcy never", "quiet").removesuffix("\n")

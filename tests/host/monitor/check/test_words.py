@@ -53,7 +53,7 @@ def test_nothing_known_is_a_rule_and_nothing_said_is_none() -> None:
         ({"heartbeat": "3=soon±1%"}, "'soon' is not a time"),
         ({"nodes": "x"}, "nodes 'x' is not like 3 or 3-7"),
         ({"nodes": "0-3"}, "nodes '0-3': node-IDs are 1 to 127"),
-        ({"nodes": "5-3"}, "nodes '5-3': node-IDs are 1 to 127"),
+        ({"nodes": "5-3"}, "nodes '5-3': the lower node-ID stands first, as 3-5"),
         ({"max_gap": "181"}, "'' is not a time"),
         ({"max_gap": "18=1ms"}, "'18' is not a CAN-ID"),
         ({"known": "18F-181"}, "known '18F-181': 18F is not below the other end"),

@@ -100,7 +100,7 @@ def test_a_filter_passes_these_frames(text: str, frames: str) -> None:
         ("node three", 6, "node is compared by one of = == != < <= > >="),
         ("node 0", 6, "'0' is no node-ID 1 to 127, as 3 or 3-5"),
         ("emcy of", 8, "nothing is no node-ID 1 to 127, as 3 or 3-5"),
-        ("emcy of 5-3", 9, "'5-3' is no node-ID 1 to 127, as 3 or 3-5"),
+        ("emcy of 5-3", 9, "'5-3' is no node-ID 1 to 127, as 3 or 3-5; the lower one stands first"),
         ("node 3 running", 8, "'running' after the end; join terms by 'and' or 'or'"),
         ("node=three", 6, "'three' is no number"),
         ("id=xyz", 4, "'xyz' is no number"),

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.check.expression.held import MAPPED, findings
 from tests.host.monitor.record_log import hear
-from tickrig.host.monitor.check.expression.parse_rule import DEMANDS, parse_rule
+from tickrig.host.monitor.check.expression.parse_rule import BEHIND, DEMANDS, parse_rule
 from tickrig.host.monitor.check.expression.quantity_parser import SCOPES, RuleError
 from tickrig.host.monitor.check.frame_rules import NoEmcy, NoErrorFrames, NoSdoAbort
 from tickrig.host.monitor.check.rules import joined, parse_rules
@@ -31,6 +31,11 @@ WANTED = f"wanted {', '.join(DEMANDS)}, or 'and', 'or'"
         ("tpdo1 every 10ms", 17, "the end behind the time; wanted how far off is right, as ±10%,"),
         ("tpdo1 every 10ms ±x", 19, "'x' is neither a share, as 10%, nor a time, as 500us"),
         ("tpdo1 every 10", 13, "'10' is no time, as 2s, 50ms or 250us"),
+        ("tpdo1 every 10 ms ±10%", 13, "'10' is no time, as 2s, 50ms or 250us; without"),
+        ("tpdo1 every 10ms ±10 %", 19, "'10' is neither a share, as 10%, nor a time, as 500us; w"),
+        ("tpdo1 after sync within 2ms", 7, "'after' is no demand; it stands behind the demand"),
+        ("emcy operational never", 6, "'operational' is no demand; it stands behind a node, as "),
+        ("emcy of 5-3 never", 9, "'5-3' is no node-ID 1 to 127, as 3 or 3-5; the lower one st"),
         ("tpdo1 every 9ms..5ms", 21, "the time before '..' is above the one behind it"),
         ("sync to tpdo1 of 3", 19, "the end where 'under' or 'within' and a time are wanted"),
         ("sync to under 2ms", 15, "'2ms' where 'under' or 'within' and a time are wanted"),
@@ -61,6 +66,12 @@ def test_a_rule_that_is_none_is_refused_with_its_column(
         parse_rule(text)
     assert str(refused.value).startswith(f"rule {text!r}, column {column}: {reason}")
     assert refused.value.column == column
+
+
+def test_what_stands_behind_a_demand_is_shown_by_a_rule() -> None:
+    for text in BEHIND.values():
+        _, _, example = text.partition(" as ")
+        assert parse_rule(example if "demand" in text else f"{example} within 2s").texts
 
 
 def test_a_range_makes_a_rule_for_each_node_where_each_must_come() -> None:
