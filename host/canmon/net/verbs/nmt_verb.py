@@ -47,8 +47,8 @@ def command(call: NetCall, word: str, node: str, yes: bool) -> None:
     """Send an NMT command to NODE, or to all: start, stop, pre-op, reset-node, reset-comm.
 
     Then it is waited for the state, or after a reset for the boot-up; only a node with
-    a heartbeat (1017h) tells its state. Exit status 1 if it reports another one, or
-    does not boot.
+    a heartbeat (1017h) tells its state. Exit status 1 if it reports another one, does
+    not boot, or nothing of it is heard.
 
     \b
     canmon net can0 nmt start 5
@@ -74,6 +74,7 @@ def _command_one(
     session: NetSession, command: NmtCommand, word: str, node_id: int, *, yes: bool
 ) -> None:
     device_type, heartbeat_ms = _number(session, node_id, 0x1000), _number(session, node_id, 0x1017)
+    known = device_type is not None or node_id in session.bus.states
     risk = nmt_risk(command, device_type)
     session.confirm(f"NMT {word} to node {node_id}", yes=yes, risk=risk)
     session.work.plan(f"NMT {word} to node {node_id}")
@@ -93,8 +94,13 @@ def _command_one(
         raise NodeFailed(f"node {node_id}: no boot-up within {wait_us // 1_000_000} s")
     elif heartbeat_ms:
         raise NodeFailed(f"node {node_id}: no heartbeat within {wait_us // 1_000} ms")
-    else:
+    elif known or _number(session, node_id, 0x1000) is not None:
         say(f"node {node_id}: sent; it has no heartbeat that tells its state")
+    else:
+        raise NodeFailed(
+            f"node {node_id}: sent, but nothing answers as node {node_id}: it is not there, or"
+            " Stopped without a heartbeat"
+        )
 
 
 def _number(session: NetSession, node_id: int, index: int) -> int | None:
@@ -118,3 +124,5 @@ def _command_all(session: NetSession, command: NmtCommand, word: str, *, yes: bo
         say(f"node {node_id}: {state_text(state)}")
     if not session.bus.states:
         say("sent; no node has reported its state since")
+    elif command not in RESETS:
+        say("sent; other nodes, if there are any, have no heartbeat that tells their state")

@@ -18,7 +18,7 @@ PATIENCE_S = 60
 def test_no_begins_nothing_and_yes_begins() -> None:
     for answer, status, told in (
         ("", 2, "Error: not begun"),
-        ("y", 0, "node 5: sent; it has no heartbeat that tells its state"),
+        ("y", 1, "Error: node 5: sent, but nothing answers as node 5"),
     ):
         child = pexpect.spawn(
             sys.executable,

@@ -9,7 +9,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.device import make_epos
+from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.net import session
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIG = """\
@@ -97,6 +99,51 @@ def test_nmt_commands_and_what_comes_of_them(rig: str) -> None:
     assert result.stderr.endswith("node 5: sent; it has no heartbeat that tells its state\n")
     result = net(rig, "nmt", "reset-comm", "ALL")
     assert result.stderr.splitlines()[1:] == ["node 5: boot-up", "node 16: boot-up"]
+
+
+@pytest.fixture
+def drive(monkeypatch: pytest.MonkeyPatch) -> SlaveBench:
+    """Node 5 of a bus of which nobody knows who is on it."""
+    bench = SlaveBench(make_epos(5), 1_000_000)
+    monkeypatch.setattr(session, "open_conform_source", lambda *words: bench.source)
+    return bench
+
+
+@pytest.mark.parametrize("word", ["start", "stop", "pre-op"])
+def test_a_command_to_a_node_that_is_not_there_has_not_ended_well(
+    drive: SlaveBench, word: str
+) -> None:
+    result = net("a-bus", "nmt", word, "9", "--yes")
+    assert result.exit_code == 1
+    assert result.stderr.splitlines()[-1] == (
+        "Error: node 9: sent, but nothing answers as node 9: it is not there, or Stopped without"
+        f" a heartbeat; done: NMT {word} to node 9"
+    )
+
+
+def test_a_stopped_node_is_started(drive: SlaveBench) -> None:
+    assert net("a-bus", "nmt", "stop", "5", "--yes").exit_code == 0
+    result = net("a-bus", "nmt", "start", "5", "--yes")
+    assert result.exit_code == 0, "it answers once it is started"
+    assert result.stderr.endswith("node 5: sent; it has no heartbeat that tells its state\n")
+
+
+def test_a_stopped_node_with_a_heartbeat_is_known(drive: SlaveBench) -> None:
+    assert net("a-bus", "write", "5", "heartbeat_time=100", "--yes").exit_code == 0
+    for _ in range(2):
+        result = net("a-bus", "nmt", "stop", "5", "--yes")
+        assert (result.exit_code, result.stderr.splitlines()[-1]) == (0, "node 5: Stopped")
+
+
+def test_of_nodes_without_a_heartbeat_nothing_is_known(drive: SlaveBench) -> None:
+    assert net("a-bus", "read", "5", "1000h").exit_code == 0
+    told = net("a-bus", "nmt", "start", "all", "--yes").stderr
+    assert "no node has reported its state since" in told
+    assert net("a-bus", "write", "5", "heartbeat_time=100", "--yes").exit_code == 0
+    assert net("a-bus", "nmt", "start", "all", "--yes").stderr.splitlines()[-2:] == [
+        "node 5: Operational",
+        "sent; other nodes, if there are any, have no heartbeat that tells their state",
+    ]
 
 
 def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
