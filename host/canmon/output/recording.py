@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -142,10 +143,14 @@ def filter_trigger(text: str, wanted: Filter) -> FilterTrigger:
 def _trigger(word: str, bit_rate: int | None) -> Trigger:
     if word.endswith(RULE_FILE):
         return _rules(word, bit_rate)
-    from tickrig.host.monitor.decode.filter import FilterError, parse_filter  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.check.expression.error_resets import errors_alone  # noqa: PLC0415 - slow
+    from tickrig.host.monitor.decode.filter import FilterError, parse_filter  # noqa: PLC0415
+    from tickrig.host.monitor.frames.tokens import tokens_of  # noqa: PLC0415
 
     try:
-        return filter_trigger(word, parse_filter(word))
+        wanted = parse_filter(word)
+        matches = errors_alone(wanted.matches, tokens_of(word), wanted.signals)
+        return filter_trigger(word, replace(wanted, matches=matches))
     except FilterError as error:
         raise Refused(f"--trigger: {error}") from None
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.check.expression.demand import Demand
+from tickrig.host.monitor.check.expression.error_resets import errors_alone
 from tickrig.host.monitor.check.expression.event import EVERY, Event
 from tickrig.host.monitor.check.expression.event_demands import (
     MOST_COUNTED,
@@ -131,6 +132,8 @@ class RuleParser(QuantityParser):
         text = self._text[taken[0].column - 1 : last.column - 1 + len(last.text)]
         name = _OF.split(text)[0]
         is_signal = any(path == name or path.endswith(f".{name}") for path in paths)
+        if self._next.text != "dlc":  # of an error reset, too
+            test = errors_alone(test, taken, paths)
         return Event(text, test, paths, is_signal, has_node)
 
     def _condition(self) -> Event:

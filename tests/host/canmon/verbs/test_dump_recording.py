@@ -73,16 +73,28 @@ def test_what_is_around_a_fault_is_recorded(tmp_path: Path) -> None:
     source, out = write_run(tmp_path, 3_000, 1_000), tmp_path / "run.log"
     rules = tmp_path / "rules.toml"
     rules.write_text('known = ["181", "085"]\n')
-    words = ["--trigger", "emcy", "--trigger", str(rules), "--pre", "10", "--post", "2ms"]
+    words = ["--trigger", "085", "--trigger", str(rules), "--pre", "10", "--post", "2ms"]
     result = canmon("dump", source, "-l", str(out), *words)
     assert result.exit_code == 0, result.output
     assert numbers(tmp_path, "run-*.log") == list(range(990, 1_017))
     assert "27 frames in 1 file, 1 trigger; " in result.stderr
 
 
+@pytest.mark.parametrize(("trigger", "kept"), [("emcy", 2), ("emcy and code = 0", 1), ("083", 3)])
+def test_the_end_of_an_error_is_no_trigger(tmp_path: Path, trigger: str, kept: int) -> None:
+    source = tmp_path / "in.log"
+    codes = ("3081", "1023", "0000")
+    lines = [f"({n}.000000) can0 083#{code}000000000000\n" for n, code in enumerate(codes)]
+    source.write_text("".join(lines))
+    words = ["-l", str(tmp_path / "run.log"), "--pre", "0", "--post", "0"]
+    canmon("dump", str(source), *words, "--trigger", trigger)
+    assert len(list(tmp_path.glob("run-*.log"))) == kept
+    assert canmon("dump", str(source), "-F", "emcy", "-L").stdout.count("083#") == 3
+
+
 def test_a_filter_says_what_is_recorded_and_a_trigger_when(tmp_path: Path) -> None:
     source, out = write_run(tmp_path, 300, 100), tmp_path / "run.log"
-    words = ["--trigger", "emcy", "-F", "181", "--pre", "3", "--post", "3"]
+    words = ["--trigger", "085", "-F", "181", "--pre", "3", "--post", "3"]
     assert canmon("dump", source, "-l", str(out), *words).exit_code == 0
     assert numbers(tmp_path, "run-*.log") == [96, 97, 98, 99, 101, 102, 103]
 

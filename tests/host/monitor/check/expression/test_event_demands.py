@@ -13,6 +13,34 @@ def test_what_never_comes_is_told_each_time() -> None:
     assert broken("emcy of 4 never", f"1 {EMCY}") == []
 
 
+RESET = "083#0000000000000000"
+
+
+@pytest.mark.parametrize(
+    ("rule", "found"),
+    [
+        ("emcy never", "1"),
+        ("emcy of 3 never", "1"),
+        ("kind = emcy never", "1"),
+        ("emcy or sync never", "1"),
+        ("emcy at most 0", "1"),
+        ("emcy at least 2", "3"),
+        ("emcy never after emcy", ""),
+        ("emcy and code = 0 never", "2"),
+        ("083 never", "12"),
+        ("not emcy never", "3"),
+        ("not 703 never", "12"),
+    ],
+)
+def test_the_end_of_an_error_is_none(rule: str, found: str) -> None:
+    text = f"1 {EMCY}\n2 {RESET}\n3 703#05"
+    assert "".join(line[0] for line in broken(rule, text)) == found
+
+
+def test_the_end_of_an_error_has_a_length() -> None:
+    assert broken("emcy of 3 dlc", "1 083#00000000")[0].startswith("1 emcy of node 3 has 4 B")
+
+
 def test_a_boot_up_comes_once() -> None:
     rule = "boot-up of 3 once"
     assert broken(rule, "1 703#00") == []
