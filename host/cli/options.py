@@ -70,10 +70,10 @@ def time_option(option: str, name: str, **attributes: Any) -> Decorator:
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
         from tickrig.host.cli.refused import Refused  # noqa: PLC0415 - a TAB needs none
-        from tickrig.host.text.values import parse_time_us  # noqa: PLC0415
+        from tickrig.host.text.values import parse_time_with_unit_us  # noqa: PLC0415
 
         try:
-            return None if text is None else parse_time_us(text)
+            return None if text is None else parse_time_with_unit_us(text)
         except ValueError as error:
             raise Refused(f"{option} {error}") from None
 

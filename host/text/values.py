@@ -26,6 +26,21 @@ def parse_time_us(text: str) -> int:
     return int(f"{whole}{fraction:0<9}") * _UNIT_US[match[2] or "s"] // 1_000_000_000
 
 
+def parse_time_with_unit_us(text: str) -> int:
+    """Read a time in microseconds; but for 0 its unit must be there.
+
+    Raises:
+        ValueError: not a time, or nobody knows its unit.
+
+    >>> parse_time_with_unit_us("1.5s"), parse_time_with_unit_us("0")
+    (1500000, 0)
+    """
+    us = parse_time_us(text)
+    if us and not text.endswith("s"):
+        raise ValueError(f"{text!r} has no unit: write {text}s, {text}ms or {text}us")
+    return us
+
+
 def us_of(duration: int | str) -> int:
     """Return a duration in microseconds.
 

@@ -18,7 +18,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.log_reader import LogReader, read_log
 from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, Lateness, ReplayPlan
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import FieldError, WireError
 
@@ -93,8 +93,8 @@ def _plan(
             log,
             route,
             _speed(speed),
-            parse_time_us(options.pop("from_")),
-            None if to is None else parse_time_us(to),
+            parse_time_with_unit_us(options.pop("from_")),
+            None if to is None else parse_time_with_unit_us(to),
             _loops(loop),
         )
     except ValueError as error:

@@ -21,7 +21,7 @@ from tickrig.host.monitor.transmit.frame_fields import (
 )
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
 from tickrig.host.monitor.transmit.transmit_list import TransmitRow
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame, parse_sent
 from tickrig.wire.candump import LogLine
@@ -104,7 +104,7 @@ def _period_us(every: str | None, count: int | None) -> int:
             raise Refused("--count says how often --every sends; give --every TIME")
         return NEVER
     try:
-        period_us = parse_time_us(every)
+        period_us = parse_time_with_unit_us(every)
     except ValueError as error:
         raise Refused(f"--every {error}") from None
     if not period_us:

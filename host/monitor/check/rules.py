@@ -24,7 +24,7 @@ from tickrig.host.monitor.check.time_rules import (
     NoLostHeartbeat,
 )
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.values import parse_time_with_unit_us
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.check.expression.parse_rule import Expression
@@ -246,7 +246,7 @@ def _heartbeat(text: str) -> HeartbeatTimes:
 
 
 def _time_us(text: str) -> int:
-    return parse_time_us(text.strip())
+    return parse_time_with_unit_us(text.strip())
 
 
 def _nodes(text: str) -> range:

@@ -17,7 +17,7 @@ from tickrig.host.monitor.sequence.sequence_run import (
 from tickrig.host.monitor.sequence.variables import fill_in
 from tickrig.host.text.steps import FOREVER, Place, StepError, content_lines
 from tickrig.host.text.toml_reader import read_toml
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 
@@ -224,7 +224,7 @@ class TomlSequence:
     def _time(self, value: Any) -> int:
         if not isinstance(value, str):
             raise ValueError(f"{value!r} is not a time: write '1.5s', '200ms' or '250us'")
-        return parse_time_us(value)
+        return parse_time_with_unit_us(value)
 
 
 _Reader = Callable[[TomlSequence, dict[str, Any], Place], FrameStep]

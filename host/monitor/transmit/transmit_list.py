@@ -14,7 +14,7 @@ from typing import Final
 
 from tickrig.host.monitor.transmit.frame_fields import FrameFields, parse_checksum, parse_counter
 from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.instant import NEVER
@@ -204,7 +204,7 @@ class RowText:
         """
         is_frame = "#" in self.frame
         frame = CanFrame.parse(self.frame) if is_frame else pdos.frame(self.frame)
-        period_us = parse_time_us(self.every) if self.every else ONCE
+        period_us = parse_time_with_unit_us(self.every) if self.every else ONCE
         if self.every and period_us == ONCE:
             raise ValueError("--every takes a time above 0, as 10ms")
         fields = FrameFields(

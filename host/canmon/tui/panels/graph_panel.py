@@ -26,7 +26,7 @@ from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.monitor.graph.plot import LABEL_WIDTH
 from tickrig.host.monitor.graph.series import LEAST_US
 from tickrig.host.monitor.graph.signal_spec import SignalSpec, parse_signal
-from tickrig.host.text.values import parse_time_us
+from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.host.tui.line_view import Line
 from tickrig.wire.can import Frames
 
@@ -146,7 +146,7 @@ class GraphPanel(Panel):
                 self._add_signal(text)
         window = text_of(settings, "window", "10s")
         with below("window"):
-            self.graph.window_us = max(LEAST_US, parse_time_us(window))
+            self.graph.window_us = max(LEAST_US, parse_time_with_unit_us(window))
 
     def save(self) -> dict[str, Any]:
         """Return them."""

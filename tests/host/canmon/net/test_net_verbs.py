@@ -170,6 +170,7 @@ def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
         (("nmt", "sart", "5"), 2, "'sart' is not one of 'start'"),
         (("red", "5"), 2, "No such command 'red'"),
         (("scan", "--wait", "x"), 2, "--wait 'x' is not a time"),
+        (("scan", "--wait", "5"), 2, "--wait '5' has no unit: write 5s, 5ms or 5us"),
     ],
 )
 def test_what_cannot_be_is_one_line(
