@@ -167,7 +167,7 @@ def listen(
 
 def say_marks(source: AnySource[object]) -> None:
     """Say on standard error which bus went away, or is back."""
-    for mark in source.marks:
+    for mark in () if source.recorded else source.marks:
         click.echo(mark.text, err=True)
 
 

@@ -12,7 +12,7 @@ from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_writer import comment, log_line
-from tickrig.host.monitor.logs.mark import Mark
+from tickrig.host.monitor.logs.mark import Mark, dropped
 from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
@@ -148,6 +148,7 @@ def _cell(text: str) -> str:
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
 
 
+_DROPS: Final = {Output.LOG: lambda lost: comment(dropped(0, lost)), Output.JSONL: drop_line}
 _MARKS: Final = {Output.LOG: comment, Output.JSONL: Mark.json}
 
 
@@ -164,8 +165,8 @@ class StdoutWriter:
         """Print frames, at once; it always takes more."""
         lines = [DUMP_HEADER] if self._header else []
         lines += [self._printer(*one) for one in decoded_frames]
-        if lost != self._lost and self._output is Output.JSONL:
-            lines.append(drop_line(lost - self._lost))
+        if lost != self._lost and (said := _DROPS.get(self._output)):
+            lines.append(said(lost - self._lost))
         if marks and (write := _MARKS.get(self._output)):
             lines += map(write, marks)
         self._header, self._lost = False, lost

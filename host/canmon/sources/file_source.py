@@ -6,9 +6,9 @@ import heapq
 import os
 import select
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source import AnySource
@@ -16,14 +16,57 @@ from tickrig.host.canmon.sources.source_spec import FileSpec
 from tickrig.host.monitor.frames.ident import flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_reader import LogLines, read_log
+from tickrig.host.monitor.logs.log_reader import Item, LogLines, among, read_log
+from tickrig.host.monitor.logs.mark import DROP, Mark
 from tickrig.host.monitor.logs.tally import Tally
 
 BATCH: Final = 1_024
 """Frames of one poll."""
 
 
-class FileSource(AnySource[Record]):
+class LoggedSource(AnySource[Record]):
+    """What somebody recorded: frames up to the next marks at a time."""
+
+    recorded = True
+
+    def __init__(self) -> None:
+        self._items: Sequence[Item] = ()
+        self._said_lost, self._no_more = 0, False
+
+    @property
+    def lost(self) -> int:
+        """Frames that its recorder lost in front of those that come next."""
+        return super().lost if self._ended else self._said_lost
+
+    def _read(self, timeout_us: int) -> Sequence[Item]:
+        """Return what is next, or none; `_no_more` says whether that was all."""
+        return []
+
+    def poll(self, timeout_us: int, /) -> list[Record]:
+        """Return the next frames, up to a mark; of a pipe it waits for some."""
+        if self._ended:
+            self.marks = ()
+            return []
+        items = self._items or self._read(timeout_us)
+        kinds = list(map(type, items))
+        end = kinds.index(Mark) if Mark in kinds else len(kinds)
+        marks = list(takewhile(lambda item: isinstance(item, Mark), items[end:]))
+        self._items = items[end + len(marks) :]
+        self._take_marks(cast("Sequence[Mark]", marks))
+        self._ended = self._no_more and not self._items
+        return cast("list[Record]", list(items[:end]))
+
+    def _take_marks(self, marks: Sequence[Mark]) -> None:
+        self._said_lost += sum(mark.frames for mark in marks)
+        self.marks = [mark for mark in marks if mark.event != DROP]  # `lost` says these
+
+    def close(self) -> None:
+        """Read no more."""
+        super().close()
+        self._items = ()
+
+
+class FileSource(LoggedSource):
     """One or more log files.
 
     Raises:
@@ -33,12 +76,15 @@ class FileSource(AnySource[Record]):
     live = False
 
     def __init__(self, files: Sequence[FileSpec]) -> None:
+        super().__init__()
         self._names = [str(file.path) for file in files]
         self._readers = [read_log(file.path) for file in files]
         for file in files:
             check_readable(file.path)
-        streams = [_chosen(file, reader) for file, reader in zip(files, self._readers, strict=True)]
-        self._frames = streams[0] if len(streams) == 1 else _merged(streams)
+        streams = [
+            _chosen(file, reader.items()) for file, reader in zip(files, self._readers, strict=True)
+        ]
+        self._stream = streams[0] if len(streams) == 1 else _merged(streams)
 
     def tallies(self) -> Iterable[tuple[str, Tally]]:
         """Return the tally of each file, with its name."""
@@ -46,20 +92,19 @@ class FileSource(AnySource[Record]):
             (name, reader.tally) for name, reader in zip(self._names, self._readers, strict=True)
         ]
 
-    def poll(self, timeout_us: int, /) -> list[Record]:
-        """Return the next frames; it never waits."""
-        batch: list[Record] = []
+    def _read(self, timeout_us: int) -> list[Item]:
+        batch: list[Item] = []
         try:
-            batch.extend(islice(self._frames, BATCH))
+            batch.extend(islice(self._stream, BATCH))
         except (OSError, LogError) as error:
             self.failed = str(error)
-        self._ended = len(batch) < BATCH
+        self._no_more = len(batch) < BATCH
         return batch
 
     def close(self) -> None:
         """Read no more."""
         super().close()
-        self._frames = iter(())
+        self._stream = iter(())
 
 
 def check_readable(path: Path) -> None:
@@ -70,42 +115,42 @@ def check_readable(path: Path) -> None:
         raise SourceFailed(f"{path}: {error.strerror}") from error
 
 
-def _chosen(file: FileSpec, frames: Iterable[Record]) -> Iterator[Record]:
+def _chosen(file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
     chosen = file.chosen
     if chosen is None:
-        return iter(frames)
-    return (record for record in frames if chosen.passes(flagged_id(record)))
+        return items
+    return (one for one in items if isinstance(one, Mark) or chosen.passes(flagged_id(one)))
 
 
-def _merged(streams: Sequence[Iterator[Record]]) -> Iterator[Record]:
-    return heapq.merge(*streams, key=lambda record: record.at_us)
+def _merged(streams: Sequence[Iterator[Item]]) -> Iterator[Item]:
+    return heapq.merge(*streams, key=lambda item: item.at_us)
 
 
 STDIN: Final = 0
 READ_BYTES: Final = 1 << 16
 
 
-class StdinSource(AnySource[Record]):
+class StdinSource(LoggedSource):
     """A pipe, a terminal or a file that somebody feeds."""
 
     live = True
 
     def __init__(self, descriptor: int = STDIN) -> None:
+        super().__init__()
         self._descriptor, self._lines = descriptor, LogLines()
 
     def tallies(self) -> Iterable[tuple[str, Tally]]:
         """Return the tally of what came."""
         return [("standard input", self._lines.tally)]
 
-    def poll(self, timeout_us: int, /) -> list[Record]:
-        """Wait for bytes; return the frames of the lines that are whole."""
-        if self._ended or not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
+    def _read(self, timeout_us: int) -> Sequence[Item]:
+        """Wait for bytes; return what the lines hold that are whole."""
+        if not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
             return []
         try:
             data = os.read(self._descriptor, READ_BYTES)
         except OSError as error:
             data, self.failed = b"", f"standard input: {error.strerror}"
-        if data:
-            return self._lines.push(data)
-        self._ended = True
-        return self._lines.finish()
+        self._no_more = not data
+        records = self._lines.push(data) if data else self._lines.finish()
+        return among(records, self._lines.marks)

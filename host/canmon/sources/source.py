@@ -21,9 +21,10 @@ class AnySource(Generic[Taken_co]):
         live: it goes on by itself; False where all of it is there already.
         failed: why it ended before its time; empty if it did not.
         marks: what happened behind the frames that `poll` returned last.
+        recorded: a recorder wrote these marks, and has said them.
     """
 
-    live = False
+    live = recorded = False
     failed = ""
     marks: Sequence[Mark] = ()
     _ended = False

@@ -12,6 +12,7 @@ import logging
 import re
 import struct
 import zlib
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO, Final, TextIO
@@ -24,8 +25,13 @@ from tickrig.host.monitor.logs.blf_damage import BlfReader, has_end, missing_end
 from tickrig.host.monitor.logs.can_record import to_record
 from tickrig.host.monitor.logs.fd_lines import told_by_flags
 from tickrig.host.monitor.logs.log_file import NO_MF4, LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.log_reader import Item
+from tickrig.host.monitor.logs.mark import Mark, read_mark
 from tickrig.host.monitor.logs.notation import LONGEST_NAME, UNNAMED
 from tickrig.host.monitor.logs.tally import OTHER_LINES, OTHER_OBJECTS, Tally
+
+MOST_MARKS: Final = 1_000
+"""Between two frames: more are a damaged log."""
 
 _SILENT: Final = {
     LogFormat.ASC: re.compile(
@@ -56,11 +62,13 @@ class WatchedLines(Iterator[str]):
 
     Attributes:
         ended: the file has no more lines.
+        marks: comments that are marks, for who takes them out; without their time.
     """
 
     def __init__(self, file: TextIO, kind: LogFormat, tally: Tally) -> None:
         self._file, self._silent, self._event = file, _SILENT[kind], _EVENTS[kind]
         self._tally = tally
+        self.marks: deque[Mark] = deque(maxlen=MOST_MARKS)
         self._line, self._number, self._again, self.ended = "", 0, False, False
 
     def __next__(self) -> str:
@@ -81,6 +89,9 @@ class WatchedLines(Iterator[str]):
         """Count the latest line, if it was not taken."""
         line, self._line = self._line, ""
         if self._silent.match(line):
+            if line and (mark := read_mark(0, line.strip().lstrip("/;"))):
+                self._tally.lost += mark.frames
+                self.marks.append(mark)
             return
         if self._event.match(line):
             self._tally.passed_over[OTHER_LINES] += 1
@@ -133,6 +144,7 @@ class CanLogReader:
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, Tally()
+        self._marks: deque[Mark] = deque()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
@@ -146,6 +158,19 @@ class CanLogReader:
             record = to_record(message, names[message.channel], self.tally)
             if record is not None:
                 yield record
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames: what says them in BLF is counted."""
+        at_us = 0
+        for record in self:
+            at_us = record.at_us
+            yield from self._passed_marks(at_us)
+            yield record
+        yield from self._passed_marks(at_us)
+
+    def _passed_marks(self, at_us: int) -> Iterator[Mark]:
+        while self._marks:
+            yield self._marks.popleft()._replace(at_us=at_us)
 
     def _name(self, channel: object) -> str:
         """Return the name of a bus; of TRC alone python-can leaves the count from one."""
@@ -178,6 +203,7 @@ class CanLogReader:
     def _text(self, file: BinaryIO) -> Iterator[can.Message]:
         with io.TextIOWrapper(file, "utf-8", errors="replace") as text:
             lines = WatchedLines(text, self._kind, self.tally)
+            self._marks = lines.marks
             reader = _TEXT[self._kind](lines)
             while not lines.ended:
                 try:

@@ -16,19 +16,27 @@ Counter({'CAN XL frames': 1})
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log, read_blocks
-from tickrig.host.monitor.logs.mark import lost_frames
-from tickrig.host.monitor.logs.notation import parse_csv_line, parse_frame, parse_json_line
+from tickrig.host.monitor.logs.mark import Mark, lost_frames, read_mark
+from tickrig.host.monitor.logs.notation import (
+    parse_csv_line,
+    parse_frame,
+    parse_json_line,
+    parse_json_mark,
+)
 from tickrig.host.monitor.logs.screen_line import ScreenClock, parse_screen_line
 from tickrig.host.monitor.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
+
+Item = Record | Mark
+"""What a log holds, in its order."""
 
 LONGEST: Final = 1 << 20
 """Bytes; of a longer line the beginning is kept, and no line of a log is so long."""
@@ -137,11 +145,13 @@ class LogLines:
 
     Attributes:
         tally: what was no frame.
+        marks: marks among the frames that were returned last, with how many of these are in
+            front of each.
     """
 
     def __init__(self) -> None:
-        self.tally = Tally()
-        self._whole, self._number = WholeLines(), 0
+        self.tally, self.marks = Tally(), list[tuple[int, Mark]]()
+        self._whole, self._number, self._latest_us = WholeLines(), 0, 0
         self._clock: ScreenClock | None = None
 
     @property
@@ -151,24 +161,57 @@ class LogLines:
 
     def push(self, data: bytes, /) -> list[Record]:
         """Return the frames of the lines that end in these bytes."""
-        lines = self._whole.push(data)
+        lines, self.marks = self._whole.push(data), []
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
     def finish(self) -> list[Record]:
         """Return the frame of a last line without LF."""
-        rest = self._whole.finish()
+        rest, self.marks = self._whole.finish(), []
         return self._frames(rest.decode("latin-1")) if rest else []
 
     def _frames(self, text: str) -> list[Record]:
         count, begin = text.count("\n") + 1, self._number
         self._number += count
         usual = _USUAL.findall(text)
-        if len(usual) == count:
-            return _usual_frames(usual)
+        records = _usual_frames(usual) if len(usual) == count else self._any_frames(text, begin)
+        self._latest_us = records[-1].at_us if records else self._latest_us
+        return records
+
+    def _any_frames(self, text: str, begin: int) -> list[Record]:
         clock = self._clock = self._clock or ScreenClock.of(text)
-        lines = enumerate(text.split("\n"), begin + 1)
-        frames = (parse_log_line(line, number, self.tally, clock) for number, line in lines)
-        return [record for record in frames if record]
+        records: list[Record] = []
+        for number, line in enumerate(text.split("\n"), begin + 1):
+            if record := parse_log_line(line, number, self.tally, clock):
+                records.append(record)
+            elif mark := _mark(line.strip()):
+                self.marks.append((len(records), mark))
+        self.marks = [(at, self._timed(mark, at, records)) for at, mark in self.marks]
+        return records
+
+    def _timed(self, mark: Mark, at: int, records: list[Record]) -> Mark:
+        """Give a mark that has no time that of the frame before it; the first, of that behind."""
+        if mark.at_us:
+            return mark
+        first_us = records[0].at_us if records else 0
+        return mark._replace(at_us=records[at - 1].at_us if at else self._latest_us or first_us)
+
+
+def _mark(text: str) -> Mark | None:
+    """Return the mark that a comment or an event is, without a time where it has none."""
+    if text.startswith("#"):
+        return read_mark(0, text[1:])
+    return parse_json_mark(text) if text.startswith("{") else None
+
+
+def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Sequence[Item]:
+    """Return frames with marks among them, each behind so many frames."""
+    if not marks:
+        return records
+    items, begin = list[Item](), 0
+    for end, mark in marks:
+        items += [*records[begin:end], mark]
+        begin = end
+    return [*items, *records[begin:]]
 
 
 def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Record]:
@@ -225,6 +268,10 @@ class LogReader(Protocol):
 
     def __iter__(self) -> Iterator[Record]: ...
 
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames."""
+        ...
+
 
 def read_log(path: Path) -> LogReader:
     """Return a reader of a log file; nothing is opened yet.
@@ -245,9 +292,18 @@ class TextLogReader:
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
+        for records, _ in self._pieces():
+            yield from records
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames."""
+        for records, lines in self._pieces():
+            yield from among(records, lines.marks)
+
+    def _pieces(self) -> Iterator[tuple[list[Record], LogLines]]:
         lines = LogLines()
         self.tally = lines.tally
         with open_log(self._path) as file:
             for data in read_blocks(file, self._path, BLOCK_BYTES):
-                yield from lines.push(data)
-        yield from lines.finish()
+                yield lines.push(data), lines
+        yield lines.finish(), lines

@@ -19,7 +19,12 @@ BACK: Final = "back"
 TRIGGER: Final = "trigger"
 VERSION: Final = 1
 
-_LOST: Final = re.compile(r"#\s*([0-9]{1,15}) frames were lost\s*")
+_SAID: Final = re.compile(
+    r"(?P<lost>[0-9]{1,15}) frames were lost|trigger: (?P<trigger>.{1,400})"
+    r"|(?P<gone>\S{1,32}) is gone: (?P<why>.{1,400})"
+    r"|(?P<back>\S{1,32}) is back after (?P<s>[0-9]{1,12})\.(?P<us>[0-9]{6}) s"
+)
+"""What the functions below write; others' comments are no marks."""
 
 
 class Mark(NamedTuple):
@@ -80,8 +85,26 @@ def lost_frames(comment: str) -> int:
     >>> lost_frames("# 12 frames were lost"), lost_frames("# a note")
     (12, 0)
     """
-    match = _LOST.fullmatch(comment)
-    return int(match[1]) if match else 0
+    mark = read_mark(0, comment.removeprefix("#"))
+    return mark.frames if mark else 0
+
+
+def read_mark(at_us: int, text: str) -> Mark | None:
+    """Return the mark that a log has in these words; None for others.
+
+    >>> read_mark(5, "can0 is back after 3.250000 s") == back(5, "can0", 3_250_000)
+    True
+    """
+    said = _SAID.fullmatch(text.strip())
+    if said is None:
+        return None
+    if said["lost"]:
+        return dropped(at_us, int(said["lost"]))
+    if said["trigger"]:
+        return triggered(at_us, said["trigger"])
+    if said["gone"]:
+        return gone(at_us, said["gone"], said["why"])
+    return back(at_us, said["back"], int(said["s"]) * 1_000_000 + int(said["us"]))
 
 
 def _plain(text: str) -> str:

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from tickrig.host.monitor.frames.record import AnyFrame, LineRecord, Record
 from tickrig.host.monitor.logs.log_file import to_us
+from tickrig.host.monitor.logs.mark import DROP, Mark, dropped, read_mark
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
 from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
@@ -110,9 +111,24 @@ def parse_json_line(text: str, tally: Tally) -> Record | str | None:
         return None
 
 
+def parse_json_mark(text: str) -> Mark | None:
+    """Return the mark that an event is; its time is 0 where it has none; None for others."""
+    import json  # noqa: PLC0415 - candump's lines are the usual ones
+
+    try:
+        said = json.loads(text)
+        at_us = to_us(said.get("t", 0))
+        if said["ev"] == DROP:
+            return dropped(at_us, int(said["n"])) if int(said["n"]) > 0 else None
+        mark = read_mark(at_us, str(said["text"]))
+        return mark if mark and mark.event == said["ev"] else None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        return None
+
+
 def _event(said: dict[str, Any], tally: Tally) -> str:
     """Take an event; one that is not known says nothing to us."""
-    if said["ev"] == "drop":
+    if said["ev"] == DROP:
         tally.lost += max(0, int(said["n"]))
     elif said["ev"] == LINE_EVENT:
         tally.passed_over[SERIAL_LINES] += 1

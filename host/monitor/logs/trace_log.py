@@ -118,6 +118,10 @@ class TraceLogReader:
         except UnicodeDecodeError:
             raise LogError(f"{self._path}: it is not ASCII") from None
 
+    def items(self) -> Iterator[Record]:
+        """Read the file; it holds no marks."""
+        return iter(self)
+
 
 def _whole_lines(file: BinaryIO) -> Iterator[str]:
     """Give the lines; a last one without LF is of a writer that was killed."""

@@ -9,10 +9,11 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, Final
+from typing import BinaryIO, Final, cast
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.log_reader import Item
 from tickrig.host.monitor.logs.notation import UNNAMED
 from tickrig.host.monitor.logs.pcap.block_format import SECTION
 from tickrig.host.monitor.logs.pcap.can_packet import LINK_TYPE, parse_packet
@@ -39,17 +40,24 @@ class PcapReader:
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
+        return cast("Iterator[Record]", self._items(marks=False))
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames."""
+        return self._items(marks=True)
+
+    def _items(self, *, marks: bool) -> Iterator[Item]:
         self.tally = Tally()
         try:
             with open_log(self._path) as file:
-                yield from self._frames(file)
+                yield from self._frames(file, marks)
         except (EOFError, zlib.error) as error:
             raise LogError(f"{self._path}: {error}") from error
 
-    def _frames(self, file: BinaryIO) -> Iterator[Record]:
+    def _frames(self, file: BinaryIO, marks: bool) -> Iterator[Item]:
         first = file.read(4)
         if first == SECTION.to_bytes(4, "little"):
-            yield from PcapngReader(str(self._path), self.tally).frames(file, first)
+            yield from PcapngReader(str(self._path), self.tally, marks).frames(file, first)
         elif first in _PCAP:
             yield from self._packets(file, *_PCAP[first])
         else:

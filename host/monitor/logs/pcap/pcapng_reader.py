@@ -13,9 +13,12 @@ from typing import BinaryIO, Final, NamedTuple, cast
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import END_S, LogError
+from tickrig.host.monitor.logs.log_reader import Item
+from tickrig.host.monitor.logs.mark import DROP, dropped, read_mark
 from tickrig.host.monitor.logs.notation import LONGEST_NAME
 from tickrig.host.monitor.logs.pcap.block_format import (
     BLOCK_BYTES,
+    COMMENT,
     DIRECTION,
     DROP_COUNT,
     IF_NAME,
@@ -27,6 +30,7 @@ from tickrig.host.monitor.logs.pcap.block_format import (
     PACKET_FLAGS,
     SECTION,
     SIMPLE_PACKET,
+    STATISTICS,
     TIME_OFFSET,
     TIME_RESOLUTION,
     options,
@@ -79,17 +83,18 @@ class PcapngReader:
     Args:
         name: what the file is called.
         tally: takes what is no frame.
+        marks: give marks among the frames, too: a comment of a frame is in front of it.
     """
 
-    def __init__(self, name: str, tally: Tally) -> None:
-        self._name, self._tally = name, tally
+    def __init__(self, name: str, tally: Tally, marks: bool = False) -> None:
+        self._name, self._tally, self._marks = name, tally, marks
         self._order, self._interfaces = "<", list[Interface]()
         self._usual: _Usual | None = None
         self._idents: dict[bytes, tuple[int, bool]] = {}
         self._names: list[str] = []
         self._blocks, self._wanted, self._at_us, self._damage = 0, _READ_BYTES, 0, ""
 
-    def frames(self, file: BinaryIO, begun: bytes) -> Iterator[Record]:
+    def frames(self, file: BinaryIO, begun: bytes) -> Iterator[Item]:
         """Yield frames.
 
         Args:
@@ -103,14 +108,14 @@ class PcapngReader:
         while more:
             data = some(self._wanted)
             begun += data
-            records: list[Record] = []
+            records: list[Item] = []
             begun = begun[self._take(begun, records) :]
             yield from records
             more = bool(data) and not self._damage
         if begun:
             raise LogError(f"{self._name}: {self._damage or CUT} after {self._blocks} blocks")
 
-    def _take(self, data: bytes, records: list[Record]) -> int:
+    def _take(self, data: bytes, records: list[Item]) -> int:
         """Add the frames of the blocks that are whole; return where the next one begins."""
         at, self._wanted = 0, _READ_BYTES
         while len(data) - (at := self._take_usual(data, at, records)) >= BLOCK_BYTES:
@@ -127,7 +132,7 @@ class PcapngReader:
             at += size
         return at
 
-    def _take_usual(self, data: bytes, at: int, records: list[Record]) -> int:
+    def _take_usual(self, data: bytes, at: int, records: list[Item]) -> int:
         """Take classic data frames without options that follow each other: nearly all are so."""
         usual, idents, names, at_us = self._usual, self._idents, self._names, -1
         if usual is None:
@@ -168,7 +173,7 @@ class PcapngReader:
         self._order = orders.get(magic, "<")
         self._interfaces, self._names, self._usual = [], [], None
 
-    def _take_block(self, kind: int, content: bytes, records: list[Record]) -> None:
+    def _take_block(self, kind: int, content: bytes, records: list[Item]) -> None:
         order = self._order
         try:
             if kind == INTERFACE:
@@ -178,13 +183,15 @@ class PcapngReader:
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == OBSOLETE_PACKET:
                 number, drops, high, low, size, _ = struct.unpack_from(f"{order}HH4I", content)
-                self._tally.lost += drops if drops < 0xFFFF else 0
+                self._drop(drops if drops < 0xFFFF else 0, records)
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == SIMPLE_PACKET:
                 (size,) = struct.unpack_from(f"{order}I", content)
                 snap = self._interfaces[0].snap_bytes if self._interfaces else 0
                 self._tally.untimed += 1
                 self._add(0, None, content[4:], min(size, snap or size), records)
+            elif kind == STATISTICS:
+                self._comment(options(order, content[12:]), records)
         except struct.error:
             self._tally.passed_over[BAD_PACKETS] += 1
 
@@ -212,7 +219,7 @@ class PcapngReader:
         self._usual = _usual(self._order) if plain else None
 
     def _add(
-        self, number: int, count: int | None, data: bytes, size: int, records: list[Record]
+        self, number: int, count: int | None, data: bytes, size: int, records: list[Item]
     ) -> None:
         """Add the frame of a packet; without a time it has that of the packet before."""
         if number >= len(self._interfaces) or size > len(data):
@@ -224,9 +231,10 @@ class PcapngReader:
             return
         told = dict(options(self._order, data[size + -size % 4 :]))
         drops = int.from_bytes(told.get(DROP_COUNT, b""), "little" if self._order == "<" else "big")
-        self._tally.lost += drops
         if count is not None:
             self._at_us = max(0, count * _MICROS // where.parts + where.offset_us)
+        self._drop(drops, records)
+        self._comment(options(self._order, data[size + -size % 4 :]), records)
         if self._at_us >= _END_US:
             self._tally.passed_over[NO_TIME] += 1
             return
@@ -237,6 +245,20 @@ class PcapngReader:
         flags = told.get(PACKET_FLAGS, b"")
         sent = int.from_bytes(flags, "little" if self._order == "<" else "big") & DIRECTION
         records.append(Record(self._at_us, where.name, frame, sent == OUTBOUND))
+
+    def _drop(self, frames: int, records: list[Item]) -> None:
+        """Count frames that were lost."""
+        self._tally.lost += frames
+        if frames and self._marks:
+            records.append(dropped(self._at_us, frames))
+
+    def _comment(self, given: Iterator[tuple[int, bytes]], records: list[Item]) -> None:
+        """Add the marks that comments are; frames that were lost have a number, too."""
+        if not self._marks:
+            return
+        texts = (value.decode("utf-8", "replace") for code, value in given if code == COMMENT)
+        marks = (read_mark(self._at_us, text) for text in texts)
+        records += [mark for mark in marks if mark and mark.event != DROP]
 
 
 def _damage_of(size: int, rest: int, block: bytes) -> str:

@@ -1,11 +1,16 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
 from tickrig.host.monitor.logs.log_reader import read_log
+
+CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 
 LOG = """\
 (1436509052.249713) can0 705#7F
@@ -40,6 +45,65 @@ def test_what_a_format_cannot_hold_is_said(tmp_path: Path) -> None:
         "run.trc: 1 remote frames left out",
         "run.trc: bench became can1",
     ]
+
+
+MARKED = """\
+(0000000001.000000) can0 123#01
+# trigger: emcy
+(0000000002.000000) can0 124#02
+# 12 frames were lost
+# can0 is gone: Network is down
+(0000000005.000000) can0 125#03
+# can0 is back after 2.500000 s
+"""
+
+
+@pytest.mark.parametrize("ending", ["log", "log.gz", "jsonl", "asc", "trc", "pcapng"])
+def test_marks_go_from_log_to_log_at_their_place(ending: str, tmp_path: Path) -> None:
+    first, again = log(tmp_path, f"# a note\n{MARKED}"), tmp_path / "again.log"
+    assert canmon("conv", first, tmp_path / f"other.{ending}").exit_code == 0
+    result = canmon("conv", tmp_path / f"other.{ending}", again)
+    assert (result.exit_code, again.read_text("ascii")) == (0, MARKED)
+    assert result.stderr == f"{tmp_path}/other.{ending}: its recorder lost 12 frames\n"
+
+
+@pytest.mark.parametrize(
+    ("ending", "said"),
+    [
+        ("csv", "other.csv: 4 marks of gaps and triggers left out"),
+        ("trace", "left out: 4 marks of gaps and triggers"),
+    ],
+)
+def test_marks_that_a_format_cannot_hold_are_said(ending: str, said: str, tmp_path: Path) -> None:
+    assert said in canmon("conv", log(tmp_path, MARKED), tmp_path / f"other.{ending}").stderr
+
+
+def test_marks_of_a_blf_log_are_not_read_and_that_is_said(tmp_path: Path) -> None:
+    canmon("conv", log(tmp_path, MARKED), tmp_path / "run.blf")
+    result = canmon("conv", tmp_path / "run.blf", tmp_path / "again.log")
+    assert "4 objects that are no frames passed over" in result.stderr
+
+
+def test_marks_stay_where_a_log_is_filtered_merged_and_shown(tmp_path: Path) -> None:
+    first, other = log(tmp_path, MARKED), log(tmp_path, "(3.0) b 126#\n", "b.log")
+    shown = canmon("dump", f"{first},124:7FF", other, "-L").stdout
+    assert shown.splitlines() == [
+        "# trigger: emcy",
+        "(0000000002.000000) can0 124#02",
+        "# 12 frames were lost",
+        "# can0 is gone: Network is down",
+        "(0000000003.000000) b 126#",
+        "# can0 is back after 2.500000 s",
+    ]
+
+
+def test_marks_of_standard_input_are_kept_and_not_said_again(tmp_path: Path) -> None:
+    lines = canmon("dump", log(tmp_path, MARKED), "--jsonl").stdout
+    out = tmp_path / "x.log"
+    words = [*CANMON, "dump", "-", "-l", str(out)]
+    result = subprocess.run(words, input=lines, capture_output=True, text=True, check=False)
+    assert (result.returncode, out.read_text("ascii")) == (0, MARKED)
+    assert result.stderr == "standard input: its recorder lost 12 frames\n"
 
 
 def test_logs_are_merged_and_filtered(tmp_path: Path) -> None:
