@@ -212,9 +212,21 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
         bus = can.Bus(**{"single_handle": True, **given})
         prepare_bus(bus, interface)
     except Exception as error:  # its drivers raise whatever they come across, NameError even
+        _let_go(error)
         name = interface if channel is None else f"{interface} {channel}"
         raise BusUnavailable(f"CAN bus {name}: {_reason(error)}") from None
     return bus, interface, channel
+
+
+def _let_go(error: Exception) -> None:
+    """Drop a bus that was never made whole: python-can warns that nobody has closed it."""
+    import logging  # noqa: PLC0415 - rarely wanted
+    from traceback import clear_frames  # noqa: PLC0415
+
+    log = logging.getLogger("can.bus")
+    log.disabled = True
+    clear_frames(error.__traceback__)
+    log.disabled = False
 
 
 def _check_interface(interface: str | None) -> None:

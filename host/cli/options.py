@@ -60,6 +60,22 @@ class NumberRange(click.FloatRange):
         return number
 
 
+class NodeId(click.IntRange):
+    """A node-ID 1..127, as `5`."""
+
+    def __init__(self) -> None:
+        super().__init__(1, 127)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Read a node-ID."""
+        if isinstance(value, str) and not value.strip().lstrip("+-").isdecimal():
+            self.fail(f"{value!r} is no node-ID 1..127.", param, ctx)
+        return int(super().convert(value, param, ctx))
+
+
+NODE_ID: Final = NodeId()
+
+
 def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that adds `--version`, in the form that all commands have."""
     return click.version_option(__version__, message="%(prog)s (tickrig) %(version)s")

@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.source_spec import BusSpec, FileSpec, parse_source
+from tickrig.host.canmon.sources.source_spec import (
+    BusSpec,
+    FileSpec,
+    LineSpec,
+    parse_source,
+)
 from tickrig.host.canopen.conform.plan import Stimulus
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
@@ -94,7 +99,7 @@ def open_conform_source(
         if words := options.arguments():
             raise Refused(f"{words[0]} is of a bus: in {word} the rig file says what the bus is")
         return _open_rig(Path(word), node_id)
-    spec = BusSpec() if word is None else parse_source(word)
+    spec = BusSpec() if word is None else _parse(word)
     if spec is None or isinstance(spec, FileSpec):
         raise Refused(
             f"SOURCE {word!r} is no bus: a log holds what was said, and answers nothing;"
@@ -103,6 +108,16 @@ def open_conform_source(
     if not isinstance(spec, BusSpec) or spec.chosen is not None:
         raise Refused(f"SOURCE {word!r} is no whole CAN bus as can0 or slcan:/dev/ttyACM0@500k")
     return _open_bus(spec, options)
+
+
+def _parse(word: str) -> FileSpec | BusSpec | LineSpec | None:
+    try:
+        return parse_source(word)
+    except Refused:
+        if Path(word).is_file():
+            text = f"SOURCE {word!r} is neither a bus as can0 nor a rig file as bench.toml"
+            raise Refused(text) from None
+        raise
 
 
 def _open_rig(path: Path, node_id: int | None) -> ConformSource:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import sys
 from collections.abc import Iterator
@@ -56,8 +57,8 @@ def command(
 
     \b
     Exit status  0 all is done              2 usage
-                 1 a command from standard  3 the bus failed
-                   input was not carried out
+                 1 a command from standard  3 the bus failed, or nothing can
+                   input was not carried out  be served at the address
     """  # noqa: D301 - click wants the backspace
     if listen is not None and path is not None:
         raise Refused("--listen and --socket: give one of them")
@@ -118,7 +119,11 @@ def _listening(
         family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
         listener = socket.create_server(address, family=family)
     except OSError as error:
-        raise Refused(f"--listen {address[0]}:{address[1]}: {error.strerror or error}") from None
+        told = f"--listen {address[0]}:{address[1]}"
+        if isinstance(error, socket.gaierror):
+            raise Refused(f"{told}: {error.strerror}") from None
+        reason = os.strerror(error.errno) if error.errno else error
+        raise SourceFailed(f"{told}: {reason}") from None
     listener.setblocking(False)
     with listener:
         host, port = listener.getsockname()[:2]

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.eds_document import read_device_document
-from tickrig.host.canmon.net.session import NetSession
+from tickrig.host.canmon.net.session import NetSession, NodeFailed
 from tickrig.host.canopen.conform.subject.other_device import TOLD, other_device
-from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.decode.node_memory import NodeMemory, eds_objects
@@ -147,7 +147,7 @@ def known_objects(
     """
     file = read_device_document(eds, what).file if eds else session.source.eds.get(node_id)
     objects = NodeObjects(node_id, file)
-    data = session.bus.read(node_id, *DEVICE_TYPE, 4)
+    data = _device_type(session, node_id)
     objects.learn(DEVICE_TYPE, data)
     if eds is not None:
         about = {"device type": as_hex(data)}
@@ -159,6 +159,15 @@ def known_objects(
                 raise Refused(f"node {node_id}: {text}; --other-device takes it all the same")
             say(f"warning: node {node_id}: {text}")
     return objects
+
+
+def _device_type(session: NetSession, node_id: int) -> bytes:
+    try:
+        return session.bus.read(node_id, *DEVICE_TYPE, 4)
+    except SdoTimeout as error:
+        within = f"no answer within {error.timeout_us // 1_000} ms"
+        text = f"node {node_id}: {within} to the read of 1000h that each node has"
+        raise NodeFailed(text) from None
 
 
 def as_hex(data: bytes) -> str:

@@ -17,7 +17,7 @@ from tickrig.host.canopen.master.boot_slave import BootOutcome, SlaveBoot
 from tickrig.host.canopen.master.boot_status import BootStatus
 from tickrig.host.canopen.master.boot_talk import BootStep
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import format_time
@@ -27,7 +27,7 @@ HALF: Final = "the node is as the steps before left it"
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.option("--bus", "bus_file", type=PATH, metavar="FILE", help="bus.yml that has the node.")
 @click.option("--eds", type=PATH, metavar="FILE", help="EDS or DCF of the node.")
 @click.option("--explain", is_flag=True, help="Show each step: asked, answered, what follows.")

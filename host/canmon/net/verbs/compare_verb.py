@@ -19,7 +19,7 @@ from tickrig.host.canopen.commissioning.configuration import (
     is_parameter,
 )
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 
@@ -27,7 +27,7 @@ DIFFERENT: Final = 1
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("other", metavar="FILE|NODE")
 @click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of both nodes.")
 @click.pass_obj

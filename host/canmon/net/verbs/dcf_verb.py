@@ -18,14 +18,14 @@ from tickrig.host.canopen.commissioning.configuration import Values, dcf_values,
 from tickrig.host.canopen.conform.safety.write_order import Write
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH)
 @click.option("--all", "whole", is_flag=True, help="Write what is there already, too.")
 @click.option("--skip", multiple=True, metavar="OBJECT", help="Is not written; may be repeated.")

@@ -14,7 +14,7 @@ from tickrig.host.canmon.net.progress_bar import ProgressBar
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
 from tickrig.host.canopen.commissioning.program import COMMANDS, Program, ProgramFailed
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.decode.sdo.transfer import write_entry
 
@@ -35,7 +35,7 @@ HALF: Final = (
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("file", type=PATH, required=False)
 @click.option("--number", type=click.IntRange(1, 254), default=1, metavar="N", help="Program.  [1]")
 @click.option("--control", type=click.Choice(list(COMMANDS)), help="Command its program alone.")

@@ -16,7 +16,7 @@ from tickrig.host.canmon.net.session import NetSession, failure_text, net_sessio
 from tickrig.host.canmon.net.values import shown
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 
@@ -24,7 +24,7 @@ REFUSED: Final = 1
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("names", nargs=-1, metavar="OBJECT...")
 @click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node.")
 @click.option("--json", "as_json", is_flag=True, help="Objects as JSON, one a line.")

@@ -7,6 +7,7 @@ import click
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.session import net_session
 from tickrig.host.canmon.net.stored import AREAS, load_defaults, reset, save
+from tickrig.host.cli.options import NODE_ID
 from tickrig.host.cli.refused import Refused
 
 
@@ -20,7 +21,7 @@ def _sub(word: str) -> int:
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.pass_obj
@@ -40,7 +41,7 @@ def store(call: NetCall, node: int, area: str, yes: bool) -> None:
 
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("area", default="all")
 @click.option("--reset", "then_reset", is_flag=True, help="Reset it, so that they count at once.")
 @click.option("--yes", is_flag=True, help="Ask nothing.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 import click
 
@@ -14,14 +15,17 @@ from tickrig.host.canmon.net.values import encoded, limits
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.sdo.abort import describe_abort
 
+MAPPING_OFFSET: Final = 0x200
+PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
+
 
 @click.command()
-@click.argument("node", type=click.IntRange(1, 127))
+@click.argument("node", type=NODE_ID)
 @click.argument("values", nargs=-1, required=True, metavar="OBJECT=VALUE...")
 @click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node.")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
@@ -67,5 +71,12 @@ def _write(session: NetSession, objects: NodeObjects, entry: Entry, data: bytes)
         try:
             session.bus.write(node_id, *entry, data)
         except SdoAborted as error:
-            why = f"refused: {describe_abort(error.code)}{limits(objects, entry)}"
+            why = f"refused: {describe_abort(error.code)}{limits(objects, entry)}{_hint(entry)}"
             raise NodeFailed(f"node {node_id}: {objects.title(entry)}: {why}") from None
+
+
+def _hint(entry: Entry) -> str:
+    """Say what a PDO wants before its mapping is changed; empty for other objects."""
+    if entry[0] not in PDO_MAPPINGS:
+        return ""
+    return f"; disable the PDO first: {entry[0] - MAPPING_OFFSET:04X}h:01 with bit 31"

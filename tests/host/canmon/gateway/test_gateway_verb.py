@@ -64,8 +64,8 @@ def test_a_port_that_is_taken_is_told_in_a_line(rig: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         result = gateway(rig, "--listen", port)
-    assert result.exit_code == 2
-    assert f"Error: --listen 127.0.0.1:{port}: " in result.stderr
+    assert result.exit_code == 3
+    assert f"Error: --listen 127.0.0.1:{port}: Address already in use\n" in result.stderr
     assert len(result.stderr.splitlines()) <= 3
 
 

@@ -52,7 +52,7 @@ def test_in_a_pipe_it_refuses_and_says_how() -> None:
 
 
 def test_a_node_that_is_silent_is_told() -> None:
-    told = (1, "Error: node 5: 1000h:00: no answer within 50 ms\n")
+    told = (1, "Error: node 5: no answer within 50 ms to the read of 1000h that each node has\n")
     assert run(*BUS, "read", "5", "1000h") == told
     assert run(*NET, "--timeout", "50ms", "-i", "virtual", "read", "5", "1000h") == told
 

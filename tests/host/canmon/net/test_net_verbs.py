@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +17,7 @@ from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.net import session
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
+CANMON = "from tickrig.commands import canmon; canmon()"
 RIG = """\
 [device.drive]
 type = "epos"
@@ -105,7 +109,8 @@ def test_nmt_commands_and_what_comes_of_them(rig: str) -> None:
 def drive(monkeypatch: pytest.MonkeyPatch) -> SlaveBench:
     """Node 5 of a bus of which nobody knows who is on it."""
     bench = SlaveBench(make_epos(5), 1_000_000)
-    monkeypatch.setattr(session, "open_conform_source", lambda *words: bench.source)
+    source = replace(bench.source, virtual=False)
+    monkeypatch.setattr(session, "open_conform_source", lambda *words: source)
     return bench
 
 
@@ -158,6 +163,8 @@ def test_an_eds_of_another_device_is_told(rig: str, tmp_path: Path) -> None:
     [
         (("read", "5", "stausword"), 2, "no object 'stausword' of node 5; did you mean 'status"),
         (("read", "7", "1000h"), 2, "has no node 7; its nodes: 5, 16"),
+        (("read", "five", "1000h"), 2, "'five' is no node-ID 1..127."),
+        (("write", "5", "1A00h:0=0"), 1, "; disable the PDO first: 1800h:01 with bit 31"),
         (("read", "128", "1000h"), 2, "128 is not in the range 1<=x<=127"),
         (("read", "5", "1000h", "--eds", "nosuch.eds"), 2, "--eds nosuch.eds: No such file"),
         (("write", "5", "controlword"), 2, "'controlword' is not OBJECT=VALUE"),
@@ -185,6 +192,29 @@ def test_what_cannot_be_is_one_line(
 def test_what_answers_nothing_is_no_source() -> None:
     assert "no SOURCE: name a bus as can0" in net("scan").stderr
     assert "is no bus: a log holds what was said" in net("run.log", "scan").stderr
+
+
+def test_another_file_is_no_source(tmp_path: Path) -> None:
+    path = tmp_path / "drive.dcf"
+    path.touch()
+    told = f"SOURCE {str(path)!r} is neither a bus as can0 nor a rig file as bench.toml"
+    assert told in net(str(path), "scan").stderr
+
+
+def test_where_nobody_is_there_the_question_ends_with_a_full_stop(drive: SlaveBench) -> None:
+    result = net("a-bus", "write", "5", "target_position=1")
+    assert result.exit_code == 2
+    assert "target position. Nobody is here to be asked: give --yes" in result.stderr
+
+
+def test_a_bus_that_cannot_be_made_is_one_line() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", CANMON, "net", "udp:no.such.group", "scan"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (3, 1), done.stderr
 
 
 def test_a_bus_may_stand_in_options() -> None:
