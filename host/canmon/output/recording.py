@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -158,11 +157,13 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
 def _rules(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
     from tickrig.host.monitor.check.alarms import Alarms  # noqa: PLC0415
+    from tickrig.host.monitor.check.rule_file import parse_rule_file  # noqa: PLC0415
     from tickrig.host.monitor.check.rules import Rules, parse_rules  # noqa: PLC0415
     from tickrig.host.monitor.recorder.trigger import RuleTrigger  # noqa: PLC0415
 
     try:
-        rules = parse_rules(tomllib.loads(Path(word).read_text("utf-8")), load_rule)
+        words = parse_rule_file(Path(word).read_text("utf-8"), load_rule)
+        rules = parse_rules(words, load_rule)
         if rules == Rules(bit_rate=rules.bit_rate):
             raise ValueError("it has no rule")
         return RuleTrigger(Path(word).name, Alarms(rules, bit_rate))

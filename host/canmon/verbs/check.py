@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -33,6 +32,7 @@ from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.decoded_check import DecodedCheck
 from tickrig.host.monitor.check.junit import junit
 from tickrig.host.monitor.check.rule import Finding
+from tickrig.host.monitor.check.rule_file import parse_rule_file
 from tickrig.host.monitor.check.rules import (
     SWITCHES,
     VALUES,
@@ -106,13 +106,11 @@ def read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
 def _file(path: Path) -> RuleValues:
     """Read a file, and check it alone so that it is named if it is wrong."""
     try:
-        words = tomllib.loads(path.read_text("utf-8"))
-        parse_rules(words, load_rule)
+        return parse_rule_file(path.read_text("utf-8"), load_rule)
     except OSError as error:
         refuse_path("rules", error)
     except ValueError as error:
         raise Refused(f"rules {path}: {error}") from None
-    return words
 
 
 BROKEN: Final = 1
@@ -189,9 +187,7 @@ def command(  # noqa: PLR0913 - options
     judged = suite, rules.names(), verdict.findings, why
     _write("--junit", report_path, junit, judged)
     _write("--sarif", sarif_path, _sarif, judged)
-    if not why or verdict.counts:
-        click.echo(verdict.summary(), err=True)
-    report(frames, strict)
+    report(frames, strict, [verdict.summary()] if verdict.counts or not why else ())
     if verdict.counts:
         click.get_current_context().exit(BROKEN)
     if unjudged:

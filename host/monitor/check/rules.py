@@ -24,6 +24,7 @@ from tickrig.host.monitor.check.time_rules import (
     NoLostHeartbeat,
 )
 from tickrig.host.monitor.frames.ident import ident_text, parse_ident
+from tickrig.host.text.names import closest
 from tickrig.host.text.values import parse_time_with_unit_us
 
 if TYPE_CHECKING:
@@ -147,7 +148,8 @@ def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
     known = (*SWITCHES, *VALUES)
     for name in words:
         if name not in known:
-            raise ValueError(f"rule {name!r} is none of {', '.join(known)}")
+            meant = "".join(f"; did you mean {word!r}?" for word in closest(name, known))
+            raise ValueError(f"rule {name!r} is none of {', '.join(known)}{meant}")
     switches = {name: _switch(name, words[name]) for name in SWITCHES if name in words}
     gaps = (text.partition("=") for text in _texts("max_gap", words))
     idents = [ident for text in _lists("known", words) for ident in _idents(text)]

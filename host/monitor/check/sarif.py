@@ -20,7 +20,7 @@ def sarif(
     """Return the report.
 
     A finding has no line: a log is read as frames. Its time, bus and frame are properties; the
-    frames around it stand behind its text.
+    frames around it are related locations.
 
     Args:
         source: what was checked, as a file or bus.
@@ -52,11 +52,15 @@ def _result(uri: str, finding: Finding, place: int) -> dict[str, object]:
     properties: dict[str, object] = {"t": finding.at_us / 1e6}
     if finding.record is not None:
         properties |= {"ch": finding.record.channel, "frame": str(finding.record.frame)}
+    text, *around = str(finding).splitlines()
+    where = {"physicalLocation": {"artifactLocation": {"uri": uri}}}
+    related = [{**where, "message": {"text": line.strip()}} for line in around]
     return {
         "ruleId": finding.rule,
         "ruleIndex": place,
         "level": "error",
-        "message": {"text": str(finding).partition(f"{finding.rule}: ")[2]},
-        "locations": [{"physicalLocation": {"artifactLocation": {"uri": uri}}}],
+        "message": {"text": text.partition(f"{finding.rule}: ")[2]},
+        "locations": [where],
+        **({"relatedLocations": related} if related else {}),
         "properties": properties,
     }

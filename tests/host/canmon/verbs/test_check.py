@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -15,6 +16,7 @@ from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources import block_log
 
 DRIVE_EDS = Path(__file__).parents[4] / "examples/eds/epos.eds"
+PAGE = (Path(__file__).parents[4] / "docs/canmon-model.md").read_text("utf-8")
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 LOG = """\
 (1.000000) can0 703#05
@@ -205,6 +207,48 @@ def test_a_rule_file_that_is_wrong_is_named(log: str, tmp_path: Path) -> None:
         assert len(result.stderr.splitlines()) == 1
 
 
+def test_all_that_is_wrong_in_a_rule_file_is_said_with_its_line(log: str, tmp_path: Path) -> None:
+    text = 'no_emci = true\nmax_gap = {181 = 20}\n[rule]\n"a" = "dlc"\n"x" = "emcy nevr"\n'
+    rules = write(tmp_path / "rules.toml", text)
+    head, *lines = check(log, rules).stderr.splitlines()
+    assert head == f"Error: rules {rules}: 3 mistakes"
+    assert [line[:31] for line in lines] == [
+        "  line 1: rule 'no_emci' is non",
+        "  line 2: '20' has no unit: wri",
+        "  line 5: rule 'emcy nevr', col",
+    ]
+    assert lines[0].endswith("; did you mean 'no_emcy'?")
+    assert lines[2].endswith("; did you mean 'never'?")
+
+
+def test_what_is_no_toml_is_said_with_its_line(log: str, tmp_path: Path) -> None:
+    rules = write(tmp_path / "rules.toml", "no_emci = true\n[b\nnodes = \n")
+    head, *lines = check(log, rules).stderr.splitlines()
+    assert head == f"Error: rules {rules}: 2 mistakes"
+    assert [line[:9] for line in lines] == ["  line 2:", "  line 3:"]
+
+
+def test_lines_that_are_no_frames_are_said_before_the_verdict(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", LOG + "what?\n")
+    first, last = check(log, "--no-sdo-abort").stderr.splitlines()
+    assert "line 5 is no frame" in first
+    assert last == "all rules hold"
+
+
+def test_a_file_is_given_as_the_page_has_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "run.log", LOG)
+    write(tmp_path / "rules.toml", PAGE.partition("```toml\n")[2].partition("```")[0])
+    words = re.findall(r"^\$ canmon check (.*)$", PAGE, re.MULTILINE)
+    assert words
+    for line in words:
+        result = check(*line.split())
+        assert (result.exit_code, EMCY in result.stdout) == (1, True)
+        assert "nodes: node 16 was never heard" in result.stdout
+
+
 def test_a_log_that_is_not_there_ends_with_3() -> None:
     result = check("none.log", "--no-emcy")
     assert (result.exit_code, result.stderr) == (3, "Error: none.log: No such file or directory\n")
@@ -309,7 +353,7 @@ def test_a_rule_that_is_none_is_one_line(log: str, tmp_path: Path) -> None:
     assert result.stderr.startswith(f"Error: {said}")
     assert result.stderr.endswith("; did you mean 'never'?\n")
     rules = write(tmp_path / "rules.toml", 'rule = ["emcy nevr"]\n')
-    assert check(log, rules).stderr.startswith(f"Error: rules {rules}: {said}")
+    assert check(log, rules).stderr.startswith(f"Error: rules {rules}: line 1: {said}")
 
 
 def test_a_written_rule_knows_what_an_eds_says(tmp_path: Path) -> None:
@@ -331,7 +375,9 @@ def test_findings_are_written_as_sarif(tmp_path: Path) -> None:
     assert run["invocations"] == [{"executionSuccessful": True}]
     quiet, nodes = run["results"]
     head, *around = FOUND.replace("emcy never", "quiet").splitlines()
-    assert quiet["message"]["text"].splitlines() == [head.partition("quiet: ")[2], *around]
+    assert quiet["message"]["text"] == head.partition("quiet: ")[2]
+    related = [one["message"]["text"] for one in quiet["relatedLocations"]]
+    assert related == [line.strip() for line in around]
     assert quiet["properties"] == {"t": 1.05, "ch": "can0", "frame": "083#3081110000000000"}
     assert (quiet["ruleId"], quiet["ruleIndex"], quiet["level"]) == ("quiet", 1, "error")
     place = quiet["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
