@@ -10,6 +10,7 @@ from typing import Final
 
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.net.session import NetSession, NodeFailed
+from tickrig.host.canmon.net.standard_names import standard_names
 from tickrig.host.canopen.conform.subject.other_device import TOLD, other_device
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import say
@@ -105,10 +106,15 @@ class NodeObjects:
         for entry in sorted(self.rows) if self.rows else self._standard():
             if name := self.text(entry).name:
                 found.setdefault(name, entry)
-        for entry in self.rows:  # those of CiA 301 mean the same object, where it is there
+        for entry in self.rows:  # those of the standards mean the same object, where it is there
             standard = describe_standard(*entry)
+            if standard is None and self.is_drive:
+                standard = describe_drive(*entry)
             if standard is not None:
                 found.setdefault(standard.name, entry)
+        for name, entry in standard_names().items():
+            if entry in self.rows or not self.rows:
+                found.setdefault(name, entry)
         return found
 
     def _standard(self) -> Iterator[Entry]:

@@ -66,6 +66,33 @@ def test_names_of_the_standard_mean_the_same_object(rig: str) -> None:
     assert net(rig, "read", "5", "device_name").stdout.startswith("1008h:00 manufacturer_dev")
 
 
+@pytest.mark.parametrize("name", ["identity_object.product_code", "identity.product"])
+def test_names_hold_with_an_eds_and_without_one(
+    rig: str, name: str, request: pytest.FixtureRequest
+) -> None:
+    told = net(rig, "read", "5", name).stdout
+    assert told == "1018h:02 identity_object.product_code = 0x00006210\n"
+    request.getfixturevalue("drive")
+    told = net("a-bus", "read", "5", name).stdout
+    assert told == "1018h:02 identity.product = 0x00006210\n"
+
+
+def test_the_eds_need_not_call_objects_as_the_standards_do(
+    drive: SlaveBench, tmp_path: Path
+) -> None:
+    text = write_eds(make_epos(5).dictionary.description)
+    for name in ("Statusword", "Product code", "Producer heartbeat time"):
+        assert f"ParameterName={name}" in text
+        text = text.replace(f"ParameterName={name}", "ParameterName=Ours")
+    path = tmp_path / "drive.eds"
+    path.write_text(text, "utf-8")
+    names = ("statusword", "identity_object.product_code", "identity.product", "heartbeat_time")
+    result = net("a-bus", "read", "5", *names, "producer_heartbeat_time", "--eds", str(path))
+    assert [line.split()[0] for line in result.stdout.splitlines()] == [
+        *("6041h:00", "1018h:02", "1018h:02", "1017h:00", "1017h:00")
+    ], result.output
+
+
 def test_all_that_the_eds_names_is_read(rig: str) -> None:
     result = net(rig, "read", "5", "--json")
     assert result.exit_code == 1, "1003h:01 has no data"
