@@ -74,7 +74,7 @@ class Recording:
         words: Sequence[str] = options["trigger"]
         self.plan = read_recording_plan(path, options, parts)
         self.triggers = [_trigger(word, bit_rate) for word in words]
-        self.decodes = any(not word.endswith(RULE_FILE) for word in words)
+        self.decodes = any(trigger.decodes for trigger in self.triggers)
 
     def open(self, source: Sequence[str], live: bool, wanted: FilterTrigger | None) -> LogFile:
         """Begin it.

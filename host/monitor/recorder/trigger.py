@@ -16,9 +16,11 @@ class Trigger(Protocol):
 
     Attributes:
         name: what people call it.
+        decodes: it asks what frames mean.
     """
 
     name: str
+    decodes: bool
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
         """Say why this frame makes somebody record; nothing if it does not."""
@@ -42,7 +44,7 @@ class FilterTrigger:
     """
 
     def __init__(self, name: str, wanted: Filter) -> None:
-        self.name, self._wanted = name, wanted
+        self.name, self.decodes, self._wanted = name, True, wanted
         self._missing = MissingSignals(wanted.signals)
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
@@ -71,10 +73,11 @@ class RuleTrigger:
 
     def __init__(self, name: str, alarms: Alarms) -> None:
         self.name, self._alarms = name, alarms
+        self.decodes = bool(alarms.rules.expressions)
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
         """Return what is wrong with the frame."""
-        self._alarms.take(record)
+        self._alarms.take(record, decoded)
         return self._found()
 
     def missing(self, now_us: int, lost: int, /) -> str:

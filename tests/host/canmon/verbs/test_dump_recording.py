@@ -92,6 +92,17 @@ def test_the_end_of_an_error_is_no_trigger(tmp_path: Path, trigger: str, kept: i
     assert canmon("dump", str(source), "-F", "emcy", "-L").stdout.count("083#") == 3
 
 
+def test_a_rule_that_is_written_out_is_a_trigger(tmp_path: Path) -> None:
+    source, rules = tmp_path / "in.log", tmp_path / "rules.toml"
+    source.write_text("(1.0) can0 703#05\n(2.0) can0 083#3081110000000000\n(3.0) can0 703#05\n")
+    rules.write_text('rule = ["emcy never"]\n')
+    words = ["-l", str(tmp_path / "run.log"), "--pre", "1", "--post", "0"]
+    result = canmon("dump", str(source), *words, "--trigger", str(rules))
+    assert "2 frames in 1 file, 1 trigger; " in result.stderr
+    (part,) = tmp_path.glob("run-*.log")
+    assert "# trigger: emcy never: emcy of node 3: 8130h" in part.read_text()
+
+
 def test_a_filter_says_what_is_recorded_and_a_trigger_when(tmp_path: Path) -> None:
     source, out = write_run(tmp_path, 300, 100), tmp_path / "run.log"
     words = ["--trigger", "085", "-F", "181", "--pre", "3", "--post", "3"]
