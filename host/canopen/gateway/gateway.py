@@ -37,6 +37,7 @@ RESETS: Final = {
     "comm": NmtCommand.RESET_COMMUNICATION,
     "communication": NmtCommand.RESET_COMMUNICATION,
 }
+SETTINGS: Final = ("network", "node", "sdo_timeout")
 HELP: Final = """\
 [SEQUENCE] [[NET] NODE] r[ead] INDEX SUBINDEX [TYPE]
 [SEQUENCE] [[NET] NODE] w[rite] INDEX SUBINDEX TYPE VALUE
@@ -150,17 +151,18 @@ class Gateway:
 
     def _set(self, request: Request) -> str:
         self._check_net(list(request.numbers))
+        check_count(request, 1, None)
+        if (name := request.words[0].lower()) not in SETTINGS:
+            raise GatewayError(ErrorCode.NOT_SUPPORTED, f"set {name!r} is not supported")
         check_count(request, 2, 2)
-        name, value = request.words
-        match name.lower():
+        value = request.words[1]
+        match name:
             case "network":
                 self._check_net([number(value, 0xFFFF, "net")])
             case "node":
                 self._node = number(value, NODES, "node", 1)
-            case "sdo_timeout":
-                self._timeout_us = 1_000 * number(value, MOST_TIMEOUT_MS, "time-out", 1)
             case _:
-                raise GatewayError(ErrorCode.NOT_SUPPORTED, f"set {name!r} is not supported")
+                self._timeout_us = 1_000 * number(value, MOST_TIMEOUT_MS, "time-out", 1)
         return OK
 
     def _info(self, request: Request) -> str:

@@ -51,6 +51,9 @@ SESSIONS = {
         ("[8] 9 r 0x1017 0", "[8] ERROR:0x05040000 #no answer within 20 ms"),
         ("[9] set sdo_timeout 0", "[9] ERROR:101 #time-out '0' is not 1..65535"),
         ("[10] set sdo_block 1", "[10] ERROR:100 #set 'sdo_block' is not supported"),
+        ("[10] set heartbeat 5 100", "[10] ERROR:100 #set 'heartbeat' is not supported"),
+        ("[10] set node", "[10] ERROR:101 #set with 1 words behind it; see help"),
+        ("[10] set", "[10] ERROR:101 #set with 0 words behind it; see help"),
         ("[11] info version", "[11] 0x00000000 0x00000000 0.0 0 0 3.0 1.2"),
     ],
     "mistakes": [
