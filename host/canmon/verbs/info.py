@@ -28,6 +28,7 @@ from tickrig.host.monitor.logs.tally import Tally
 
 HEAD_FRAMES: Final = 1_000
 TAIL_BYTES: Final = 1 << 14
+UNREAD: Final = "not read, nor whether the log was ended: canmon stats does"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,11 @@ class LogHead:
     def whole(self) -> bool:
         """All of the log was read."""
         return self.head_frames < HEAD_FRAMES
+
+    @property
+    def end_read(self) -> bool:
+        """The end of the log was read, or all of it."""
+        return self.whole or self.last_us is not None
 
 
 def read_head(path: Path) -> LogHead:
@@ -139,7 +145,7 @@ def _lines(path: Path, head: LogHead) -> list[str]:
         f"  frames   {head.head_frames:,}{more}",
         f"  buses    {' '.join(head.channels) or '-'}",
         f"  first    {_time(head.first_us)}",
-        f"  last     {_time(head.last_us)}",
+        f"  last     {_time(head.last_us) if head.end_read else UNREAD}",
     ]
     if head.first_us is not None and head.last_us is not None:
         lines.append(f"  span     {(head.last_us - head.first_us) / 1e6:.6f} s")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import os
 import shutil
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -211,7 +210,8 @@ class Files:
             if not (may_remove and self._remove_oldest(index)):
                 path = str(self.path)
                 self.end_part()  # there is room for that
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), path)
+                left = f"{RESERVE_BYTES >> 10} KiB are left on the disk"
+                raise OSError(errno.ENOSPC, left, path)
 
     def _remove_oldest(self, index: Index) -> bool:
         """Remove a file; say whether there was one."""

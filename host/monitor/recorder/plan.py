@@ -176,7 +176,10 @@ def parse_bytes(name: str, word: str, least: int = MIN_BYTES) -> int:
         raise ValueError(f"{name} {word!r} is no size: write 64k, 100M or 2G")
     size = int(match[1]) << _SHIFT[match[2]]
     if size < least:
-        raise ValueError(f"{name} {word!r} is too small: at least {least >> 10}k")
+        raise ValueError(
+            f"{name} {word!r} is too small: at least {least >> 10}k; "
+            f"rotate takes {MIN_BYTES >> 10}k, disk {MIN_DISK_BYTES >> 10}k or more"
+        )
     return size
 
 

@@ -7,6 +7,7 @@ from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, Final, cast
 
+from tickrig.host.monitor.frames.dump_line import decoded_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.mark import Mark, dropped, triggered
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 LATE_US: Final = 1_000_000
 """A frame is taken to have come by then, when time alone says that a recording is over."""
+
+MOST_CHARACTERS: Final = 200
+"""Of what is said of a frame that was a trigger."""
 
 LOOK_US: Final = 100_000
 """How often rules are asked what is missing."""
@@ -189,7 +193,8 @@ class Recorder:
         said += f", {counted(self.triggers, 'trigger')}" if self._before is not None else ""
         said += f", {counted(files.removed, 'old file')} removed" if files.removed else ""
         said += f"; {files.ended}" if files.ended else ""
-        said += f"; {self.missing} that came are missing" if self.failed else ""
+        missing = f"{self.missing} that came are" if self.missing else "none that came is"
+        said += f"; {missing} missing" if self.failed else ""
         return f"{said}; {self.plan.index}" if self.plan.numbered else said
 
     def _watch(self, decoded_frames: Sequence[tuple[AnyRecord, Decoded | None]]) -> None:
@@ -210,10 +215,12 @@ class Recorder:
                 if why := trigger.why(record, decoded):
                     self._files.store(pending)
                     pending = []
-                    self._fire(trigger.name, why, record.at_us)
+                    self._fire(trigger.name, why, record.at_us, (record, decoded))
         self._files.store(pending)
 
-    def _fire(self, name: str, why: str, at_us: int) -> None:
+    def _fire(
+        self, name: str, why: str, at_us: int, seen: tuple[Record, Decoded | None] | None = None
+    ) -> None:
         self.triggers += 1
         if self._window is None:
             self._window = _Window(self._behind, at_us)
@@ -222,7 +229,9 @@ class Recorder:
             self._window.extend(at_us)
         if name not in self._window.names:  # a filter that passes each frame is told once
             self._window.names.add(name)
-            self._files.mark(triggered(at_us, why))
+            # a rule says what is wrong; a filter is its own name
+            what = f": {_what(*seen)}" if seen is not None and why == name else ""
+            self._files.mark(triggered(at_us, f"{why}{what}"))
 
     def _store(self, entries: Sequence[Entry]) -> None:
         """Add frames with the marks among them; these are in the index already."""
@@ -260,3 +269,9 @@ class Recorder:
         if isinstance(error, OSError):
             self.failed = f"{error.filename or self._files.path}: {error.strerror}"
         self._files.rescue(self.failed)
+
+
+def _what(record: Record, decoded: Decoded | None) -> str:
+    """Say which frame it was, and what it means."""
+    text = decoded_text(decoded)
+    return f"{record.channel} {record.frame}{f', {text}' if text else ''}"[:MOST_CHARACTERS]

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gzip
 import subprocess
 import sys
 from pathlib import Path
@@ -126,6 +127,16 @@ def test_info_tells_what_a_log_is_from_its_ends(tmp_path: Path) -> None:
         "  last     1436509054.000001 (2015-07-10 06:17:34 UTC)",
         "  span     1.750288 s",
     ]
+
+
+def test_info_says_where_it_does_not_look_at_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "run.log.gz"
+    with gzip.open(path, "wt") as file:
+        file.write(LOG[:32] * 1_500)
+    path.write_bytes(path.read_bytes()[:-8])
+    last = canmon("info", path).stdout.splitlines()[-1]
+    assert last == "  last     not read, nor whether the log was ended: canmon stats does"
+    assert canmon("stats", path).exit_code == 3
 
 
 def test_info_of_an_empty_log_in_json(tmp_path: Path) -> None:

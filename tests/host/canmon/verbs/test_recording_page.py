@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Final
 
@@ -16,11 +18,32 @@ from tickrig.host.canmon.cli import main
 from tickrig.host.monitor.logs.log_reader import read_log
 
 PAGE: Final = (Path(__file__).parents[4] / "docs" / "canmon-recording.md").read_text("utf-8")
-COMMANDS: Final = re.findall(r"^canmon (dump can0 .*?)(?:  .*)?$", PAGE, re.MULTILINE)
+COMMANDS: Final = re.findall(r"^canmon (dump can0 .*?[^&])(?:  .*)?$", PAGE, re.MULTILINE)
 
 
 def test_the_page_has_commands() -> None:
     assert len(COMMANDS) == 7
+
+
+SCRIPT: Final = re.compile(r"^(canmon dump can0 -l run.log &\n.*?)^```", re.MULTILINE | re.DOTALL)
+FRAME: Final = "(0000000001.000000) can0 705#7F\n"
+CALL: Final = "from tickrig.commands import canmon; canmon()"
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(sys.platform == "win32", reason="no bash")
+def test_a_script_ends_a_recording(tmp_path: Path) -> None:
+    command = tmp_path / "canmon"
+    command.write_text(f"#!/bin/sh\nexec {shlex.quote(sys.executable)} -c '{CALL}' \"$@\"\n")
+    command.chmod(0o755)
+    (script,) = SCRIPT.findall(PAGE)
+    script = script.replace("canmon dump can0 -l run.log &", "./canmon dump - -l run.log <fifo &")
+    feed = f"exec 3>fifo; printf '{FRAME}' >&3; until [ -s run.log ]; do :; done; kill -INT $!"
+    script = script.replace("# what is to be recorded", feed)
+    words = ["bash", "-c", f"mkfifo fifo\n{script}"]
+    result = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert (tmp_path / "run.log").read_text("ascii") == FRAME
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -13,7 +13,10 @@ RUN = Path("run.log")
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"rotate": ["0M"]}, "rotate '0M' is too small: at least 64k"),
+        (
+            {"rotate": ["0M"]},
+            "rotate '0M' is too small: at least 64k; rotate takes 64k, disk 1024k or more",
+        ),
         ({"rotate": ["0s"]}, "rotate '0s' is too short: at least 1ms"),
         ({"rotate": ["100"]}, "rotate '100' is neither a size as 100M nor a time as 10min or 1h"),
         ({"rotate": ["5parsec"]}, "rotate '5parsec' is neither a size"),

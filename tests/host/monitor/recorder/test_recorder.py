@@ -270,7 +270,9 @@ def test_a_full_disk_ends_it_in_good_order(small_disk: Path, name: str) -> None:
         feed(recorder, [record(number) for number in range(count, count + 2_000)], batch=2_000)
         count += 2_000
     recorder.close()
-    assert recorder.failed == f"{parts(plan)[-1]}: No space left on device"
+    assert recorder.failed == f"{parts(plan)[-1]}: 256 KiB are left on the disk"
+    missing = f"{recorder.missing} that came are" if recorder.missing else "none that came is"
+    assert f"; {missing} missing; " in recorder.messages()[-1]
     assert frames_of(plan) == list(range(recorder.frames))
     assert recorder.frames + recorder.missing == count
     assert events(plan, "file")[-1]["frames"] == recorder.frames - sum(
