@@ -32,7 +32,8 @@ from tickrig.device.horizon import Horizon
 from tickrig.device.physical import InputBank
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import Request
 from tickrig.wire.scip.command import Command

@@ -13,7 +13,8 @@ from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER

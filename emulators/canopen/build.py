@@ -28,7 +28,7 @@ from tickrig.emulators.canopen.profiles import application_of
 from tickrig.emulators.canopen.second_node import SecondNodeAlarm
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.rig.clock import Clock
-from tickrig.emulators.rig.rig import Station
+from tickrig.emulators.rig.station import Station
 from tickrig.host.cli.messages import say, show_findings
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.log import log_of

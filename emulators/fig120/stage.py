@@ -18,7 +18,8 @@ from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
 from tickrig.emulators.rig.emulated import read_signal
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.refused import Refused
 from tickrig.host.control.client import ControlClient

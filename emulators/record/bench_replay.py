@@ -10,7 +10,8 @@ from typing import Any
 from tickrig.device.core import Device
 from tickrig.emulators.record.replay import Recording, read_recording
 from tickrig.emulators.record.replay_port import Difference, ReplayPort, first_difference
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.text.bench_header import (
     PREFIX,
     BenchHeader,

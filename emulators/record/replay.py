@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from tickrig.emulators.record.replay_port import Difference, ReplayPort, first_difference
 from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.text.trace import (
     RESET,
     Header,

@@ -6,15 +6,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from itertools import compress
 from operator import not_
-from typing import Any, Final, Generic, TypeVar, overload
+from typing import Any, Final, TypeVar, overload
 
-from tickrig.device.core import Device, W
 from tickrig.device.horizon import Horizon
-from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
+from tickrig.device.twin import Copyable, Listeners, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.port import Host, OutsideBridge, Port, Wire
+from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
+from tickrig.emulators.rig.station import Station, next_tick_us
 from tickrig.emulators.rig.timetable import Timetable
 from tickrig.emulators.rig.wire_port import WirePort
 from tickrig.emulators.rig.wires import Wires
@@ -29,35 +29,6 @@ LATE_KEPT: Final = 1_000
 
 T = TypeVar("T")
 U = TypeVar("U")
-
-
-class Station(Part, Generic[W]):
-    """A device on a port.
-
-    Attributes:
-        at_us: the tick for which it stands in the timetable of its rig.
-    """
-
-    __slots__ = ("_timetable", "at_us", "device", "port", "tick_us")
-
-    def __init__(self, device: Device[W], port: Port[W]) -> None:
-        self.device, self.port, self.tick_us = device, port, device.tick_us
-        self.at_us: int = NEVER
-        self._timetable: Timetable | None = None
-
-    def _stand_in(self, timetable: Timetable | None) -> None:
-        """Enter itself in a timetable when traffic arrives; without one it is looked at anyway."""
-        self._timetable = timetable
-        if isinstance(self.port, WirePort):
-            self.port.attach(self.device, self._wake)
-
-    def _wake(self, at_us: int) -> None:
-        if at_us < self.at_us and self._timetable is not None:
-            self._timetable.enter(self, at_us)
-
-    def wake_us(self, now_us: int) -> int:
-        """Return the first tick after `now_us` at which this station has work."""
-        return _next_tick_us(now_us, min(self.device.due_us, self.port.due_us), self.tick_us)
 
 
 class Rig(Copyable):
@@ -131,7 +102,7 @@ class Rig(Copyable):
         port, device = station.port, station.device
         if not isinstance(port, WirePort):
             return False
-        station._stand_in(None if self._dense else self._timetable)
+        station.stand_in(None if self._dense else self._timetable)
         self.move_on(port.wire)
         if hasattr(device, "horizon"):
             device.horizon = None if self._dense else self._horizon
@@ -287,7 +258,7 @@ class Rig(Copyable):
                 next_us = min(next_us, station.wake_us(now_us))
             for coupling in self._couplings:
                 if (due_us := coupling.due_us) < next_us:
-                    next_us = min(next_us, _next_tick_us(now_us, due_us, coupling.tick_us))
+                    next_us = min(next_us, next_tick_us(now_us, due_us, coupling.tick_us))
         else:
             for tick_us in self._periods:
                 next_us = min(next_us, now_us - now_us % tick_us + tick_us)
@@ -404,11 +375,3 @@ class Rig(Copyable):
             coupling.act(now_us)
         if acting:
             self._enter_due()
-
-
-def _next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
-    """Return the first tick after `now_us` that is not before `due_us`, which may be `NEVER`."""
-    first_us = now_us - now_us % tick_us + tick_us
-    if due_us <= first_us:
-        return first_us
-    return -(-due_us // tick_us) * tick_us

@@ -9,7 +9,7 @@ from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.emulators.rig.rig import Station
+    from tickrig.emulators.rig.station import Station
 
 
 class Timetable(Part):

@@ -13,7 +13,8 @@ from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.faults import FaultType, FaultyPort
 from tickrig.emulators.rig.port import ByteLine, Port
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.bridge import Bridge, HostEnd, Tap
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine

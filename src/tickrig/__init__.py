@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from tickrig.emulators.commands.device_type import DeviceType as DeviceType
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.rig import Rig as Rig
-    from tickrig.emulators.rig.rig import Station as Station
     from tickrig.emulators.rig.sim_link import SimLink as SimLink
+    from tickrig.emulators.rig.station import Station as Station
     from tickrig.emulators.serial.emulator import LineSettings as LineSettings
     from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS as SERIAL_PORTS
     from tickrig.emulators.serial.outside.serial_side import SerialSide as SerialSide
@@ -52,7 +52,8 @@ else:
             "tickrig.emulators.canopen.eds": ("read_eds",),
             "tickrig.emulators.commands.device_type": ("DeviceType",),
             "tickrig.emulators.rig.clock": ("VirtualClock",),
-            "tickrig.emulators.rig.rig": ("Rig", "Station"),
+            "tickrig.emulators.rig.rig": ("Rig",),
+            "tickrig.emulators.rig.station": ("Station",),
             "tickrig.emulators.rig.sim_link": ("SimLink",),
             "tickrig.emulators.serial.emulator": ("LineSettings",),
             "tickrig.emulators.serial.outside.serial_ports": ("SERIAL_PORTS",),

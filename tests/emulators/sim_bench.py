@@ -16,7 +16,8 @@ from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 from tests.host.spy_link import SpyLink
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import OnRefusals, RrcClient
 

@@ -12,7 +12,8 @@ from pymodbus.client import ModbusSerialClient
 
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside import protocol_tickrig
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide

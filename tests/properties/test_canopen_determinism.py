@@ -14,7 +14,8 @@ import pytest
 from tests.device.canopen.reference import make_dictionary
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 
 ROOT = Path(__file__).parents[2]

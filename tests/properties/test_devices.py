@@ -39,7 +39,8 @@ from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.commands.device_type import DEVICES
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.check_device import _Bench
 from tickrig.emulators.testing.properties.strategies import Session

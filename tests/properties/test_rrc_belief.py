@@ -15,8 +15,9 @@ from typing import Final, NamedTuple
 from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rrc.states import POWERED_ON, RrcState
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused

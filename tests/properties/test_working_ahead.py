@@ -22,7 +22,8 @@ from tickrig.device.twin import Copyable, twin
 from tickrig.emulators.bench.running_emulator import UNSEEN_US
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames
 
 CYCLIC = {(0x6060, 0): 8, (0x1400, 1): 0x8000_0200, (0x1401, 2): 1, (0x1800, 2): 1}

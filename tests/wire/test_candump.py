@@ -11,7 +11,8 @@ from tests.emulators.can.test_can_rig import Node
 from tests.wire.candump_port import CandumpPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.record.candump_file import CandumpFile
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can_error import BIT_ERROR, ErrorFrame
 from tickrig.wire.candump import CandumpError, LogLine, parse_line, parse_log
 from tickrig.wire.instant import NEVER

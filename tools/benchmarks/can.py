@@ -6,7 +6,8 @@ import random
 
 from benchmarks.table import rates
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_bits import frame_bits
 

@@ -14,7 +14,8 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import EdsCache
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

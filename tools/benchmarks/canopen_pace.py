@@ -18,7 +18,8 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.bridge import CanBridge
 from tickrig.emulators.can.outside.bus_port import CanBusPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.control.clock import RealClock
 
 CYCLE_S = 0.01

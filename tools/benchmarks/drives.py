@@ -14,7 +14,8 @@ from benchmarks.table import rates
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames
 
 CYCLE_US: Final = 10_000

@@ -6,8 +6,9 @@ from itertools import count
 
 from benchmarks.table import rates
 from tickrig.device.rrc.machine import TICK_US, Rrc
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.serial.serial_line import SerialLine

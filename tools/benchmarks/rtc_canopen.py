@@ -11,7 +11,8 @@ from tickrig.device.canopen.device_rtc.component import CanopenComponent
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import CanopenOutPort as DeviceOutPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, RtComponent
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role, SystemDefinition

@@ -10,8 +10,9 @@ from benchmarks.table import percentiles, rates
 from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink

@@ -8,8 +8,9 @@ from benchmarks.table import RUNS, row
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.options.collision_guard import CollisionGuard

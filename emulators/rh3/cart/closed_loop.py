@@ -12,8 +12,9 @@ from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine

@@ -9,8 +9,9 @@ from typing import Final, Protocol
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.bench.child import running
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rtc_lite.device_type import COMPONENTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.control.client import ControlClient

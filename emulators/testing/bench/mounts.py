@@ -17,7 +17,7 @@ from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import ByteLine
-from tickrig.emulators.rig.rig import Station
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.bridge import Tap
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.host.text.bench_header import DeviceEntry, WireEntry, WireType

@@ -22,7 +22,8 @@ from tickrig.emulators.commands.device_type import DeviceType
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.record.replay import read_recording, replay
 from tickrig.emulators.rig.port import ByteLine
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties import strategies

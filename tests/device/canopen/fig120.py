@@ -11,7 +11,8 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import f_palette, motor_core_unit
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 

@@ -13,7 +13,8 @@ from tests.emulators.can.can_bench import Log, frames
 from tickrig.device.twin import Listeners
 from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.instant import NEVER

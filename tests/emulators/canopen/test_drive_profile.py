@@ -12,7 +12,8 @@ from tickrig.device.canopen.ds402.state.automaton import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIGHT_WHEEL = 2

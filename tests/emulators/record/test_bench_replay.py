@@ -22,7 +22,8 @@ from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.record.bench_replay import read_bench_recording, replay_device
 from tickrig.emulators.record.replay_port import Difference
 from tickrig.emulators.record.trace_recorder import TraceRecorder
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.recorded_device import make_recorded, node_entry
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, WireEntry, WireType

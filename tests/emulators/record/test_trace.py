@@ -12,7 +12,8 @@ from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.record.replay import Recording, read_recording, replay
 from tickrig.emulators.record.replay_port import Difference
 from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.text.trace import Header, Mark, Record, TraceError, parse_record

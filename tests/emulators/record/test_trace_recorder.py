@@ -14,7 +14,8 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.record.trace_recorder import TraceRecorder
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, WireEntry, WireType
 from tickrig.wire.can import CanFrame

@@ -17,7 +17,8 @@ from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node as CanopenNode
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine

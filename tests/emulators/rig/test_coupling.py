@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.coupling import Coupling
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.control.clock import RealClock
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER

@@ -19,8 +19,9 @@ from tests.emulators.rig import forks
 from tests.emulators.rig.forks import STATUS, Bench, go_on
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.serial.serial_line import SerialLine

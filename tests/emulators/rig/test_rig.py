@@ -10,7 +10,8 @@ from tests.emulators.can.can_bench import frames
 from tests.emulators.can.test_can_rig import Node
 from tests.emulators.echo import Echo
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import LATE_KEPT, Rig, Station
+from tickrig.emulators.rig.rig import LATE_KEPT, Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
 

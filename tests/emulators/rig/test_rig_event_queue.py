@@ -25,8 +25,9 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import make_bench
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import RigClock, SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser
 from tickrig.emulators.serial.emulator import Emulator

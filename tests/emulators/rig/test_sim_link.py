@@ -3,8 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.emulators.echo import Echo
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.errors import LinkClosed
 

@@ -12,7 +12,8 @@ from tests.emulators.can.can_bench import Log, frames
 from tests.emulators.can.test_can_rig import Node
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.instant import NEVER
 

@@ -7,8 +7,9 @@ import pytest
 
 from tests.emulators.echo import Echo
 from tests.host.live import pty
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.reopening_link import ReopeningLink

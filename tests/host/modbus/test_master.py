@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from tickrig.device.modbus.registers import Register, Registers
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.links.errors import LinkClosed

@@ -8,8 +8,9 @@ from tests.host.motion.port_bench import PERIOD_US, PortBench
 from tests.host.spy_link import SpyLink
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.links.link import Link

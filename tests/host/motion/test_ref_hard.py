@@ -12,7 +12,8 @@ from tests.host.motion.port_bench import PortBench
 from tickrig.device.modbus.registers import Registers
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.rh3.base import Rh3Base
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import Link
 from tickrig.host.motion.components.ref_hard import RefHard, RefHardRh3

@@ -10,7 +10,8 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc_canopen.definition.definition import SystemDefinition
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition

@@ -9,8 +9,9 @@ from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc import ExecutionContext, Manager

@@ -5,8 +5,9 @@ from __future__ import annotations
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
 from tickrig.emulators.rig.faults import FaultyPort
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.urg.client import UrgClient, UrgScan

@@ -12,7 +12,8 @@ from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.record.bench_replay import BenchRecording, do, play_device, traffic_of
 from tickrig.emulators.record.comparison import Said
 from tickrig.emulators.record.tolerance import Tolerance
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.commands.compare.compared_line import (
     SEARCHED_US,
     ComparedRun,

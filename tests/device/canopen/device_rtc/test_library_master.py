@@ -12,7 +12,8 @@ from examples.device_rtc_gripper import Gripper
 from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.rtc_canopen.objects import object_table
 

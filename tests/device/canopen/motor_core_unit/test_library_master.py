@@ -13,7 +13,8 @@ from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.models import motor_core_unit
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 NODE_ID = motor_core_unit.NODE_ID

@@ -12,7 +12,8 @@ from tests.emulators.can.test_can_rig import Clock, Node
 from tickrig.emulators.can.outside.bridge import CanBridge
 from tickrig.emulators.can.outside.bus_port import FRAMES_A_POLL, CanBusPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER

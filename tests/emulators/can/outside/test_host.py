@@ -6,7 +6,8 @@ from tests.emulators.can.can_bench import Log, frames
 from tests.emulators.can.test_can_rig import Node
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.links.errors import LinkClosed, LinkTimeout
 from tickrig.wire.can_bits import frame_bits
 

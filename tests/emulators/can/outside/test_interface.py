@@ -15,7 +15,8 @@ from tests.emulators.can.test_can_rig import Node
 from tests.emulators.sim_bench import eds
 from tickrig.emulators.can.outside.interface import CHANNELS, TickrigBus
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.links.can_message import to_frame, to_message
 
 

@@ -19,7 +19,8 @@ from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nod
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.emulators.canopen.rig_file import read_rig
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"

@@ -19,7 +19,8 @@ from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.nmt import NmtState
 

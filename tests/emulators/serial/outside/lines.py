@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from tests.emulators.echo import Echo
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.serial.serial_line import LineEnd, SerialLine

@@ -13,7 +13,8 @@ import pytest
 import serial
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.serial_line import SerialLine

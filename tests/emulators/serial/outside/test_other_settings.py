@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from tests.emulators.echo import Echo
 from tests.emulators.serial.outside.lines import BAUD, SETTING, OpenLine, rig_of
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.serial.outside.uart_errors import UartErrors

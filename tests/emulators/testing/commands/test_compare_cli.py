@@ -18,8 +18,9 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.commands.device_config import configure
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rrc.cli import main as rrc_emu
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine

@@ -11,7 +11,8 @@ from tests.emulators.record.test_bench_replay import EDS, Bench
 from tests.mutated import mutated
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rrc.device_type import RRC
 from tickrig.emulators.rtc_lite.device_type import RTC_LITE
 from tickrig.emulators.serial.serial_line import SerialLine

@@ -18,9 +18,10 @@ from tests.emulators.sim_bench import SimBench
 from tests.emulators.testing.host_clock import user_host
 from tests.emulators.testing.host_clock.user_host import Host
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.sim_waits import EPOCH_S
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.host_clock.errors import HostTimeError
 from tickrig.emulators.testing.host_clock.patched_time import patched_time

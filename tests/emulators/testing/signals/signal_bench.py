@@ -8,7 +8,8 @@ from typing import Any
 
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.signals.driver import SignalDriver
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec

@@ -12,7 +12,8 @@ from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.signals.driver import SignalDriver
 from tickrig.emulators.testing.signals.scope import check_signals
 from tickrig.wire.instant import NEVER

@@ -23,7 +23,8 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.signals.driver import SignalDriver
 from tickrig.wire.instant import NEVER
 

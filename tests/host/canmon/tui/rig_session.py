@@ -8,7 +8,8 @@ from pathlib import Path
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.monitor.decode.node_memory import read_eds_objects

@@ -6,7 +6,8 @@ from tests.host.canmon.tui.rig_session import EPOS, NODE
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
 from tickrig.host.canmon.tui.tasks.session import Model, Session, open_session

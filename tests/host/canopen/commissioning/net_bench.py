@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.slave import Slave
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
 

@@ -9,7 +9,8 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 

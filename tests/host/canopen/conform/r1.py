@@ -16,7 +16,8 @@ from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan

@@ -12,7 +12,8 @@ from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tests.host.canopen.conform.test_safety import SpyLink, failing
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan

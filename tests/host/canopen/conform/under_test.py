@@ -10,7 +10,8 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe
 from tickrig.emulators.canopen.eds import EdsCache
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report, Verdict

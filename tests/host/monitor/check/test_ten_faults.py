@@ -15,7 +15,8 @@ from tests.host.monitor.check.expression.held import findings
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.rules import parse_rules
 from tickrig.host.monitor.frames.record import Record

@@ -46,7 +46,7 @@ def test_the_bytes_of_a_frame_with_neg8_sum_up_to_0(data: bytes, number: int) ->
     ("text", "said"),
     [
         ("0", "is not BYTE:LOW..HIGH"),
-        ("8:0..1", "is not BYTE:LOW..HIGH"),
+        ("100:0..1", "is not BYTE:LOW..HIGH"),
         ("0.6+4:0..1", "has 4 bits from bit 6 of a byte"),
         ("0:5..5", "counts from 5 to 5"),
         ("0:0..256", "counts from 0 to 256; 8 bits hold 255"),

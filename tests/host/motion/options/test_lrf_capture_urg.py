@@ -7,8 +7,9 @@ import pytest
 from tests.host.motion.port_bench import PERIOD_US, PortBench
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import room
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.link import Link
 from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg

@@ -8,7 +8,8 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
 from tickrig.emulators.canopen.node.node_spec import parse_node
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc_canopen.builder.build import build
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, parse_project
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition

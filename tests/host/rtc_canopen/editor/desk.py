@@ -14,7 +14,8 @@ from tests.host.rtc_canopen.bench import SYSTEMS, node
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc_canopen.editor import app as editor_app
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.session import AddComponents, EditorSession

@@ -14,7 +14,8 @@ from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun

@@ -12,7 +12,8 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.rig import Rig, Station
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
