@@ -98,6 +98,9 @@ def prepare_bus(bus: can.BusABC, interface: str) -> None:
             _enlarge_queue(sock)
             if interface == INTERFACE:
                 _keep_to_group(sock)
+                with suppress(BlockingIOError):
+                    while True:  # what came before
+                        sock.recv(1, socket.MSG_DONTWAIT)
 
 
 def _keep_to_group(sock: socket.socket) -> None:
@@ -106,9 +109,6 @@ def _keep_to_group(sock: socket.socket) -> None:
             sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
         else:
             sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
-    with suppress(BlockingIOError):
-        while True:  # what came before
-            sock.recv(1, socket.MSG_DONTWAIT)
 
 
 SEND_TIMEOUT_US: Final = 1_000_000

@@ -31,15 +31,15 @@ class TriggerKeys:
         """Take signals while the block runs."""
         if sys.platform == "win32":
             yield
-            return
-        before = signal.signal(signal.SIGUSR1, self._signalled)
-        # a job in the background that reads its terminal would be stopped
-        ignored = signal.signal(signal.SIGTTIN, signal.SIG_IGN)
-        try:
-            yield
-        finally:
-            signal.signal(signal.SIGUSR1, before)
-            signal.signal(signal.SIGTTIN, ignored)
+        else:  # mypy leaves out the branch of the other system
+            before = signal.signal(signal.SIGUSR1, self._signalled)
+            # a job in the background that reads its terminal would be stopped
+            ignored = signal.signal(signal.SIGTTIN, signal.SIG_IGN)
+            try:
+                yield
+            finally:
+                signal.signal(signal.SIGUSR1, before)
+                signal.signal(signal.SIGTTIN, ignored)
 
     def pressed(self) -> str:
         """Return what was pressed since the last time; empty if nothing was."""
