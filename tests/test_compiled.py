@@ -147,7 +147,7 @@ def test_of_the_public_classes_users_derive_from_all_but_those_of_the_page() -> 
 
 def test_a_compiled_caller_does_not_see_what_is_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
     station = Station(make_epos(6), CanWire().end())
-    monkeypatch.setattr("tickrig.emulators.rig.rig._next_tick_us", lambda *times: -1)
+    monkeypatch.setattr("tickrig.emulators.rig.station.next_tick_us", lambda *times: -1)
     assert (station.wake_us(0) == -1) is not tickrig.compiled
 
 
