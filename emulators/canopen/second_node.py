@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.device.canopen.core.slave import UNCONFIGURED
-from tickrig.emulators.can.outside.bridge import CountingPort
+from tickrig.emulators.can.outside.bridge import CountingPort, PortBefore
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
@@ -17,7 +17,7 @@ ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + UN
 _logger = log_of(__name__)
 
 
-class SecondNodeAlarm:
+class SecondNodeAlarm(PortBefore):
     """A port that warns, once for each node, of somebody outside who has its node-ID.
 
     It hears boot-ups, heartbeats and answers to guarding. A second node that sends none of them
@@ -29,29 +29,16 @@ class SecondNodeAlarm:
     """
 
     def __init__(self, port: CountingPort, nodes: Sequence[Node]) -> None:
-        self._port, self._alone = port, list(nodes)
-
-    @property
-    def lost(self) -> int:
-        """Frames dropped because the adapter took none."""
-        return self._port.lost
-
-    @property
-    def due_us(self) -> int:
-        """When the next traffic arrives."""
-        return self._port.due_us
+        super().__init__(port)
+        self._alone = list(nodes)
 
     def poll(self, now_us: int, /) -> Frames:
         """Read what others have sent."""
-        frames = self._port.poll(now_us)
+        frames = super().poll(now_us)
         for frame in frames:
             if frame.can_id in ERROR_CONTROL and self._alone:
                 self._look(frame)
         return frames
-
-    def send(self, now_us: int, traffic: Frames, /) -> None:
-        """Send."""
-        self._port.send(now_us, traffic)
 
     def _look(self, frame: CanFrame) -> None:
         if frame.extended or not frame.data:

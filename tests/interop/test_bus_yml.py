@@ -13,7 +13,8 @@ from tests.interop.buses import Bus
 from tests.interop.slave import running
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
 from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
-from tickrig.host.links.can_link import INTERFACE, CanLink, EchoFreeLink
+from tickrig.host.links.can_link import INTERFACE, CanLink
+from tickrig.host.links.echo import EchoFreeLink
 from tickrig.testing import open_master
 
 pytestmark = pytest.mark.realtime

@@ -6,7 +6,7 @@ from typing import Final, Protocol
 
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.port import Port
-from tickrig.host.links.can_link import EchoFilter
+from tickrig.host.links.echo import EchoFilter
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
@@ -61,15 +61,15 @@ class CountingPort(Port[Frames], Protocol):
         ...
 
 
-class WithoutEcho:
-    """A port on the udp_multicast bus of python-can, which hears its own frames.
+class PortBefore:
+    """A port that passes all on to and from the port behind it.
 
     Args:
         port: the port behind it.
     """
 
     def __init__(self, port: CountingPort) -> None:
-        self._port, self._echo = port, EchoFilter()
+        self._port = port
 
     @property
     def lost(self) -> int:
@@ -83,10 +83,30 @@ class WithoutEcho:
 
     def poll(self, now_us: int, /) -> Frames:
         """Read what others have sent."""
+        return self._port.poll(now_us)
+
+    def send(self, now_us: int, traffic: Frames, /) -> None:
+        """Send."""
+        self._port.send(now_us, traffic)
+
+
+class WithoutEcho(PortBefore):
+    """A port on the udp_multicast bus of python-can, which hears its own frames.
+
+    Args:
+        port: the port behind it.
+    """
+
+    def __init__(self, port: CountingPort) -> None:
+        super().__init__(port)
+        self._echo = EchoFilter()
+
+    def poll(self, now_us: int, /) -> Frames:
+        """Read what others have sent."""
         self._echo.expire(now_us)
-        return tuple(frame for frame in self._port.poll(now_us) if not self._echo.take(frame))
+        return tuple(frame for frame in super().poll(now_us) if not self._echo.take(frame))
 
     def send(self, now_us: int, traffic: Frames, /) -> None:
         """Send, and await the echo."""
         self._echo.sent(now_us, traffic)
-        self._port.send(now_us, traffic)
+        super().send(now_us, traffic)

@@ -12,6 +12,7 @@ from tickrig.device.twin import NonCopyable
 from tickrig.emulators.can.outside.bridge import CountingPort, WithoutEcho
 from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.echo import ECHOING
 from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
@@ -98,10 +99,6 @@ class CanBusPort(NonCopyable):
         if failed and not self.failed:
             _logger.warning("CAN bus: %s; what it does not take is kept", failed)
         self.failed = failed
-
-
-ECHOING: Final = ("udp_multicast",)
-"""Interfaces that give back what they sent, whatever is asked of them."""
 
 
 class OpenBus(NamedTuple):

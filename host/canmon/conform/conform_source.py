@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from tickrig.wire.canopen.eds.eds_file import EdsFile
 
 RIG_FILE: Final = ".toml"
-ECHOING: Final = ("udp_multicast",)
-"""Interfaces that give a host its own frames."""
 
 RIGS: Final = ExtensionGroup[Any](
     "tickrig.conform_sources",
@@ -132,7 +130,8 @@ def _open_rig(path: Path, node_id: int | None) -> ConformSource:
 
 def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
     from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
-    from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
 
     given = bus_source.merged(spec, options)
     bus, interface, name = bus_source.open_bus(given)
@@ -142,7 +141,7 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
         bus.shutdown()
         raise SourceFailed(str(error)) from None
     return ConformSource(
-        EchoFreeLink(link) if interface in ECHOING else link,
+        free_of_echo(link, interface),
         name,
         interface,
         given.bitrate,

@@ -21,7 +21,7 @@ from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH, VERSION
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.serving import stopped_by_signals
-from tickrig.host.control.line_server import LineServer
+from tickrig.host.control.line_server import Answer, LineServer
 from tickrig.host.control.unix_socket import listen_at
 from tickrig.host.links.errors import LinkClosed
 
@@ -134,8 +134,8 @@ def _serve(listener: socket.socket, bus: NodeBus, net: int) -> None:
     """Answer clients until Ctrl-C; meanwhile the bus is listened to, so that no queue fills."""
     stopped: list[bool] = []
 
-    def begin() -> LineAnswer:
-        return LineAnswer(Gateway(bus, net, VERSION))
+    def begin() -> Answer:
+        return _answering(Gateway(bus, net, VERSION))
 
     server = LineServer(listener, begin, _refusal, MAX_LINE)
     with stopped_by_signals(lambda: stopped.append(True)), suppress(KeyboardInterrupt):
@@ -145,20 +145,9 @@ def _serve(listener: socket.socket, bus: NodeBus, net: int) -> None:
     server.close()
 
 
-class LineAnswer:
-    """Answers the lines of a client.
-
-    Args:
-        gateway: of this client.
-    """
-
-    def __init__(self, gateway: Gateway) -> None:
-        self._gateway = gateway
-
-    def __call__(self, line: bytes) -> bytes:
-        """Answer a line."""
-        text = line.decode("latin-1").rstrip("\r")
-        return _line(self._gateway.answer(text))
+def _answering(gateway: Gateway) -> Answer:
+    """Return what answers the lines of a client."""
+    return lambda line: _line(gateway.answer(line.decode("latin-1").rstrip("\r")))
 
 
 def _line(text: str) -> bytes:

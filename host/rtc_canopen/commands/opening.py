@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from tickrig.host.rtc_canopen.server import RtcCanopenServer
     from tickrig.wire.can_error import ErrorState
 
-ECHOING: Final = ("udp_multicast",)
-"""Interfaces that give back what they sent, whatever is asked of them."""
-
 STANDARD_OUTPUT: Final = Path("-")
 
 
@@ -101,14 +98,15 @@ def open_link(
         bus_state: called with what its CAN controller reports.
         stack: closes it.
     """
-    from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
 
     bus, interface, channel = open_raw(options)
     link = CanLink(bus, f"{interface}:{channel}", drops=True)
     stack.callback(_close, link)
     link.on_error_state = bus_state
     name = f"{interface} {channel}"
-    return (EchoFreeLink(link) if interface in ECHOING else link), name
+    return free_of_echo(link, interface), name
 
 
 def bus_of(options: BusOptions, entry: BusEntry) -> BusOptions:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.links.can_link import ECHO_US, EchoFilter
+from tickrig.host.links.echo import ECHO_US, EchoFilter
 from tickrig.wire.can import CanFrame
 
 FRAMES = st.sampled_from([CanFrame(0x181, bytes([number])) for number in range(3)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.emulators.can.can_bench import frames
-from tickrig.host.links.can_link import EchoFreeLink
+from tickrig.host.links.echo import EchoFreeLink
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import Frames
 

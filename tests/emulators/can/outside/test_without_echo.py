@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from tests.device.canopen.slave_bench import frames
 from tickrig.emulators.can.outside.bridge import WithoutEcho
-from tickrig.host.links.can_link import ECHO_US
+from tickrig.host.links.echo import ECHO_US
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 

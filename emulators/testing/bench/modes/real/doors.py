@@ -139,13 +139,13 @@ def _line_link(place: LinePlace) -> Link[bytes]:
 
 
 def _frame_link(place: BusPlan, watch: DoorWatch) -> StampedLink:
-    from tickrig.emulators.can.outside.bus_port import ECHOING  # noqa: PLC0415 - slow
     from tickrig.emulators.testing.bench.modes.real.watched_bus import (  # noqa: PLC0415 - slow
         name_of,
         open_bus,
     )
-    from tickrig.host.links.can_link import CanLink, EchoFreeLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
 
     link = CanLink(open_bus(place, {}), name_of(place))
     link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
-    return EchoFreeLink(link) if place.interface in ECHOING else link
+    return free_of_echo(link, place.interface)

@@ -1,0 +1,92 @@
+"""One's own frames that come back: what tells them from those of others."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Final
+
+from tickrig.host.links.link import StampedFrames, StampedLink
+from tickrig.wire.can import CanFrame, Frames
+
+ECHOING: Final = ("udp_multicast",)
+"""Interfaces that give back what they sent, whatever is asked of them."""
+
+ECHO_US: Final = 1_000_000
+"""An echo that has not come by then was lost."""
+
+
+class EchoFilter:
+    """Tells the echo of one's own frames from what others sent.
+
+    A frame of somebody else that is the same as one whose echo is awaited is taken
+    for the echo, and the echo for it.
+    """
+
+    def __init__(self) -> None:
+        self._sent: deque[tuple[int, CanFrame]] = deque()
+        self._awaited: dict[CanFrame, deque[int]] = {}  # by frame: a look does not take longer
+
+    def sent(self, now_us: int, traffic: Frames) -> None:
+        """Await the echo of what is sent now."""
+        for frame in traffic:
+            self._sent.append((now_us, frame))
+            self._awaited.setdefault(frame, deque()).append(now_us)
+
+    def expire(self, now_us: int) -> None:
+        """Await no more what was sent more than `ECHO_US` ago."""
+        while self._sent and self._sent[0][0] < now_us - ECHO_US:
+            sent_us, frame = self._sent.popleft()
+            if frame in self._awaited and self._awaited[frame][0] <= sent_us:
+                self.take(frame)
+
+    def take(self, frame: CanFrame) -> bool:
+        """Return whether a frame is an awaited echo, which is then awaited no more."""
+        if frame not in self._awaited:
+            return False
+        times = self._awaited[frame]
+        times.popleft()
+        if not times:
+            del self._awaited[frame]
+        return True
+
+
+class EchoFreeLink:
+    """A `StampedLink` on the udp_multicast bus of python-can, which hears its own frames.
+
+    Args:
+        link: the link behind it.
+    """
+
+    def __init__(self, link: StampedLink) -> None:
+        self._link, self._echo = link, EchoFilter()
+
+    @property
+    def now_us(self) -> int:
+        """The clock of the link behind it."""
+        return self._link.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        """Send, and await the echo."""
+        self._echo.sent(self.now_us, traffic)
+        self._link.send(traffic)
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        """Return what others sent; nothing, maybe before its time, if it was all echo."""
+        return tuple(frame for _, frame in self.receive_stamped(timeout_us)[1])
+
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        """Return a time, and what others sent by then."""
+        now_us, received = self._link.receive_stamped(timeout_us)
+        self._echo.expire(now_us)
+        return now_us, tuple(
+            (at_us, frame) for at_us, frame in received if not self._echo.take(frame)
+        )
+
+    def close(self) -> None:
+        """Close the link behind it."""
+        self._link.close()
+
+
+def free_of_echo(link: StampedLink, interface: str) -> StampedLink:
+    """Return the link without its echo, or itself where its interface gives none."""
+    return EchoFreeLink(link) if interface in ECHOING else link
