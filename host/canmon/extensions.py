@@ -63,7 +63,11 @@ def load_rule(name: str) -> Callable[[], Rule]:
     Raises:
         ExtensionError: there is none of this name, or it cannot be used.
     """
-    found = DECODERS.load(name)
+    try:
+        found = DECODERS.load(name)
+    except ExtensionError as error:
+        hint = "" if name in DECODERS.names() else "; without a package it is as 'emcy never'"
+        raise ExtensionError(f"{error}{hint}") from None
     if not _is_class_with(found, RULE):
         raise ExtensionError(f"{name!r} is a decoder, no rule")
 

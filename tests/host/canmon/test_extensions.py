@@ -137,7 +137,8 @@ def test_a_foreign_rule_is_held_by_a_file() -> None:
         ("fragile", "rule 'fragile': ZeroDivisionError: division by zero"),
         (
             "heavy",
-            "no decoder or rule 'heavy'; known: fragile, max-weight, number, scale, unmade",
+            "no decoder or rule 'heavy'; known: fragile, max-weight, number, scale, unmade;"
+            " without a package it is as 'emcy never'",
         ),
     ],
 )
