@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, ClassVar, Final, Generic, TypeVar
 
 from tickrig.device.physical import InputSignal, QuantityBank
 from tickrig.device.twin import Copyable
+from tickrig.wire.instant import NEVER
 
 P = TypeVar("P")
 
@@ -109,6 +111,48 @@ class CallbackRunner(Generic[C]):
         self.executed += callback == "on_execute"
         result: Result = getattr(self.component, callback)()
         return result in (None, DeviceReturnCode.RTC_OK)
+
+
+@dataclass(slots=True)
+class Timer:
+    """A timer as execution context (RTC-Lite type 22h, DeviceRTC): periods from its start on.
+
+    It does not drift, and a period that is missed is left out.
+
+    Attributes:
+        rate_hz: periods a second; a new rate holds from the next start.
+        due_us: when the next period ends, `NEVER` while it stands still.
+    """
+
+    rate_hz: int
+    due_us: int = field(default=NEVER, init=False)
+    _start_us: int = field(default=0, init=False)
+
+    def start(self, now_us: int) -> None:
+        """Begin the first period."""
+        self._start_us = now_us
+        self._note_due(now_us)
+
+    def stop(self) -> None:
+        """Stand still."""
+        self.due_us = NEVER
+
+    def run(self, now_us: int) -> None:
+        """Run or go on running."""
+        if self.due_us == NEVER:
+            self.start(now_us)
+
+    def elapsed(self, now_us: int) -> bool:
+        """Whether a period has ended; the next one is that which ends after `now_us`."""
+        if now_us < self.due_us:
+            return False
+        self._note_due(now_us)
+        return True
+
+    def _note_due(self, now_us: int) -> None:
+        """Look for the first end of a period after `now_us`."""
+        periods = (now_us - self._start_us) * self.rate_hz // 1_000_000 + 1
+        self.due_us = self._start_us - -periods * 1_000_000 // self.rate_hz
 
 
 def declared(owner: type, kind: type[P]) -> Iterator[tuple[str, P]]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
+from tickrig.device.component import Timer
 from tickrig.device.physical import InputBank, OutputSignal
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
@@ -13,7 +14,6 @@ from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
 from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, LiteReceiver
 from tickrig.device.rtc_lite.server import LiteServer
 from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
-from tickrig.device.timer import Timer
 from tickrig.device.twin import Copyable
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteLinkFault, LiteState
 from tickrig.wire.rtc_lite.decoder import LiteDecoder

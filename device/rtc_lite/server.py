@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
+from tickrig.device.component import Timer
 from tickrig.device.rtc_lite.config import RATE_HZ
 from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
 from tickrig.device.rtc_lite.ports import LitePort
-from tickrig.device.timer import Timer
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
 from tickrig.wire.rtc_lite.frame import LiteFrame
 from tickrig.wire.rtc_lite.layout import WITH_FIELDS

@@ -1,4 +1,4 @@
-"""Servos that are shipped, with where their numbers are from (docs/servo.md)."""
+"""Servos that are shipped, with where their numbers are from (docs/reference/devices/servo.md)."""
 
 from __future__ import annotations
 

@@ -12,8 +12,15 @@ from tickrig.device.urg.parameters import LAST_STEP
 from tickrig.device.urg.settings import Settings
 from tickrig.device.urg.texts import first_version
 from tickrig.device.urg.view import View
-from tickrig.wire.scip import status
-from tickrig.wire.scip.scip1 import ERROR, FARTHEST_MM, OK, SWITCH, encode_distances, encode_reply
+from tickrig.wire.sensors.scip import status
+from tickrig.wire.sensors.scip.scip1 import (
+    ERROR,
+    FARTHEST_MM,
+    OK,
+    SWITCH,
+    encode_distances,
+    encode_reply,
+)
 
 _RATE_KEPT: Final = "03"
 

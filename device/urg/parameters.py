@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.device.twin import Immutable
-from tickrig.wire.scip.description import Specification
+from tickrig.wire.sensors.scip.description import Specification
 
 URG_04LX: Final = Specification(
     "URG-04LX(Hokuyo Automatic Co.,Ltd.)", 20, 5_600, 1_024, 44, 725, 384, 600

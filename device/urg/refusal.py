@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tickrig.device.urg.parameters import LAST_STEP
-from tickrig.wire.scip import status
-from tickrig.wire.scip.command import LETTERS, MOST_STRING, SIZES, Command
+from tickrig.wire.sensors.scip import status
+from tickrig.wire.sensors.scip.command import LETTERS, MOST_STRING, SIZES, Command
 
 NOT_A_NUMBER = ("01", "02", "03", "06", "07")
 """Starting step, end step, cluster count, scan interval, number of scans."""

@@ -18,11 +18,11 @@ from tickrig.device.urg.texts import CONDITION, version
 from tickrig.device.urg.view import View
 from tickrig.device.urg.world import World
 from tickrig.wire.instant import NEVER
-from tickrig.wire.scip import status
-from tickrig.wire.scip.command import Command
-from tickrig.wire.scip.description import encode_lines
-from tickrig.wire.scip.encoding import encode_number, with_sum
-from tickrig.wire.scip.reply import Reply
+from tickrig.wire.sensors.scip import status
+from tickrig.wire.sensors.scip.command import Command
+from tickrig.wire.sensors.scip.description import encode_lines
+from tickrig.wire.sensors.scip.encoding import encode_number, with_sum
+from tickrig.wire.sensors.scip.reply import Reply
 
 TIMER: Final = 2**24
 """Milliseconds after which the timer begins again."""

@@ -13,7 +13,7 @@ from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.scip_server import ScipServer
 from tickrig.device.urg.terminals import GROUPS, INPUTS, OUTPUTS
 from tickrig.device.urg.world import Post, World
-from tickrig.wire.scip import status
+from tickrig.wire.sensors.scip import status
 from tickrig.wire.serial.lines import LineSplitter
 
 TICK_US: Final = 1_000

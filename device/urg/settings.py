@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.device.urg.parameters import BIT_RATE
 from tickrig.device.urg.texts import BY_DEFAULT
-from tickrig.wire.scip import status
+from tickrig.wire.sensors.scip import status
 
 BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tickrig.device.urg.view import View
-from tickrig.wire.scip import status
-from tickrig.wire.scip.command import Command
-from tickrig.wire.scip.reply import Reply
-from tickrig.wire.scip.scan import WIDTHS, encode_scan
+from tickrig.wire.sensors.scip import status
+from tickrig.wire.sensors.scip.command import Command
+from tickrig.wire.sensors.scip.reply import Reply
+from tickrig.wire.sensors.scip.scan import WIDTHS, encode_scan
 
 WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
 """The most that so many characters carry; what is farther reads so."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.wire.scip import status
+from tickrig.wire.sensors.scip import status
 
 BY_DEFAULT: Final = "<-Default setting by user"
 

@@ -15,7 +15,7 @@ from tickrig.device.twin import Immutable
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.ray_cast import Beams
 from tickrig.device.urg.world import Rays, World, rays_of
-from tickrig.wire.scip.description import Specification
+from tickrig.wire.sensors.scip.description import Specification
 
 HALF: Final = 2.0**63
 

@@ -36,6 +36,9 @@ from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.servo.presets import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.device.twin import Copyable, NonCopyable
+from tickrig.device.ucode_reader.markers import Marker
+from tickrig.device.ucode_reader.parameters import ReaderParameters
+from tickrig.device.ucode_reader.reader import UcodeReader
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World, room
@@ -65,6 +68,7 @@ MACHINES: Final[dict[str, Callable[[], object]]] = {
     "RH3 base": Rh3Base,
     "Modbus slave": lambda: Rh3Base().slave,
     "URG": Urg,
+    "ucode reader": UcodeReader,
     "servo": lambda: Servo(EPOS_WHEEL),
     "wheeled body": lambda: WheeledBody(WHEELS),
     "omni body": OmniBody,
@@ -142,6 +146,7 @@ def test_every_type_of_machine_is_copied_or_refuses() -> None:
 FROZEN: Final = (
     *(RrcConfig(), LiteConfig(), UrgParameters(), BaseParameters(), WHEELS, OmniParameters()),
     *(World(posts=(Post(1, 0, 0.2),)), room(4, 3), Pose(1, 2, 3), EPOS_WHEEL),
+    *(ReaderParameters(), Marker("0" * 32, 1, 2)),
     *(InputSignal("lamp", "lamp"), OutputSignal("state", "state"), CanFrame.parse("123#00")),
 )
 

@@ -55,7 +55,7 @@ class Ok:
 
     def encode(self) -> bytes:
         """Write the line with its LF."""
-        return b"OK:%b\n" % self.name.encode("ascii")
+        return b"OK:%b\n" % self.name.encode("latin-1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Refusal:
 
     def encode(self) -> bytes:
         """Write the line with its LF."""
-        return b"ER:%b\n" % self.reason.encode("ascii")
+        return b"ER:%b\n" % self.reason.encode("latin-1")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +87,7 @@ class Event:
 
     def encode(self) -> bytes:
         """Write the line with its LF."""
-        return b"EV:%b\n" % self.name.encode("ascii")
+        return b"EV:%b\n" % self.name.encode("latin-1")
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from tickrig.device.canopen.device_rtc.life_cycle import CanopenLifeCycle
 from tickrig.device.canopen.device_rtc.terminals import SHUT_DOWN, inputs_of, outputs_of, text_of
 from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
 from tickrig.device.canopen.stack import make_slave
+from tickrig.device.component import Timer
 from tickrig.device.physical import OutputSignal
-from tickrig.device.timer import Timer
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.rtc_canopen.objects import object_table
 

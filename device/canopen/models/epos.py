@@ -1,7 +1,7 @@
 """A positioning drive like Maxon's EPOS 24/5 with a wheel of beego (DECISION K21).
 
 Objects, units and defaults follow the EPOS Firmware Specification as far as CiA 402
-has the same; docs/epos.md says what is ours.
+has the same; docs/reference/devices/epos.md says what is ours.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ import pytest
 from tests.device.urg.measured import Measured
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.world import World, room
-from tickrig.wire.scip.description import encode_lines, parse_lines
-from tickrig.wire.scip.encoding import parse_number, parse_numbers, without_sum
+from tickrig.wire.sensors.scip.description import encode_lines, parse_lines
+from tickrig.wire.sensors.scip.encoding import parse_number, parse_numbers, without_sum
 
 GOLDEN: Final[dict[str, Any]] = json.loads(
     (Path(__file__).parents[2] / "golden" / "scip_urg_04lx.json").read_text()

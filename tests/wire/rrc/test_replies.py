@@ -47,6 +47,11 @@ def test_noise_is_a_wire_error_or_a_reply(line: bytes) -> None:
     assert isinstance(reply, Ok | Refusal | Event | StatusA | Text)
 
 
+@pytest.mark.parametrize("line", [b"OK:out\xf4ut", b"ER:\x80", b"EV:Init\xffalized", b"dev\xe9ce"])
+def test_a_line_that_a_fault_changed_is_written_as_it_came(line: bytes) -> None:
+    assert parse_reply(line).encode() == line + b"\n"
+
+
 def test_both_names_of_power_on_are_one_event() -> None:
     assert Event("PowerOn").kind is Event("PowerOnTrigger").kind is RrcEvent.POWER_ON
 

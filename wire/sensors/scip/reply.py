@@ -13,8 +13,8 @@ from typing import Final
 
 from tickrig._compiled import mypyc_attr
 from tickrig.wire.errors import FramingError, WireError
-from tickrig.wire.scip.encoding import with_sum, without_sum
-from tickrig.wire.scip.scip1 import OK, SWITCH
+from tickrig.wire.sensors.scip.encoding import with_sum, without_sum
+from tickrig.wire.sensors.scip.scip1 import OK, SWITCH
 
 END: Final = b"\n\n"
 STATUS_BYTES: Final = 2

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tickrig.wire.errors import FramingError
-from tickrig.wire.scip.encoding import (
+from tickrig.wire.sensors.scip.encoding import (
     encode_number,
     encode_numbers,
     parse_number,

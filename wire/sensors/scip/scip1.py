@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from tickrig.wire.scip.encoding import encode_numbers
-from tickrig.wire.scip.scan import BLOCK_BYTES
+from tickrig.wire.sensors.scip.encoding import encode_numbers
+from tickrig.wire.sensors.scip.scan import BLOCK_BYTES
 
 SWITCH: Final = b"SCIP2.0"
 """The command after which a sensor speaks SCIP 2.0, until it is without power."""

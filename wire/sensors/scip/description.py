@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from tickrig.wire.errors import ChecksumError, FieldError, FramingError
-from tickrig.wire.scip.encoding import line_sum, with_sum
+from tickrig.wire.sensors.scip.encoding import line_sum, with_sum
 
 
 def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:

@@ -1,0 +1,231 @@
+"""Machines put back in place to what they were: many runs from one state."""
+
+from __future__ import annotations
+
+import copyreg
+import enum
+import gc
+import operator
+import re
+import struct
+import weakref
+from _random import Random
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from functools import partial
+from io import BytesIO, StringIO
+from types import (
+    BuiltinFunctionType,
+    CellType,
+    CodeType,
+    CoroutineType,
+    FrameType,
+    FunctionType,
+    GeneratorType,
+    GenericAlias,
+    MappingProxyType,
+    MethodType,
+    MethodWrapperType,
+    ModuleType,
+)
+from typing import Any, Final
+
+from tickrig.device.twin.copyable import NonCopyable
+
+PutBack = Callable[[], object]
+"""Makes one object what it was."""
+
+LEFT: Final = (
+    *(int, str, bytes, float, complex, type(None), range, slice, type(...)),
+    *(Decimal, type, ModuleType, CodeType, GenericAlias, re.Pattern, enum.Enum, struct.Struct),
+    *(operator.attrgetter, operator.itemgetter, operator.methodcaller, property),
+    *(weakref.ref, FrameType),
+)
+"""What never changes, or is of the process: it is left as it is."""
+
+NEVER_CHANGES: Final[tuple[type, ...]] = (
+    *(tuple, frozenset, MethodType, BuiltinFunctionType, MethodWrapperType, partial),
+    *(MappingProxyType, type({}.keys()), type({}.values()), type({}.items())),
+)
+"""What never changes itself, but refers to what does."""
+
+LEFT_MODULES: Final = {"_thread", "datetime", "logging"}
+"""Modules whose objects are left as they are: locks, times, loggers."""
+
+HEAP_TYPE: Final = 1 << 9
+"""Flag of a class that is written in Python."""
+
+
+class MachineSnapshot:
+    """What machines are at a moment; `restore` makes the same objects so again.
+
+    Where a twin is another machine, this is the same one: whoever has it, or an end of its wire,
+    need not be told. It costs a fraction of a copy. What was made since is left alone, and nobody
+    in here knows it any more; so listeners that came since are gone.
+
+    What has a method `way_back` is asked for what puts it back, and not looked into. Left as they
+    are: classes, modules, functions but for what they enclose, loggers, locks.
+
+    Args:
+        machines: devices, wires, rigs, hosts, with all that they refer to.
+
+    Raises:
+        TypeError: something in it cannot be put back, as a file or a port of this machine.
+
+    >>> numbers = {"of": [1, 2]}
+    >>> snapshot = MachineSnapshot(numbers)
+    >>> numbers["of"].append(3)
+    >>> snapshot.restore()
+    >>> numbers
+    {'of': [1, 2]}
+    """
+
+    def __init__(self, *machines: object) -> None:
+        self._put_back: tuple[PutBack, ...] = tuple(_Walk().through(machines))
+
+    def restore(self) -> None:
+        """Make all of it what it was; as often as wanted.
+
+        Raises:
+            TypeError: a generator has gone on since, which nobody can undo.
+        """
+        for put_back in self._put_back:
+            put_back()
+
+
+class _Walk:
+    """Goes through all that machines refer to, each once."""
+
+    def __init__(self) -> None:
+        self._seen: dict[int, object] = {}
+        self._found: list[tuple[object, str]] = []
+
+    def through(self, machines: tuple[object, ...]) -> Iterator[PutBack]:
+        """Give what puts each of it back."""
+        self._found = [(machine, "a snapshot") for machine in machines]
+        while self._found:
+            item, owner = self._found.pop()
+            if id(item) in self._seen:
+                continue
+            self._seen[id(item)] = item
+            way_back = getattr(type(item), "way_back", None)
+            if way_back is not None:
+                yield way_back(item)
+            elif isinstance(item, NEVER_CHANGES):
+                self._find(item, gc.get_referents(item))
+            elif not _is_left(item):
+                yield from self._changing(item, owner)
+
+    def _find(self, owner: object, items: Any) -> None:
+        name = type(owner).__name__
+        self._found.extend((item, name) for item in items)
+
+    def _changing(self, item: Any, owner: str) -> Iterator[PutBack]:
+        if isinstance(item, FunctionType):
+            self._find(item, item.__closure__ or ())
+        elif isinstance(item, CellType):
+            if (content := _content_of(item)) is not item:
+                self._find(item, (content,))
+                yield partial(setattr, item, "cell_contents", content)
+        elif isinstance(item, GeneratorType | CoroutineType):
+            self._find(item, gc.get_referents(item))
+            yield partial(_check_place, item, _place_of(item))
+        else:
+            yield from self._contents(item, owner)
+            yield from self._attributes(item)
+
+    def _contents(self, item: Any, owner: str) -> Iterator[PutBack]:
+        """Give what puts back what a container holds; TypeError for what nobody can put back."""
+        if isinstance(item, dict):
+            kept = dict(item)
+            self._find(item, (*kept, *kept.values()))
+            base = OrderedDict if isinstance(item, OrderedDict) else dict
+            yield from (partial(base.clear, item), partial(base.update, item, kept))
+        elif isinstance(item, list | deque | set):
+            items, put = [*item], item.update if isinstance(item, set) else item.extend
+            self._find(item, items)
+            yield from (item.clear, partial(put, items))
+        elif isinstance(item, bytearray):
+            yield partial(item.__setitem__, slice(None), bytes(item))
+        elif isinstance(item, Random):
+            yield partial(Random.setstate, item, Random.getstate(item))
+        elif isinstance(item, BytesIO | StringIO):
+            yield partial(item.__setstate__, item.__getstate__())  # type: ignore[union-attr] # both have it
+        elif isinstance(item, BaseException):
+            self._find(item, item.args)
+        elif not _is_plain(type(item)) or isinstance(item, NonCopyable):
+            name = type(item).__name__
+            raise TypeError(f"{name} cannot be put back, and {owner} has one")
+
+    def _attributes(self, item: Any) -> Iterator[PutBack]:
+        """Give what puts attributes back; a frozen dataclass has none to be put back."""
+        kind, own = type(item), getattr(item, "__dict__", {})
+        kept = dict(own)
+        slots = [name for name in _slots_of(kind) if name != "__dict__"]
+        values = {name: getattr(item, name) for name in slots if hasattr(item, name)}
+        self._find(item, (*kept.values(), *values.values()))
+        if getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
+            return
+        if hasattr(item, "__dict__"):
+            yield partial(_put_attributes, own, kept)
+        for name, value in values.items():
+            yield partial(getattr(kind, name).__set__, item, value)
+        unset = () if hasattr(kind, "__mypyc_attrs__") else slots  # compiled, none can be deleted
+        yield from (partial(_forget, item, name) for name in unset if name not in values)
+
+
+def _is_left(item: object) -> bool:
+    kind = type(item)
+    shared = getattr(kind, "shared_by_twins", False)
+    return shared or isinstance(item, LEFT) or kind.__module__ in LEFT_MODULES
+
+
+def _slots_of(kind: type) -> list[str]:
+    """Return the names of attributes that are not in `__dict__`."""
+    return [*getattr(kind, "__mypyc_attrs__", ()), *copyreg._slotnames(kind)]  # type: ignore[attr-defined] # pickle asks it too
+
+
+def _is_plain(kind: type) -> bool:
+    """Say whether all that objects of a class have are attributes: nothing is hidden in C."""
+    made = ((base, base.__new__) for base in kind.__mro__)
+    solid = next(
+        base
+        for base, new in made
+        if not base.__flags__ & HEAP_TYPE
+        or (isinstance(new, BuiltinFunctionType) and new.__self__ is base)
+    )
+    return solid is object or hasattr(kind, "__mypyc_attrs__")
+
+
+def _put_attributes(own: dict[str, object], kept: dict[str, object]) -> None:
+    own.update(kept)
+    if len(own) != len(kept):
+        for name in [name for name in own if name not in kept]:
+            del own[name]
+
+
+def _forget(item: object, name: str) -> None:
+    if hasattr(item, name):
+        delattr(item, name)
+
+
+def _content_of(cell: CellType) -> object:
+    """Return what a cell has; the cell itself if that is nothing yet."""
+    try:
+        content: object = cell.cell_contents
+    except ValueError:
+        return cell
+    return content
+
+
+def _place_of(item: Any) -> int:
+    """Return where a generator or coroutine stands, -2 if it has ended."""
+    frame = item.gi_frame if isinstance(item, GeneratorType) else item.cr_frame
+    return -2 if frame is None else int(frame.f_lasti)
+
+
+def _check_place(item: object, place: int) -> None:
+    if _place_of(item) != place:
+        name = getattr(item, "__qualname__", "")
+        raise TypeError(f"{type(item).__name__} {name} has gone on, and cannot be put back")
