@@ -1,0 +1,1 @@
+"""OpenRTM on T-Kernel: its node, the ucode reader, the resolution service, the demonstration."""

@@ -1,0 +1,1 @@
+"""The resolution service of ucodes: a table, its faults, HTTP: `ucode-resolver`."""

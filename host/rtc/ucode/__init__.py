@@ -1,0 +1,1 @@
+"""Environment position detection (NEDO report, Fig. 123): reader, settlement, contents."""

@@ -1,0 +1,152 @@
+"""A cache before a source that may be slow, or gone."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from tickrig.host.rtc.ucode.source import Fetched, Source, SourceStatus
+
+V = TypeVar("V")
+
+
+@dataclass(frozen=True, slots=True)
+class CacheLimits:
+    """How much a cache holds, and for how long.
+
+    Attributes:
+        entries: at most so many; the one that was not used for the longest time goes first.
+        fresh_us: an entry that is older is asked for again, and serves meanwhile.
+        keep_us: an entry that is older serves no more.
+        unknown_us: so long what is not there is not asked for again.
+        retry_us: so long after a request that failed.
+    """
+
+    entries: int
+    fresh_us: int
+    keep_us: int
+    unknown_us: int
+    retry_us: int
+
+
+@dataclass(slots=True)
+class CacheCounts:
+    """What became of the questions to a cache.
+
+    Attributes:
+        hits: answered at once.
+        stale: of these, by an entry that is no longer fresh.
+        misses: not answered at once.
+        unknown: of these, because there is nothing under this address.
+        failures: requests to the source that failed.
+        age_us: of the entry that answered last.
+    """
+
+    hits: int = 0
+    stale: int = 0
+    misses: int = 0
+    unknown: int = 0
+    failures: int = 0
+    age_us: int = 0
+
+    @property
+    def total(self) -> int:
+        """How many questions there were, and how many requests that failed: a sign of news."""
+        return self.hits + self.misses + self.failures
+
+
+@dataclass(slots=True)
+class _Entry(Generic[V]):
+    """What is known of an address; `next_us` is when it may be asked for again."""
+
+    value: V | None = None
+    fetched_us: int = 0
+    next_us: int = 0
+    pending: bool = False
+    unknown: bool = False
+
+
+class Cache(Generic[V]):
+    """Holds values by their addresses; while the source does not answer, old ones serve.
+
+    Args:
+        parse: makes a value of a text; ValueError if it is none: such an address is unknown.
+
+    Attributes:
+        counts: what became of the questions.
+        trouble: why the latest request failed; empty after one that did not.
+        invalid: what latest text was none, and why.
+    """
+
+    def __init__(self, parse: Callable[[str], V]) -> None:
+        self._parse, self._entries = parse, OrderedDict[str, _Entry[V]]()
+        self.counts, self.trouble, self.invalid, self._pending = CacheCounts(), "", "", 0
+
+    def __len__(self) -> int:
+        """Return how many addresses have a value."""
+        return sum(entry.value is not None for entry in self._entries.values())
+
+    def look_up(self, address: str, source: Source, limits: CacheLimits, now_us: int) -> V | None:
+        """Return the value under an address, None if there is none now; it may be asked for."""
+        entry = self._entries.setdefault(address, _Entry())
+        self._entries.move_to_end(address)
+        if not entry.pending and now_us >= entry.next_us and self._pending < limits.entries:
+            entry.pending = True
+            self._pending += 1
+            source.request(address, now_us)
+        while len(self._entries) > limits.entries:
+            self._entries.popitem(last=False)
+        return self._answer(entry, limits, now_us)
+
+    def update(self, source: Source, limits: CacheLimits, now_us: int) -> tuple[str, ...]:
+        """Take what came from the source; return the addresses that have a value now."""
+        ended = source.take(now_us)
+        self._pending -= len(ended)
+        return tuple(fetched.address for fetched in ended if self._take(fetched, limits, now_us))
+
+    def value(self, address: str) -> V | None:
+        """Return what is held under an address, however old; this is no look-up."""
+        return entry.value if (entry := self._entries.get(address)) is not None else None
+
+    def forget_requests(self) -> None:
+        """Expect nothing more: the source was closed."""
+        self._pending = 0
+        for entry in self._entries.values():
+            entry.pending = False
+
+    def _answer(self, entry: _Entry[V], limits: CacheLimits, now_us: int) -> V | None:
+        counts, age_us = self.counts, now_us - entry.fetched_us
+        if entry.value is None or age_us > limits.keep_us:
+            counts.misses += 1
+            counts.unknown += entry.unknown
+            return None
+        counts.hits += 1
+        counts.stale += age_us > limits.fresh_us
+        counts.age_us = age_us
+        return entry.value
+
+    def _take(self, fetched: Fetched, limits: CacheLimits, now_us: int) -> bool:
+        entry = self._entries.get(fetched.address)
+        if entry is None:
+            return False
+        entry.pending = False
+        if fetched.status is SourceStatus.FAILED:
+            self.counts.failures += 1
+            self.trouble, entry.next_us = fetched.text, now_us + limits.retry_us
+            return False
+        self.trouble, entry.value = "", self._parsed(fetched)
+        known = entry.value is not None
+        entry.fetched_us, entry.unknown = now_us, not known
+        entry.next_us = now_us + (limits.fresh_us if known else limits.unknown_us)
+        return known
+
+    def _parsed(self, fetched: Fetched) -> V | None:
+        if fetched.status is SourceStatus.UNKNOWN:
+            return None
+        try:
+            return self._parse(fetched.text)
+        except ValueError as error:
+            self.invalid = f"{fetched.address}: {error}"
+            return None

@@ -1,0 +1,115 @@
+"""Information about ucodes over HTTP, in a thread of its own."""
+
+from __future__ import annotations
+
+import queue
+import socket
+import time
+from functools import partial
+from http.client import HTTPException, HTTPResponse
+from io import BytesIO
+from typing import Final
+from urllib.parse import SplitResult, urlsplit
+
+from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.ucode.source import Fetched, SourceStatus
+
+TIMEOUT_S: Final = 1.0
+MOST_OCTETS: Final = 8_192
+"""Of an answer, with its head."""
+
+
+class HttpSource:
+    """Asks by GET, one request after the other, in a thread; a service that hangs delays nobody.
+
+    An answer takes a second at most, however it comes, and has 8192 octets at most. Nobody is
+    asked but the hosts that are named, redirections are not followed, and there is no HTTPS.
+
+    Args:
+        name: who asks; for people.
+        hosts: that addresses may name.
+        timeout_s: for a whole answer.
+    """
+
+    def __init__(self, name: str, hosts: tuple[str, ...], timeout_s: float = TIMEOUT_S) -> None:
+        self._hosts, self._timeout_s = hosts, timeout_s
+        self._thread = PeerThread(name)
+        self._ended: queue.SimpleQueue[Fetched] = queue.SimpleQueue()
+
+    def request(self, address: str, now_us: int) -> None:
+        """Ask for what is under an address."""
+        self._thread.submit(partial(self._fetch, address))
+
+    def take(self, now_us: int) -> tuple[Fetched, ...]:
+        """Take the requests that have ended."""
+        ended = []
+        while not self._ended.empty():
+            ended.append(self._ended.get_nowait())
+        return tuple(ended)
+
+    def close(self) -> None:
+        """End after the present request; nothing waits for that."""
+        self._thread.close()
+
+    def _fetch(self, address: str) -> None:
+        try:
+            fetched = self._get(address, _parts(address, self._hosts))
+        except (OSError, HTTPException, ValueError) as error:
+            why = " ".join(f"{address[:80]}: {error}".split())
+            fetched = Fetched(address, SourceStatus.FAILED, why[:200])
+        self._ended.put(fetched)
+
+    def _get(self, address: str, parts: SplitResult) -> Fetched:
+        raw = _exchange(parts, time.monotonic() + self._timeout_s)
+        response = HTTPResponse(_Received(raw))  # type: ignore[arg-type] # all it wants is makefile
+        response.begin()
+        text = response.read().decode()
+        match response.status:
+            case 200:
+                return Fetched(address, SourceStatus.FOUND, text)
+            case 404:
+                return Fetched(address, SourceStatus.UNKNOWN)
+            case other:
+                raise ValueError(f"HTTP status {other}")
+
+
+class _Received:
+    """What came, where a socket is wanted."""
+
+    def __init__(self, raw: bytes) -> None:
+        self._raw = raw
+
+    def makefile(self, mode: str) -> BytesIO:
+        """Return it as a file."""
+        return BytesIO(self._raw)
+
+
+def _parts(address: str, hosts: tuple[str, ...]) -> SplitResult:
+    parts = urlsplit(address)
+    if parts.scheme != "http" or parts.hostname not in hosts or parts.username is not None:
+        raise ValueError(f"{address[:80]!r} is not http:// at one of {', '.join(hosts)}")
+    if not address.isascii() or not address.isprintable() or " " in address:
+        raise ValueError(f"{address[:80]!r} is no address")
+    return parts
+
+
+def _exchange(parts: SplitResult, deadline_s: float) -> bytes:
+    """Ask, and return all that comes until the other end closes."""
+    request = f"GET {parts.path or '/'} HTTP/1.0\r\nHost: {parts.netloc}\r\n\r\n"
+    end = (str(parts.hostname), parts.port or 80)
+    with socket.create_connection(end, _left_s(deadline_s)) as connection:
+        connection.sendall(request.encode())
+        raw = b""
+        while True:
+            connection.settimeout(_left_s(deadline_s))
+            if not (part := connection.recv(MOST_OCTETS + 1)):
+                return raw
+            raw += part
+            if len(raw) > MOST_OCTETS:
+                raise ValueError(f"the answer has more than {MOST_OCTETS} octets")
+
+
+def _left_s(deadline_s: float) -> float:
+    if (left_s := deadline_s - time.monotonic()) <= 0:
+        raise TimeoutError("timed out")
+    return left_s

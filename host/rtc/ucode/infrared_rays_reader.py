@@ -1,0 +1,111 @@
+"""InfraredRaysReader: lines of an infra-red reader become ucodes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import ClassVar, Final
+
+from tickrig.host.links.errors import LinkError
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.ports.data_port import OutPort
+from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc.ucode.reader_client import Round, UcodeReaderClient
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types.basic import Time, TimedLongSeq, TimedStringSeq
+from tickrig.wire.sensors.ucode import BAUD
+
+_LOG: Final = log_of(__name__)
+
+OpenReader = Callable[[str], Link[bytes]]
+OPEN_SERIAL: Final[OpenReader] = partial(SerialLink, baud=BAUD)
+
+
+class InfraredRaysReader(RtComponent):
+    """Lets a reader listen while it is Active, and writes what it receives in each round.
+
+    Ports: `ucodes` (32 hex digits each, the nearest marker first, none where none was received)
+    and `levels` of their signals in per cent. The report (Fig. 123) only names it; ports and
+    parameters are ours. A reader that is silent is called each second; one whose line is gone
+    is an Error.
+
+    Args:
+        instance_name: of the component.
+        open_link: opens the line; by pyserial unless given.
+
+    Attributes:
+        client: the host of the reader while it is Active.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("InfraredRaysReader", "Ucodes of infra-red markers")
+
+    def __init__(self, instance_name: str, open_link: OpenReader = OPEN_SERIAL) -> None:
+        super().__init__(instance_name)
+        self.device = self.configuration.bind("DeviceFileName", "/dev/ttyUSB0")
+        self.ucodes = self.add_port(OutPort("ucodes", TimedStringSeq))
+        self.levels = self.add_port(OutPort("levels", TimedLongSeq))
+        self._open_link = open_link
+        self.client: UcodeReaderClient | None = None
+        self._was_silent = self._was_blinded = False
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Open the line, and let the reader listen; also after Error."""
+        self._was_silent = self._was_blinded = False
+        try:
+            self.client = UcodeReaderClient(self._open_link(self.device.value))
+        except LinkError as error:
+            return self._failed(error)
+        return ReturnCode.RTC_OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Let it listen no more, and give the line back."""
+        self._close()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Write the rounds that have come."""
+        if self.client is None:
+            return ReturnCode.RTC_ERROR
+        restarts = self.client.restarts
+        try:
+            rounds = self.client.poll()
+        except LinkError as error:
+            return self._failed(error)
+        for received in rounds:
+            self._write(Time.from_us(ec.now_us), received)
+        self._watch(rounds, self.client.restarts > restarts)
+        return ReturnCode.RTC_OK
+
+    def _write(self, now: Time, received: Round) -> None:
+        self.ucodes.write(TimedStringSeq(now, tuple(ucode for ucode, _ in received.ucodes)))
+        self.levels.write(TimedLongSeq(now, tuple(level for _, level in received.ucodes)))
+
+    def _watch(self, rounds: list[Round], silent: bool) -> None:
+        """Log in a line when the reader becomes silent or blinded, or comes back."""
+        if rounds:
+            blinded = rounds[-1].blinded
+            if blinded != self._was_blinded:
+                what = "too much light: nothing is received" if blinded else "it receives again"
+                _LOG.warning("%s: %s", self.instance_name, what)
+            self._was_blinded = blinded
+        if silent and not self._was_silent:
+            _LOG.warning("%s: the reader is silent", self.instance_name)
+        elif rounds and self._was_silent:
+            _LOG.warning("%s: the reader is back", self.instance_name)
+        self._was_silent = not rounds and (silent or self._was_silent)
+
+    def _failed(self, error: Exception) -> ReturnCode:
+        _LOG.error("%s: %s", self.instance_name, error)
+        self._close()
+        return ReturnCode.RTC_ERROR
+
+    def _close(self) -> None:
+        client, self.client = self.client, None
+        try:
+            if client is not None:
+                client.close()
+        except LinkError as error:
+            _LOG.warning("%s: %s", self.instance_name, error)
