@@ -1,4 +1,4 @@
-"""What installed packages add to ours: entry points, read when needed (docs/extending.md)."""
+"""What installed packages add to ours: entry points, read when needed (docs/howto/extending.md)."""
 
 from __future__ import annotations
 

@@ -45,6 +45,7 @@ class MotionChain:
         rate_hz: of the execution context.
 
     Attributes:
+        manager: as given.
         position_input: where goals are entered.
         odometry: what the pose is.
         components: all six, in the order of execution.
@@ -58,7 +59,7 @@ class MotionChain:
         suffix: str = "",
         rate_hz: float = RATE_HZ,
     ) -> None:
-        self._manager, self._suffix = manager, suffix
+        self.manager, self._suffix = manager, suffix
         self.ref_hard = RefHardRh3(f"RefHardRh3{suffix}", open_link)
         self.odometry = Odometry(f"Odometry{suffix}")
         self.position_input = PositionInput(f"PositionInput{suffix}")
@@ -93,11 +94,11 @@ class MotionChain:
 
     def activate(self) -> None:
         """Ask all for Active."""
-        self._manager.activate(*(component.instance_name for component in self.components))
+        self.manager.activate(*(component.instance_name for component in self.components))
 
     def deactivate(self) -> None:
         """Ask those that are Active for Inactive."""
-        self._manager.deactivate(*self._in(LifeCycleState.ACTIVE))
+        self.manager.deactivate(*self._in(LifeCycleState.ACTIVE))
 
     def _in(self, state: LifeCycleState) -> tuple[str, ...]:
         state_of = self.context.state_of

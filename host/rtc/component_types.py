@@ -9,6 +9,11 @@ from tickrig.host.rtc.component import ModuleSpec, RtComponent
 from tickrig.host.rtc.states import RtcRefused
 
 _HERE: Final = "tickrig.host.rtc.components"
+_UCODE: Final = {
+    "infrared_rays_reader": "InfraredRaysReader",
+    "ucode_settlement": "UcodeSettlement",
+    "contents_interpretation": "ContentsInterpretation",
+}
 
 
 def is_component_type(found: object) -> bool:
@@ -26,11 +31,12 @@ COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
     {
         name: f"{_HERE}:{name}"
         for name in ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample")
-    },
+    }
+    | {name: f"tickrig.host.rtc.ucode.{module}:{name}" for module, name in _UCODE.items()},
     is_component_type,
     "an RtComponent with a spec",
 )
-"""The entry-point group `tickrig.components` (docs/extending.md)."""
+"""The entry-point group `tickrig.components` (docs/howto/extending.md)."""
 
 
 def installed_type(name: str) -> type[RtComponent]:

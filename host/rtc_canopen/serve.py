@@ -42,8 +42,9 @@ class ServerRunner:
         late_ticks: how many ticks began more than 1 ms after they were due.
         worst_late_us: by how much the worst of them was late, us.
         after_tick: called with the time after each tick.
-        serve: called between the ticks with the time in us that it may take, every 20 ms
-            at least; a control socket, say.
+        serve: called between the ticks with the time in us that it may take, every
+            `pause_us` at least; a control socket, say.
+        pause_us: 20 ms; as long waits who is served.
     """
 
     def __init__(self, server: RtcCanopenServer, link: StampedLink) -> None:
@@ -51,6 +52,7 @@ class ServerRunner:
         self.running, self.late_ticks, self.worst_late_us = True, 0, 0
         self.after_tick: list[Callable[[int], None]] = []
         self.serve: Callable[[int], None] | None = None
+        self.pause_us = PAUSE_US
 
     def run(self, until_us: int = NEVER) -> None:
         """Let the server work until a time on the link's clock, or until somebody calls `stop`.
@@ -62,7 +64,7 @@ class ServerRunner:
             pause_us = until_us
             if self.serve is not None:
                 self.serve(0)
-                pause_us = min(until_us, self._link.now_us + PAUSE_US)
+                pause_us = min(until_us, self._link.now_us + self.pause_us)
             late_us = _step(self._server, self._link, pause_us)
             self.worst_late_us = max(self.worst_late_us, late_us)
             self.late_ticks += late_us > LATE_US

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cos, sin
-from typing import Final
+from typing import Any, Final, Protocol
 
 from tickrig.device.rh3.base import LOOK_US, Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
+from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
@@ -79,6 +80,15 @@ class MountedUrg:
         self.urg.world = self.world.with_posts(*posts) if posts else self.world
 
 
+class Aboard(Coupling, Protocol):
+    """Something that a cart carries; it moves along as a coupling of the rig."""
+
+    @property
+    def station(self) -> Station[bytes]:
+        """It, on its line."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Cart:
     """One cart.
@@ -108,7 +118,9 @@ class ClosedLoop:
         seed: of the wire faults' chance.
         dense: run every tick of every base.
         world: what is around them; with one, each carries a range finder that sees it.
+        aboard: makes what else the first cart carries.
         pace: how many times as fast as the machine's its time passes; as it goes without one.
+        clock: what it waits by, with a pace.
 
     Attributes:
         rig: the bases on their lines.
@@ -119,23 +131,26 @@ class ClosedLoop:
         range_finders: range finders, in the same order.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what a cart may be like
         self,
         *parameters: BaseParameters,
         seed: int = 0,
         dense: bool = False,
         world: World | None = None,
+        aboard: Callable[[Rh3Base], Aboard] | None = None,
         pace: float | None = None,
+        clock: RealClock | None = None,
     ) -> None:
-        self._pace, self._clock = pace, RealClock()
+        self._pace, self._clock = pace, clock or RealClock()
         bases = [Rh3Base(each) for each in parameters or (BaseParameters(),)]
         lines = [Rs485Line(BAUD, bursts=True) for _ in bases]
         ports = [FaultyPort(line.a, BYTE_FAULTS, seed + n) for n, line in enumerate(lines)]
         self.range_finders = _range_finders(bases, world) if world else ()
-        stations = [Station(eye.urg, eye.line.a) for eye in self.range_finders]
-        self.rig = Rig(
-            *map(Station, bases, ports), *stations, couplings=self.range_finders, dense=dense
-        )
+        stations: list[Station[Any]] = [Station(eye.urg, eye.line.a) for eye in self.range_finders]
+        others = () if aboard is None else (aboard(bases[0]),)
+        stations += [other.station for other in others]
+        couplings = (*self.range_finders, *others)
+        self.rig = Rig(*map(Station, bases, ports), *stations, couplings=couplings, dense=dense)
         self.manager = Manager()
         self.carts = tuple(
             Cart(base, MotionChain(self.manager, self._opener(line), str(n) if n else ""), port)

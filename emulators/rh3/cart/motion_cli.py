@@ -8,6 +8,7 @@ from typing import Any, Final
 import click
 
 from tickrig.emulators.rh3.base_options import base_options
+from tickrig.host.cli.engine_options import openrtm_options, ros2_options
 from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options, version_option
 from tickrig.host.cli.start import loading
 
@@ -62,6 +63,8 @@ def main() -> None:
     rh3 path corners.txt --pace 10
     rh3 square --tread-m 0.459
     rh3 goto 1 0 0 --device /dev/ttyUSB0
+    rh3 serve --openrtm localhost:2809
+    rh3 serve --ros2
     """  # noqa: D301 - click wants the backspace
 
 
@@ -127,3 +130,29 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
         from tickrig.emulators.rh3.cart.motion_verbs import go_round  # noqa: PLC0415 - slow
 
     go_round(runs, side, save, options)
+
+
+@main.command()
+@openrtm_options
+@ros2_options
+@click.option(
+    "--room",
+    "room_m",
+    nargs=2,
+    type=NumberRange(0.1, 1_000),
+    metavar="WIDTH DEPTH",
+    help="Walls around an emulated base in m, and a range finder that sees them.",
+)
+@_SHARED
+def serve(**options: Any) -> None:
+    """Run the six components in real time until Ctrl-C, for others to work with.
+
+    \b
+    rh3 serve --openrtm localhost:2809
+    rh3 serve --openrtm localhost:2809 --device /dev/ttyUSB0
+    rh3 serve --ros2 --room 6 4
+    """  # noqa: D301
+    with loading():
+        from tickrig.emulators.rh3.cart.motion_verbs import serve as serve_until  # noqa: PLC0415
+
+    serve_until(options)

@@ -16,8 +16,11 @@ from tickrig.emulators.rh3.cart.options import (
     require_arrival,
     watched,
 )
+from tickrig.emulators.rh3.cart.served_cart import serve_cart
 from tickrig.emulators.rh3.cart.squares import SquarePlan, run_squares
+from tickrig.emulators.rh3.cart.topics import SCAN, TOPICS
 from tickrig.emulators.rh3.cart.track_plot import write_track
+from tickrig.host.cli.engine_options import take_engines
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.motion.drive import drive, stop
 from tickrig.host.motion.geometry import Pose
@@ -54,6 +57,18 @@ def go_round(
     checked = _checked(options)
     by_chance = checked.device is not None or checked.base.noise
     run_squares(checked, SquarePlan(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
+
+
+def serve(options: dict[str, Any]) -> None:
+    """Run a cart in real time until Ctrl-C."""
+    room_m = options["room_m"]
+    if room_m and options["device"]:
+        raise Refused("--room is for the emulated base; a --device has what is around it")
+    engines = take_engines(options, TOPICS + SCAN if room_m else TOPICS)
+    if engines.ros2 and options["pace"] not in {None, 1.0}:
+        raise Refused("--pace is not for --ros2: what others send has real time")
+    pace = options["pace"] or (None if options["device"] else 1.0)
+    serve_cart(_checked({**options, "pace": pace}), engines)
 
 
 def _checked(options: dict[str, Any]) -> MotionOptions:

@@ -5,28 +5,35 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from shutil import get_terminal_size
+from typing import Final
 
 import click
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.device.urg.world import room
+from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop, MountedUrg
+from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.motion.chain import MotionChain
+from tickrig.host.motion.chain import RATE_HZ, MotionChain
 from tickrig.host.motion.drive import BaseConnection, start
 from tickrig.host.motion.geometry import Pose, Wheels
 from tickrig.host.motion.motion_run import MotionRun, Sample
+from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.motion.track_map import WIDTH, LiveMap, TrackMap
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.real_time import RealTime
+
+SCANNER: Final = "LRFCapture_URG"
+"""The component of a range finder, if the cart has one."""
 
 
 class RunStopped(Exception):  # noqa: N818 - no error
@@ -46,6 +53,9 @@ class MotionOptions:
         show_map: draw the track while it runs.
         base: what the emulated base is like.
         plot: file for a picture.
+        clock: what the cart waits by, in real time and with a pace.
+        room_m: width and depth of a room around the origin; with one, an emulated base carries a
+            range finder.
     """
 
     set_id: str
@@ -56,6 +66,8 @@ class MotionOptions:
     show_map: bool
     base: BaseParameters
     plot: Path | None = None
+    clock: RealClock = field(default_factory=RealClock)
+    room_m: tuple[float, float] | None = None
 
     def begin(self, wheels: Wheels | None = None) -> BaseConnection:
         """Return a cart at the origin with its components active."""
@@ -76,8 +88,19 @@ class MotionOptions:
 
     def _connection(self) -> BaseConnection:
         if self.device is not None:
-            return SerialBaseConnection(self.device, self.baud)
-        return ClosedLoop(self.base, pace=self.pace)
+            return SerialBaseConnection(self.device, self.baud, self.clock)
+        world = room(*self.room_m) if self.room_m else None
+        loop = ClosedLoop(self.base, world=world, pace=self.pace, clock=self.clock)
+        for eye in loop.range_finders:
+            _add_scanner(loop, eye)
+        return loop
+
+
+def _add_scanner(loop: ClosedLoop, eye: MountedUrg) -> None:
+    """Have the scans of a range finder written to a port."""
+    scanner = LrfCaptureUrg(SCANNER, lambda name: SimLink(loop.rig, eye.line.b))
+    loop.manager.add(scanner, RATE_HZ)
+    loop.manager.activate(SCANNER)
 
 
 class SerialBaseConnection:
@@ -86,16 +109,17 @@ class SerialBaseConnection:
     Args:
         url: what DeviceFileName is set to; a path or a pyserial URL.
         baud: bit rate in bit/s.
+        clock: what it waits by.
 
     Attributes:
         chain: its components.
     """
 
-    def __init__(self, url: str, baud: int) -> None:
+    def __init__(self, url: str, baud: int, clock: RealClock | None = None) -> None:
         self._manager = Manager()
         self.chain = MotionChain(self._manager, partial(SerialLink, baud=baud))
         self.chain.ref_hard.configuration.set("DeviceFileName", url)
-        self._runner = RealTime(self._manager, RealClock())
+        self._runner = RealTime(self._manager, clock or RealClock())
 
     @property
     def now_us(self) -> int:

@@ -10,8 +10,8 @@ from typing import ClassVar, Final, Protocol
 from tickrig.host.links.errors import LinkError
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
 from tickrig.host.motion.geometry import Twist, wheel_speeds
+from tickrig.host.motion.modbus_master import ModbusAnswer, ModbusMaster
 from tickrig.host.motion.ports import plausible, read_newest
 from tickrig.host.rtc import (
     ExecutionContext,

@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from tickrig.host.cli.engine_options import openrtm_options, ros2_options, take_engines
 from tickrig.host.cli.options import PATH, NumberRange
 from tickrig.host.cli.refused import time_us
 from tickrig.host.cli.start import loading
@@ -67,6 +68,8 @@ def rtc() -> None:
 )
 @click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
 @click.option("--console", is_flag=True, help="Numbers typed here go to each ConsoleIn.")
+@openrtm_options
+@ros2_options
 def run(lite_boot: str, **options: Any) -> None:
     """Run the system of a file in real time, until Ctrl-C.
 
@@ -80,11 +83,14 @@ def run(lite_boot: str, **options: Any) -> None:
     tickrig rtc run system.xml --component my_rtc.py:Scale --save after.toml
     seq 1 5 | tickrig rtc run chain.toml --console
     tickrig rtc run lite.toml --lite LiteA=/dev/ttyUSB0@57600 --lite LiteB=/tmp/lite-b
+    tickrig rtc run system.toml --openrtm localhost:2809
+    tickrig rtc run system.toml --ros2 --ros2-table topics.toml
     """  # noqa: D301 - click wants the backspace
     with loading():
         from tickrig.host.rtc.commands.run import SystemOptions, run_system  # noqa: PLC0415 - slow
 
-    run_system(SystemOptions(lite_boot_us=time_us("--lite-boot", lite_boot), **options))
+    engines, boot_us = take_engines(options), time_us("--lite-boot", lite_boot)
+    run_system(SystemOptions(lite_boot_us=boot_us, engines=engines, **options))
 
 
 for _command in (*VERBS, *SYSTEM_VERBS, conf):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 import click
 
+from tickrig.host.cli.engine_options import EngineOptions
 from tickrig.host.cli.messages import say, warnings_shown
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
@@ -22,11 +23,13 @@ from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.real_time import RealTime
-from tickrig.host.rtc.system.system import System, restore
+from tickrig.host.rtc.system.system import System, restore, with_remotes
 from tickrig.host.text.user_file import explain_error, find_class
 
 ATTACH_LITE: Final = "tickrig.host.rtc_lite.lite_option:attach_lite"
 """Named by its path, as a command is: that room is made of this one's components."""
+JOIN_ENGINES: Final = "tickrig.host.engines.engines_joined:engines_joined"
+"""The same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +44,7 @@ class SystemOptions:
     rate_hz: float | None = None
     save: Path | None = None
     console: bool = False
+    engines: EngineOptions = field(default_factory=EngineOptions)
 
 
 def run_system(options: SystemOptions) -> None:
@@ -79,6 +83,11 @@ def _restore(manager: Manager, system: System, options: SystemOptions) -> None:
     if (rate_hz := options.rate_hz) is not None:
         entries = tuple(replace(entry, rate_hz=rate_hz) for entry in system.components)
         system = replace(system, components=entries)
+    if options.engines.openrtm is not None:
+        system = with_remotes(system, manager.types)
+    elif system.remotes:
+        names = ", ".join(entry.name for entry in system.remotes)
+        raise Refused(f"system {options.system}: {names} runs elsewhere: --openrtm HOST says where")
     there = {component.instance_name for component in manager.components}
     made = tuple(entry for entry in system.components if entry.name not in there)
     try:
@@ -95,7 +104,17 @@ def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:
     runner = RealTime(manager, clock)
     control = SystemControl(manager, runner)
     stack.enter_context(stopped_by_signals(runner.stop))
-    stack.enter_context(serving_control(options.control, control, clock))
+    server = stack.enter_context(serving_control(options.control, control, clock))
+    if options.engines:
+        join = load(JOIN_ENGINES)
+        stack.enter_context(
+            join(
+                options.engines,
+                manager,
+                lambda calls: server.attach(calls, calls.make),
+                runner.stop,
+            )
+        )
     _run(manager, runner, options)
     if options.save is not None:
         write_system(control.saved(file_format(options.save)), options.save)

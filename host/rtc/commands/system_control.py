@@ -1,4 +1,4 @@
-"""What can be asked of a running system of RT components (docs/rtc.md)."""
+"""What can be asked of a running system of RT components (docs/reference/rtc/rtc.md)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.configuration import Configuration
 from tickrig.host.rtc.parameter import as_text
 from tickrig.host.rtc.ports.literal import literal
-from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
+from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase
 from tickrig.host.rtc.states import LifeCycleState
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 from tickrig.host.rtc.system.rts_profile import write_rts_profile
@@ -249,13 +249,15 @@ def _port(port: AnyPort) -> Object:
             {"name": item.instance_name, "type": item.type_name, "polarity": item.polarity}
             for item in profile.interfaces
         ],
-        "connectors": [_connector(connector) for connector in profile.connector_profiles],
+        "connectors": [_connector(connector) for connector in port.connectors],
     }
 
 
-def _connector(profile: ConnectorProfile) -> Object:
+def _connector(connector: ConnectorBase) -> Object:
+    profile, state = connector.profile, connector.state
     return {
         "name": profile.name,
         "ports": list(profile.ports),
         "properties": dict(profile.properties),
+        **({"state": state} if state else {}),
     }

@@ -51,7 +51,8 @@ def _port_lines(port: Any, *, long: bool) -> Iterator[str]:
         yield f"    {interface['polarity'].lower()} {interface['name']} ({interface['type']})"
     for connector in port["connectors"]:
         others = [name for name in connector["ports"] if name != port["name"]]
-        yield f"    connected to {(others or connector['ports'])[0]}"
+        lost = " (lost)" if connector.get("state") == "lost" else ""
+        yield f"    connected to {(others or connector['ports'])[0]}{lost}"
         if long:
             properties = {"name": connector["name"], **connector["properties"]}
             yield from (f"      {key} = {value}" for key, value in properties.items())

@@ -40,6 +40,7 @@ class ExecutionContext:
         rate_hz: periods a second.
         period_us: one period.
         running: between start and stop.
+        allows_period: asked for each new period in us, where not all are possible.
         on_move: called with a component, its state and what the callback of the move returned,
             after each move that it made or, after on_reset, could not make; Created if it left.
 
@@ -57,6 +58,7 @@ class ExecutionContext:
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
         self._participants: tuple[Participant, ...] = ()
         self._by_id: dict[int, Participant] = {}
+        self.allows_period: Callable[[int], bool] | None = None
         self.on_move: list[MoveListener] = []
 
     @property
@@ -135,9 +137,11 @@ class ExecutionContext:
             rate_hz: periods a second.
 
         Returns:
-            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz.
+            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz, and its period is allowed.
         """
         if not _possible(rate_hz):
+            return ReturnCode.BAD_PARAMETER
+        if self.allows_period is not None and not self.allows_period(_period_us(rate_hz)):
             return ReturnCode.BAD_PARAMETER
         self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
         if self.running:

@@ -65,7 +65,8 @@ class OutPort(DataPort[T]):
 
         Returns:
             PORT_OK if all connectors took it, also if there is none; else the status of the
-            first that did not: BUFFER_FULL, BUFFER_TIMEOUT, INVALID_ARGS.
+            first that did not: BUFFER_FULL, BUFFER_TIMEOUT, INVALID_ARGS. PORT_ERROR where it is
+            beyond a limit of its node.
 
         Raises:
             TypeError: a value of another type.
@@ -73,6 +74,8 @@ class OutPort(DataPort[T]):
         if not isinstance(value, self.data_type):
             wanted = self.data_type.__name__
             raise TypeError(f"{self.full_name} takes {wanted}, not {type(value).__name__}")
+        if self.guard is not None and not self.guard.passes(self, value):
+            return PortStatus.PORT_ERROR
         status = _OK
         for connector in self.connectors:
             written = connector.write(value)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from tickrig.host.rtc.listeners import call_listeners
 
@@ -80,12 +80,24 @@ class ConnectorBase:
         self.profile, self.ports, self.joined = profile, ports, False
 
     @property
+    def state(self) -> str:
+        """Whether its peer answers, `connected` or `lost`; empty if both ports are here."""
+        return ""
+
+    @property
     def joins_components(self) -> bool:
         """Whether both its ports are here, each of a component; those of probes are of none."""
         return len(self.ports) == 2 and all(port.owner for port in self.ports)
 
     def begin(self) -> None:
-        """Give it to both ports, then notify their listeners."""
+        """Give it to both ports, then notify their listeners.
+
+        Raises:
+            RtcRefused: who guards a port does not admit it.
+        """
+        for port in self.ports:
+            if port.guard is not None:
+                port.guard.admit(self)
         self.joined = True
         for port in self.ports:
             port.attach(self)
@@ -104,6 +116,17 @@ class ConnectorBase:
 C = TypeVar("C", bound=ConnectorBase)
 
 
+class PortGuard(Protocol):
+    """Sees to it that a port stays within the limits of the node that it is on."""
+
+    def admit(self, connector: ConnectorBase, /) -> None:
+        """Raise RtcRefused unless a port may have one more connector, this one."""
+
+    def passes(self, port: AnyPort, value: Any, /) -> bool:
+        """Return whether a value may leave by a port, or come in by one from a peer."""
+        ...
+
+
 class Port(Generic[C]):
     """A named end of connectors.
 
@@ -114,6 +137,7 @@ class Port(Generic[C]):
         name: without that of its component.
         port_type: how OpenRTM calls its class, such as `DataInPort`.
         owner: instance name of its component, empty without one.
+        guard: keeps it within the limits of its node, where there are any.
         connectors: in the order in which they were made.
         on_connect: called with its profile after a connector was made.
         on_disconnect: called with its profile after a connector ended.
@@ -123,6 +147,7 @@ class Port(Generic[C]):
 
     def __init__(self, name: str) -> None:
         self.name, self.owner = name, ""
+        self.guard: PortGuard | None = None
         self.connectors: tuple[C, ...] = ()
         self.on_connect: list[Listener] = []
         self.on_disconnect: list[Listener] = []

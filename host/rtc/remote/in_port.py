@@ -15,7 +15,7 @@ from tickrig.host.rtc.remote.buffers import ArrivalBuffer
 from tickrig.host.rtc.remote.call_queue import CallQueue
 from tickrig.host.rtc.remote.peer_end import Codec, PeerEnd
 from tickrig.host.rtc.remote.peer_state import PeerState, PeerWatch
-from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.remote.peer_threads import PeerCaller
 from tickrig.host.rtc.states import PortStatus, RtcRefused
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.idl import Struct
@@ -57,7 +57,8 @@ class _InPortConnector(Connector[T], Generic[T, P]):
             self._invalid = True
             return None
         self._invalid = False
-        return value
+        guard = self.ports[0].guard
+        return value if guard is None or guard.passes(self.ports[0], value) else None
 
 
 class InPortPushConnector(_InPortConnector[T, P]):
@@ -68,6 +69,8 @@ class InPortPushConnector(_InPortConnector[T, P]):
         end: what was agreed with the peer.
         codec: makes values of what passes.
         calls: those of the manager's thread.
+        post: has a call made in that thread before the next tick, in its own way; else it is
+            woken up for each.
 
     Raises:
         RtcRefused: the port has a connector of this ID, or properties that cannot be.
@@ -75,9 +78,16 @@ class InPortPushConnector(_InPortConnector[T, P]):
 
     buffer: ArrivalBuffer[T]
 
-    def __init__(self, port: InPort[T], end: PeerEnd, codec: Codec[T, P], calls: CallQueue) -> None:
+    def __init__(
+        self,
+        port: InPort[T],
+        end: PeerEnd,
+        codec: Codec[T, P],
+        calls: CallQueue,
+        post: Callable[[Callable[[], object]], object] | None = None,
+    ) -> None:
         super().__init__(port, end, codec, calls)
-        self.buffer = ArrivalBuffer(end.options.inport)
+        self.buffer, self._post = ArrivalBuffer(end.options.inport), post or calls.post
 
     def put(self, payload: P) -> PortStatus:
         """Put a value into the buffer, in any thread; it is there before the next tick.
@@ -96,7 +106,7 @@ class InPortPushConnector(_InPortConnector[T, P]):
         status, is_first = self.buffer.arrive(value)
         try:
             if is_first:
-                self._calls.post(self.buffer.let_in)
+                self._post(self.buffer.let_in)
         except RtcRefused:
             return PortStatus.CONNECTION_LOST
         return status
@@ -157,7 +167,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
         end: PeerEnd,
         codec: Codec[T, P],
         consumer: OutPortConsumer[P],
-        thread: PeerThread,
+        thread: PeerCaller,
         calls: CallQueue,
     ) -> None:
         super().__init__(port, end, codec, calls)

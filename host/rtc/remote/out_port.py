@@ -12,7 +12,7 @@ from tickrig.host.rtc.ports.data_port import OutPort
 from tickrig.host.rtc.remote.buffers import LockedBuffer, SendBuffer
 from tickrig.host.rtc.remote.peer_end import Codec, PeerEnd
 from tickrig.host.rtc.remote.peer_state import PeerState, PeerWatch
-from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.remote.peer_threads import PeerCaller
 from tickrig.host.rtc.states import PortStatus
 from tickrig.wire.rtc_types.idl import Struct
 
@@ -63,7 +63,7 @@ class OutPortPushConnector(Connector[Any], Generic[T, P]):
         end: PeerEnd,
         codec: Codec[T, P],
         consumer: InPortConsumer[P],
-        thread: PeerThread,
+        thread: PeerCaller,
     ) -> None:
         options = replace(end.options, dataflow=DataflowType.PUSH)
         super().__init__(end.profile(port), (port,), options)

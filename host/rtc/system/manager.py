@@ -16,6 +16,7 @@ from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.name_service import NameService
+from tickrig.host.rtc.system.remotes import Remotes
 from tickrig.host.rtc.system.schedule import Schedule
 
 R = TypeVar("R", bound=RtComponent)
@@ -39,16 +40,20 @@ class Manager(Schedule):
 
     Attributes:
         names: its components, such as `localhost/ConsoleIn0.rtc`.
+        path_uris: by instance name, where a name server of others has components; RTSProfiles
+            say so.
+        remotes: components that run elsewhere, which an engine joins with those here.
         on_added: called with each component that is added, once it has its name.
         on_removed: called with each component that ended, once its name is free.
     """
 
     def __init__(self, host: str = "localhost") -> None:
         super().__init__()
-        self.names = NameService()
+        self.names, self.remotes = NameService(), Remotes()
         self._host = host
         self._registered: dict[str, type[RtComponent]] = {}
         self._components: dict[str, RtComponent] = {}
+        self.path_uris: dict[str, str] = {}
         self.on_added: list[ComponentListener] = []
         self.on_removed: list[ComponentListener] = []
 
@@ -93,7 +98,7 @@ class Manager(Schedule):
         """Create a component of a type that is registered or installed, and add it; see `add`.
 
         Args:
-            type_name: as registered, or as a package names it (docs/extending.md).
+            type_name: as registered, or as a package names it (docs/howto/extending.md).
             instance_name: the type name with the lowest number that is free, if left out.
             rate_hz: of its own execution context.
             context: an execution context to take part in, in place of an own one.

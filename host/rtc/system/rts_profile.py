@@ -114,7 +114,8 @@ def _component_id(component: RtComponent) -> str:
 def _add_component(root: ET.Element, component: RtComponent, manager: Manager) -> None:
     name, configuration = component.instance_name, component.configuration
     node = _child(root, "Components", id=_component_id(component), instanceName=name)
-    _set(node, pathUri=manager.path(name), activeConfigurationSet=configuration.active_id)
+    path_uri = manager.path_uris.get(name, manager.path(name))
+    _set(node, pathUri=path_uri, activeConfigurationSet=configuration.active_id)
     _set(node, compositeType="None", isRequired="true")
     for port in component.ports.values():
         is_data = isinstance(port, DataPort)
@@ -165,6 +166,7 @@ def _component(node: ET.Element) -> ComponentEntry:
         rate,
         configuration_set=node.get(_rts("activeConfigurationSet")) or DEFAULT,
         configuration=dict(_sets(node)),
+        path=node.get(_rts("pathUri"), ""),
     )
 
 
@@ -190,6 +192,7 @@ def _connection(node: ET.Element, word: str) -> ConnectionEntry:
             properties["dataport.publisher.push_rate"] = str(1 / interval_s)
     for extra in node.findall(f"{{{EXT}}}Properties"):
         properties[extra.get(f"{{{EXT}}}name", "")] = extra.get(f"{{{EXT}}}value", "")
+    properties.pop("dataport.data_type", None)  # of rtcryo; the ports say it
     ports, connector_id = (source, target), node.get(_rts("connectorId"), "")
     name, given = node.get(_rts("name"), ""), given_id(connector_id, (source, target))
     return ConnectionEntry(ports, name, properties, given)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.configuration import DEFAULT
@@ -11,6 +11,7 @@ from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.ports.port import ConnectorProfile, automatic_id
 from tickrig.host.rtc.states import LifeCycleState, RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
+from tickrig.host.rtc.system.remotes import RemoteConnection, RemoteEntry, Remotes
 
 Sets = Mapping[str, Mapping[str, str]]
 
@@ -27,6 +28,7 @@ class ComponentEntry:
         active: whether it is activated.
         configuration_set: the active one.
         configuration: values of each set.
+        path: where an RTSProfile says that it runs, empty if it says nothing.
     """
 
     name: str
@@ -36,6 +38,7 @@ class ComponentEntry:
     active: bool = False
     configuration_set: str = DEFAULT
     configuration: Sets = field(default_factory=dict)
+    path: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +63,16 @@ class System:
     """All components and connectors, in the order in which they are made.
 
     Not saved: values in ports and buffers, and what a component keeps in itself.
+
+    Attributes:
+        components: those that are made.
+        connections: their connectors, with each other and with remote components.
+        remotes: components that run elsewhere.
     """
 
     components: tuple[ComponentEntry, ...] = ()
     connections: tuple[ConnectionEntry, ...] = ()
+    remotes: tuple[RemoteEntry, ...] = ()
 
 
 def describe(manager: Manager) -> System:
@@ -71,23 +80,46 @@ def describe(manager: Manager) -> System:
     shared: dict[int, str] = {}
     return System(
         tuple(_entry(component, shared) for component in manager.components),
-        tuple(_connection(profile) for profile in manager.connectors),
+        (
+            *(_connection(profile) for profile in manager.connectors),
+            *(_remote_connection(one) for one in manager.remotes.connections),
+        ),
+        tuple(manager.remotes.components),
     )
 
 
 def restore(manager: Manager, system: System) -> None:
     """Make the components and connectors of a system, and ask for Active where it says so.
 
+    Connectors with remote components are put into `manager.remotes`: an engine makes them.
+
     Raises:
         RtcRefused: something cannot be made; then nothing is left of it.
     """
     made: list[str] = []
+    before = Remotes(list(manager.remotes.components), list(manager.remotes.connections))
     try:
         _make(manager, system, made)
     except ValueError:
+        manager.remotes = before
         for name in reversed(made):
             manager.delete(name)
         raise
+
+
+def with_remotes(system: System, types: Container[str]) -> System:
+    """Return a system whose components of unknown types run elsewhere, if it says where.
+
+    So is the RTSProfile of a system of which others run a part.
+
+    Args:
+        system: as it was read.
+        types: names of those that can be created.
+    """
+    there = [one for one in system.components if one.path and one.type_name not in types]
+    here = tuple(one for one in system.components if one not in there)
+    remotes = tuple(RemoteEntry(one.name, one.path) for one in there)
+    return replace(system, components=here, remotes=system.remotes + remotes)
 
 
 def _entry(component: RtComponent, shared: dict[int, str]) -> ComponentEntry:
@@ -121,12 +153,58 @@ def _make(manager: Manager, system: System, made: list[str]) -> None:
         component = manager.create(entry.type_name, entry.name, entry.rate_hz, context)
         made.append(entry.name)
         _configure(component, entry)
+    remotes = {entry.name: entry for entry in system.remotes}
     for connection in system.connections:
+        if not remotes.keys().isdisjoint(map(_owner, connection.ports)):
+            continue
         names = {"name": connection.name, "connector_id": connection.connector_id}
         manager.connect(*connection.ports, connection.properties, **names)
+    _take_remotes(manager, system, remotes)
     for context in contexts.values():
         context.start()
     manager.activate(*(entry.name for entry in system.components if entry.active))
+
+
+def _take_remotes(manager: Manager, system: System, remotes: Mapping[str, RemoteEntry]) -> None:
+    """Note the components that run elsewhere, and what is to join them with ours."""
+    here = {component.instance_name for component in manager.components}
+    for name in sorted(here.intersection(remotes)):
+        raise RtcRefused(f"{name} is here and runs elsewhere, too")
+    wanted = [
+        _remote(manager, connection, remotes)
+        for connection in system.connections
+        if not remotes.keys().isdisjoint(map(_owner, connection.ports))
+    ]
+    manager.remotes.components += remotes.values()
+    manager.remotes.connections += wanted
+
+
+def _remote(
+    manager: Manager, entry: ConnectionEntry, remotes: Mapping[str, RemoteEntry]
+) -> RemoteConnection:
+    owners = [_owner(port) for port in entry.ports]
+    if all(owner in remotes for owner in owners):
+        raise RtcRefused(f"{' and '.join(entry.ports)} both run elsewhere")
+    place = int(owners[0] in remotes)
+    port, theirs = entry.ports[place], entry.ports[1 - place]
+    return RemoteConnection(
+        manager.port(port).full_name,
+        remotes[_owner(theirs)],
+        theirs.rpartition(".")[2],
+        entry.ports,
+        entry.name or automatic_id(entry.ports),
+        entry.properties,
+        entry.connector_id or automatic_id(entry.ports),
+    )
+
+
+def _owner(port: str) -> str:
+    return port.rpartition(".")[0]
+
+
+def _remote_connection(one: RemoteConnection) -> ConnectionEntry:
+    given = given_id(one.connector_id, one.ports)
+    return ConnectionEntry(one.ports, one.name, dict(one.properties), given)
 
 
 def _context(

@@ -12,11 +12,15 @@ configuration_set = "default"
 int_param0 = "5"
 
 [[connection]]
-ports = ["ConsoleIn0.out", "ConsoleOut0.in"]
+ports = ["ConsoleIn0.out", "ConsoleOut0.in"]    # one of them may be of a remote component
 connector_id = "9c1f"     # made of the names of the ports if left out
 
 [connection.properties]
 "dataport.subscription_type" = "new"
+
+[[remote]]                # a component that runs elsewhere
+name = "Joystick0"        # how the ports of a connection name it
+path = "localhost:2809/robot.host_cxt/Joystick0.rtc"
 """
 
 from __future__ import annotations
@@ -27,6 +31,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.remotes import RemoteEntry
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
 
 _COMPONENT: Final[Mapping[str, type]] = {
@@ -44,6 +49,7 @@ _CONNECTION: Final[Mapping[str, type]] = {
     "connector_id": str,
     "properties": dict,
 }
+_REMOTE: Final[Mapping[str, type]] = {"name": str, "path": str}
 _FIELDS: Final[Mapping[str, str]] = {"type": "type_name"}
 
 
@@ -59,19 +65,23 @@ def parse_toml(text: str) -> System:
         raise RtcRefused(f"not TOML: {error}") from error
     except RecursionError:
         raise RtcRefused("not TOML that can be read: lists or tables nest too deep") from None
-    if unknown := set(tables) - {"component", "connection"}:
-        raise RtcRefused(f"{min(unknown)!r} is none of: component, connection")
+    if unknown := set(tables) - {"component", "connection", "remote"}:
+        raise RtcRefused(f"{min(unknown)!r} is none of: component, connection, remote")
     components = _read(tables, "component", _COMPONENT, ("name", "type"))
     connections = _read(tables, "connection", _CONNECTION, ("ports",))
+    remotes = _read(tables, "remote", _REMOTE, ("name", "path"))
     return System(
         tuple(_component(entry) for entry in components),
         tuple(_connection(entry) for entry in connections),
+        tuple(RemoteEntry(**entry) for entry in remotes),
     )
 
 
 def write_toml(system: System) -> str:
     """Write a system file."""
-    return "\n".join((*_component_lines(system), *_connection_lines(system)))
+    return "\n".join(
+        (*_component_lines(system), *_connection_lines(system), *_remote_lines(system))
+    )
 
 
 def _read(
@@ -146,6 +156,11 @@ def _connection_lines(system: System) -> Iterator[str]:
         if entry.properties:
             yield "[connection.properties]"
             yield from _texts(entry.properties)
+
+
+def _remote_lines(system: System) -> Iterator[str]:
+    for entry in system.remotes:
+        yield f"[[remote]]\nname = {_quoted(entry.name)}\npath = {_quoted(entry.path)}\n"
 
 
 def _texts(values: Mapping[str, str]) -> Iterator[str]:

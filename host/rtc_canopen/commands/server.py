@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.engine_options import (
+    EngineOptions,
+    openrtm_options,
+    ros2_options,
+    take_engines,
+)
 from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.refused import Refused
@@ -27,7 +34,12 @@ from tickrig.host.text.values import parse_time_us
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
+    from tickrig.host.rtc.remote.call_queue import CallQueue
+    from tickrig.host.rtc_canopen.serve import ServerRunner
     from tickrig.host.rtc_canopen.server import RtcCanopenServer
+
+QUICK_US: Final = 2_000
+"""So long at most a call of an engine waits for the bus."""
 
 
 @click.command(cls=BusCommand)
@@ -41,6 +53,8 @@ if TYPE_CHECKING:
 @click.option("--check", is_flag=True, help="Read FILE and its EDS files, and end.")
 @click.option("--dot", is_flag=True, help="Draw FILE as a graph for Graphviz, and end.")
 @click.option("-q", "--quiet", is_flag=True, help="Do not tell the events on standard error.")
+@openrtm_options
+@ros2_options
 @version_option()
 def main(file: Path, span: str | None, **options: Any) -> None:
     """Manage the CANopen nodes of a System Definition as RT components.
@@ -55,10 +69,12 @@ def main(file: Path, span: str | None, **options: Any) -> None:
     rtc-canopen-server robot.yaml -i socketcan -c vcan0 --start --log events.jsonl
     rtc-canopen-server robot.yaml --control /tmp/robot.ctl
     rtc-canopen-server robot.yaml --component Logger0=parts.py:Logger
+    rtc-canopen-server robot.yaml --openrtm localhost:2809
+    rtc-canopen-server robot.yaml --ros2
     rtc-canopen-server robot.yaml --check
     rtc-canopen-server robot.yaml --dot | dot -Tsvg -o robot.svg
     """  # noqa: D301 - click wants the backspace
-    span_us = _span_us(span)
+    span_us, engines = _span_us(span), take_engines(options)
     server = read_server(file, options.pop("components"))
     definition = server.definition
     if options.pop("check"):
@@ -80,7 +96,7 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         click.echo(f"{len(server.nodes)} nodes on {name}. Ctrl-C ends.", err=True)
         if start:
             server.start()
-        _run(server, link, span_us, control, name)
+        _run(server, link, span_us, _Doors(control, name, engines))
 
 
 def _check(file: Path, server: RtcCanopenServer) -> None:
@@ -91,9 +107,7 @@ def _check(file: Path, server: RtcCanopenServer) -> None:
     click.echo(f"{file}: {len(server.nodes)} nodes, no mistake found")
 
 
-def _run(
-    server: RtcCanopenServer, link: StampedLink, span_us: int, control: Path | None, bus: str
-) -> None:
+def _run(server: RtcCanopenServer, link: StampedLink, span_us: int, doors: _Doors) -> None:
     from tickrig.host.rtc_canopen.serve import ServerRunner  # noqa: PLC0415
 
     until_us = NEVER if span_us == NEVER else link.now_us + span_us
@@ -101,17 +115,43 @@ def _run(
     try:
         with ExitStack() as stack:
             stack.enter_context(stopped_by_signals(runner.stop))
-            if control is not None:
-                from tickrig.host.rtc_canopen.commands.server_control import (  # noqa: PLC0415
-                    ServerControl,
-                )
-
-                requests = ServerControl(server, runner, bus)
-                stack.enter_context(serving_control(control, requests, runner))
+            doors.open(stack, server, runner)
             runner.run(until_us)
         link.send(server.stop(link.now_us))
     except LinkClosed as error:
         raise BusFailed(str(error)) from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Doors:
+    """By which others work with a server while it runs: a control socket, engines."""
+
+    control: Path | None
+    bus: str
+    engines: EngineOptions
+
+    def open(self, stack: ExitStack, server: RtcCanopenServer, runner: ServerRunner) -> None:
+        if self.control is not None:
+            from tickrig.host.rtc_canopen.commands.server_control import (  # noqa: PLC0415
+                ServerControl,
+            )
+
+            requests = ServerControl(server, runner, self.bus)
+            door = stack.enter_context(serving_control(self.control, requests, runner))
+        if not self.engines:
+            return
+        from tickrig.host.engines.engines_joined import engines_joined  # noqa: PLC0415
+
+        def attach(calls: CallQueue) -> None:
+            runner.pause_us = QUICK_US
+            if self.control is None:
+                runner.serve = calls.serve
+            else:
+                door.attach(calls, calls.make)
+
+        stack.enter_context(
+            engines_joined(self.engines, server.manager, attach, runner.stop, fixed=True)
+        )
 
 
 def _span_us(span: str | None) -> int:

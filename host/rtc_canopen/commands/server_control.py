@@ -1,4 +1,4 @@
-"""What can be asked of a running RTC-CANopen server (docs/rtc-canopen.md, docs/control.md)."""
+"""What can be asked of a running RTC-CANopen server (docs/reference/rtc/rtc-canopen.md)."""
 
 from __future__ import annotations
 

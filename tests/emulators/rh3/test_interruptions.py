@@ -1,4 +1,4 @@
-"""What happens to a cart on its way: each with a documented result (docs/rh3.md)."""
+"""What happens to a cart on its way: each with a documented result (docs/reference/rtc/rh3.md)."""
 
 from __future__ import annotations
 

@@ -95,6 +95,7 @@ def test_a_killed_peer_is_lost_in_a_line_and_found_again(
         pair.out.write(long(2))
         pair.until(lambda: pushed.state is PeerState.LOST)
         assert pair.out.write(long(3)) is LOST
+        assert "    connected to far/ConsoleOut0.rtc:in (lost)" in lines_of(pair)
         pair.near.manager.run_for(20 * PERIOD_US)
         pair.far.serve(answer_put(put_into), servant.port)
         pair.until(lambda: pair.numbers == [1, 2, 3])
@@ -232,9 +233,7 @@ def test_a_connector_is_shown_with_its_peer_and_not_saved(pair: Pair) -> None:
         "dataport.subscription_type": "new",
         "dataport.x": "kept",
     }
-    shown: Any = describe_component(pair.near.manager, pair.source)
-    lines = list(component_lines(shown, long=True))
-    assert "    connected to far/ConsoleOut0.rtc:in" in lines
+    assert "    connected to far/ConsoleOut0.rtc:in" in lines_of(pair)
     assert describe(pair.near.manager).connections == ()
 
 
@@ -280,3 +279,9 @@ def put(pair: Pair, reference: Reference, payload: bytes) -> PortStatus:
     pair.near.thread.submit(lambda: answers.append(reference.put(payload)))
     pair.until(lambda: answers)
     return answers[0]
+
+
+def lines_of(pair: Pair) -> list[str]:
+    """Return what `tickrig rtc cat -l` shows of the component that pushes."""
+    shown: Any = describe_component(pair.near.manager, pair.source)
+    return list(component_lines(shown, long=True))

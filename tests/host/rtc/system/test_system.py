@@ -29,6 +29,7 @@ from tickrig.host.rtc.system.system import (
     System,
     describe,
     restore,
+    with_remotes,
 )
 from tickrig.host.rtc.system.system_toml import parse_toml, write_toml
 
@@ -118,7 +119,7 @@ def test_what_is_left_out_has_its_default() -> None:
     [
         ("a = ", "not TOML"),
         ("a = " + "[" * 20_000, "not TOML that can be read: lists or tables nest too deep"),
-        ("[[components]]", "'components' is none of: component, connection"),
+        ("[[components]]", "'components' is none of: component, connection, remote"),
         ("[component]\nname = 'A'", "component is written [[component]]"),
         ("[[component]]\nname = 'A'", "[[component]] 1 has no type"),
         (COMPONENT + "speed = 1", "[[component]] 1: speed is none of: name, type"),
@@ -262,7 +263,8 @@ SAMPLE = """<?xml version="1.0" encoding="UTF-8"?>
  r:subscriptionType="Periodic" r:pushInterval="0.5">
 <r:sourceDataPort r:portName="out" r:instanceName="In0"/>
 <r:targetDataPort r:portName="Out0.in" r:instanceName="Out0"/>
-<e:Properties e:name="dataport.buffer.length" e:value="4"/></r:DataPortConnectors>
+<e:Properties e:name="dataport.buffer.length" e:value="4"/>
+<e:Properties e:name="dataport.data_type" e:value="IDL:RTC/TimedLong:1.0"/></r:DataPortConnectors>
 <r:StartUp/>
 </r:RtsProfile>"""
 
@@ -301,3 +303,59 @@ def test_a_mistake_in_an_rts_profile_is_told(change: tuple[str, str], said: str)
     assert change[0] in SAMPLE
     with pytest.raises(RtcRefused, match=re.escape(said)):
         parse_rts_profile(SAMPLE.replace(*change))
+
+
+REMOTE = """
+[[component]]
+name = "ConsoleIn0"
+type = "ConsoleIn"
+
+[[connection]]
+ports = ["{first}", "{second}"]
+
+[[remote]]
+name = "Far0"
+path = "localhost:2809/far.host_cxt/Far0.rtc"
+"""
+
+
+def remote_system(first: str = "ConsoleIn0.out", second: str = "Far0.in") -> System:
+    return parse_toml(REMOTE.format(first=first, second=second))
+
+
+def test_connectors_with_remote_components_are_left_to_an_engine() -> None:
+    manager = make_manager()
+    restore(manager, remote_system())
+    (wanted,) = manager.remotes.connections
+    assert (wanted.port, wanted.remote.name, wanted.remote_port) == ("ConsoleIn0.out", "Far0", "in")
+    assert wanted.connector_id == "ConsoleIn0.out_Far0.in"
+    assert parse_toml(write_toml(describe(manager))) == describe(manager)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "reason"),
+    [
+        ("Far0.out", "Far0.in", "Far0.out and Far0.in both run elsewhere"),
+        ("ConsoleIn0.none", "Far0.in", "ConsoleIn0 has no port 'none'; known: out"),
+    ],
+)
+def test_what_cannot_be_joined_with_remote_components_is_refused(
+    first: str, second: str, reason: str
+) -> None:
+    manager = make_manager()
+    with pytest.raises(RtcRefused, match=reason):
+        restore(manager, remote_system(first, second))
+    assert (manager.components, manager.remotes.components) == ((), [])
+
+
+def test_a_component_that_is_here_does_not_run_elsewhere() -> None:
+    manager = make_manager()
+    manager.create("ConsoleIn", "Far0")
+    with pytest.raises(RtcRefused, match="Far0 is here and runs elsewhere, too"):
+        restore(manager, remote_system())
+
+
+def test_components_of_unknown_types_run_where_an_rtsprofile_says() -> None:
+    text = GOLDEN.read_text("utf-8").replace(":ConsoleOut:", ":Display:")
+    system = with_remotes(parse_rts_profile(text), ("ConsoleIn", "ConfigSample"))
+    assert "ConsoleOut0" in {entry.name for entry in system.remotes}

@@ -13,7 +13,7 @@ from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.modbus.master import ModbusAnswer, ModbusMaster
+from tickrig.host.motion.modbus_master import ModbusAnswer, ModbusMaster
 from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus.requests import (
     READ,

@@ -1,0 +1,1 @@
+"""RT components as those of OpenRTM-aist: CORBA servants, names, ports (extra tickrig[openrtm])."""

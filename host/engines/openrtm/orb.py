@@ -1,0 +1,191 @@
+"""The ORB of this process: where it listens, what it serves, how long it waits for peers."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, Final
+
+import omniORB
+from omniORB import CORBA, PortableServer
+from omniORB import any as omni_any
+
+from tickrig.host.cli.openrtm_options import Endpoint
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
+from tickrig.host.text.log import log_of
+
+Reference = Any
+"""A reference to a CORBA object, here or elsewhere."""
+
+CALL_TIMEOUT_MS: Final = 1_000
+_CLOSE_S: Final = 2.0
+_POLL_S: Final = 0.005
+
+_LOG: Final = log_of(__name__)
+
+_REFUSALS: Final = {
+    ReturnCode.BAD_PARAMETER: CORBA.BAD_PARAM,
+    ReturnCode.UNSUPPORTED: CORBA.NO_IMPLEMENT,
+    ReturnCode.OUT_OF_RESOURCES: CORBA.NO_RESOURCES,
+}
+
+_REASONS: Final = {
+    "connectfailed": "nobody is there",
+    "timedout": f"no answer within {CALL_TIMEOUT_MS / 1_000:g} s",
+    "comm_failure": "the connection broke",
+    "object_not_exist": "it has ended",
+    "nousableprofile": "no such address",
+}
+
+
+class OrbFailed(RuntimeError):  # noqa: N818 - what an ORB did
+    """There can be no ORB here."""
+
+
+class Orb:
+    """The ORB; omniORB knows one in a process, and another one only after this was closed.
+
+    A call into a peer that gives no answer ends after 1 s with `CORBA.TRANSIENT`.
+
+    Args:
+        endpoint: where it listens.
+
+    Attributes:
+        endpoint: as given.
+
+    Raises:
+        OrbFailed: it cannot listen there.
+    """
+
+    def __init__(self, endpoint: Endpoint | None = None) -> None:
+        self.endpoint = endpoint = endpoint or Endpoint()
+        self._named: list[tuple[Any, bytes]] = []
+        words = ["tickrig"]
+        for option, value in _options(endpoint).items():
+            words += [f"-ORB{option}", value]
+        try:
+            self._orb = CORBA.ORB_init(words, CORBA.ORB_ID)
+            self._poa = self._orb.resolve_initial_references("RootPOA")
+            self._poa._get_the_POAManager().activate()
+        except CORBA.INITIALIZE:
+            raise OrbFailed(f"cannot listen at {endpoint}: no address or free port here") from None
+
+    def serve(self, skeleton: type, *answers: object) -> Reference:
+        """Let peers call an object.
+
+        Args:
+            skeleton: class of its interface, of a `..__POA` module.
+            answers: have a method for each operation, named as in the IDL, the first that has
+                it; one that none has is NO_IMPLEMENT. They are called in threads of the ORB.
+                What they raise becomes an answer: TimeoutError is TIMEOUT, RtcRefused BAD_PARAM
+                and the like, an exception of CORBA itself, and all else INTERNAL, with a line
+                in the log.
+
+        Returns:
+            Its reference; the same calls in this process take no socket.
+        """
+        return self._poa.id_to_reference(self._poa.activate_object(_servant(skeleton, answers)))
+
+    def serve_as(self, name: str, skeleton: type, *answers: object) -> Reference:
+        """Let peers call an object that `corbaloc::HOST:PORT/NAME` names; see `serve`."""
+        poa = self._orb.resolve_initial_references("omniINSPOA")
+        poa._get_the_POAManager().activate()
+        self._named.append((poa, name.encode()))
+        poa.activate_object_with_id(name.encode(), _servant(skeleton, answers))
+        return poa.id_to_reference(name.encode())
+
+    def key(self, reference: Reference) -> bytes:
+        """Return what tells an object that is served here from others; empty if it is not."""
+        try:
+            found: bytes = self._poa.reference_to_id(reference)
+        except (PortableServer.POA.WrongAdapter, CORBA.SystemException):
+            return b""
+        return found
+
+    def withdraw(self, reference: Reference) -> None:
+        """Let an object be called no more; calls that run end as they would."""
+        self._poa.deactivate_object(self._poa.reference_to_id(reference))
+
+    def reference(self, text: str) -> Reference:
+        """Return the reference that an IOR or a corbaloc stands for; nobody is asked.
+
+        Raises:
+            ValueError: it is neither.
+        """
+        try:
+            return self._orb.string_to_object(text)
+        except CORBA.SystemException as error:
+            raise ValueError(f"{text[:80]!r} is no reference: {explain(error)}") from None
+
+    def text(self, reference: Reference) -> str:
+        """Return a reference as an IOR."""
+        ior: str = self._orb.object_to_string(reference)
+        return ior
+
+    def close(self) -> None:
+        """Answer the calls that run, refuse all others, and free the port."""
+        for poa, name in self._named:  # they would outlive this ORB
+            poa.deactivate_object(name)
+        self._orb.shutdown(True)
+        self._orb.destroy()
+        end_s = time.monotonic() + _CLOSE_S
+        while _serves() and time.monotonic() < end_s:  # else the process could abort at its end
+            time.sleep(_POLL_S)
+
+
+def _serves() -> bool:
+    """Return whether a thread of the ORB is about to end."""
+    return any(isinstance(thread, omniORB.WorkerThread) for thread in threading.enumerate())
+
+
+def nvlist(values: dict[str, str], name_value: Callable[[str, Any], Any]) -> list[Any]:
+    """Return an NVList of strings, made of the `NameValue` of the stubs."""
+    return [name_value(name, omni_any.to_any(value)) for name, value in values.items()]
+
+
+def explain(error: Exception) -> str:
+    """Say in a few words why a call had no answer."""
+    text = str(error)
+    found = (words for mark, words in _REASONS.items() if mark in text.lower())
+    return next(found, text or type(error).__name__)
+
+
+def _options(endpoint: Endpoint) -> dict[str, str]:
+    return {
+        "endPoint": endpoint.uri,
+        "clientCallTimeOutPeriod": str(CALL_TIMEOUT_MS),
+        "clientConnectTimeOutPeriod": str(CALL_TIMEOUT_MS),
+        "traceLevel": "0",  # it would write to standard error
+    }
+
+
+def _servant(skeleton: type, answers: tuple[object, ...]) -> Any:
+    servant: Any = skeleton()
+    for name in servant._omni_op_d:  # its operations
+        found = (getattr(one, name) for one in answers if hasattr(one, name))
+        if (operation := next(found, None)) is not None:
+            setattr(servant, name, _answering(operation))
+    return servant
+
+
+def _answering(operation: Callable[..., Any]) -> Callable[..., Any]:
+    """Return an operation whatever of which ends in an answer."""
+
+    @wraps(operation)
+    def answer(*args: Any) -> Any:
+        try:
+            return operation(*args)
+        except CORBA.Exception:
+            raise
+        except TimeoutError as error:
+            raise CORBA.TIMEOUT(0, CORBA.COMPLETED_NO) from error
+        except RtcRefused as error:
+            kind = _REFUSALS.get(error.code, CORBA.BAD_INV_ORDER)
+            raise kind(0, CORBA.COMPLETED_NO) from error
+        except Exception as error:
+            _LOG.exception("OpenRTM: %s raised", operation.__name__)
+            raise CORBA.INTERNAL(0, CORBA.COMPLETED_MAYBE) from error
+
+    return answer

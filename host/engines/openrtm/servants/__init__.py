@@ -1,0 +1,1 @@
+"""What peers can ask of components, their execution contexts and their manager."""

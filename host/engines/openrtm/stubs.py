@@ -1,0 +1,181 @@
+"""Stubs of our IDL: compiled by omniidl when they are first wanted, and kept in a cache."""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import importlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.host.rtc.states import RtcRefused
+
+PACKAGE: Final = "tickrig_openrtm"
+"""What the stubs are imported as: others may have some of the same IDL modules."""
+
+IDL: Final = Path(__file__).parent / "idl"
+DATA_TYPES: Final = "DataTypes.idl"
+"""For peers; here the bytes of values are made without an ORB."""
+
+NEEDS_OMNIORB: Final = "OpenRTM needs omniORB: pip install 'tickrig[openrtm]'"
+
+_COMPILE: Final = "import sys; from omniidl.main import main; sys.exit(main())"
+_TIMEOUT_S: Final = 60.0
+_MODULES: Final = ("SDOPackage", "RTC", "OpenRTM", "RTM", "_GlobalIDL")
+
+
+class Stubs:
+    """The modules of our IDL as omniORB's Python mapping has them.
+
+    Their names are known at run time only, so their type is `Any`.
+
+    Args:
+        modules: by name, those of skeletons (`RTC__POA`) too.
+
+    Attributes:
+        sdo: `SDOPackage`.
+        rtc: `RTC`.
+        openrtm: `OpenRTM`, of the component and of data ports.
+        rtm: `RTM`, of the manager.
+        services: what stands in no IDL module: `RefHard`.
+    """
+
+    def __init__(self, modules: dict[str, Any]) -> None:
+        self._modules = modules
+        self.sdo, self.rtc, self.openrtm, self.rtm, self.services = (
+            modules[name] for name in _MODULES
+        )
+
+    def skeleton(self, interface: str) -> type:
+        """Return the class that `Orb.serve` wants for an interface.
+
+        Args:
+            interface: such as `RTC.PortService`; without a module such as `RefHard`.
+        """
+        module, _, name = interface.rpartition(".")
+        found: type = getattr(self._modules[f"{module or '_GlobalIDL'}__POA"], name)
+        return found
+
+
+@cache
+def stubs() -> Stubs:
+    """Import the stubs; the first time on a machine they are compiled, which takes 0.5 s.
+
+    Raises:
+        RtcRefused: no omniORB here, or the stubs cannot be made.
+    """
+    try:
+        import omniORB  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        raise RtcRefused(NEEDS_OMNIORB) from error
+    files = [path for path in sorted(IDL.glob("*.idl")) if path.name != DATA_TYPES]
+    cached = _cache_folder() / f"openrtm-{_key(files, omniORB.coreVersion())}"
+    try:
+        if cached.is_dir():
+            return _imported(cached)
+    except Exception:  # whatever somebody left of it
+        shutil.rmtree(cached, ignore_errors=True)
+    return _imported(_compiled(files, cached))
+
+
+def compile_idl(files: Iterable[Path], folder: Path, package: str = PACKAGE) -> None:
+    """Write stubs into a folder.
+
+    Args:
+        files: in IDL; what they include is found beside ours.
+        folder: where the package comes to be.
+        package: below which the modules are.
+
+    Raises:
+        RtcRefused: omniidl is not there, or says what is wrong.
+        OSError: the folder cannot be written.
+    """
+    options = ["-bpython", f"-C{folder}", f"-Wbpackage={package}", f"-I{IDL}", *_preprocessor()]
+    command = [sys.executable, "-c", _COMPILE, *options, *map(str, files)]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise RtcRefused(f"omniidl did not end within {_TIMEOUT_S:g} s") from error
+    if done.returncode:
+        raise RtcRefused(f"omniidl: {' '.join((done.stderr or done.stdout).split())}")
+
+
+def _preprocessor() -> list[str]:
+    """Say where omniidl finds its preprocessor: the wheel has it in a folder of its own."""
+    found = importlib.util.find_spec("jeteve_omniorb")
+    for folder in (found and found.submodule_search_locations) or ():
+        return [f"-Y{Path(folder) / 'bin' / 'omnicpp'}"]
+    return []
+
+
+def _cache_folder() -> Path:
+    """Return where the stubs of this user are kept; below a file if there is no such place."""
+    named = os.environ.get("XDG_CACHE_HOME", ""), os.path.expanduser("~/.cache"), os.devnull
+    return next(Path(folder) for folder in named if Path(folder).is_absolute()) / "tickrig"
+
+
+def _key(files: list[Path], version: str) -> str:
+    """Return what the stubs depend on, in 16 digits."""
+    digest = hashlib.sha256(f"{version} {sys.version_info[:2]} {PACKAGE}".encode())
+    for path in files:
+        digest.update(f"{path.name}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _compiled(files: list[Path], cached: Path) -> Path:
+    """Return the folder with new stubs: the cached one, or where that cannot be written, another.
+
+    They come to be in a folder of their own, which then gets its name: two processes at once do
+    not meet, and who is faster makes it for both.
+    """
+    try:
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(prefix="making-", dir=cached.parent))
+    except OSError:
+        return _temporary(files)
+    try:
+        compile_idl(files, made)
+        made.rename(cached)
+    except OSError:
+        return cached if cached.is_dir() else _temporary(files)
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+    return cached
+
+
+def _temporary(files: list[Path]) -> Path:
+    """Compile into a folder that ends with this process."""
+    try:
+        made = Path(tempfile.mkdtemp(prefix="tickrig-openrtm-"))
+        atexit.register(shutil.rmtree, made, ignore_errors=True)
+        compile_idl(files, made)
+    except OSError as error:
+        raise RtcRefused(f"the stubs of OpenRTM cannot be written: {error}") from error
+    return made
+
+
+def _imported(folder: Path) -> Stubs:
+    """Import the stubs from a folder; nothing is put on the path of modules."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
+        del sys.modules[name]
+    home = folder / PACKAGE
+    spec = importlib.util.spec_from_file_location(
+        PACKAGE, home / "__init__.py", submodule_search_locations=[str(home)]
+    )
+    if spec is None or spec.loader is None:
+        raise ImportError(f"no package in {folder}")
+    package = importlib.util.module_from_spec(spec)
+    sys.modules[PACKAGE] = package
+    spec.loader.exec_module(package)
+    names = [name + end for name in _MODULES for end in ("", "__POA")]
+    return Stubs({name: importlib.import_module(f"{PACKAGE}.{name}") for name in names})

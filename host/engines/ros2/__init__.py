@@ -1,0 +1,1 @@
+"""Ports of RT components as topics of ROS 2, over Cyclone DDS (extra tickrig[ros2])."""

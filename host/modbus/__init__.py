@@ -1,1 +1,0 @@
-"""A Modbus RTU master over a link."""
