@@ -1,4 +1,4 @@
-"""What installed packages add to `canmon`: decoders and check rules (docs/extending.md)."""
+"""What installed packages add to `canmon`: decoders and check rules (docs/howto/extending.md)."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The control socket, both ends (docs/control.md), and the clock that serves it meanwhile."""
+"""The control socket, both ends, and its clock in real time (docs/reference/bench/control.md)."""

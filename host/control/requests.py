@@ -1,4 +1,4 @@
-"""Requests to something that runs, and their answers: one JSON object a line (docs/control.md)."""
+"""Requests and their answers: one JSON object a line (docs/reference/bench/control.md)."""
 
 from __future__ import annotations
 

@@ -240,8 +240,9 @@ class CanLink:
     def _read(self, wait_us: int) -> can.Message | None:
         try:
             return self._bus.recv(wait_us / 1e6)
-        except (can.CanError, OSError) as error:
-            raise LinkClosed(f"cannot read from {self._name}: {error}") from error
+        except Exception as error:  # drivers raise what they like
+            text = str(error) or type(error).__name__
+            raise LinkClosed(f"cannot read from {self._name}: {text}") from error
 
     def _take(self, message: can.Message) -> StampedFrames:
         if (error := to_error_frame(message)) is not None:

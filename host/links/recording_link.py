@@ -1,4 +1,4 @@
-"""A link that writes what passes it into a trace (docs/trace.md)."""
+"""A link that writes what passes it into a trace (docs/reference/bench/trace.md)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Steps of scenarios and sequences: when, what, what must come, how often.
 
 It is one model with two syntaxes: scenarios are lines at times that count from the beginning
-(docs/scenario.md); sequences are TOML or lines, each step after the one before
-(docs/canmon-sending.md).
+(docs/reference/bench/scenario.md); sequences are TOML or lines, each step after the one before
+(docs/reference/canmon/canmon-sending.md).
 """
 
 from __future__ import annotations

@@ -10,12 +10,12 @@ from typing import Final
 from tickrig.host.links.errors import DeviceRefused
 from tickrig.host.links.link import Link
 from tickrig.wire.errors import WireError
-from tickrig.wire.scip import status
-from tickrig.wire.scip.command import Command
-from tickrig.wire.scip.description import Specification
-from tickrig.wire.scip.reply import Reply, ReplySplitter
-from tickrig.wire.scip.scan import WIDTHS, parse_scan
-from tickrig.wire.scip.scip1 import SWITCH
+from tickrig.wire.sensors.scip import status
+from tickrig.wire.sensors.scip.command import Command
+from tickrig.wire.sensors.scip.description import Specification
+from tickrig.wire.sensors.scip.reply import Reply, ReplySplitter
+from tickrig.wire.sensors.scip.scan import WIDTHS, parse_scan
+from tickrig.wire.sensors.scip.scip1 import SWITCH
 
 
 @dataclass(frozen=True, slots=True)

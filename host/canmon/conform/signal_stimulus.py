@@ -1,4 +1,4 @@
-"""Moves the inputs of an emulated device by the names of its signals (docs/control.md)."""
+"""Moves inputs of an emulated device by names of its signals (docs/reference/bench/control.md)."""
 
 from __future__ import annotations
 

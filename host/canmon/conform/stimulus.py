@@ -104,7 +104,7 @@ class CommandStimulus:
 
 
 class ControlStimulus(SignalStimulus):
-    """The control socket of an emulator (docs/control.md).
+    """The control socket of an emulator (docs/reference/bench/control.md).
 
     Args:
         path: of the socket.
@@ -127,7 +127,7 @@ class ControlStimulus(SignalStimulus):
             raise Refused(f"--stimulus {path}: no emulator: what it describes is none") from None
 
     def _learn(self, described: Any) -> None:
-        """Take names, units and converters, as docs/control.md has them."""
+        """Take names, units and converters, as docs/reference/bench/control.md has them."""
         for item in (*described.get("inputs", ()), *described.get("outputs", ())):
             self._units[item["name"]] = str(item.get("unit", ""))
             if "counts" in item:

@@ -90,11 +90,11 @@ def parse_address(text: str) -> tuple[str, int]:
 def _answer_input(gateway: Gateway) -> None:
     """Answer standard input; exit status 1 if a command was not carried out."""
     failed = False
-    for line in sys.stdin:
-        answer = gateway.answer(line.rstrip("\r\n"))
+    for line in sys.stdin.buffer:
+        answer = gateway.answer(line.decode("latin-1").rstrip("\r\n"))
         if answer:
             failed |= ERROR in answer
-            click.echo(answer)
+            click.echo(answer.encode("latin-1", "replace"))
     if failed:
         raise click.exceptions.Exit(1)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Sequence
+from functools import partial
 
 import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.monitor.check.rule import Finding
-from tickrig.host.monitor.frames.dump_line import decoded_text
+from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.text.values import counted
 
@@ -20,6 +21,7 @@ class Verdict:
 
     Args:
         jsonl: show them as JSON.
+        stamp: how times are shown as text; None for seconds of the epoch.
         kept: a report will want them.
 
     Attributes:
@@ -28,11 +30,24 @@ class Verdict:
         frames: how many were held against the rules.
     """
 
-    def __init__(self, jsonl: bool, *, kept: bool) -> None:
+    def __init__(self, jsonl: bool, stamp: Stamp | None = None, *, kept: bool) -> None:
         self.counts: Counter[str] = Counter()
         self.findings: list[Finding] = []
         self.frames = self._shown = 0
-        self._text, self._kept = finding_json if jsonl else str, kept
+        self._lines = None if stamp is None else DumpLines(stamp)
+        self._text = finding_json if jsonl else partial(Finding.shown, lines=self._lines)
+        self._kept = kept
+
+    def count(self, frames: int, first_us: int) -> None:
+        """Count frames; the first of all is where times may begin.
+
+        Args:
+            frames: at least one.
+            first_us: when the first of them was.
+        """
+        if self._lines is not None and not self.frames:
+            self._lines.stamp(first_us)
+        self.frames += frames
 
     def begin_again(self) -> None:
         """Forget all but how many findings were shown: those come first again, and are not."""

@@ -87,9 +87,10 @@ class BusReader:
                 one = to_record(message, self.name, self.tally)
                 records += (one,) if one else ()
                 message = self._bus.recv(0) if len(records) < BATCH else None
-        except (can.CanError, OSError, ValueError, TypeError) as error:
+        except Exception as error:  # drivers raise what they like
             if not records:
-                raise LinkClosed(f"{self.name}: {' '.join(str(error).split())}") from error
+                text = " ".join(str(error).split()) or type(error).__name__
+                raise LinkClosed(f"{self.name}: {text}") from error
         return records
 
     def close(self) -> None:

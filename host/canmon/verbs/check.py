@@ -41,6 +41,7 @@ from tickrig.host.monitor.check.rules import (
     joined,
     parse_rules,
 )
+from tickrig.host.monitor.frames.dump_line import Stamp
 from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
@@ -136,6 +137,12 @@ MOST_AROUND: Final = 1_000
     click.option("--junit", "report_path", type=PATH, metavar="FILE", help="Write a JUnit report."),
     click.option("--sarif", "sarif_path", type=PATH, metavar="FILE", help="Write a SARIF report."),
     click.option("--jsonl", is_flag=True, help="Findings as JSON, one a line."),
+    click.option(
+        "-t",
+        "stamp",
+        type=click.Choice([Stamp.ABSOLUTE.value, Stamp.ZERO.value, Stamp.DATE.value]),
+        help="Time: (a)bsolute, (z)ero at the first frame, (A)bsolute with date.",
+    ),
     reopen_option,
 )
 def command(  # noqa: PLR0913 - options
@@ -148,6 +155,7 @@ def command(  # noqa: PLR0913 - options
     report_path: Path | None,
     sarif_path: Path | None,
     jsonl: bool,
+    stamp: str | None,
     reopen: bool,
     strict: bool,
     **options: Any,
@@ -170,7 +178,8 @@ def command(  # noqa: PLR0913 - options
     bus = BusOptions(**{name: options[name] for name in NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     decoder = make_decoder(eds, dbc) if rules.expressions else None
-    verdict = Verdict(jsonl, kept=bool(report_path or sarif_path))
+    kept = bool(report_path or sarif_path)
+    verdict = Verdict(jsonl, Stamp(stamp) if stamp else None, kept=kept)
     log = None if decoder else block_log(words)
     log = _in_blocks(log, rules, bit_rate, verdict) if log else None
     frames = log or open_source(words, bus)
@@ -225,7 +234,8 @@ def _in_blocks(
     checker = ColumnChecker(rules, bit_rate)
 
     def take(block: Columns) -> None:
-        verdict.frames += len(block)
+        if len(block):
+            verdict.count(len(block), int(block.at_us[0]))
         verdict.take(checker.take(block))
 
     if take_blocks(log, take):
@@ -242,7 +252,8 @@ def _one_by_one(
 
     def take(records: Sequence[Record]) -> None:
         watch.take(records)
-        verdict.frames += len(records)
+        if records:
+            verdict.count(len(records), records[0].at_us)
         verdict.take(held.take(records))
         if not records and verdict.frames:
             verdict.take(held.wait(watch.now_us, has_clock))

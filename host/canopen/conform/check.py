@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import Any, Final
 
 Step = Mapping[str, Any]
-"""One step, in the terms of the notation of checks (docs/conform.md)."""
+"""One step, in the terms of the notation of checks (docs/reference/canopen/conform.md)."""
 
 
 class Level(IntEnum):

@@ -9,6 +9,7 @@ from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
+    from tickrig.host.monitor.frames.dump_line import DumpLines
 
 
 class Finding(NamedTuple):
@@ -30,20 +31,7 @@ class Finding(NamedTuple):
 
     def __str__(self) -> str:
         """Write it as `line`, with a line as of `canmon dump` for each frame around it."""
-        if not self.around:
-            return self.line
-        from tickrig.host.monitor.frames.dump_line import (  # noqa: PLC0415 - seldom wanted
-            DumpLines,
-            Stamp,
-            decoded_text,
-        )
-
-        lines = DumpLines(Stamp.ABSOLUTE)
-        shown = [
-            ("  >" if record is self.record else "   ") + lines.line(record, decoded_text(decoded))
-            for record, decoded in self.around
-        ]
-        return "\n".join([self.line, *shown])
+        return self.shown(None)
 
     @property
     def line(self) -> str:
@@ -52,9 +40,30 @@ class Finding(NamedTuple):
         >>> Finding(1_500_000, "nodes", "node 3 was never heard").line
         '(1.500000) nodes: node 3 was never heard'
         """
-        shown = f" [{self.record.channel} {self.record.frame}]" if self.record else ""
         seconds, micros = divmod(self.at_us, 1_000_000)
-        return f"({seconds}.{micros:06d}) {self.rule}: {self.text}{shown}"
+        return self._line(f"({seconds}.{micros:06d})")
+
+    def shown(self, lines: DumpLines | None) -> str:
+        """Write it with its frames, and times as these lines have them; None: of the epoch."""
+        head = self.line if lines is None else self._line(lines.stamp(self.at_us).strip())
+        if not self.around:
+            return head
+        from tickrig.host.monitor.frames.dump_line import (  # noqa: PLC0415 - seldom wanted
+            DumpLines,
+            Stamp,
+            decoded_text,
+        )
+
+        lines = lines or DumpLines(Stamp.ABSOLUTE)
+        shown = [
+            ("  >" if record is self.record else "   ") + lines.line(record, decoded_text(decoded))
+            for record, decoded in self.around
+        ]
+        return "\n".join([head, *shown])
+
+    def _line(self, stamp: str) -> str:
+        shown = f" [{self.record.channel} {self.record.frame}]" if self.record else ""
+        return f"{stamp} {self.rule}: {self.text}{shown}"
 
 
 NO_GAP_US: Final = -1

@@ -1,4 +1,4 @@
-"""Frames in traces of benches and of ports (docs/trace.md)."""
+"""Frames in traces of benches and of ports (docs/reference/bench/trace.md)."""
 
 from __future__ import annotations
 

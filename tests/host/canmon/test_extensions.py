@@ -1,4 +1,4 @@
-"""A foreign package with the decoder, rule and tab of docs/extending.md, and broken ones."""
+"""A foreign package with the decoder, rule and tab of docs/howto/extending.md, and broken ones."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tickrig.host.canmon.tui.panels.tabs import TABS, make_panels
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
-PAGE = Path(__file__).parents[3] / "docs" / "extending.md"
+PAGE = Path(__file__).parents[3] / "docs" / "howto/extending.md"
 BROKEN = """
 class Fragile:
     def decode(self, record):

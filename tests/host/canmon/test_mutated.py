@@ -32,7 +32,7 @@ VERBS = (
     *(["stats"], ["stats", "--by", "node", "--jsonl"], ["nodes"], ["nodes", "--jsonl"], ["top"]),
     *(["check", "--no-emcy", "--nodes", "3-9", "--max-gap", "181=20ms"], ["graph", "185[0]"]),
 )
-TARGETS = ("out.log", "out.jsonl", "out.asc", "out.trc", "out.csv", "out.blf")
+TARGETS = ("out.log", "out.jsonl", "out.asc", "out.trc", "out.csv", "out.blf", "out.pcapng")
 WORKSPACE = b"""\
 [bus]
 source = ["run.log"]
@@ -78,12 +78,20 @@ def run(*words: object) -> str:
     return result.output
 
 
+FD = b"""\
+(1600000003.000000) can0 185##1%s
+(1600000003.001000) can0 18FF0001##5%s
+(1600000003.002000) can0 705##0
+""" % (b"5A" * 64, b"00" * 12)
+
+
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[str, bytes]]:
     """Return the beginning of a log in each format, and on screens."""
     folder = tmp_path_factory.mktemp("logs")
     first = folder / "first.log"
-    first.write_bytes(b"".join((GOLDEN / "drive.log").read_bytes().splitlines(True)[:25]))
+    frames = (GOLDEN / "drive.log").read_bytes().splitlines(True)[:25]
+    first.write_bytes(b"".join(frames) + FD)
     found = []
     for name in TARGETS:
         run("conv", first, folder / name)

@@ -12,6 +12,7 @@ import can
 import pytest
 
 from tests.emulators.can.can_bench import frames
+from tickrig.host.canmon.sources.bus_source import BusReader
 from tickrig.host.links.can_link import CanLink, prepare_bus
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
@@ -60,6 +61,28 @@ def test_a_closed_link_says_so(other: can.BusABC) -> None:
         link.send(frames("080#"))
     with pytest.raises(LinkClosed, match="cannot read from virtual:can_link"):
         link.receive(0)
+
+
+class BadDriver(can.BusABC):
+    """A driver of somebody else, with a fault of its own."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        raise AttributeError
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise AssertionError
+
+
+def test_a_fault_of_a_driver_is_told_as_one_of_the_bus() -> None:
+    link = CanLink(BadDriver("bad"), "bad:0")
+    with pytest.raises(LinkClosed, match="cannot read from bad:0: AttributeError"):
+        link.receive(0)
+    reader = BusReader(BadDriver("bad"), "bad", "bad:0")
+    with pytest.raises(LinkClosed, match="bad:0: AttributeError"):
+        reader.read(0)
 
 
 def test_a_bus_that_cannot_be_opened_is_told() -> None:

@@ -14,8 +14,8 @@ from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.errors import DeviceRefused, LinkClosed
 from tickrig.host.urg.client import UrgClient
-from tickrig.wire.scip.reply import Reply
-from tickrig.wire.scip.scan import encode_scan
+from tickrig.wire.sensors.scip.reply import Reply
+from tickrig.wire.sensors.scip.scan import encode_scan
 
 REPLIES = [
     Reply(b"PP", "00", URG_04LX.lines).encode(),

@@ -1,1 +1,1 @@
-"""The checks as data: a text file for each group, in the notation of docs/conform.md."""
+"""The checks as data: a text file for each group (notation: docs/reference/canopen/conform.md)."""

@@ -1,4 +1,4 @@
-"""Steps of a check, one a line, in the notation of docs/conform.md.
+"""Steps of a check, one a line, in the notation of docs/reference/canopen/conform.md.
 
 >>> parse_step("3..5 x $heartbeat#05 in 400 ms")
 {'count': '$heartbeat#05', 'for': 400, 'min': 3, 'max': 5}
@@ -33,7 +33,7 @@ def parse_step(line: str) -> Step:
         match = pattern.fullmatch(line)
         if match is not None:
             return make(*match.groups())
-    raise ValueError(f"{line!r} is no step; docs/conform.md has the notation")
+    raise ValueError(f"{line!r} is no step; docs/reference/canopen/conform.md has the notation")
 
 
 def _expect(patterns: str, within_ms: str | None) -> Step:

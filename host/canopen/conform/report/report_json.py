@@ -1,4 +1,4 @@
-"""A report as JSON, for programs (docs/conform.md has what each field means)."""
+"""A report as JSON, for programs (docs/reference/canopen/conform.md has what each field means)."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from tests.host.canopen.data_sheet.corpus import DRIVE, ROOT
 from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig.host.canmon.cli import main
 
-PAGE: Final = (ROOT / "docs" / "eds.md").read_text("utf-8")
+PAGE: Final = (ROOT / "docs" / "reference/canmon/eds.md").read_text("utf-8")
 COMMANDS: Final = re.findall(r"^canmon (eds [^#\n]+)", PAGE, re.MULTILINE)
 
 

@@ -1,4 +1,4 @@
-"""docs/canmon-gateway.md: what it shows happens, and all is in it."""
+"""docs/reference/canmon/canmon-gateway.md: what it shows happens, and all is in it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tests.environment import ROOT
 from tests.page_runner import PageRunner
 from tickrig.host.canopen.gateway.lss_requests import LSS_VERBS
 
-PAGE = ROOT / "docs" / "canmon-gateway.md"
+PAGE = ROOT / "docs" / "reference/canmon/canmon-gateway.md"
 
 
 def test_what_the_page_shows_happens(tmp_path: Path) -> None:

@@ -47,6 +47,14 @@ def test_an_error_goes_on_and_ends_with_status_1(rig: Path) -> None:
     ]
 
 
+def test_bytes_of_a_text_come_back_as_they_went_in(rig: Path) -> None:
+    said = b'[1] 5 w 0x1008 0 vs "\xec"\n[2] 5 r 0x1000 0 u32 # \xc3\xa9\n[3] \xec\n'
+    result = CliRunner().invoke(main, ["gateway", str(rig)], input=said, catch_exceptions=False)
+    lines = result.stdout_bytes.splitlines()
+    assert (len(lines), lines[1]) == (3, b"[2] 131474")
+    assert b"\xec" in lines[2]
+
+
 @pytest.mark.parametrize("text", ["", "x", "127.0.0.1:", ":80", "65536", "-1", "1e3", "9" * 5_000])
 def test_an_address_that_is_none_is_refused(rig: Path, text: str) -> None:
     result = gateway(rig, "--listen", text)

@@ -1,4 +1,4 @@
-"""docs/canmon-net.md: what it shows happens."""
+"""docs/reference/canmon/canmon-net.md: what it shows happens."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.net.group import VERBS
 from tickrig.host.cli.start import load
 
-PAGE = ROOT / "docs" / "canmon-net.md"
+PAGE = ROOT / "docs" / "reference/canmon/canmon-net.md"
 
 
 class Here(PageRunner):

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from decimal import Decimal
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources import block_log
 
 DRIVE_EDS = Path(__file__).parents[4] / "examples/eds/epos.eds"
-PAGE = (Path(__file__).parents[4] / "docs/canmon-model.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[4] / "docs/reference/canmon/canmon-model.md").read_text("utf-8")
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 LOG = """\
 (1.000000) can0 703#05
@@ -74,6 +75,26 @@ def test_a_large_log_is_checked_the_same(log: str, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
     result = check(log, "--no-emcy", *HEARTBEAT)
     assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n{LATE}\n")
+
+
+@pytest.mark.parametrize("small_bytes", [0, 1 << 20])
+def test_times_count_from_the_first_frame(
+    small_bytes: int, log: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(block_log, "SMALL_BYTES", small_bytes)
+    first_s = Decimal(LOG.partition(")")[0].strip(" ("))
+    found = [line.partition(")") for line in (EMCY, LATE)]
+    wanted = [f"({Decimal(at[1:]) - first_s:010.6f}{end}{text}" for at, end, text in found]
+    assert check(log, "--no-emcy", *HEARTBEAT, "-t", "z").stdout.splitlines() == wanted
+    assert "'d' is not one of 'a', 'z', 'A'" in check(log, "--no-emcy", "-t", "d").stderr
+
+
+def test_frames_around_a_finding_have_its_kind_of_time(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.log", WRITTEN)
+    _, *around = check(log, "--rule", "emcy never", "-t", "z").stdout.splitlines()
+    dumped = CliRunner().invoke(main, ["dump", log, "-t", "z"]).stdout
+    assert {line[3:] for line in around} <= set(dumped.splitlines())
+    assert around
 
 
 def test_findings_are_lines_of_json(log: str) -> None:

@@ -17,7 +17,9 @@ from tests.host.monitor.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
 from tickrig.host.monitor.logs.log_reader import read_log
 
-PAGE: Final = (Path(__file__).parents[4] / "docs" / "canmon-recording.md").read_text("utf-8")
+PAGE: Final = (
+    Path(__file__).parents[4] / "docs" / "reference/canmon/canmon-recording.md"
+).read_text("utf-8")
 COMMANDS: Final = re.findall(r"^canmon (dump can0 .*?[^&])(?:  .*)?$", PAGE, re.MULTILINE)
 
 

@@ -15,7 +15,7 @@ from tickrig.host.canopen.bus_file.bus_file import read_bus_file
 from tickrig.host.canopen.bus_file.bus_rules import RULES
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, PDO, ROS, SLAVE
 
-PAGE: Final = (ROOT / "docs" / "bus-file.md").read_text("utf-8")
+PAGE: Final = (ROOT / "docs" / "reference/canopen/bus-file.md").read_text("utf-8")
 
 
 def rows_below(head: str) -> list[str]:

@@ -7,7 +7,7 @@ from typing import Final
 from tests.host.canopen.data_sheet.corpus import ROOT
 from tickrig.host.canopen.data_sheet.rule_table import RULES
 
-PAGE: Final = (ROOT / "docs" / "eds.md").read_text("utf-8")
+PAGE: Final = (ROOT / "docs" / "reference/canmon/eds.md").read_text("utf-8")
 
 
 def test_the_page_has_all_rules_in_their_order() -> None:

@@ -78,7 +78,9 @@ def test_a_mistake_in_a_line_is_told_with_its_number(text: str, said: str) -> No
 
 
 def test_the_sequence_of_the_page_can_be_carried_out() -> None:
-    page = (Path(__file__).parents[4] / "docs/canmon-sending.md").read_text("utf-8")
+    page = (Path(__file__).parents[4] / "docs/reference/canmon/canmon-sending.md").read_text(
+        "utf-8"
+    )
     match = re.search(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
     assert match is not None
     assert outline(TomlSequence(match[1], "page.toml").parse().steps)[:2] == [

@@ -54,7 +54,9 @@ def test_each_name_stands_for_something_on_some_node() -> None:
 
 @pytest.mark.parametrize("line", ["", "sleep 5", "> ", "write 1017:00", "wait 5", "none on 705"])
 def test_a_line_that_is_no_step_is_refused(line: str) -> None:
-    with pytest.raises(ValueError, match=r"is no step; docs/conform\.md has the notation"):
+    with pytest.raises(
+        ValueError, match=r"is no step; docs/reference/canopen/conform\.md has the notation"
+    ):
         parse_step(line)
 
 

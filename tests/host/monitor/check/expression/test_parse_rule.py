@@ -141,7 +141,7 @@ def test_any_text_is_a_rule_or_refused(text: str) -> None:
         return
 
 
-PAGE = (Path(__file__).parents[5] / "docs" / "canmon-model.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[5] / "docs" / "reference/canmon/canmon-model.md").read_text("utf-8")
 WRITTEN = PAGE.partition("### Rules that are written out")[2].partition("\n- ")[0]
 ROWS = re.findall(r"^\| (`.*?) \|", WRITTEN, re.MULTILINE)
 
