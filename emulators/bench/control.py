@@ -1,4 +1,4 @@
-"""What can be asked of a running emulator (docs/control.md)."""
+"""What can be asked of a running emulator (docs/reference/bench/control.md)."""
 
 from __future__ import annotations
 
@@ -68,7 +68,9 @@ class EmulatorControl(RequestDispatcher):
 
     def _get(self, request: Object) -> Object:
         device = self._emulator.device
-        names = request.get("names", [*device.inputs.table, *device.outputs])
+        names = request.get("names")  # no list of all: a CANopen node has hundreds of objects
+        if "names" not in request:
+            names = [*device.inputs.table, *device.outputs]
         if not isinstance(names, list):
             raise ValueError(f"names is a list of names, not {short(names)}")
         for name in names:

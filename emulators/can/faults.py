@@ -67,6 +67,7 @@ class CanFaults(Part):
         changed: called with each fault that begins (True) or ends (False).
 
     Attributes:
+        seed: seed of all chance in it; a new one counts for what was not drawn yet.
         fault_types: the faults that can be armed, by name.
         active: whether any is armed.
         place: a number from which the place of a turned bit is taken.
@@ -75,7 +76,7 @@ class CanFaults(Part):
     fault_types = CAN_FAULTS
 
     def __init__(self, seed: int, changed: Callable[[str, bool], None]) -> None:
-        self._seed, self._changed = seed, changed
+        self.seed, self._changed = seed, changed
         self._armed: dict[str, int] = {}
         self._chances: dict[str, Chance] = {}
         self._verdict: Verdict | None = None
@@ -132,4 +133,9 @@ class CanFaults(Part):
         return self._chance(stream).hit(self._armed[name])
 
     def _chance(self, stream: str) -> Chance:
-        return self._chances.setdefault(stream, Chance(self._seed, stream))
+        return self._chances.setdefault(stream, Chance(self.seed, stream))
+
+    @property
+    def drawn(self) -> bool:
+        """Whether anything was drawn by chance."""
+        return bool(self._chances)

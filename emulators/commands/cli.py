@@ -12,6 +12,10 @@ from tickrig.host.cli.options import version_option
 HERE: Final = "tickrig.emulators.commands"
 TESTING: Final = "tickrig.emulators.testing.commands"
 COMMANDS: Final = {
+    "campaign": (
+        f"{TESTING}.campaign_cli:campaign",
+        "Run tests that have a bench with many seeds and parameters, on all cores or a cluster.",
+    ),
     "check": (
         f"{TESTING}.check_cli:check",
         "Check rig files and bus.yml: say what is on the bench, or all that is wrong.",
@@ -67,6 +71,7 @@ def main() -> None:
     tickrig record /dev/ttyUSB0 -o run.trace      record a real device and its host
     tickrig replay run.trace                      replay a recorded run
     tickrig report run.json -o bench.html         see a test run as a page
+    tickrig campaign test_x.py --seeds 0-9999     run a test ten thousand times
     tickrig demo rrc                              see a device and a host at work
     tickrig rtc run system.toml                   run RT components
 

@@ -1,4 +1,4 @@
-"""Device types: what builds, connects and shows a device on a serial line (docs/extending.md)."""
+"""Device types: what builds, connects and shows a device on a line (docs/howto/extending.md)."""
 
 from __future__ import annotations
 
@@ -125,6 +125,7 @@ DEVICES: Final = ExtensionGroup[DeviceType](
         "rtc-lite": "tickrig.emulators.rtc_lite.device_type:RTC_LITE",
         "rh3-base": "tickrig.emulators.rh3.device_type:RH3_BASE",
         "urg": "tickrig.emulators.urg.device_type:URG",
+        "ucode-reader": "tickrig.emulators.tkernel.reader.device_type:UCODE_READER",
     },
     accepts=lambda found: isinstance(found, DeviceType),
     wanted="a DeviceType",

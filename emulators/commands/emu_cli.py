@@ -24,6 +24,10 @@ OURS: Final = {
     "rtc-lite": ("tickrig.emulators.rtc_lite.cli:main", "Emulate a PIC, as rtc-lite-emu."),
     "rh3-base": ("tickrig.emulators.rh3.cli:main", "Emulate the base of RH3, as rh3-emu."),
     "urg": ("tickrig.emulators.urg.cli:main", "Emulate a range finder, as urg-emu."),
+    "ucode-reader": (
+        "tickrig.emulators.tkernel.reader.cli:main",
+        "Emulate an infra-red reader of ucodes, as ucode-reader-emu.",
+    ),
     "canopen-slave": (
         "tickrig.emulators.canopen.cli:main",
         "Emulate CANopen slaves, as canopen-slave-emu.",

@@ -43,6 +43,8 @@ class FaultyPort(Copyable, Generic[W]):
         seed: seed of all chance in it.
 
     Attributes:
+        seed: seed of all chance in it; a new one counts for faults that are armed from then on.
+        drawn: whether a fault by chance was ever armed.
         listeners: called with the time, the direction, what was sent and what faults left of
             it, where that differs. Nobody listens to a twin.
     """
@@ -50,7 +52,7 @@ class FaultyPort(Copyable, Generic[W]):
     def __init__(
         self, port: Port[W], fault_types: Mapping[str, FaultType[W]], seed: int = 0
     ) -> None:
-        self._port, self._seed = port, seed
+        self._port, self.seed, self.drawn = port, seed, False
         self.fault_types = fault_types
         self._to_device: dict[str, Fault[W]] = {}
         self._from_device: dict[str, Fault[W]] = {}
@@ -74,8 +76,9 @@ class FaultyPort(Copyable, Generic[W]):
         """
         self.check(name, rate)
         threshold, make = threshold_of(rate or 0), self.fault_types[name].make
-        self._to_device[name] = make(Chance(self._seed, f"{name} >"), threshold)
-        self._from_device[name] = make(Chance(self._seed, f"{name} <"), threshold)
+        self.drawn |= rate is not None
+        self._to_device[name] = make(Chance(self.seed, f"{name} >"), threshold)
+        self._from_device[name] = make(Chance(self.seed, f"{name} <"), threshold)
 
     def clear(self, name: str) -> None:
         """Let a fault end; clearing one that is not armed is no error."""

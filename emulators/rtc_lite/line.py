@@ -72,7 +72,7 @@ class _Noise(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
         out = bytearray()
         for byte in data:
-            if self.hits():
+            if self.chance.hit(self.threshold):
                 out.append(self.chance.draw() & 0xFF)
             out.append(byte)
         return bytes(out)

@@ -1,4 +1,4 @@
-"""Scenarios: what is done to a device at which time (docs/scenario.md)."""
+"""Scenarios: what is done to a device at which time (docs/reference/bench/scenario.md)."""
 
 from __future__ import annotations
 

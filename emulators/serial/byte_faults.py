@@ -22,24 +22,32 @@ class ByteFault:
     chance: Chance
     threshold: int
 
-    def hits(self) -> bool:
-        """Draw once."""
-        return self.chance.hit(self.threshold)
+    def hits(self, draws: int) -> list[int]:
+        """Draw so often, and return which draws hit, counted from 0."""
+        return self.chance.hits(self.threshold, draws)
 
 
 class _Flip(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
-        return bytes(byte ^ sum(1 << bit for bit in range(8) if self.hits()) for byte in data)
+        if not (hits := self.hits(8 * len(data))):
+            return data
+        turned = bytearray(data)
+        for bit in hits:
+            turned[bit >> 3] ^= 1 << (bit & 7)
+        return bytes(turned)
 
 
 class _Drop(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
-        return bytes(byte for byte in data if not self.hits())
+        if not (hits := set(self.hits(len(data)))):
+            return data
+        return bytes(byte for at, byte in enumerate(data) if at not in hits)
 
 
 class _Dup(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
-        return b"".join(bytes([byte]) * (1 + self.hits()) for byte in data)
+        hits = set(self.hits(len(data)))
+        return b"".join(bytes([byte]) * (1 + (at in hits)) for at, byte in enumerate(data))
 
 
 class _Cut(ByteFault):

@@ -34,6 +34,8 @@ from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.twin import Copyable
+from tickrig.device.ucode_reader.markers import Marker
+from tickrig.device.ucode_reader.reader import UcodeReader
 from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
@@ -119,6 +121,7 @@ CAN_IDS = [0x000, 0x080, 0x100, 0x205, 0x305, 0x405, 0x505, 0x605, 0x705, 0x7E5]
 
 BASE = BaseParameters(friction=0.1, noise=0.05, seed=3, delay_ms=7)
 POST = World(posts=(Post(2, 0, 0.5),))
+UCODE_MARKERS = (Marker("0" * 32, 1, 0), Marker("1" * 32, 0, 2))
 
 
 def lite(framing: Framing = Framing.LITE, **settings: Any) -> dict[str, Any]:
@@ -200,6 +203,12 @@ KINDS: dict[str, dict[str, Any]] = {
     "RH3 base at once": rh3(BaseParameters()),
     "URG of SCIP 1.1": urg("1.1"),
     "URG of SCIP 2.0": urg("2.0"),
+    "ucode reader": {
+        "device_type": partial(UcodeReader, None, UCODE_MARKERS),
+        "wire": partial(SerialLine, 38_400),
+        "traffic": strategies.chunks([b"ID\n", b"ON\n", b"OFF\r\n", b"X\n"]),
+        "max_examples": examples(10),
+    },
     "CANopen slave": canopen(reference_slave),
     "CiA 401 module": canopen(reference_io),
     "CiA 402 drive": canopen(reference_drive),

@@ -148,7 +148,8 @@ JOINT_KEYS: Final[Mapping[str, Key]] = {
         _one_of(*PRESETS),
         ", ".join(f"`{name}`" for name in PRESETS),
         "`epos-wheel`",
-        "motor, power stage, encoder and gear to begin with: [presets](servo.md#parameters)",
+        "motor, power stage, encoder and gear to begin with: "
+        "[presets](../reference/devices/servo.md#parameters)",
     ),
     "supply_v": Key(_number(1, 100), "1..100", "of the motor", "supply of the power stage"),
     "encoder_counts": Key(
@@ -218,7 +219,8 @@ KEYS: Final[Mapping[str, Key]] = {
         _one_of(*PROFILES),
         ", ".join(f"`{name}`" for name in PROFILES),
         "`auto`",
-        "what the node does with its objects: [profiles](canopen-slave-emu.md#profiles)",
+        "what the node does with its objects: "
+        "[profiles](../reference/devices/canopen-slave-emu.md#profiles)",
     ),
     "configured": Key(
         _flag,

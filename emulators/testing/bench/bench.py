@@ -32,6 +32,7 @@ from tickrig.wire.instant import NEVER
 T = TypeVar("T")
 
 if TYPE_CHECKING:
+    from tickrig.device.twin.snapshot import MachineSnapshot
     from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 
 VIRTUAL: Final = "virtual"
@@ -260,8 +261,8 @@ class Bench(BenchDevice, Closing):
 
         In virtual time, from `with` to its end, `time.sleep`, `monotonic`, `time` and
         `perf_counter`, `wait` of threading's events and conditions, `get` and `put` of queues
-        make the time of the bench pass, wherever the code of a host has kept them (docs/hosts.md).
-        In real time they do so anyway.
+        make the time of the bench pass, wherever the code of a host has kept them
+        (docs/reference/bench/hosts.md). In real time they do so anyway.
 
         Returns:
             A context manager; it gives the clock, with the functions of `time`.
@@ -300,6 +301,40 @@ class Bench(BenchDevice, Closing):
             NotOnThisBench: not in virtual time.
         """
         return Bench.of_mode(self._mode.fork())
+
+    def snapshot(self, *hosts: object) -> MachineSnapshot:
+        """Return what puts the bench back to what it is now, as often as wanted.
+
+        It is the same bench afterwards: who has it, or a link of it, keeps it. That costs a small
+        part of a `fork`. A task, a trigger or a host that came since is not there any more.
+
+        Args:
+            hosts: what is to be put back with it: hosts, and what else a test has.
+
+        Returns:
+            The snapshot; `restore()` puts it all back.
+
+        Raises:
+            NotOnThisBench: not in virtual time.
+            TypeError: something in a host cannot be put back, as a file or a thread.
+
+        >>> from tickrig.device.rrc.machine import Rrc
+        >>> with Bench(Rrc()) as bench:
+        ...     bench.run_for("1s")
+        ...     warm = bench.snapshot()
+        ...     bench.press("power_button")
+        ...     bench.run_for("1s")
+        ...     print(bench.get("state"))
+        ...     warm.restore()
+        ...     print(bench.get("state"), bench.now_us)
+        Standby
+        WaitPowerOn 1000000
+        """
+        from tickrig.device.twin.snapshot import MachineSnapshot  # noqa: PLC0415 - seldom
+
+        if not isinstance(self._mode, VirtualMode):
+            raise NotOnThisBench("time that has passed comes back in virtual time alone")
+        return MachineSnapshot(self, *hosts)
 
     def close(self) -> None:
         """Give everything back."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
@@ -167,13 +167,13 @@ class BenchDevice:
         """A new link for a client: bytes on a serial line, frames on a CAN bus."""
         return self._mode.link(self._wire())
 
-    def serial(self, **options: Any) -> serial.SerialBase:
-        """Open the serial line as a pyserial object.
+    def serial(self, **options: Any) -> serial.Serial:
+        """Open the serial line as a pyserial object, for types what `serial_for_url` returns.
 
         Args:
             options: as `serial.Serial` takes them; `timeout` passes in the time of the bench.
         """
-        return self._mode.serial(self._wire(), options)
+        return cast("serial.Serial", self._mode.serial(self._wire(), options))
 
     @property
     def url(self) -> str:

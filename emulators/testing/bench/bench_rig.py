@@ -12,11 +12,13 @@ from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator
+from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.bench.assembly import Assembly, AssemblyFaults
@@ -150,6 +152,11 @@ class RigState(Copyable):
         if not parts.signals:
             return ()
         return (SignalDriver(parts.signals, self.assembly.parts, parts.seed),)
+
+    @property
+    def chances(self) -> Sequence[FaultyPort[bytes] | CanFaults]:
+        """What has faults by chance, in the order of the wires."""
+        return [chance for mount in self.mounts.values() for chance in mount.chances]
 
     def fault_name(self, owner: str, fault: str) -> str:
         """Return the full name of a fault of a device, or of its wire, or of a wire.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 from zlib import crc32
 
@@ -10,6 +10,7 @@ from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
@@ -78,6 +79,11 @@ class LineMount(Copyable):
         return self._ports[0]
 
     @property
+    def chances(self) -> Sequence[FaultyPort[bytes]]:
+        """What has faults by chance."""
+        return self._ports
+
+    @property
     def parts(self) -> Mapping[str, HasSignals]:
         """The physical side of each device."""
         return self.devices
@@ -142,6 +148,11 @@ class BusMount(Copyable):
     def faults(self) -> WireFaults:
         """Where faults of the bus are armed."""
         return self.wire.faults
+
+    @property
+    def chances(self) -> Sequence[CanFaults]:
+        """What has faults by chance."""
+        return [self.wire.faults]
 
     @property
     def parts(self) -> Mapping[str, HasSignals]:

@@ -21,14 +21,27 @@ if TYPE_CHECKING:
 @click.command("replay")
 @click.argument("file", type=PATH)
 @click.option("-v", "--verbose", is_flag=True, help="Each device: its ticks, and what differs.")
+@click.option(
+    "--host",
+    metavar="FILE.py:Class",
+    help="FILE is a scenario that a search has found: do it with this BenchMachine.",
+)
 @click.pass_context
-def replay_command(context: click.Context, /, file: Path, *, verbose: bool) -> None:
+def replay_command(
+    context: click.Context, /, file: Path, *, verbose: bool, host: str | None
+) -> None:
     """Replay the trace FILE on fresh devices; exit status 1 if one says anything else.
+
+    With --host a scenario of check_host is done again, with a fresh bench and host; exit status 1
+    if something is still wrong.
 
     \b
     rrc-emu --link /tmp/rrc --trace run.trace
     tickrig replay run.trace
+    tickrig replay found.txt --host test_chair.py:Chair
     """  # noqa: D301 - click wants the backspace
+    if host is not None:
+        context.exit(_replay_host(file, host))
     with loading():
         from tickrig.host.text.bench_header import PREFIX  # noqa: PLC0415 - slow
 
@@ -52,6 +65,31 @@ def replay_command(context: click.Context, /, file: Path, *, verbose: bool) -> N
     if first.difference is not None and not verbose:
         click.echo(_describe(first.name, first.difference, file))
     context.exit(1)
+
+
+def _replay_host(file: Path, host: str) -> int:
+    """Do a scenario again; return 1 if something is wrong."""
+    with loading():
+        from tickrig.emulators.testing.machine.bench_machine import BenchMachine  # noqa: PLC0415
+        from tickrig.emulators.testing.machine.host_runs import HostRuns  # noqa: PLC0415
+        from tickrig.emulators.testing.machine.step import parse_steps  # noqa: PLC0415
+        from tickrig.host.text.user_file import find_class  # noqa: PLC0415
+
+    try:
+        steps = parse_steps(file.read_text("utf-8"), str(file))
+        runs = HostRuns(find_class(host, BenchMachine))
+    except OSError as error:
+        refuse_path("scenario", error)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    with runs:
+        try:
+            runs.run(steps)
+        except Exception as error:  # what a host may raise
+            click.echo(f"{type(error).__name__}: {error}\n{runs.last_lines()}")
+            return 1
+    click.echo(f"nothing is wrong in {counted(len(steps), 'step')}")
+    return 0
 
 
 class _Played(NamedTuple):

@@ -34,6 +34,7 @@ from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.plugin.verdict import blocked, make_error
+from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
 from tickrig.host.cli.refused import Refused
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ class BenchedTest:
         item: the test.
         wanted: what it asked for.
         safe: what outputs are when it is over.
+        warm_up: what is done to its bench before.
 
     Attributes:
         bench: its bench, from the moment at which it is open.
@@ -61,8 +63,10 @@ class BenchedTest:
         not_kept: why other files were not, or not whole, each in a line.
     """
 
-    def __init__(self, item: pytest.Function, wanted: Wanted, safe: SafeState) -> None:
-        self.item, self.wanted, self._safe = item, wanted, safe
+    def __init__(
+        self, item: pytest.Function, wanted: Wanted, safe: SafeState, warm_up: WarmUp = None
+    ) -> None:
+        self.item, self.wanted, self._safe, self._warm_up = item, wanted, safe, warm_up
         self._settings = item.config.stash[SETTINGS]
         self.bench: Bench | None = None
         self.fingerprint: Fingerprint | None = None
@@ -87,7 +91,7 @@ class BenchedTest:
         check_mode(needs, self.wanted.mode)
         self._listen()
         self.wanted = self.wanted.settled(self.item)
-        bench = self.bench = self.wanted.open()
+        bench = self.bench = warmed(self.item, self.wanted.open(), self._warm_up)
         check_needs(needs, bench)
         self._safe = with_plan(self._safe, self.wanted.safe, bench)
         check_safe(bench, self._safe)
@@ -199,14 +203,18 @@ class BenchedTest:
 
 @contextmanager
 def benched(
-    request: pytest.FixtureRequest, source: BenchSource, mode: str, safe: SafeState
+    request: pytest.FixtureRequest,
+    source: BenchSource,
+    mode: str,
+    safe: SafeState,
+    warm_up: WarmUp = None,
 ) -> Iterator[Bench]:
     """Give a test its bench."""
     settings = request.config.stash[SETTINGS]
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
     wanted = Wanted(source, mode, settings.seed, request.path.parent)
-    test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe)
+    test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe, warm_up)
     try:
         yield _opened(test)
     finally:

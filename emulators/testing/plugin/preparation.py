@@ -27,6 +27,10 @@ def prepare(config: pytest.Config, settings: Settings) -> None:
         if MODES[0] not in settings.modes:
             raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         config.pluginmanager.register(Compare(), "tickrig-bench-compare")
+    if settings.parameters:
+        from tickrig.emulators.testing.plugin.parameters import Parameters  # noqa: PLC0415 - asked
+
+        config.pluginmanager.register(Parameters(settings.parameters), "tickrig-bench-param")
     if settings.artifacts:
         from tickrig.host.text.whole_file import check_writable  # noqa: PLC0415 - asked for
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
     from tickrig.emulators.testing.plugin.bench_source import BenchSource
     from tickrig.emulators.testing.plugin.checks.safe_state import SafeState
+    from tickrig.emulators.testing.plugin.warm_up import WarmUp
 
 MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
@@ -38,10 +39,11 @@ OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Enter the options, on the command line and in the configuration file."""
     group = parser.getgroup("tickrig", "benches of tickrig")
-    for name, metavar, text in OPTIONS:
-        flag = "--" + name.replace("_", "-")
-        if metavar:
-            group.addoption(flag, dest=name, metavar=metavar, help=text)
+    for option in OPTIONS:
+        flag, name, text = option.flag, option.name, option.text
+        if option.metavar:
+            action = "append" if option.many else "store"
+            group.addoption(flag, dest=name, action=action, metavar=option.metavar, help=text)
         else:
             group.addoption(flag, dest=name, action="store_const", const="true", help=text)
         parser.addini(name, text, default="")
@@ -130,17 +132,24 @@ def bench_safe() -> SafeState:
 
 
 @pytest.fixture
+def bench_warm_up() -> WarmUp:
+    """What is done to the bench before the test; override it: a function of the bench."""
+    return None
+
+
+@pytest.fixture
 def bench(
     request: pytest.FixtureRequest,
     bench_config: BenchSource,
     bench_mode: str,
     bench_safe: SafeState,
+    bench_warm_up: WarmUp,
 ) -> Iterator[Bench]:
     """A bench for this test alone, of `bench_config` or `--bench`; healthy after the test."""
     from tickrig.emulators.testing.plugin.benched_test import benched  # noqa: PLC0415 - asked for
 
     source: BenchSource = getattr(request, "param", bench_config)
-    with benched(request, source, bench_mode, bench_safe) as opened:
+    with benched(request, source, bench_mode, bench_safe, bench_warm_up) as opened:
         yield opened
 
 

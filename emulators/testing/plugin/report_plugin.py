@@ -14,11 +14,11 @@ from typing import Final
 import pytest
 
 from tickrig.emulators.testing.plugin.evidence.failure_report import repeat_command
+from tickrig.emulators.testing.plugin.evidence.outcome import outcome_of
 from tickrig.emulators.testing.plugin.settings import Settings
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
-    Outcome,
     RunEnvironment,
     TestRecord,
 )
@@ -168,7 +168,7 @@ def record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord
         item: the test.
         reports: of all its phases.
     """
-    outcome, reason, longrepr = _verdict(item, reports)
+    outcome, reason, longrepr = outcome_of(item, reports)
     record = TestRecord(
         str(item.nodeid),
         outcome,
@@ -181,30 +181,6 @@ def record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord
         command=repeat_command(item),
     )
     return _with_bench(item, record)
-
-
-def _verdict(item: pytest.Item, reports: list[pytest.TestReport]) -> tuple[Outcome, str, str]:
-    """Return how a test ended, why in a line, and what pytest says of it."""
-    test = item.stash.get(BENCHED, None)
-    for report in reports:
-        if report.failed:
-            crash = getattr(report.longrepr, "reprcrash", None)
-            reason = crash.message if crash else report.longreprtext
-            if test is not None and test.blocked:
-                return Outcome.BLOCKED, test.blocked, report.longreprtext
-            outcome = Outcome.FAILED if report.when == "call" else Outcome.ERROR
-            return outcome, reason.partition("\n")[0], report.longreprtext
-        if report.skipped:
-            return Outcome.SKIPPED, _why_skipped(report), ""
-    return Outcome.PASSED, "", ""
-
-
-def _why_skipped(report: pytest.TestReport) -> str:
-    if hasattr(report, "wasxfail"):
-        return f"expected to fail: {report.wasxfail}".rstrip(": ")
-    if isinstance(report.longrepr, tuple):
-        return report.longrepr[2].removeprefix("Skipped: ")
-    return report.longreprtext
 
 
 def _with_bench(item: pytest.Item, record: TestRecord) -> TestRecord:

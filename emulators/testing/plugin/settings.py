@@ -21,11 +21,13 @@ class Option(NamedTuple):
         name: as `bench_mode`: the option is `--bench-mode`.
         metavar: stands for its value; empty if it has none.
         text: what it is for.
+        many: whether it may be repeated; in the configuration file it has a line each time.
     """
 
     name: str
     metavar: str
     text: str
+    many: bool = False
 
     @property
     def flag(self) -> str:
@@ -42,7 +44,20 @@ OPTIONS: Final = (
     Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
     Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
     Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
+    Option("bench_param", "NAME=V,V", "run tests that take NAME with each value; many", many=True),
 )
+
+
+class Parameter(NamedTuple):
+    """What tests take by name, as an argument or through fixtures.
+
+    Attributes:
+        name: of the argument or fixture.
+        words: the values, as they were written.
+    """
+
+    name: str
+    words: tuple[str, ...]
 
 
 class Settings(NamedTuple):
@@ -58,6 +73,7 @@ class Settings(NamedTuple):
         compare: whether each test runs twice.
         report: file for the report, None if there is none.
         requirements: file with what the tests have to show, None if nobody says it.
+        parameters: of tests, each with the values that they run with.
     """
 
     rig_file: Path | None = None
@@ -69,6 +85,7 @@ class Settings(NamedTuple):
     compare: bool = False
     report: Path | None = None
     requirements: Path | None = None
+    parameters: tuple[Parameter, ...] = ()
 
     @classmethod
     def of(cls, config: pytest.Config) -> Settings:
@@ -84,6 +101,7 @@ class Settings(NamedTuple):
             wanted["bench_compare"].lower() in {"true", "1", "yes", "on"},
             _path(config, "bench_report", wanted["bench_report"]),
             _requirements(config, wanted),
+            _parameters(wanted["bench_param"]),
         )
 
     @property
@@ -100,6 +118,8 @@ SETTINGS: Final = pytest.StashKey[Settings]()
 
 def _wanted(config: pytest.Config, option: Option) -> str:
     given = config.getoption(option.name)
+    if isinstance(given, list):
+        given = "\n".join(given)
     return str(config.getini(option.name) if given is None else given).strip()
 
 
@@ -136,6 +156,20 @@ def _seed(text: str) -> int | None:
     if not text.isdecimal():
         raise pytest.UsageError(f"--bench-seed {text}: it is a number from 0 on, or {RANDOM}")
     return int(text)
+
+
+def _parameters(text: str) -> tuple[Parameter, ...]:
+    """Read the lines `NAME=VALUE,VALUE`."""
+    found: dict[str, Parameter] = {}
+    for line in filter(None, map(str.strip, text.splitlines())):
+        name, _, values = line.partition("=")
+        words = tuple(dict.fromkeys(word.strip() for word in values.split(",")))
+        if not (name.isidentifier() and all(words)):
+            raise pytest.UsageError(f"--bench-param {line}: write NAME=VALUE,VALUE, as flip=0.001")
+        if name in found:
+            raise pytest.UsageError(f"--bench-param {line}: {name} has values already")
+        found[name] = Parameter(name, words)
+    return tuple(found.values())
 
 
 def _every(text: str) -> bool:

@@ -54,7 +54,8 @@ def check_device(
     - A reset device is as one that was reset twice, with the same inputs.
     - A fresh device that meets the same does the same; on a line from its trace, too.
     - A copy, by `copy.deepcopy`, by pickle and with its rig, goes on as the original; what is
-      done to it leaves the original unchanged.
+      done to it leaves the original unchanged. One that is put back by a snapshot goes on as
+      it was.
 
     Args:
         device_type: what makes the device: its `DeviceType`, class or function.
@@ -196,7 +197,10 @@ def _check_copies(bench: Benches, before: Session, after: Session, otherwise: Se
     now_us, wanted = original.rig.now_us, unchanged.play(after)
     for way, fork in forks.items():
         assert fork.play(after) == wanted, f"a copy by {way} goes on otherwise"
+    snapshot = original.rig.snapshot(original.device, original.end)
     assert original.play(after) == wanted, "a copy acts on the original"
+    snapshot.restore()
+    assert original.play(after) == wanted, "what a snapshot has put back goes on otherwise"
     first, second = (_tick(device, now_us, after, original.nothing) for device in alone)
     assert first == second, "a copy by pickle goes on otherwise"
 

@@ -1,4 +1,4 @@
-"""The keys of each table of a rig file; docs/rig-file.md shows them as they stand here."""
+"""The keys of each table of a rig file; docs/reference/bench/rig-file.md shows them as here."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ def read_signal_spec(
     Whether the signals that a formula names are there is judged by `check_signals`.
 
     Args:
-        value: a number, true or false, a text, or a table (docs/signals.md).
+        value: a number, true or false, a text, or a table (docs/reference/bench/signals.md).
         keys: where it stands, for mistakes.
         folder: where files of tables are looked for; unless given, the working directory.
 

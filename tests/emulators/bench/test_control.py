@@ -42,6 +42,21 @@ def test_get_gives_all_or_what_is_named(emulator: Emulator) -> None:
     assert ask(emulator, "get", names=["state", "lamp"])["values"] == {"state": "Lit", "lamp": 1}
 
 
+class Unlisted(dict[str, Any]):
+    """Can be asked, and not listed."""
+
+    def __iter__(self) -> Any:
+        raise AssertionError("all names were listed")
+
+
+def test_what_is_named_is_got_without_a_list_of_all(
+    emulator: Emulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inputs = emulator.device.inputs
+    monkeypatch.setattr(inputs, "table", Unlisted(inputs.table))
+    assert ask(emulator, "get", names=["state", "lamp"])["values"] == {"state": "Lit", "lamp": 1}
+
+
 def test_set_takes_one_value_or_those_of_a_group(emulator: Emulator) -> None:
     assert ask(emulator, "set", name="lamp", value=0) == {"v": 1, "ok": True}
     assert ask(emulator, "set", name="place", value=[1, -2])["ok"]

@@ -37,7 +37,7 @@ def frames(result: Result) -> list[str]:
 
 
 def test_the_example_of_the_page_prints_what_it_says(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "canopen-slave-emu.md").read_text("utf-8")
+    text = (ROOT / "docs" / "reference/devices/canopen-slave-emu.md").read_text("utf-8")
     scenario, log = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
     (tmp_path / "start.txt").write_text(scenario)
     result = run("--eds", EDS, "--node-id", "5", "--scenario", tmp_path / "start.txt")

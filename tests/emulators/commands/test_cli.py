@@ -49,7 +49,7 @@ def test_the_transcript_does_not_depend_on_the_process() -> None:
 
 
 def test_the_example_of_the_documentation_prints_what_it_says(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "scenario.md").read_text()
+    text = (ROOT / "docs" / "reference/bench/scenario.md").read_text()
     scenario, transcript = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
     (tmp_path / "drive.txt").write_text(scenario)
     result = rrc("--scenario", tmp_path / "drive.txt")

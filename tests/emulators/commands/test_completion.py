@@ -22,13 +22,14 @@ MAINS = {
     "rrc-emu": "tickrig.emulators.rrc.cli:main",
     "rh3-emu": "tickrig.emulators.rh3.cli:main",
     "urg-emu": "tickrig.emulators.urg.cli:main",
+    "ucode-reader-emu": "tickrig.emulators.tkernel.reader.cli:main",
     "rtc-lite-emu": "tickrig.emulators.rtc_lite.cli:main",
     "canopen-slave-emu": "tickrig.emulators.canopen.cli:main",
     "tickrig": "tickrig.emulators.commands.cli:main",
 }
 
 
-TYPES = "rrc rtc-lite rh3-base urg"
+TYPES = "rrc rtc-lite rh3-base urg ucode-reader"
 
 
 def completed(line: str) -> str:
@@ -82,7 +83,7 @@ def test_without_an_emulator_nothing_is_completed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "line",
     [
-        *("rrc-emu", "rh3-emu", "urg-emu", "rtc-lite-emu"),
+        *("rrc-emu", "rh3-emu", "urg-emu", "rtc-lite-emu", "ucode-reader-emu"),
         *(f"canopen-slave-emu --node-id 5 --model {name}" for name in MODELS),
     ],
 )

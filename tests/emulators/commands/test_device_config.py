@@ -6,7 +6,7 @@ from tickrig.emulators.commands.device_config import configure, option_names
 from tickrig.host.cli.extensions import ExtensionError
 
 
-@pytest.mark.parametrize("name", ["rrc", "rtc-lite", "rh3-base", "urg"])
+@pytest.mark.parametrize("name", ["rrc", "rtc-lite", "rh3-base", "urg", "ucode-reader"])
 def test_a_device_of_no_options_is_as_on_the_command_line(name: str) -> None:
     made = configure(name, {})
     assert type(made.device) is type(made.type.of_trace(made.config))

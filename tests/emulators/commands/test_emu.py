@@ -87,7 +87,7 @@ def test_broken_entry_points_are_a_line_each_and_break_nothing_else() -> None:
     ]
 
 
-OURS = "rrc, rtc-lite, rh3-base, urg"
+OURS = "rrc, rtc-lite, rh3-base, urg, ucode-reader"
 
 
 @pytest.mark.parametrize(

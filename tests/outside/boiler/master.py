@@ -44,10 +44,10 @@ class Master:
         self._heard_s = time.monotonic()
         self._answers: list[bytes] = []
 
-    def turn(self, timeout_s: float = 0.01) -> None:
-        """Take one frame, if it comes in time."""
+    def turn(self, timeout_s: float = 0.01) -> bool:
+        """Take one frame, if it comes in time; return whether one came."""
         if (message := self._bus.recv(timeout_s)) is None:
-            return
+            return False
         data = bytes(message.data)
         listen = 0x280 + NODE if planted("wrong COB-ID") else ANGLE_COB_ID
         match message.arbitration_id:
@@ -60,6 +60,7 @@ class Master:
                 self._fail(int.from_bytes(data[:2], "little"))
             case cob_id if cob_id == listen:
                 self.angle = int.from_bytes(data[:2], "little", signed=True)
+        return True
 
     def start(self) -> None:
         """Bring the motor to Operational, whether its boot-up was heard or not."""
@@ -72,7 +73,8 @@ class Master:
 
     def watch(self) -> None:
         """Look whether the motor is still there; if it restarts, set it up again."""
-        self.turn()
+        while self.turn():
+            continue  # what has waited comes first
         if time.monotonic() - self._heard_s > LOST_S:
             self._recover()
 
@@ -104,6 +106,7 @@ class Master:
 
     def _ask(self, request: bytes, fits: Callable[[bytes], bool]) -> bytes:
         """Send a request, and return the first answer that fits."""
+        self._answers.clear()  # what came late is of another question
         self._send(0x605, request)
         until_s = time.monotonic() + TIMEOUT_S
         while time.monotonic() < until_s:
@@ -135,8 +138,8 @@ class Master:
         self._heard_s = time.monotonic()
 
     def _fail(self, code: int) -> None:
-        self.failed = code
-        if code:
+        known, self.failed = self.failed, code
+        if code not in (0, known):  # the same may come a hundred times on a bad line
             self._on_failure()
 
     def _send(self, cob_id: int, data: bytes) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.rig.sim_link import SimLink
@@ -20,6 +22,30 @@ if TYPE_CHECKING:
     from tickrig.host.links.link import Link
 
 
+T = TypeVar("T")
+
+
+class Offers:
+    """What programs find under names; a snapshot takes back what was offered since."""
+
+    def __init__(self) -> None:
+        self._open: list[AbstractContextManager[object]] = []
+
+    def enter(self, offer: AbstractContextManager[T]) -> None:
+        """Offer something until it is taken back."""
+        offer.__enter__()
+        self._open.append(offer)
+
+    def close(self, left: int = 0) -> None:
+        """Take back the latest, but for so many."""
+        while len(self._open) > left:
+            self._open.pop().__exit__(None, None, None)
+
+    def way_back(self) -> Callable[[], None]:
+        """Return what takes back what is offered from now on."""
+        return partial(self.close, len(self._open))
+
+
 class VirtualDoors:
     """Opens doors for hosts; see `BenchMode`.
 
@@ -31,7 +57,7 @@ class VirtualDoors:
         self._rig, self._mounts = rig.rig, rig.state.mounts
         self._sides: dict[str, SerialSide] = {}
         self._addresses: dict[str, Address] = {}
-        self._offered = ExitStack()
+        self._offers = Offers()
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a link."""
@@ -69,7 +95,7 @@ class VirtualDoors:
 
     def close(self) -> None:
         """Offer nothing any more."""
-        self._offered.close()
+        self._offers.close()
 
     def _offer(self, wire: str) -> Address:
         """Offer a wire under a name that nobody else has."""
@@ -80,12 +106,12 @@ class VirtualDoors:
             )
 
             name = _free(wire, SERIAL_PORTS.names)
-            self._offered.enter_context(SERIAL_PORTS.offer(name, self._side(wire)))
+            self._offers.enter(SERIAL_PORTS.offer(name, self._side(wire)))
             return f"tickrig://{name}"
         from tickrig.emulators.can.outside.interface import CHANNELS  # noqa: PLC0415 - slow
 
         name = _free(wire, CHANNELS.names)
-        self._offered.enter_context(CHANNELS.offer(name, self._rig, mount.wire))
+        self._offers.enter(CHANNELS.offer(name, self._rig, mount.wire))
         return {"interface": "tickrig", "channel": name}
 
     def _side(self, wire: str) -> SerialSide:

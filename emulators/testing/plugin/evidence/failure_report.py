@@ -10,6 +10,7 @@ import pytest
 
 from tickrig.emulators.testing.plugin.evidence.artifacts import TRACE
 from tickrig.emulators.testing.plugin.evidence.journal_text import last_lines
+from tickrig.emulators.testing.plugin.parameters import words_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.host.text.values import format_time
 
@@ -49,6 +50,8 @@ def repeat_command(item: pytest.Item) -> str:
         ("--bench-seed", None if seed is None else str(seed)),
     ):
         words += [] if value is None else [flag, value]
+    for name, word in words_of(item).items():
+        words += ["--bench-param", f"{name}={word}"]
     return shlex.join(words)
 
 

@@ -1,4 +1,4 @@
-"""What docs/ros2-canopen.md shows is run, and its tables are those of the code."""
+"""What docs/howto/ros2-canopen.md shows is run, and its tables are those of the code."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tickrig.emulators.testing.commands.check_cli import check
 from tickrig.testing import open_master
 
 ROOT = Path(__file__).parents[4]
-TEXT = (ROOT / "docs/ros2-canopen.md").read_text("utf-8")
+TEXT = (ROOT / "docs/howto/ros2-canopen.md").read_text("utf-8")
 
 
 @pytest.fixture(autouse=True)

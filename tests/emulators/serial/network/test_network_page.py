@@ -1,4 +1,4 @@
-"""The section "Over the network" of docs/hosts.md, command by command."""
+"""The section "Over the network" of docs/reference/bench/hosts.md, command by command."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tickrig.host.rrc import RrcClient
 pytestmark = pytest.mark.realtime
 
 ROOT = Path(__file__).parents[4]
-TEXT = (ROOT / "docs/hosts.md").read_text("utf-8")
+TEXT = (ROOT / "docs/reference/bench/hosts.md").read_text("utf-8")
 SECTION = TEXT.partition("\n## Over the network\n")[2].partition("\n## ")[0]
 PATIENCE_S = 20.0
 ANSWER = "OK:device\nRRC\n"
@@ -101,7 +101,7 @@ def test_every_command_of_the_section_is_run_here() -> None:
 @pytest.mark.filterwarnings("ignore:set:DeprecationWarning")  # of pyserial's own thread
 def test_pyserial_asks(ports: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
     (program,) = blocks("python")
-    exec(compile(at(ports, program), "docs/hosts.md", "exec"), {})
+    exec(compile(at(ports, program), "docs/reference/bench/hosts.md", "exec"), {})
     assert capsys.readouterr().out == f"{ANSWER.encode()!r}\n"
 
 

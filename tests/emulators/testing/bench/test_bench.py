@@ -6,9 +6,10 @@ import can
 import pytest
 import serial
 
-from tickrig import Bench, BenchError
+from tickrig import Bench, BenchError, NotOnThisBench
 from tickrig.device import Rrc, make_epos, make_f_palette
 from tickrig.device.rrc.config import RrcConfig
+from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.host import RrcClient
 
 
@@ -289,3 +290,56 @@ def test_a_condition_that_takes_what_it_sees_is_true_once_and_that_is_enough() -
         host = bench.link  # EV:Initialized comes
         assert bench.wait_until(lambda: bool(host.receive(0)), within="1s")
         assert bench.now_us < 100_000
+
+
+def test_a_snapshot_puts_the_bench_back_with_its_links() -> None:
+    with Bench(Rrc()) as bench:
+        link = bench.link
+        bench.run_for("1s")
+        snapshot = bench.snapshot()
+        runs = set()
+        for _ in range(3):
+            snapshot.restore()
+            bench.press("power_button")
+            bench.fault("cut@1200ms-1300ms")
+            trigger = bench.on_line("EV:*")
+            link.send(b"device\n")
+            bench.run_for("1s")
+            assert trigger.count == 2
+            runs.add((link.receive(0), bench.transcript(), bench.get("state")))
+        assert len(runs) == 1
+
+
+def test_a_snapshot_takes_back_what_was_offered_since() -> None:
+    with Bench("rrc") as bench:
+        url, snapshot = bench.url, bench.snapshot()
+        snapshot.restore()
+        assert bench.url == url == "tickrig://rrc"
+        assert "rrc" in SERIAL_PORTS.names
+    with Bench("rrc") as bench:
+        snapshot = bench.snapshot()
+        for _ in range(2):
+            with serial.serial_for_url(bench.url) as port:
+                assert port.port == "tickrig://rrc"
+            snapshot.restore()
+        assert "rrc" not in SERIAL_PORTS.names
+
+
+def test_a_host_is_put_back_with_its_bench() -> None:
+    with Bench(drive=make_epos(1)) as bench, bench.can_bus() as bus:
+        seen: list[object] = []
+        snapshot = bench.snapshot(bus, seen)
+        for _ in range(2):
+            snapshot.restore()
+            assert seen == []
+            seen.append(bus.recv(1))
+            assert [message.arbitration_id for message in seen] == [0x701]  # type: ignore[attr-defined] # one came
+
+
+@pytest.mark.realtime
+def test_real_time_does_not_come_back() -> None:
+    with (
+        Bench("rrc", mode="real") as bench,
+        pytest.raises(NotOnThisBench, match="time that has passed comes back in virtual time"),
+    ):
+        bench.snapshot()

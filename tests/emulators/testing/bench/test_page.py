@@ -1,4 +1,4 @@
-"""The programs of docs/bench.md, in each of the three modes."""
+"""The programs of docs/reference/bench/bench.md, in each of the three modes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from tests.test_docs import blocks
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 
-PAGE = "docs/bench.md"
-BODY, VIRTUAL, REAL, HARDWARE, FAULTS, SEVERAL = blocks(PAGE, "python")
+PAGE = "docs/reference/bench/bench.md"
+BODY, VIRTUAL, REAL, HARDWARE, FAULTS, WARM, SEVERAL = blocks(PAGE, "python")
 REAL_PORT, PLAYED = blocks(PAGE, "toml")
 
 
@@ -23,7 +23,7 @@ def run(*programs: str) -> None:
 
 
 def test_the_programs_in_virtual_time_run() -> None:
-    run(BODY, VIRTUAL, FAULTS, SEVERAL)
+    run(BODY, VIRTUAL, FAULTS, WARM, SEVERAL)
 
 
 @pytest.mark.realtime

@@ -61,7 +61,7 @@ def test_what_is_for_the_slaves_alone_is_told_with_all_else(folder: Path) -> Non
     assert status == 1
     assert out[0] == (
         "bus.yml:5: error: [tickrig] axis.tickrig: no key 'motr'; did you mean 'motor'?;"
-        " fix: docs/ros2-canopen.md has all keys (canopen-slave-emu)"
+        " fix: docs/howto/ros2-canopen.md has all keys (canopen-slave-emu)"
     )
     assert out[1].startswith("bus.yml:6: warning: [flag-text]")
     assert out[2].startswith("bus.yml:7: error: [object-missing]")

@@ -1,4 +1,4 @@
-"""docs/trace.md, command by command."""
+"""docs/reference/bench/trace.md, command by command."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tickrig.emulators.rrc.cli import main as rrc_emu
 from tickrig.host.canmon.cli import main as canmon
 from tickrig.host.links.serial_link import SerialLink
 
-PAGE = (Path(__file__).parents[4] / "docs" / "trace.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[4] / "docs" / "reference/bench/trace.md").read_text("utf-8")
 PROGRAMS: dict[str, Command] = {"tickrig": tickrig, "canmon": canmon, "rrc-emu": rrc_emu}
 
 

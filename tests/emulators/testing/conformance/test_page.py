@@ -1,4 +1,4 @@
-"""docs/conform.md: what it shows happens."""
+"""docs/reference/canopen/conform.md: what it shows happens."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.environment import ROOT, Environment
 from tests.page_runner import PageRunner
 
-PAGE = ROOT / "docs" / "conform.md"
+PAGE = ROOT / "docs" / "reference/canopen/conform.md"
 
 
 class ThisEnvironment(Environment):

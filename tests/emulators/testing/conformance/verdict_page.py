@@ -1,4 +1,4 @@
-"""docs/conformance.md: what the tester says of our slaves and of foreign stacks."""
+"""docs/reference/canopen/conformance.md: what the tester says of our slaves and of others."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tickrig import Bench
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
 from tickrig.testing import conformance
 
-PAGE: Final = ROOT / "docs" / "conformance.md"
+PAGE: Final = ROOT / "docs" / "reference/canopen/conformance.md"
 OBJECTS: Final = "OD"
 SHOWN: Final = (
     Verdict.PASS,

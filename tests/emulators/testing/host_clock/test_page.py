@@ -1,4 +1,4 @@
-"""The section "Hosts that look at the clock" of docs/hosts.md."""
+"""The section "Hosts that look at the clock" of docs/reference/bench/hosts.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tickrig.emulators.testing.host_clock.errors import UnpatchedTimeError
 from tickrig.emulators.testing.host_clock.kept_names import LOOKS
 from tickrig.emulators.testing.host_clock.unpatched_time import unpatched_time_fails
 
-PAGE = (Path(__file__).parents[4] / "docs/hosts.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[4] / "docs/reference/bench/hosts.md").read_text("utf-8")
 SECTION = PAGE.partition("\n## Hosts that look at the clock\n")[2].partition("\n## ")[0]
 
 

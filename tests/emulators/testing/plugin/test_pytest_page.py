@@ -1,4 +1,4 @@
-"""docs/pytest.md: its project runs, its commands too, and its tables are what the code has."""
+"""docs/reference/bench/pytest.md: its project and commands run, its tables are true."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tickrig.emulators.testing.plugin.settings import MODES, OPTIONS
 
 pytest_plugins = ("pytester",)
 
-PAGE = (Path(__file__).parents[4] / "docs" / "pytest.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[4] / "docs" / "reference/bench/pytest.md").read_text("utf-8")
 TESTS = re.findall(r"^(?:async )?def test_", PAGE, re.MULTILINE)
 
 

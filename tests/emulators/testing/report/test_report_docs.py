@@ -1,4 +1,4 @@
-"""The page docs/report.md: its programs and its commands, in the order in which they stand."""
+"""docs/reference/bench/report.md: its programs and commands, in the order in which they stand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tickrig.emulators.testing.plugin import pytest_plugin
 
 pytest_plugins = ("pytester",)
 
-TEXT = (Path(__file__).parents[4] / "docs" / "report.md").read_text("utf-8")
+TEXT = (Path(__file__).parents[4] / "docs" / "reference/bench/report.md").read_text("utf-8")
 
 
 def blocks(language: str) -> list[str]:
@@ -66,7 +66,7 @@ def test_the_commands_make_the_pages(pytester: pytest.Pytester, run_pytest: Run)
 
 def test_the_program_keeps_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    exec(compile(blocks("python")[1], "docs/report.md", "exec"), {})
+    exec(compile(blocks("python")[1], "docs/reference/bench/report.md", "exec"), {})
     run_tickrig("report", "mine.json", "-o", "bench.html")
     (row,) = page().by_class("requirements")[0].all("tr")[1:]
     assert row.words.startswith("SAF-12 A pulled bus stops the chair within 200 ms shown 1 of 1")

@@ -1,4 +1,4 @@
-"""docs/rig-file.md shows the keys as they are, and what it shows happens."""
+"""docs/reference/bench/rig-file.md shows the keys as they are, and what it shows happens."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tickrig.emulators.commands.cli import main
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.emulators.testing.rig_file.schema import PAGE, rows
 
-FILE = Path(__file__).parents[4] / "docs" / "rig-file.md"
+FILE = Path(__file__).parents[4] / "docs" / "reference/bench/rig-file.md"
 RIGS = sorted(FILE.parents[1].glob("examples/rigs/*.toml"))
 TEXT = FILE.read_text("utf-8")
 

@@ -1,4 +1,4 @@
-"""What docs/signals.md shows is read, and its tables name what there is."""
+"""What docs/reference/bench/signals.md shows is read, and its tables name what there is."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tickrig.emulators.testing.signals.formula_parser import CALLED
 from tickrig.emulators.testing.signals.spec_reader import FORMS
 
 ROOT = Path(__file__).parents[4]
-PAGE = (ROOT / "docs/signals.md").read_text("utf-8")
+PAGE = (ROOT / "docs/reference/bench/signals.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```toml\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 
 

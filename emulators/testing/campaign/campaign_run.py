@@ -1,0 +1,232 @@
+"""A campaign from its options to its table."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, NoReturn
+
+import click
+from click._termui_impl import ProgressBar
+
+from tickrig.emulators.testing.campaign.campaign import Campaign, Workers
+from tickrig.emulators.testing.campaign.crew import Crew
+from tickrig.emulators.testing.campaign.journal import SUFFIX, CampaignJournal, JournalFullError
+from tickrig.emulators.testing.campaign.local_workers import LocalWorkers, cores
+from tickrig.emulators.testing.campaign.order import Order, Refusal
+from tickrig.emulators.testing.campaign.plan import Plan, Shard
+from tickrig.emulators.testing.campaign.seeds import Seeds
+from tickrig.emulators.testing.campaign.table import PARQUET, WELL, Table, table_of, write_table
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.start import INTERRUPTED, UNWRITTEN
+from tickrig.host.text.names import known
+from tickrig.host.text.values import counted
+from tickrig.host.text.whole_file import check_file
+
+CSV: Final = ".csv"
+NEEDS_ARROW: Final = "Parquet needs pyarrow: pip install 'tickrig[campaign]'"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignOptions:
+    """What the command line says.
+
+    Attributes:
+        tests: files, folders and node IDs.
+        seeds: as `0-9999`.
+        parameters: as `flip=0.0001,0.001`.
+        shard: as `3/8`.
+        outputs: tables to write.
+        workers: processes; None for one a core.
+        timeout_us: what a run takes at most.
+        bench: rig file, empty for that of the tests.
+        keyword: as pytest's `-k`.
+        scheduler: of a Dask cluster, empty for this machine.
+        fresh: whether what is there is replaced.
+        version: of tickrig.
+    """
+
+    tests: tuple[str, ...]
+    seeds: str
+    parameters: tuple[str, ...] = ()
+    shard: str = "1/1"
+    outputs: tuple[Path, ...] = ()
+    workers: int | None = None
+    timeout_us: int = 60_000_000
+    bench: str = ""
+    keyword: str = ""
+    scheduler: str = ""
+    fresh: bool = False
+    version: str = ""
+
+    @property
+    def output_paths(self) -> tuple[Path, ...]:
+        """Where the tables go; a shard's have its numbers unless they are given."""
+        shard = Shard.parse(self.shard)
+        part = f"-{shard.part}-of-{shard.parts}" if shard.parts > 1 else ""
+        return self.outputs or (Path(f"campaign{part}{CSV}"),)
+
+    @property
+    def order(self) -> Order:
+        """What workers are asked for."""
+        return Order(
+            tests=self.tests,
+            parameters=self.parameters,
+            bench=self.bench,
+            keyword=self.keyword,
+            timeout_s=self.timeout_us / 1e6,
+            folder=str(Path.cwd()),
+            version=self.version,
+        )
+
+
+class CampaignRun:
+    """The run of a campaign.
+
+    Args:
+        options: what the command line says.
+
+    Raises:
+        Refusal: what cannot be.
+    """
+
+    def __init__(self, options: CampaignOptions) -> None:
+        self._options = options
+        with _refused("--seeds"):
+            self._seeds = Seeds.parse(options.seeds)
+        with _refused("--shard"):
+            self._shard = Shard.parse(options.shard)
+        if options.timeout_us == 0:
+            raise Refusal("--timeout 0: no run is over at once; write 60s")
+        check_outputs(options.output_paths)
+        self._paths = options.output_paths
+        self._journal_path = Path(f"{self._paths[0]}{SUFFIX}")
+        self._check_old()
+
+    def _check_old(self) -> None:
+        """Refuse to replace a table, unless it is of a campaign whose end was cut off."""
+        if self._options.fresh:
+            self._journal_path.unlink(missing_ok=True)
+            return
+        there = [path for path in self._paths if path.exists() and path.is_file()]
+        if there and not self._journal_path.exists():
+            raise Refusal(f"{there[0]} is there already: --fresh replaces it, -o takes another")
+
+    def run(self) -> Table:
+        """Do all that is left to do, and write the tables.
+
+        Raises:
+            Refusal: it cannot be done; what was done is kept.
+        """
+        crew = Crew(self._options.order)
+        try:
+            return self._run(crew)
+        except JournalFullError as error:
+            self._end(UNWRITTEN, f"{error.filename}: {error.strerror}; make room")
+        except OSError as error:
+            raise Refusal(f"{error.filename or 'campaign'}: {error.strerror or error}") from None
+        except KeyboardInterrupt:
+            self._end(INTERRUPTED, "interrupted")
+        finally:
+            crew.close()
+
+    def _run(self, crew: Crew) -> Table:
+        collected = crew.collect()
+        if not collected.tests:
+            if not collected.left_out:
+                raise Refusal("no tests were collected")
+            without = known(collected.left_out)
+            raise Refusal(f"no test has a bench, so no seed changes anything: {without}")
+        if collected.left_out:
+            say(f"{counted(len(collected.left_out), 'test')} without a bench left out")
+        plan = Plan(self._options.order, collected, self._seeds, self._shard)
+        self._plan = plan
+        self._journal = CampaignJournal(self._journal_path, plan.head)
+        with closing(self._journal):
+            with closing(self._workers(crew, plan)) as workers:
+                self._do(plan, workers)
+            table = table_of(plan, self._journal.verdicts.values())
+            write_outputs(table, self._paths)
+            self._journal.remove()
+        return table
+
+    def _workers(self, crew: Crew, plan: Plan) -> Workers:
+        if not self._options.scheduler:
+            return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
+        try:
+            from tickrig.emulators.testing.campaign.dask_workers import (  # noqa: PLC0415 - slow
+                DaskWorkers,
+            )
+        except ImportError:
+            raise Refusal("--scheduler needs Dask: pip install 'tickrig[campaign]'") from None
+        return DaskWorkers(self._options.scheduler, plan)
+
+    def _do(self, plan: Plan, workers: Workers) -> None:
+        """Do all runs, with a bar on a terminal."""
+        kept = self._journal.verdicts
+        if kept:
+            say(f"{self._journal_path}: {len(kept)} of {counted(plan.size(), 'run')} are done")
+        failed = Counter(verdict.outcome in WELL for verdict in kept.values())
+        bar: ProgressBar[int] = click.progressbar(
+            length=plan.size(),
+            file=sys.stderr,
+            hidden=not sys.stderr.isatty(),
+            item_show_func=lambda _: f"{failed[False]} not passed",
+        )
+        with bar:
+            bar.update(len(kept))
+            for verdicts in Campaign(plan, self._journal, workers).verdicts():
+                failed.update(verdict.outcome in WELL for verdict in verdicts)
+                bar.update(len(verdicts), len(verdicts))
+
+    def _end(self, status: int, why: str) -> NoReturn:
+        """End before all is done; say how to go on."""
+        if not hasattr(self, "_journal"):
+            say(f"{why}; nothing was begun")
+        else:
+            done, size = len(self._journal.verdicts), self._plan.size()
+            command = shlex.join(["tickrig", *_without_fresh(sys.argv[1:])])
+            say(f"{why}: {done} of {size} runs are kept; go on with {command}")
+        raise click.exceptions.Exit(status)
+
+
+def _without_fresh(words: Sequence[str]) -> list[str]:
+    return [word for word in words if word != "--fresh"]
+
+
+@contextmanager
+def _refused(option: str) -> Iterator[None]:
+    try:
+        yield
+    except ValueError as error:
+        raise Refusal(f"{option}: {error}") from None
+
+
+def check_outputs(paths: Sequence[Path]) -> None:
+    """Refuse tables that cannot be written."""
+    for path in paths:
+        if path.suffix not in (CSV, PARQUET):
+            raise Refusal(f"-o {path}: a table is a .csv or a .parquet")
+        with _refused("-o"):
+            check_file(path, "table")
+    check_arrow(paths)
+
+
+def check_arrow(paths: Sequence[Path]) -> None:
+    """Refuse Parquet where pyarrow is missing."""
+    if any(path.suffix == PARQUET for path in paths):
+        try:
+            import pyarrow  # noqa: F401, PLC0415 - whether it is there
+        except ImportError:
+            raise Refusal(NEEDS_ARROW) from None
+
+
+def write_outputs(table: Table, paths: Sequence[Path]) -> None:
+    """Write a table in each form; OSError if it cannot be."""
+    for path in paths:
+        write_table(table, path)

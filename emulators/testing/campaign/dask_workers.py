@@ -1,0 +1,141 @@
+"""Workers of a Dask cluster (extra `campaign`): each of its threads has a process for runs."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Sequence
+from concurrent.futures import CancelledError, Future
+from contextlib import suppress
+from functools import partial
+from typing import Any, Final
+from uuid import uuid4
+
+from distributed import Client, KilledWorker, Worker, WorkerPlugin, get_worker
+
+from tickrig.emulators.testing.campaign.crew import Crew
+from tickrig.emulators.testing.campaign.order import Order, Refusal, Run, Verdict
+from tickrig.emulators.testing.campaign.plan import Plan
+
+CONNECT: Final = "10s"
+WAIT_S: Final = 60.0
+"""So long a scheduler may be without any worker."""
+
+LOSSES: Final = 3
+"""So often a batch is begun again that Dask gives up for lost."""
+
+
+class CrewPlugin(WorkerPlugin):
+    """Gives each worker of a cluster a crew while a campaign runs.
+
+    Args:
+        order: what the crew collects.
+    """
+
+    crew: Crew
+
+    def __init__(self, order: Order) -> None:
+        self._order = order
+        self.name = f"tickrig-campaign-{uuid4().hex}"
+
+    def setup(self, worker: Worker) -> None:
+        """Begin; processes are started when there are runs."""
+        self.crew = Crew(self._order)
+
+    def teardown(self, worker: Worker) -> None:
+        """End all processes."""
+        self.crew.close()
+
+
+class DaskWorkers:
+    """All threads of a cluster; a batch whose worker was lost is given to another one.
+
+    Args:
+        url: of the scheduler.
+        plan: what is done.
+
+    Raises:
+        Refusal: nobody is there, or no worker.
+    """
+
+    def __init__(self, url: str, plan: Plan) -> None:
+        for name in ("distributed", "distributed.client"):  # what is lost, we say
+            logging.getLogger(name).handlers[:] = [logging.NullHandler()]
+        self._url, self._plan, self._plugin = url, plan, CrewPlugin(plan.order)
+        if re.fullmatch(r"\w+://.+:[0-9]+", url) is None:
+            raise Refusal(f"--scheduler {url}: write tcp://HOST:PORT")
+        try:
+            self._client = Client(url, timeout=CONNECT, set_as_default=False)
+        except (OSError, ValueError, TimeoutError) as error:
+            text = str(error).partition("\n")[0] or "no answer"
+            raise Refusal(f"--scheduler {url}: {text}") from None
+        try:
+            self._client.wait_for_workers(1, WAIT_S)
+            self._client.register_plugin(self._plugin)
+        except TimeoutError:
+            self._client.close()
+            raise Refusal(f"--scheduler {url}: it has no worker: dask worker {url}") from None
+        self._executor = self._client.get_executor(pure=False)
+
+    @property
+    def count(self) -> int:
+        """How many threads the workers have that are there now."""
+        try:
+            threads: dict[str, int] = self._client.nthreads()
+            return max(1, sum(threads.values()))
+        except (OSError, RuntimeError, TimeoutError):
+            raise self._gone() from None
+
+    def submit(self, runs: Sequence[Run]) -> Future[list[Verdict]]:
+        """Let a worker of the cluster do runs."""
+        wanted: Future[list[Verdict]] = Future()
+        self._try(list(runs), wanted, LOSSES)
+        return wanted
+
+    def _try(self, runs: list[Run], wanted: Future[list[Verdict]], losses: int) -> None:
+        digest, version = self._plan.collected.digest, self._plan.order.version
+        future = self._executor.submit(_do, self._plugin.name, runs, digest, version)
+        future.add_done_callback(partial(self._take, runs, wanted, losses))
+
+    def _take(
+        self, runs: list[Run], wanted: Future[list[Verdict]], losses: int, future: Future[Any]
+    ) -> None:
+        """Hand on what came of runs."""
+        error = CancelledError() if future.cancelled() else future.exception()
+        if isinstance(error, KilledWorker) and losses:
+            self._try(runs, wanted, losses - 1)
+        elif isinstance(error, CancelledError):
+            wanted.set_exception(self._gone())
+        elif error is not None:
+            text = f"{type(error).__name__}: {error}".partition("\n")[0]
+            wanted.set_exception(Refusal(f"--scheduler {self._url}: {text}"))
+        elif isinstance(answer := future.result(), str):
+            wanted.set_exception(Refusal(answer))
+        else:
+            wanted.set_result([Verdict(*verdict) for verdict in answer])
+
+    def _gone(self) -> Refusal:
+        return Refusal(f"--scheduler {self._url} is gone; what was done is kept")
+
+    def close(self) -> None:
+        """Let the cluster forget the campaign."""
+        with suppress(OSError, RuntimeError, TimeoutError, CancelledError):
+            self._executor.shutdown(wait=False)
+            self._client.unregister_worker_plugin(self._plugin.name)
+        with suppress(OSError, RuntimeError, TimeoutError, CancelledError):
+            self._client.close(timeout=1)
+
+
+def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[Verdict] | str:
+    """Do runs on the worker that this is called on; a text is a refusal."""
+    from tickrig import __version__  # noqa: PLC0415 - it is above all rooms
+
+    worker = get_worker()
+    if __version__ != version:
+        return f"{worker.address}: there is tickrig {__version__}, here {version}"
+    try:
+        plugin = worker.plugins[name]
+        assert isinstance(plugin, CrewPlugin)
+        return plugin.crew.do([Run(*run) for run in runs], digest)
+    except Refusal as refusal:
+        return f"{worker.address}: {refusal}"

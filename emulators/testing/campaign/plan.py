@@ -1,0 +1,116 @@
+"""All runs of a campaign, by number."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from tickrig.emulators.testing.campaign.order import Collected, Order, Refusal, Run
+from tickrig.emulators.testing.campaign.seeds import Seeds
+
+MOST: Final = 10_000_000
+"""Runs of a campaign: their numbers fit into memory."""
+
+KEPT: Final = "kept"
+"""The folder of traces in the commands that replay."""
+
+
+class Shard(NamedTuple):
+    """A part of a campaign: the `part`-th of `parts`, from 1 on.
+
+    >>> str(Shard.parse("3/8"))
+    '3/8'
+    """
+
+    part: int = 1
+    parts: int = 1
+
+    @classmethod
+    def parse(cls, text: str) -> Shard:
+        """Read it; ValueError if it is none."""
+        part, slash, parts = text.partition("/")
+        digits = slash and part.isdecimal() and parts.isdecimal() and len(text) <= 15
+        if not digits or not 1 <= int(part) <= int(parts):
+            raise ValueError(f"{text!r} is no part of a campaign: write 3/8 for the third of eight")
+        return cls(int(part), int(parts))
+
+    def __str__(self) -> str:
+        return f"{self.part}/{self.parts}"
+
+
+WHOLE: Final = Shard()
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The runs of a campaign: each test with each seed, seed by seed.
+
+    Attributes:
+        order: how tests are run.
+        collected: the tests.
+        seeds: of the runs.
+        shard: which of all runs are done here.
+    """
+
+    order: Order
+    collected: Collected
+    seeds: Seeds
+    shard: Shard = WHOLE
+
+    def __post_init__(self) -> None:
+        if (runs := len(self.seeds) * len(self.collected.tests)) > MOST:
+            raise Refusal(f"--seeds {self.seeds}: that makes {runs} runs; {MOST} are the most")
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, in the order of the command line."""
+        return tuple(text.partition("=")[0].strip() for text in self.order.parameters)
+
+    def numbers(self) -> Iterator[int]:
+        """Give the numbers of the runs of this shard, in ascending order.
+
+        Each shard has runs of each test.
+        """
+        tests, (part, parts) = len(self.collected.tests), self.shard
+        for index in range(len(self.seeds)):
+            first = (part - 1 - index) % parts
+            yield from range(index * tests + first, (index + 1) * tests, parts)
+
+    def size(self) -> int:
+        """Return how many runs this shard has."""
+        return sum(1 for _ in self.numbers())
+
+    def run(self, number: int) -> Run:
+        """Return a run by its number."""
+        index, test = divmod(number, len(self.collected.tests))
+        return Run(number, self.collected.tests[test].nodeid, self.seeds[index])
+
+    def values(self, number: int) -> tuple[str, ...]:
+        """Return the values of the parameters of a run, empty where its test takes none."""
+        test = self.collected.tests[number % len(self.collected.tests)]
+        return tuple(test.values.get(name, "") for name in self.parameters)
+
+    def command(self, number: int) -> str:
+        """Return the command that replays a run, with a trace, for a shell."""
+        test = self.collected.tests[number % len(self.collected.tests)]
+        words = ["pytest", test.place, "--bench-mode", "virtual"]
+        if self.order.bench:
+            words += ["--bench", self.order.bench]
+        words += ["--bench-seed", str(self.run(number).seed)]
+        for name, value in test.values.items():
+            words += ["--bench-param", f"{name}={value}"]
+        return shlex.join([*words, "--bench-artifacts", KEPT])
+
+    @property
+    def head(self) -> dict[str, str | list[str]]:
+        """What must be the same for a campaign to be gone on with, by what people call it."""
+        return {
+            "tests": [test.nodeid for test in self.collected.tests],
+            "seeds": str(self.seeds),
+            "shard": str(self.shard),
+            "rig file": self.order.bench,
+            "tickrig": self.order.version,
+            "files of the tests": self.collected.digest,
+        }

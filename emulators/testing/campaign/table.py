@@ -1,0 +1,165 @@
+"""The table of a campaign: a row for each run, the same in whatever order they were done."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from tickrig.emulators.testing.campaign.order import Refusal, Verdict
+from tickrig.emulators.testing.campaign.plan import Plan
+from tickrig.emulators.testing.report.overview import natural
+from tickrig.host.text.whole_file import write_whole
+
+FIRST: Final = ("test", "seed")
+LAST: Final = ("outcome", "virtual_us", "where", "reason", "replay")
+PARQUET: Final = ".parquet"
+WELL: Final = ("passed", "skipped")
+
+
+class Row(NamedTuple):
+    """A run.
+
+    Attributes:
+        test: node ID.
+        seed: of all chance.
+        values: of the parameters, as they were written; empty where the test takes none.
+        outcome: how it ended.
+        virtual_us: how old the bench was then.
+        where: file and line; empty if it passed.
+        reason: why, in a line; empty if it passed.
+        replay: the command that replays it with a trace; empty if it passed.
+    """
+
+    test: str
+    seed: int
+    values: tuple[str, ...]
+    outcome: str
+    virtual_us: int
+    where: str
+    reason: str
+    replay: str
+
+    def cells(self) -> tuple[str | int, ...]:
+        """Return what stands in its columns."""
+        return (self.test, self.seed, *self.values, *self[3:])
+
+
+class Table(NamedTuple):
+    """All runs, by test and seed.
+
+    Attributes:
+        parameters: the names of their columns.
+        rows: the runs.
+    """
+
+    parameters: tuple[str, ...]
+    rows: Sequence[Row]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of all columns."""
+        return (*FIRST, *self.parameters, *LAST)
+
+
+def table_of(plan: Plan, verdicts: Iterable[Verdict]) -> Table:
+    """Return the table of runs that are done."""
+    return Table(plan.parameters, _sorted(_row(plan, verdict) for verdict in verdicts))
+
+
+def _row(plan: Plan, verdict: Verdict) -> Row:
+    number, outcome, virtual_us, where, reason = verdict
+    run, values = plan.run(number), plan.values(number)
+    replay = "" if outcome in WELL else plan.command(number)
+    return Row(run.nodeid, run.seed, values, outcome, virtual_us, where, reason, replay)
+
+
+def _sorted(rows: Iterable[Row]) -> list[Row]:
+    places: dict[str, tuple[object, str]] = {}
+
+    def place(row: Row) -> tuple[object, int]:
+        if row.test not in places:
+            places[row.test] = (natural(row.test), row.test)
+        return places[row.test], row.seed
+
+    return sorted(rows, key=place)
+
+
+def write_table(table: Table, path: Path) -> None:
+    """Write it, as Parquet or CSV by the suffix; the file is there whole or as it was.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    if path.suffix == PARQUET:
+        from tickrig.emulators.testing.campaign.parquet_file import (  # noqa: PLC0415 - slow
+            parquet_of,
+        )
+
+        write_whole(path, parquet_of(table.columns, [row.cells() for row in table.rows]))
+        return
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(row.cells() for row in table.rows)
+    write_whole(path, text.getvalue())
+
+
+def read_table(path: Path) -> Table:
+    """Read what `write_table` wrote.
+
+    Raises:
+        Refusal: it is no table of a campaign.
+        OSError: it cannot be read.
+    """
+    if path.suffix == PARQUET:
+        from tickrig.emulators.testing.campaign.parquet_file import (  # noqa: PLC0415 - slow
+            read_parquet,
+        )
+
+        return _table(path, read_parquet(path))
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return _table(path, csv.reader(file, strict=True))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise Refusal(f"{path} is no table of a campaign: {error}") from None
+
+
+def _table(path: Path, lines: Iterable[Sequence[str]]) -> Table:
+    numbered = enumerate(lines, 1)
+    _, columns = next(numbered, (1, ()))
+    if tuple(columns[:2]) != FIRST or tuple(columns[-len(LAST) :]) != LAST:
+        raise Refusal(f"{path} is no table of a campaign: its columns are {', '.join(columns)}")
+    return Table(tuple(columns[2 : -len(LAST)]), list(_rows(path, len(columns), numbered)))
+
+
+def _rows(path: Path, width: int, lines: Iterator[tuple[int, Sequence[str]]]) -> Iterator[Row]:
+    for number, cells in lines:
+        seed, virtual = (cells[1], cells[1 - len(LAST)]) if len(cells) == width else ("", "")
+        if not (seed.isdecimal() and virtual.isdecimal()):
+            raise Refusal(f"{path}:{number}: no row of a campaign: {','.join(cells)[:60]}")
+        values, (outcome, _, *ended) = tuple(cells[2 : -len(LAST)]), cells[-len(LAST) :]
+        yield Row(cells[0], int(seed), values, outcome, int(virtual), *ended)
+
+
+def merge_tables(tables: Sequence[tuple[Path, Table]]) -> Table:
+    """Join the tables of shards; a run that is in several counts once.
+
+    Raises:
+        Refusal: their columns differ, or a run has ended otherwise in two.
+    """
+    first, table = tables[0]
+    rows: dict[tuple[str, int], tuple[Row, Path]] = {}
+    for path, other in tables:
+        if other.columns != table.columns:
+            ours, theirs = (", ".join(t.parameters) or "none" for t in (table, other))
+            raise Refusal(f"{path} has the parameters {theirs}; {first} has {ours}")
+        for row in other.rows:
+            before, where = rows.setdefault((row.test, row.seed), (row, path))
+            if before != row:
+                run = f"{row.test} with seed {row.seed}"
+                ended = f"{before.outcome} in {where}, {row.outcome} in {path}"
+                raise Refusal(f"{run} is not the same in two tables: {ended}")
+    return Table(table.parameters, _sorted(row for row, _ in rows.values()))

@@ -1,0 +1,151 @@
+"""The command `tickrig campaign`: a test with thousands of seeds; its shards joined."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.options import PATH, VERSION, time_option
+from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import loading
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.campaign.table import Table
+
+RUN: Final = "run"
+OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
+NOT_PASSED: Final = 1
+
+
+class CampaignGroup(click.Group):
+    """A group whose first command need not be named: `tickrig campaign tests --seeds 0-9`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the words behind the command; those that name no command are for `run`."""
+        if args and args[0] not in (*self.commands, *ctx.help_option_names):
+            args = [RUN, *args]
+        return super().parse_args(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[Any]:
+        """Complete commands, and what `run` takes."""
+        run = self.commands[RUN]
+        with run.make_context(RUN, [], parent=ctx, resilient_parsing=True) as own:
+            return [
+                *super().shell_complete(ctx, incomplete),
+                *run.shell_complete(own, incomplete),
+                *run.params[0].shell_complete(own, incomplete),
+            ]
+
+
+@click.group(cls=CampaignGroup)
+def campaign() -> None:
+    """Run tests that have a bench with many seeds and parameters, on all cores or a cluster.
+
+    \b
+    tickrig campaign tests/test_stop.py --seeds 0-9999
+    tickrig campaign tests/test_stop.py::test_it_stops --seeds 0-999 --param flip=0.0001,0.001
+    tickrig campaign tests --seeds 0-9999 --shard 3/8 -o part3.csv
+    tickrig campaign tests --seeds 0-9999 --scheduler tcp://10.0.0.5:8786
+    tickrig campaign merge part1.csv part2.csv -o all.csv
+
+    The word run may be left out: see 'tickrig campaign run --help' for the options. After Ctrl-C or
+    a kill the same command goes on where it ended.
+    """  # noqa: D301 - click wants the backspace
+
+
+@campaign.command(RUN)
+@click.argument("tests", nargs=-1, required=True, type=click.Path())
+@click.option("--seeds", required=True, help="As 0-9999, or 3,17,100-199.")
+@click.option(
+    "--param",
+    "parameters",
+    multiple=True,
+    metavar="NAME=V,V",
+    help="Values of an argument or fixture of the tests, each with all seeds; may be repeated.",
+)
+@click.option("--shard", default="1/1", metavar="K/N", help="Do the K-th of N parts of the runs.")
+@click.option(
+    "-o", "--output", "outputs", multiple=True, type=PATH, help=OUTPUT + "  [campaign.csv]"
+)
+@click.option("-j", "--workers", type=click.IntRange(1, 1000), help="Processes.  [one a core]")
+@time_option("--timeout", "timeout_us", default="60s", help="What a run takes at most.  [60s]")
+@click.option("--bench", default="", metavar="RIG.TOML", help="Rig file of the bench.")
+@click.option(
+    "-k", "keyword", default="", metavar="EXPRESSION", help="Tests by name, as of pytest."
+)
+@click.option("--scheduler", default="", metavar="URL", help="Run on this Dask cluster.")
+@click.option("--fresh", is_flag=True, help="Begin anew, whatever is there.")
+@click.pass_context
+def run(context: click.Context, /, **options: Any) -> None:
+    """Run TESTS (files, folders or node IDs) with each seed and each value, in virtual time.
+
+    Exit status 1 if a run did not pass, 3 if the disk is full.
+
+    \b
+    tickrig campaign tests/test_stop.py --seeds 0-9999 --param flip=0.0001,0.001
+    tickrig campaign tests/test_stop.py --seeds 0-99 -o runs.csv -o runs.parquet
+    """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.testing.campaign.campaign_run import (  # noqa: PLC0415
+            CampaignOptions,
+            CampaignRun,
+        )
+        from tickrig.emulators.testing.campaign.order import Refusal  # noqa: PLC0415 - slow
+
+    try:
+        wanted = CampaignOptions(version=VERSION, **options)
+        table = CampaignRun(wanted).run()
+    except Refusal as refusal:
+        raise Refused(str(refusal)) from None
+    context.exit(_shown(table, wanted.output_paths[0]))
+
+
+@campaign.command()
+@click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", "outputs", multiple=True, required=True, type=PATH, help=OUTPUT)
+@click.pass_context
+def merge(context: click.Context, tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
+    """Join the tables of shards, and say what they found.
+
+    \b
+    tickrig campaign merge part1.csv part2.csv -o all.csv
+    tickrig campaign merge part*.parquet -o all.csv -o all.parquet
+    """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.testing.campaign.campaign_run import (  # noqa: PLC0415
+            check_arrow,
+            check_outputs,
+            write_outputs,
+        )
+        from tickrig.emulators.testing.campaign.order import Refusal  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.campaign.summary import missing_seeds  # noqa: PLC0415
+        from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
+            merge_tables,
+            read_table,
+        )
+
+    try:
+        check_outputs(outputs)
+        check_arrow(tables)
+        table = merge_tables([(path, read_table(path)) for path in tables])
+        write_outputs(table, outputs)
+    except Refusal as refusal:
+        raise Refused(str(refusal)) from None
+    except OSError as error:
+        raise Refused(f"{error.filename}: {error.strerror}") from None
+    for line in missing_seeds(table):
+        say(f"warning: {line}")
+    context.exit(_shown(table, outputs[0]))
+
+
+def _shown(table: Table, path: Path) -> int:
+    """Show what was found; return the exit status."""
+    from tickrig.emulators.testing.campaign.summary import summary  # noqa: PLC0415 - slow
+    from tickrig.emulators.testing.campaign.table import WELL  # noqa: PLC0415
+
+    for line in summary(table, str(path)):
+        click.echo(line)
+    return 0 if all(row.outcome in WELL for row in table.rows) else NOT_PASSED

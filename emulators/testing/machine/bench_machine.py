@@ -1,0 +1,122 @@
+"""What a user writes for a search: a bench, a host, its rules, and what must always be so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, ClassVar, Final, TypeVar
+
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.machine.world import World
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+RULE: Final = "_tickrig_rule"
+INVARIANT: Final = "_tickrig_invariant"
+
+
+def host_rule(**arguments: object) -> Callable[[F], F]:
+    """Make a method of a `BenchMachine` something that may happen.
+
+    Args:
+        arguments: of the method, each with what it may be: a list, a tuple or a `range` of plain
+            values, or a strategy of Hypothesis that draws some.
+    """
+
+    def mark(method: F) -> F:
+        setattr(method, RULE, arguments)
+        return method
+
+    return mark
+
+
+def invariant() -> Callable[[F], F]:
+    """Make a method of a `BenchMachine` what must always be so: it is called after each tick.
+
+    It only looks, and raises AssertionError where something is not so.
+    """
+
+    def mark(method: F) -> F:
+        setattr(method, INVARIANT, True)
+        return method
+
+    return mark
+
+
+class BenchMachine:
+    r"""A bench and a host of yours, to be tried with any order of calls, faults and hands.
+
+    Derive from it: make the bench, connect the host, and write a `host_rule` for each thing that
+    the host may be asked for. `check_host` searches; `replay_host` does again what it found. Each
+    run begins with the same bench, warm if `warm_up` makes it so, and with a host of its own.
+
+    Attributes:
+        bench: the bench, in virtual time.
+        world: what may happen to the bench beside the host's calls.
+        faults: names of the faults that may come, each for a while; all of the bench unless given.
+        inputs: names of the inputs and buttons that may change; all of the bench unless given.
+        traffic: what somebody else may send: frames in candump's notation, or bytes in hex to a
+            device; where there are several wires with a device before them: `drive/705#00`.
+        fault_for: how long faults stay, as `"300ms"`.
+        patience: how much time of the bench one call may take: a host that waits for ever is a
+            finding. A search is the faster the less it is, as each such call is waited for so long.
+        longest: how much time of the bench a whole run may take.
+        patched: whether hosts that call `time.sleep` and `time.monotonic` live in the bench's time.
+
+    >>> class Chair(BenchMachine):
+    ...     faults = ()
+    ...     def make_bench(self):
+    ...         return Bench("rrc")
+    ...     def connect(self):
+    ...         self.link = self.bench.link
+    ...     @host_rule(line=[b"device", b"hello"])
+    ...     def ask(self, line):
+    ...         self.link.send(line + b"\n")
+    >>> sorted(Chair.rules())
+    ['ask']
+    """
+
+    faults: ClassVar[Sequence[str] | None] = None
+    inputs: ClassVar[Sequence[str] | None] = None
+    traffic: ClassVar[Sequence[str]] = ()
+    fault_for: ClassVar[Sequence[str]] = ("20ms", "100ms", "300ms", "1s", "3s")
+    patience: ClassVar[str] = "60s"
+    longest: ClassVar[str] = "600s"
+    patched: ClassVar[bool] = True
+
+    bench: Bench
+    world: World
+
+    def make_bench(self) -> Bench:
+        """Return the bench, in virtual time; called once in a search."""
+        raise NotImplementedError(f"{type(self).__name__} makes no bench: write make_bench")
+
+    def warm_up(self) -> None:
+        """Bring the bench to where each run begins; called once."""
+
+    def connect(self) -> None:
+        """Connect the host, at the beginning of each run; what it raises is a finding."""
+
+    def end(self) -> None:
+        """Judge at the end of each run; `calm` ends all faults first, if that is wanted."""
+
+    def disconnect(self) -> None:
+        """Close what the host has open, after each run, whatever came of it."""
+
+    def calm(self) -> None:
+        """End all faults, and put all inputs back to what they were when the run began."""
+        self.world.calm()
+
+    @classmethod
+    def rules(cls) -> dict[str, Mapping[str, object]]:
+        """Return the arguments of each rule, by its name."""
+        return {name: getattr(method, RULE) for name, method in _marked(cls, RULE)}
+
+    @classmethod
+    def invariants(cls) -> list[str]:
+        """Return the names of what must always be so."""
+        return [name for name, _ in _marked(cls, INVARIANT)]
+
+
+def _marked(machine: type, mark: str) -> Iterable[tuple[str, Any]]:
+    methods = ((name, getattr(machine, name)) for name in sorted(dir(machine)))
+    return [(name, method) for name, method in methods if hasattr(method, mark)]

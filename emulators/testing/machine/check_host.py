@@ -1,0 +1,129 @@
+"""The search for what a host does wrong, and the replay of what was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+from tickrig.emulators.testing.machine.bench_machine import BenchMachine
+from tickrig.emulators.testing.machine.host_runs import HostRuns
+from tickrig.emulators.testing.machine.step import HostStep, parse_steps
+
+HEAD: Final = "# a scenario of {place}, {count}"
+REPLAY: Final = "put it into a file, and: tickrig replay FILE --host {place}"
+WANTED: Final = "a search wants Hypothesis: pip install 'tickrig[test]'"
+
+
+def check_host(
+    machine: type[BenchMachine],
+    *,
+    max_examples: int = 200,
+    max_steps: int = 12,
+    seed: int | None = None,
+) -> None:
+    """Search for an order of calls, faults and hands in which a host does something wrong.
+
+    What is found is made as short as can be. The exception has a note with the scenario of it and
+    the command that replays it, without Hypothesis.
+
+    Args:
+        machine: the bench, the host and its rules.
+        max_examples: how many runs, if nothing is found.
+        max_steps: how many steps a run has at most.
+        seed: of what is drawn: the same search again, whatever was found before; None for
+            another one each time, which begins with what was found before.
+
+    Raises:
+        ModuleNotFoundError: Hypothesis is not there.
+        Exception: what the host, a rule or an invariant raised in the shortest run found.
+    """
+    with HostRuns(machine) as runs:
+        search = search_of(runs, max_examples=max_examples, max_steps=max_steps, seed=seed)
+        try:
+            search()
+        except Exception as error:
+            error.add_note(note_of(runs))
+            raise
+
+
+def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | None = None) -> Any:
+    """Return the test of Hypothesis that draws steps and runs them.
+
+    Raises:
+        ModuleNotFoundError: Hypothesis is not there.
+    """
+    try:
+        import hypothesis  # noqa: PLC0415 - an extra
+        from hypothesis import HealthCheck, Phase, given, settings  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise ModuleNotFoundError(WANTED, name="hypothesis") from None
+    from tickrig.emulators.testing.machine import strategies  # noqa: PLC0415 - with it
+
+    others: dict[str, Any] = {} if seed is None else {"database": None}
+
+    @settings(
+        max_examples=max_examples,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+        report_multiple_bugs=False,
+        print_blob=False,
+        phases=[phase for phase in Phase if phase is not Phase.explain],
+        **others,
+    )
+    @given(strategies.steps(runs.machine, max_steps))
+    def search(steps: list[HostStep]) -> None:
+        runs.run(steps)
+
+    return search if seed is None else hypothesis.seed(seed)(search)
+
+
+def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
+    """Do again what a search found; nothing is drawn, and Hypothesis is not asked.
+
+    Args:
+        machine: the bench, the host and its rules.
+        scenario: a file with the scenario; or its text, of several lines.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is no scenario of this machine; the text says where.
+        Exception: what the host, a rule or an invariant raised.
+    """
+    text, name = str(scenario), "scenario"
+    if "\n" not in text:
+        text, name = Path(scenario).read_text("utf-8"), str(scenario)
+    steps = parse_steps(text, name)
+    with HostRuns(machine) as runs:
+        try:
+            runs.run(steps)
+        except Exception as error:
+            error.add_note(f"what passed last:\n{runs.last_lines()}")
+            raise
+
+
+def scenario_of(runs: HostRuns) -> str:
+    """Write the last run as a scenario."""
+    done = runs.done
+    count = f"{len(done)} step{'' if len(done) == 1 else 's'}"
+    head = HEAD.format(place=_place(type(runs.machine)), count=count)
+    return "\n".join([head, *map(str, done)])
+
+
+def note_of(runs: HostRuns) -> str:
+    """Write the last run as a scenario, how it is replayed, and what passed last."""
+    replay = REPLAY.format(place=_place(type(runs.machine)))
+    passed = f"what passed last:\n{runs.last_lines()}"
+    return f"{scenario_of(runs)}\n\n{replay}\n\n{passed}"
+
+
+def _place(machine: type) -> str:
+    """Return `FILE.py:Class`, the file as it is seen from here."""
+    import inspect  # noqa: PLC0415 - of failures alone
+
+    try:
+        path = Path(inspect.getfile(machine))
+    except (OSError, TypeError):
+        path = Path(f"{machine.__module__}.py")
+    here = Path.cwd()
+    shown = path.relative_to(here) if path.is_relative_to(here) else path
+    return f"{shown}:{machine.__qualname__}"

@@ -1,0 +1,58 @@
+"""The door for fuzzers that are guided by coverage: bytes in, an exception for what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz
+from tickrig.emulators.testing.machine.bench_machine import BenchMachine
+from tickrig.emulators.testing.machine.check_host import note_of, search_of
+from tickrig.emulators.testing.machine.host_runs import HostRuns
+
+
+def fuzz_one_input(
+    what: type[BenchMachine] | Any, *, max_steps: int = 12, **options: Any
+) -> Callable[[bytes], None]:
+    r"""Return what a fuzzer such as Atheris calls with bytes, each time from one snapshot.
+
+    Args:
+        what: a `BenchMachine`, whose bench stays open: bytes choose its steps, by Hypothesis. Or
+            a device, as `DeviceFuzz` takes it: bytes are what it hears.
+        max_steps: how many steps a run of the machine has at most.
+        options: of `DeviceFuzz`.
+
+    Returns:
+        The function. It raises what the device, the host or the machine raises; the exception
+        has a note with what was done.
+
+    Raises:
+        ModuleNotFoundError: of a machine: Hypothesis is not there.
+
+    >>> one_input = fuzz_one_input("rrc", words=[b"device"], request=[b"\ndevice\n"], answer=b"RRC")
+    >>> one_input(b"any bytes")
+    """
+    if isinstance(what, type) and issubclass(what, BenchMachine):
+        return _OneInput(what, max_steps)
+    return DeviceFuzz(what, **options)
+
+
+class _OneInput:
+    """Runs of a machine, each by some bytes."""
+
+    def __init__(self, machine: type[BenchMachine], max_steps: int) -> None:
+        self._runs = HostRuns(machine)
+        self._runs.__enter__()
+        try:
+            search = search_of(self._runs, max_examples=1, max_steps=max_steps)
+        except BaseException:
+            self._runs.__exit__()
+            raise
+        self._fuzz: Callable[[bytes], object] = search.hypothesis.fuzz_one_input
+
+    def __call__(self, data: bytes) -> None:
+        try:
+            self._fuzz(data)
+        except Exception as error:
+            error.add_note(note_of(self._runs))
+            raise

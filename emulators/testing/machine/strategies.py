@@ -1,0 +1,168 @@
+"""Hypothesis strategies of what may happen to devices and hosts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from hypothesis import strategies as st
+
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.machine.bench_machine import BenchMachine
+from tickrig.emulators.testing.machine.step import HostStep
+from tickrig.emulators.testing.machine.world import World, WorldInput
+from tickrig.emulators.testing.properties.strategies import (
+    Act,
+    Session,
+    chunks,
+    frames,
+    input_changes,
+    sessions,
+    values,
+    waits,
+)
+from tickrig.host.text.values import us_of
+
+__all__ = (
+    "Act",
+    "Session",
+    "chunks",
+    "faults",
+    "frames",
+    "input_changes",
+    "operator",
+    "sessions",
+    "steps",
+    "timing",
+    "traffic",
+    "values",
+    "waits",
+)
+
+RATES: Final = ("1", "0.5", "0.1", "0.02")
+PRESSES: Final = ("10ms", "100ms", "500ms", "2s")
+WAITS_US: Final = (0, 0, 0, 1_000, 10_000, 50_000, 100_000, 300_000, 1_000_000, 3_000_000)
+
+
+def timing() -> st.SearchStrategy[int]:
+    """Draw how long nothing is done before a step, in microseconds: mostly nothing, up to 3 s."""
+    return st.sampled_from(WAITS_US)
+
+
+def faults(
+    bench: Bench, names: Sequence[str] | None = None, for_: Sequence[str] = ("100ms", "1s")
+) -> st.SearchStrategy[HostStep]:
+    """Draw faults that come for a while; `step.do(bench)` lets one come.
+
+    Args:
+        bench: where.
+        names: of faults of it; all unless given.
+        for_: how long they stay.
+
+    Raises:
+        ValueError: there is no such fault.
+    """
+    return _faults(World(bench, names, ()), for_)
+
+
+def operator(bench: Bench, names: Sequence[str] | None = None) -> st.SearchStrategy[HostStep]:
+    """Draw what hands do: buttons are pressed, levels set; `step.do(bench)` does it.
+
+    Args:
+        bench: where.
+        names: of inputs and buttons of it; all but the objects of nodes unless given.
+
+    Raises:
+        ValueError: there is no such input.
+    """
+    return _operator(World(bench, (), names))
+
+
+def traffic(words: Sequence[str]) -> st.SearchStrategy[HostStep]:
+    """Draw what somebody else sends; `step.do(bench)` sends it.
+
+    Args:
+        words: frames in candump's notation, or bytes in hex, as `HostStep.what` has them.
+    """
+    return st.builds(HostStep, timing(), st.just("send"), st.sampled_from(words))
+
+
+def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
+    @st.composite
+    def fault(draw: st.DrawFn) -> HostStep:
+        wait_us = draw(timing())
+        name = draw(st.sampled_from(list(world.faults)))
+        rate = f"={draw(st.sampled_from(RATES))}" if world.faults[name] else ""
+        return HostStep(wait_us, "fault", name + rate, us_of(draw(st.sampled_from(for_))))
+
+    return fault()
+
+
+def _operator(world: World) -> st.SearchStrategy[HostStep]:
+    @st.composite
+    def act(draw: st.DrawFn) -> HostStep:
+        wait_us, item = draw(timing()), draw(st.sampled_from(world.inputs))
+        if item.type == "button":
+            return HostStep(wait_us, "press", item.name, us_of(draw(st.sampled_from(PRESSES))))
+        return HostStep(wait_us, "set", f"{item.name} {draw(_values(item))}")
+
+    return act()
+
+
+def _calls(rules: Mapping[str, Mapping[str, object]]) -> st.SearchStrategy[HostStep]:
+    """Draw calls of rules.
+
+    Args:
+        rules: the arguments of each, by its name.
+    """
+    drawn = {
+        name: st.fixed_dictionaries({each: _strategy(what) for each, what in given.items()})
+        for name, given in rules.items()
+    }
+
+    @st.composite
+    def call(draw: st.DrawFn) -> HostStep:
+        wait_us, name = draw(timing()), draw(st.sampled_from(list(drawn)))
+        return HostStep(wait_us, "call", name, arguments=draw(drawn[name]))
+
+    return call()
+
+
+def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]:
+    """Draw a run: calls, as often as all else together.
+
+    Args:
+        machine: whose rules there are, with its bench.
+        most: how many steps at most.
+    """
+    world, rules = machine.world, machine.rules()
+    happens = [
+        *([_faults(world, machine.fault_for)] if world.faults else []),
+        *([_operator(world)] if world.inputs else []),
+        *([traffic(machine.traffic)] if machine.traffic else []),
+    ]
+    called = [_calls(rules)] if rules else []
+    if not happens and not called:
+        raise ValueError(f"{type(machine).__name__} has no rule, fault, input or traffic")
+
+    @st.composite
+    def step(draw: st.DrawFn) -> HostStep:
+        kinds = called if not happens or (called and draw(st.booleans())) else happens
+        return draw(draw(st.sampled_from(kinds)))
+
+    return st.lists(step(), max_size=most)
+
+
+def _strategy(what: object) -> st.SearchStrategy[Any]:
+    if isinstance(what, st.SearchStrategy):
+        return what
+    if isinstance(what, list | tuple | range):
+        return st.sampled_from(what)
+    raise TypeError(f"{what!r:.60} says not what an argument may be: a list, a range, a strategy")
+
+
+def _values(item: WorldInput) -> st.SearchStrategy[int]:
+    """Draw whole values of a level: its ends and zero more often."""
+    low, high = int(item.low), int(item.high)
+    ends = [value for value in (0, low, high, 1) if low <= value <= high]
+    return st.sampled_from(ends) | st.integers(low, high)

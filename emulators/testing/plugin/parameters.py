@@ -1,0 +1,75 @@
+"""The plug-in of `--bench-param`: tests that take a parameter by name run with each value."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+
+from tickrig.emulators.testing.plugin.settings import SETTINGS, Parameter
+from tickrig.host.text.names import near
+from tickrig.host.text.values import parse_setting
+
+
+class Parameters:
+    """Gives tests the values of `--bench-param`, in place of those of the fixture of this name.
+
+    Args:
+        parameters: what was asked for.
+    """
+
+    def __init__(self, parameters: tuple[Parameter, ...]) -> None:
+        self._parameters = parameters
+        self._taken: set[str] = set()
+        self._names: dict[str, None] = {}
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        """Let a test run with each value.
+
+        Raises:
+            Collector.CollectError: the test has values of its own.
+        """
+        self._names.update(dict.fromkeys(metafunc.fixturenames))
+        own = _own_names(metafunc)
+        for name, words in self._parameters:
+            if name not in metafunc.fixturenames:
+                continue
+            if name in own:
+                where = metafunc.definition.name
+                raise pytest.Collector.CollectError(
+                    f"{where}: {name} has values of its own; make it a fixture that returns one"
+                )
+            self._taken.add(name)
+            ids = [f"{name}={word}" for word in words]
+            metafunc.parametrize(name, [parse_setting(word) for word in words], ids=ids)
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Refuse what no test takes."""
+        unknown = [one.name for one in self._parameters if one.name not in self._taken]
+        if items and unknown:
+            names = [name for name in self._names if not name.startswith(("bench", "request"))]
+            raise pytest.UsageError(
+                f"--bench-param {unknown[0]}: no test takes it; {near(unknown[0], names)}"
+            )
+
+
+def _own_names(metafunc: pytest.Metafunc) -> set[str]:
+    """Return what a test has values for by its own markers."""
+    names = set[str]()
+    for marker in metafunc.definition.iter_markers("parametrize"):
+        given = marker.args[0] if marker.args else marker.kwargs.get("argnames", "")
+        listed = given.split(",") if isinstance(given, str) else given
+        names.update(name.strip() for name in listed)
+    return names
+
+
+def words_of(item: pytest.Item) -> Mapping[str, str]:
+    """Return the values of `--bench-param` that a test runs with, as they were written."""
+    callspec = getattr(item, "callspec", None)
+    if callspec is None:
+        return {}
+    return {
+        name: words[callspec.indices[name]]
+        for name, words in item.config.stash[SETTINGS].parameters
+        if name in callspec.indices
+    }

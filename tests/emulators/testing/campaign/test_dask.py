@@ -1,0 +1,111 @@
+"""A campaign over a Dask cluster of real processes on loopback."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.emulators.testing.campaign.conftest import Campaign
+from tests.emulators.testing.campaign.test_campaign import add_test
+
+if "CI" not in os.environ:  # there it fails without them
+    pytest.importorskip("distributed", reason="no Dask here: pip install 'tickrig[campaign]'")
+
+pytestmark = pytest.mark.realtime
+
+DASK = (sys.executable, "-m", "dask")
+
+
+def started(pattern: str, *words: str) -> tuple[subprocess.Popen[str], str]:
+    """Start a process of Dask; return it, and what its output has for the pattern."""
+    process = subprocess.Popen(
+        [*DASK, *words], stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stderr is not None
+    for line in process.stderr:
+        if found := re.search(pattern, line):
+            return process, found[0]
+    raise AssertionError(f"{words} has ended")
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+
+
+@pytest.fixture
+def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """Give the address of a scheduler with two workers, and their processes."""
+    host = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    scheduler, url = started(r"tcp://127\.0\.0\.1:\d+", "scheduler", *host, "--no-show")
+    processes = [scheduler]
+    local = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+    try:
+        for _ in range(2):
+            words = ("worker", url, *local, "--local-directory", str(folder / "dask"))
+            processes.append(started("Registered to", *words)[0])
+        yield url, processes
+    finally:
+        for process in processes[::-1]:
+            end(process)
+
+
+Cluster = tuple[str, list[subprocess.Popen[str]]]
+
+
+def test_the_table_is_that_of_one_machine(
+    folder: Path, tickrig: Campaign, cluster: Cluster
+) -> None:
+    words = ("test_rrc.py", "--seeds", "0-29", "--param", "flip=0.0001,0.001")
+    outputs = ("-o", "b.csv", "-o", "b.parquet")
+    tickrig(*words, *outputs, "--scheduler", cluster[0], status=1)
+    tickrig(*words, "-o", "a.csv", "-o", "a.parquet", status=1)
+    assert (folder / "b.csv").read_bytes() == (folder / "a.csv").read_bytes()
+    assert (folder / "b.parquet").read_bytes() == (folder / "a.parquet").read_bytes()
+    tickrig("merge", "b.parquet", "-o", "c.csv", status=1)
+    assert (folder / "c.csv").read_bytes() == (folder / "a.csv").read_bytes()
+
+
+def test_runs_of_a_worker_that_is_lost_are_done_by_the_other(
+    folder: Path, tickrig: Campaign, cluster: Cluster
+) -> None:
+    kill = "os.kill(os.getppid(), signal.SIGKILL)"
+    add_test(folder, f"if seed == 20 and once('killed'): {kill}")
+    words = ("test_rrc.py", "--seeds", "0-29")
+    tickrig(*words, "--scheduler", cluster[0])
+    tickrig(*words, "-o", "a.csv")
+    assert (folder / "campaign.csv").read_bytes() == (folder / "a.csv").read_bytes()
+    assert [process.poll() for process in cluster[1]].count(None) == 2  # the scheduler, and one
+
+
+def test_a_cluster_that_is_gone_is_told_and_the_campaign_goes_on_here(
+    folder: Path, tickrig: Campaign, cluster: Cluster
+) -> None:
+    scheduler = cluster[1][0].pid
+    kill = f"os.kill({scheduler}, signal.SIGKILL)"
+    add_test(folder, f"if seed == 20 and once('killed'): {kill}")
+    words = ("test_rrc.py", "--seeds", "0-29")
+    done = tickrig(*words, "--scheduler", cluster[0], status=2)
+    assert done.stderr == f"Error: --scheduler {cluster[0]} is gone; what was done is kept\n"
+    again = tickrig(*words)
+    assert re.fullmatch(r"campaign\.csv\.journal: \d+ of 30 runs are done\n", again.stderr)
+
+
+def test_tests_of_a_worker_that_are_not_the_same_are_refused(
+    folder: Path, tickrig: Campaign, cluster: Cluster
+) -> None:
+    add_test(folder, "if seed == 3 and once('x'): Path('test_rrc.py').open('a').write('#\\n')")
+    add = "if seed == 4 and once('y'): os.kill(os.getpid(), signal.SIGKILL)"
+    path = folder / "test_rrc.py"
+    path.write_text(path.read_text().replace("    bench.run_for", f"    {add}\n    bench.run_for"))
+    done = tickrig("test_rrc.py", "--seeds", "0-29", "--scheduler", cluster[0], status=2)
+    said = "the files of the tests are not the same everywhere: they were changed"
+    assert re.fullmatch(rf"Error: tcp://127\.0\.0\.1:\d+: {said}\n", done.stderr)

@@ -1,0 +1,350 @@
+"""A search finds what a host does wrong, as short as can be; it can be done again."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from random import Random
+from typing import ClassVar
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tickrig import Bench
+from tickrig.emulators.commands.cli import main
+from tickrig.emulators.testing.machine.step import HostStep
+from tickrig.host.links.link import Link
+from tickrig.testing import (
+    BenchMachine,
+    check_host,
+    fuzz_one_input,
+    host_rule,
+    invariant,
+    replay_host,
+    strategies,
+)
+
+ROOT = Path(__file__).parents[4]
+
+
+class Chair(BenchMachine):
+    """Asks an RRC, which is on."""
+
+    faults: ClassVar[Sequence[str]] = ("cut",)
+    inputs = ("power_button",)
+    link: Link[bytes]
+
+    def make_bench(self) -> Bench:
+        return Bench("rrc")
+
+    def warm_up(self) -> None:
+        self.bench.run_for("1s")
+        self.bench.press("power_button")
+        self.bench.run_for("1s")
+
+    def connect(self) -> None:
+        self.link = self.bench.link
+        self.answers: list[bytes] = []
+
+    @host_rule()
+    def ask(self) -> None:
+        self.link.send(b"device\n")
+        self.answers.append(self.link.receive(50_000))
+
+    @host_rule(speed=[10, 20, 30])
+    def drive(self, speed: int) -> None:
+        self.link.send(b"output%02x00\n" % speed)
+        self.link.receive(50_000)
+
+
+class Trusting(Chair):
+    """Believes that each question is answered."""
+
+    @invariant()
+    def each_is_answered(self) -> None:
+        assert all(self.answers), "a question was not answered"
+
+
+class Fast(Chair):
+    """May not be driven at 30 %."""
+
+    faults = ()
+
+    @invariant()
+    def it_is_slow(self) -> None:
+        assert int(self.bench.get("out_v_pct")) < 30, "it is too fast"
+
+
+class Restless(Chair):
+    """Asks again and again, and swallows whatever comes of it."""
+
+    longest = "20s"
+
+    @host_rule()
+    def ask_for_ever(self) -> None:
+        while True:
+            try:
+                self.ask()
+                self.bench.run_for("1s")
+            except ValueError:
+                continue
+
+
+class Impatient(Chair):
+    """Waits for ever once it was not answered, whatever it is told meanwhile."""
+
+    patience = "2s"
+
+    @host_rule()
+    def ask(self) -> None:
+        while not self.answers or not self.answers[-1]:
+            self.link.send(b"device\n")
+            self.answers.append(self.link.receive(50_000))
+            if not self.answers[-1]:
+                self.bench.run_for("3600s")
+
+
+class Failing(Chair):
+    """Wants it to be ready in the end."""
+
+    def end(self) -> None:
+        self.calm()
+        self.bench.run_for("2s")
+        assert self.bench.get("state") == "Standby", "it is not ready in the end"
+
+
+def found(machine: type[BenchMachine], max_examples: int = 300) -> tuple[str, str]:
+    """Return what a search finds: the exception, and the steps."""
+    with pytest.raises(AssertionError) as caught:
+        check_host(machine, max_examples=max_examples)
+    note = caught.value.__notes__[-1]
+    scenario, _, rest = note.partition("\n\n")
+    assert rest.startswith("put it into a file, and: tickrig replay FILE --host ")
+    return str(caught.value), scenario
+
+
+def test_a_host_without_a_mistake_passes() -> None:
+    check_host(Chair, max_examples=30)
+
+
+@pytest.mark.parametrize(
+    ("machine", "said", "steps"),
+    [
+        (Trusting, "a question was not answered", ["fault cut for ", "call ask()"]),
+        (Fast, "it is too fast", ["call drive(speed=30)"]),
+    ],
+)
+def test_a_mistake_is_found_and_is_short(
+    machine: type[BenchMachine], said: str, steps: list[str]
+) -> None:
+    text, scenario = found(machine)
+    assert text.startswith(said)
+    head, *lines = scenario.splitlines()
+    assert f"test_check_host.py:{machine.__name__}, {len(lines)} step" in head
+    assert len(lines) <= 3
+    assert all(step in scenario for step in steps)
+
+
+def test_what_is_found_can_be_done_again(tmp_path: Path) -> None:
+    _, scenario = found(Trusting)
+    with pytest.raises(AssertionError, match="a question was not answered") as caught:
+        replay_host(Trusting, scenario)
+    assert "rrc > device" in caught.value.__notes__[-1]
+    (tmp_path / "found.txt").write_text(scenario, "utf-8")
+    with pytest.raises(AssertionError, match="a question was not answered"):
+        replay_host(Trusting, tmp_path / "found.txt")
+    replay_host(Chair, scenario)
+
+
+def test_a_command_does_it_again_without_hypothesis(tmp_path: Path) -> None:
+    (tmp_path / "chair.py").write_text(CHAIR, "utf-8")
+    (tmp_path / "found.txt").write_text("+0us call drive(speed=30)\n", "utf-8")
+    (tmp_path / "fine.txt").write_text("+0us call drive(speed=20)\n", "utf-8")
+    program = "import sys; sys.modules['hypothesis'] = None\n"
+    program += "from tickrig.commands import tickrig; tickrig()"
+    said = {}
+    for name in ("found", "fine"):
+        done = subprocess.run(
+            [sys.executable, "-c", program, "replay", f"{name}.txt", "--host", "chair.py:Chair"],
+            cwd=tmp_path,
+            env={"PYTHONPATH": str(ROOT / "src")},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        said[name] = done.returncode, done.stdout.splitlines()[0] if done.stdout else done.stderr
+    assert said == {
+        "found": (1, "AssertionError: it is too fast"),
+        "fine": (0, "nothing is wrong in 1 step"),
+    }
+
+
+CHAIR = """
+from tickrig import Bench
+from tickrig.testing import BenchMachine, host_rule
+
+
+class Chair(BenchMachine):
+    def make_bench(self):
+        return Bench("rrc")
+
+    @host_rule(speed=[10, 20, 30])
+    def drive(self, speed):
+        assert speed < 30, "it is too fast"
+"""
+
+
+@pytest.mark.parametrize(
+    ("scenario", "host", "said"),
+    [
+        (
+            "+0us call drive(speed=1)\n",
+            "chair.py:Bike",
+            "chair.py has no component 'Bike'; it has Chair",
+        ),
+        ("nothing\n", "chair.py:Chair", "found.txt:1: 'nothing' is not '+TIME ACTION"),
+        (None, "chair.py:Chair", "found.txt"),
+    ],
+)
+def test_a_call_that_cannot_be_is_told_in_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, scenario: str | None, host: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("chair.py").write_text(CHAIR, "utf-8")
+    if scenario:
+        Path("found.txt").write_text(scenario, "utf-8")
+    result = CliRunner().invoke(main, ["replay", "found.txt", "--host", host])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1)
+    assert said in result.output
+
+
+def test_a_host_that_does_not_come_back_is_found() -> None:
+    with pytest.raises(AssertionError, match="the run does not end within 20s"):
+        replay_host(Restless, "+0us call ask_for_ever()\n")
+    text, scenario = found(Impatient)
+    assert text.startswith("the host does not come back within 2s")
+    assert len(scenario.splitlines()) <= 4
+
+
+def test_a_host_that_waits_while_nothing_happens_is_found() -> None:
+    class Quiet(BenchMachine):
+        patience = "3s"
+
+        def make_bench(self) -> Bench:
+            return Bench("rrc")
+
+        @host_rule()
+        def listen(self) -> None:
+            with self.bench.serial(timeout=None) as port:
+                port.read(1)
+
+    with pytest.raises(AssertionError, match="the host does not come back within 3s"):
+        replay_host(Quiet, "+0us fault cut for 3600s\n+0us call listen()\n")
+
+
+def test_a_seed_is_the_same_search_again() -> None:
+    def drawn() -> list[list[str]]:
+        runs: list[list[str]] = []
+
+        class Noted(Chair):
+            @host_rule()
+            def note(self) -> None:
+                runs[-1].append(f"{self.bench.now_us}")
+
+            def connect(self) -> None:
+                super().connect()
+                runs.append([])
+
+        check_host(Noted, max_examples=20, seed=3)
+        return runs
+
+    first = drawn()
+    assert drawn() == first
+    assert any(first)
+
+
+def test_the_end_is_judged_after_calm() -> None:
+    replay_host(Failing, "+0us fault cut for 3s\n+0us call ask()\n")
+    with pytest.raises(AssertionError, match="it is not ready in the end"):
+        replay_host(Failing, "+0us fault bus_unplugged for 1s\n+500ms wait\n")
+
+
+@pytest.mark.parametrize(
+    ("scenario", "said"),
+    [
+        ("+0us call drift()\n", "no rule 'drift'; did you mean 'drive'"),
+        ("+0us call drive(fast=1)\n", r"drive takes \(speed\), got \+0us call drive\(fast=1\)"),
+        ("+0us fault cot\n", "no fault 'cot'; did you mean 'cut'"),
+    ],
+)
+def test_a_scenario_of_another_machine_is_refused(scenario: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        replay_host(Chair, scenario)
+
+
+def test_a_machine_that_cannot_be_is_refused() -> None:
+    class Misspelt(Chair):
+        faults = ("cot",)
+
+    class Odd(Chair):
+        @host_rule(speed=5)
+        def go(self, speed: int) -> None:
+            raise NotImplementedError
+
+    class Empty(BenchMachine):
+        faults = inputs = ()
+
+        def make_bench(self) -> Bench:
+            return Bench("rrc")
+
+    with pytest.raises(ValueError, match="no fault 'cot'; did you mean 'cut'"):
+        check_host(Misspelt)
+    with pytest.raises(TypeError, match="5 says not what an argument may be"):
+        check_host(Odd)
+    with pytest.raises(ValueError, match="Empty has no rule, fault, input or traffic"):
+        check_host(Empty)
+    with pytest.raises(NotImplementedError, match="BenchMachine makes no bench: write make_bench"):
+        check_host(BenchMachine)
+
+
+def test_without_hypothesis_it_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "hypothesis", None)
+    said = r"a search wants Hypothesis: pip install 'tickrig\[test\]'"
+    for use in (check_host, fuzz_one_input):
+        with pytest.raises(ModuleNotFoundError, match=said):
+            use(Chair)
+
+
+def test_bytes_are_runs_too() -> None:
+    one_input: Callable[[bytes], None] = fuzz_one_input(Fast)
+
+    def throw() -> None:
+        for number in range(1_000):
+            one_input(Random(number).randbytes(300))
+
+    with pytest.raises(AssertionError, match="it is too fast") as caught:
+        throw()
+    assert "call drive(speed=30)" in caught.value.__notes__[-1]
+
+
+def test_strategies_draw_what_a_bench_has() -> None:
+    with Bench("rrc") as bench:
+        hands = strategies.operator(bench, ["stick_v_pct", "power_button"])
+        steps = strategies.faults(bench) | hands | strategies.traffic(["6f6b0a"])
+        fresh = bench.snapshot()
+        verbs = set()
+
+        @settings(max_examples=30)
+        @given(st.lists(steps, max_size=5))
+        def do(drawn: list[HostStep]) -> None:
+            fresh.restore()
+            for step in drawn:
+                step.do(bench)
+                verbs.add(step.verb)
+
+        do()
+    assert verbs == {"fault", "press", "set", "send"}
