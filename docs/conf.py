@@ -1,15 +1,29 @@
-"""How Sphinx makes the API reference of the docstrings (`make docs`)."""
+"""How Sphinx makes the site: of these pages, and of the docstrings (`make docs`)."""
+
+from __future__ import annotations
+
+import re
+from logging import getLogger
+from typing import TYPE_CHECKING
 
 from tickrig import __version__
 
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
 project = "tickrig"
 version = release = __version__
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser"]
-root_doc = "api/index"
-include_patterns = ["api/*.md"]
+extensions = [
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.intersphinx",
+    "myst_parser",
+]
 html_theme = "furo"
 html_title = f"tickrig {version}"
+html_show_sourcelink = False
 
+myst_heading_anchors = 4
 default_role = "code"  # a name between backticks, as in the pages
 autodoc_default_options = {
     "members": True,
@@ -21,3 +35,32 @@ autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+
+# What of others our signatures name. The lists lie here, so that no build asks the network.
+intersphinx_mapping = {
+    name: (where, f"inventories/{name}.txt")
+    for name, where in {
+        "python": "https://docs.python.org/3/",
+        "python-can": "https://python-can.readthedocs.io/en/stable/",
+        "canopen": "https://canopen.readthedocs.io/en/stable/",
+        "pyserial": "https://pyserial.readthedocs.io/en/latest/",
+    }.items()
+}
+
+ELSEWHERE = re.compile(r"(?<!!)\[([^]]*)\]\(((?:\.\./)+)(?!examples/[^)]*\.)[^)]*\)")
+"""A link out of the folder of its page, but to a file of examples/, which can be downloaded."""
+
+
+def setup(app: Sphinx) -> None:
+    """Mend what is right on a code host and not on a site."""
+    # A toctree ends with `*`, for pages that it does not name; that there is none is no mistake.
+    getLogger("sphinx.sphinx.directives.other").addFilter(
+        lambda record: getattr(record, "subtype", "") != "empty_glob"
+    )
+    app.connect("source-read", _unlink)
+
+
+def _unlink(app: Sphinx, page: str, source: list[str]) -> None:
+    """Let links out of docs/ be plain text: the site has no sources beside it."""
+    out = "../" * (page.count("/") + 1)
+    source[0] = ELSEWHERE.sub(lambda link: link[1] if link[2] == out else link[0], source[0])

@@ -1,8 +1,8 @@
 """Do what a page says, word for word: write its files, type its commands, compare what comes.
 
 A block whose first line is `# NAME` is the file NAME. In a block of `console` a line with `$ ` is
-typed in a shell, and what follows is what it prints; `...` stands for anything. What only installs
-tickrig is left out: the environment has it.
+typed in a shell, and what follows is what it prints; `...` stands for anything. A command of which
+nothing is shown has to end well. What only installs tickrig is left out: the environment has it.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class PageRunner:
         """End what still runs."""
         for process in self._running:
             os.killpg(process.pid, signal.SIGINT)
-            process.wait(TIMEOUT_S)
+            process.communicate(timeout=TIMEOUT_S)
 
     def _type_all(self, text: str) -> None:
         for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
@@ -95,6 +95,7 @@ class PageRunner:
             timeout=TIMEOUT_S,
         )
         said = done.stdout + done.stderr
+        assert expected.strip() or done.returncode == 0, f"$ {command}\n{said}"
         pattern = ".*".join(map(re.escape, expected.strip().split("...")))
         assert re.search(pattern, said, re.DOTALL), f"$ {command}\n{said}\n--- not:\n{expected}"
 

@@ -199,7 +199,8 @@ def _look(style: Style) -> tuple[str, str, str]:
 
 
 if __name__ == "__main__":
-    folder = Path(sys.argv[1])
-    folder.mkdir(exist_ok=True)
     for picture, text in asyncio.run(pictures(sys.argv[2:])).items():
-        (folder / f"canmon-{picture}.svg").write_text(text, "utf-8")
+        tab, _, size = picture.partition("-")
+        folder = Path(sys.argv[1], size)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"canmon-{tab}.svg").write_text(text, "utf-8")

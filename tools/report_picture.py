@@ -1,6 +1,7 @@
 """Write a report of two runs in virtual time, and photograph it where there is a Chromium.
 
-`python tools/report_picture.py docs/report.png`; without one only `docs/report.html` is written.
+`python tools/report_picture.py docs/pictures/report.png`; without one
+only `docs/pictures/report.html` is written.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Draw the operator panel into an SVG file, from a run in virtual time.
 
-`python tools/rrc_panel_picture.py docs/rrc-panel.svg`
+`python tools/rrc_panel_picture.py docs/pictures/rrc-panel.svg`
 """
 
 from __future__ import annotations

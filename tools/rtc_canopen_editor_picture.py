@@ -1,6 +1,6 @@
 """Draw the System Editor into an SVG file, on Fig. 120 in virtual time.
 
-`python tools/rtc_canopen_editor_picture.py docs/rtc-canopen-editor.svg`
+`python tools/rtc_canopen_editor_picture.py docs/pictures/rtc-canopen-editor.svg`
 """
 
 from __future__ import annotations

@@ -1,0 +1,109 @@
+"""The site of docs/: made without a warning and without a network, each page and link of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+
+from tests.environment import ROOT, made_once
+
+PLACES = ("tickrig", "tickrig.device", "tickrig.host", "tickrig.rtc", "tickrig.testing")
+pytestmark = pytest.mark.timeout(600)  # it takes half a minute of a processor, beside other tests
+
+INDEXES = {"genindex.html", "py-modindex.html", "search.html"}
+"""Sphinx makes them; whether they are linked is the theme's business."""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Make it, once for all workers."""
+    return made_once(tmp_path_factory, "site", make_site) / "html"
+
+
+def make_site(folder: Path) -> None:
+    done = subprocess.run(
+        (
+            *(sys.executable, "-m", "sphinx", "-W", "-q", "-d", str(folder / "doctrees")),
+            *(str(ROOT / "docs"), str(folder / "html")),
+        ),
+        env={**os.environ, "PYTHONPATH": str(ROOT / "src")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@cache
+def text_of(page: Path) -> str:
+    return page.read_text("utf-8")
+
+
+def links(page: Path) -> Iterator[tuple[Path, str]]:
+    """Return where a page leads to within the site: files, and names in them."""
+    for target in re.findall(r'<a [^>]*href="([^"]+)"', text_of(page)):
+        if not re.match(r"\w+:", target):
+            path, _, name = unquote(target).partition("#")
+            yield ((page.parent / path).resolve() if path else page), name
+
+
+def test_every_page_of_docs_is_reached_from_the_first_one(site: Path) -> None:
+    reached, new = set[Path](), {site / "index.html"}
+    while new:
+        page = new.pop()
+        reached.add(page)
+        new |= {path for path, _ in links(page) if path.suffix == ".html"} - reached
+    pages = {
+        (site / path.relative_to(ROOT / "docs")).with_suffix(".html")
+        for path in (ROOT / "docs").rglob("*.md")
+    }
+    assert pages - reached == set()
+    assert set(site.rglob("*.html")) - reached - {site / name for name in INDEXES} == set()
+
+
+def test_every_link_of_the_site_leads_to_something(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        for path, name in links(page):
+            assert path.exists(), f"{page.name} leads to {path.name}"
+            if name and path.suffix == ".html":
+                assert f'id="{name}"' in text_of(path), f"{page.name} leads to {path.name}#{name}"
+
+
+def test_the_site_wants_nothing_of_the_network(site: Path) -> None:
+    loading = re.compile(r'<(?:script|img|iframe|link)\b[^>]*(?:src|href)="(?:https?:)?//[^"]*"')
+    for page in site.rglob("*.html"):
+        assert loading.findall(text_of(page)) == []
+
+
+def test_the_search_knows_all_pages(site: Path) -> None:
+    index = (site / "searchindex.js").read_text("utf-8")
+    found = json.loads(index.removeprefix("Search.setIndex(").rstrip().removesuffix(")"))
+    pages = {str(page.relative_to(ROOT / "docs"))[:-3] for page in (ROOT / "docs").rglob("*.md")}
+    assert set(found["docnames"]) == pages
+    where = found["terms"]["wheelchair"]
+    assert "index" in [found["docnames"][page] for page in where]
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_the_reference_has_each_public_name(site: Path, place: str) -> None:
+    text = text_of(site / "api" / f"{place.rpartition('.')[2]}.html")
+    for name in import_module(place).__all__:
+        assert f'id="{place}.{name}"' in text
+
+
+def test_signatures_lead_to_the_types_of_others_and_to_public_names(site: Path) -> None:
+    text = text_of(site / "api" / "tickrig.html")
+    can = "https://python-can.readthedocs.io/en/stable/bus.html#can.BusABC"
+    for target in (can, "https://docs.python.org/3/library/pathlib.html#pathlib.Path"):
+        assert f'href="{target}"' in text
+    assert 'href="#tickrig.Rig" title="tickrig.emulators.rig.rig.Rig"' in text

@@ -1,0 +1,32 @@
+"""The moving pictures of terminals show what their commands say."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from html import unescape
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.environment import ROOT
+
+TOOL = runpy.run_path(str(ROOT / "tools" / "terminal_picture.py"))
+
+
+def shown(svg: str) -> list[str]:
+    """Return the lines, without the width of rules and gaps, which is pytest's own."""
+    rows = [
+        "".join(row.itertext()) for row in ElementTree.fromstring(svg).iter() if "text" in row.tag
+    ]
+    return [re.sub(r"[\s=_-]+", " ", unescape(row)).strip() for row in rows]
+
+
+@pytest.mark.parametrize("name", TOOL["SCRIPTS"])
+def test_a_picture_shows_what_the_commands_say(name: str) -> None:
+    picture = ROOT / "docs" / "pictures" / f"{name}.svg"
+    now = TOOL["svg"](TOOL["lines_of"](*TOOL["SCRIPTS"][name]))
+    again = f"python tools/terminal_picture.py {name} {picture.relative_to(ROOT)}"
+    assert shown(picture.read_text("utf-8")) == shown(now), again
+    assert Path(picture).stat().st_size < 40_000
