@@ -1,0 +1,59 @@
+"""A base for containers out of this machine's Debian packages, where no image can be fetched."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tarfile
+from pathlib import Path
+from typing import Final
+
+WANTED: Final = ("passwd", "python3-venv")
+"""What the images of Python have and an essential system has not."""
+
+LEFT_OUT: Final = ("/usr/share/doc", "/usr/share/man", "/usr/share/locale")
+ACCOUNTS: Final = {"passwd": "root:x:0:0:root:/root:/bin/sh\n", "group": "root:x:0:\n"}
+KINDS: Final = ("suggests", "recommends", "conflicts", "breaks", "replaces", "enhances")
+
+
+def why_no_base() -> str:
+    """Return why none can be made, nothing if one can."""
+    if missing := [tool for tool in ("dpkg-query", "apt-cache") if not shutil.which(tool)]:
+        return f"this is no Debian: there is no {missing[0]}"
+    done = subprocess.run(["dpkg-query", "-W", *WANTED], capture_output=True, check=False)
+    return f"a base wants the packages {' and '.join(WANTED)}" if done.returncode else ""
+
+
+def write_base(path: Path) -> None:
+    """Write the files of all essential packages, and of those that are wanted, as a tar file."""
+    with tarfile.open(path, "w") as base:
+        for name in ("bin", "sbin", "lib", "lib64"):  # links into /usr
+            base.add(f"/{name}", name, recursive=False)
+        for name in sorted(_files()):
+            base.add(name, name.removeprefix("/"), recursive=False)
+        for name, text in ACCOUNTS.items():
+            file = path.with_name(name)
+            file.write_text(text)
+            base.add(file, f"etc/{name}")
+        base.add("/etc/ld.so.cache", "etc/ld.so.cache")
+
+
+def _files() -> set[str]:
+    """Return what dpkg knows of these packages, where it really is."""
+    essential = _lines("dpkg-query", "-W", "-f", "${Essential} ${Package}\n")
+    names = [line.removeprefix("yes ") for line in essential if line.startswith("yes ")]
+    options = [f"--no-{kind}" for kind in KINDS]
+    closure = _lines("apt-cache", "depends", "--recurse", "--installed", *options, *names, *WANTED)
+    packages = {line for line in closure if line[0] not in " <|"}
+    listed = [Path(line) for line in _lines("dpkg-query", "-L", *packages) if line[0] == "/"]
+    real = {str(each.parent.resolve() / each.name) for each in listed if each.name}
+    return {
+        each
+        for each in real - {"/bin", "/sbin", "/lib", "/lib64"}
+        if Path(each).exists() and not each.startswith(LEFT_OUT)
+    }
+
+
+def _lines(*words: str) -> list[str]:
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    return [line for line in done.stdout.splitlines() if line]
