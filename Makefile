@@ -2,7 +2,7 @@
 #   make test   lint, types, import contracts, wheel, tests, coverage
 #   make demo   an RRC on a pty, driven by the host client; CANopen: a potentiometer turns a motor;
 #               two PICs as RT components, one loses its power
-#   make docs   the API reference, made of the docstrings
+#   make docs   the site, of the pages in docs/ and the docstrings
 PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || command -v python3)
 VENV   ?= .venv
 READY  := $(VENV)/.ready
@@ -21,7 +21,7 @@ demo: $(READY)
 
 docs: $(READY)
 	$(VENV)/bin/sphinx-build -W --keep-going -q docs build/docs
-	@echo build/docs/api/index.html
+	@echo build/docs/index.html
 
 bench: $(READY)
 	$(VENV)/bin/python tools/bench
@@ -31,7 +31,7 @@ $(READY): pyproject.toml
 	    { echo "tickrig needs Python 3.11 or newer; $(PYTHON) is older. Try: make PYTHON=python3.12"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet --upgrade pip
-	$(VENV)/bin/python -m pip install --quiet --editable '.[tui,plot,fast,dbc,rtc]' --group dev
+	$(VENV)/bin/python -m pip install --quiet --editable '.[tui,plot,fast,dbc,rtc,openrtm,ros2,docs]' --group dev
 	@touch $(READY)
 
 clean:

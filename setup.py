@@ -1,6 +1,6 @@
 """Refuse to build what has no modules, keep the links in a source distribution, compile a wheel.
 
-With TICKRIG_COMPILE=1 in the environment a wheel has extension modules too (docs/compiled.md).
+With TICKRIG_COMPILE=1 in the environment a wheel has extension modules (docs/howto/compiled.md).
 All else about the build stands in pyproject.toml.
 """
 

@@ -122,10 +122,10 @@ def _install_wheel(folder: Path) -> None:
         shim.write_text(SHIM.format(python=made.folder / "bin" / "python", module=module))
         shim.chmod(0o755)
     again = "--force-reinstall"  # though tickrig is among the dependencies, not in this one
-    made.run("pip", "install", "--quiet", again, _make_wheel(folder), cwd=folder)
+    made.run("pip", "install", "--quiet", again, make_wheel(folder), cwd=folder)
 
 
-def _make_wheel(folder: Path) -> Path:
+def make_wheel(folder: Path) -> Path:
     """Return a wheel of this tree; where the compiled package is tested, that of `.ci/compiled`."""
     if tickrig.compiled:
         (wheel,) = (ROOT / "build" / "compiled").glob("tickrig-*.whl")

@@ -21,7 +21,7 @@ PLACES = ("tickrig", "tickrig.device", "tickrig.host", "tickrig.rtc", "tickrig.t
 NAMES = {name: place for place in PLACES for name in import_module(place).__all__}
 TOOL = runpy.run_path(str(ROOT / "tools" / "api"))
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
-SHOWN = [ROOT / "README.md", *EXAMPLES, *sorted((ROOT / "docs").glob("*.md"))]
+SHOWN = [ROOT / "README.md", *EXAMPLES, *sorted((ROOT / "docs").rglob("*.md"))]
 MEANT_TWICE = {"ReturnCode"}
 """Names that the component model of devices has too."""
 
@@ -166,7 +166,7 @@ def test_the_first_page_imports_public_names_alone() -> None:
 
 
 def test_what_the_upgrading_page_says_to_import_is_there() -> None:
-    page = (ROOT / "docs" / "upgrading.md").read_text("utf-8")
+    page = (ROOT / "docs" / "howto/upgrading.md").read_text("utf-8")
     lines = re.findall(r"`(from (tickrig[\w.]*) import [^`]+)`", page)
     assert {place for _, place in lines} <= {*PLACES}
     assert len(lines) > 20

@@ -13,10 +13,12 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 from packaging.requirements import Requirement
 
 from tickrig import __version__
 from tickrig.emulators.commands.cli import main as tickrig
+from tickrig.emulators.commands.demo_cli import DEMOS
 from tickrig.emulators.rh3.cart.motion_cli import main as rh3
 from tickrig.host.canmon.cli import main as canmon
 
@@ -31,6 +33,9 @@ BAD = {
     "canmon": ("tui a.log", "pip install 'tickrig[tui]'"),
     "rh3": ("goto 1 0 0 --plot a.png", "pip install 'tickrig[plot]'"),
     "rh3-emu": ("--address 0", "0"),
+    "ucode-reader-emu": ("--marker 1", "a marker is UCODE,X,Y in m, got '1'"),
+    "ucode-resolver": ("/nowhere", "table /nowhere: No such file"),
+    "tkernel-emu": ("--connectors 0", "connectors 0 is not in 1..1000"),
     "urg-emu": ("--room 4", "a room is WIDTH,DEPTH"),
     "canopen-slave-emu": ("--eds nowhere.eds --node-id 5 --scenario -", "nowhere.eds"),
     "rtc-canopen-server": ("a.yaml", "pip install 'tickrig[rtc]'"),
@@ -191,6 +196,15 @@ def test_a_full_disk_is_one_line(words: str) -> None:
 def test_the_package_is_the_command() -> None:
     words = [sys.executable, "-m", "tickrig", "--version"]
     assert subprocess.check_output(words, text=True) == f"tickrig (tickrig) {__version__}\n"
+
+
+def test_demo_without_a_name_lists_what_can_be_typed() -> None:
+    listed = CliRunner().invoke(tickrig, ["demo"])
+    assert listed.exit_code == 0
+    typed = [line.partition("  ")[0] for line in listed.output.splitlines()]
+    assert typed == [f"tickrig demo {name}" for name in DEMOS]
+    for words in typed:
+        assert CliRunner().invoke(tickrig, [*words.split()[1:], "--help"]).exit_code == 0
 
 
 @pytest.mark.parametrize("words", ["demo rtc-lite --virtual", "demo fig120"])

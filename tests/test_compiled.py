@@ -36,7 +36,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import Request
-from tickrig.wire.scip.command import Command
+from tickrig.wire.sensors.scip.command import Command
 from tickrig.wire.serial.uart import UartSetting
 
 ROOT: Final = Path(__file__).parents[1]
@@ -121,7 +121,7 @@ KEPT: Final = {
     *("CanopenSlave", "Dictionary", "EntryDescription", "InputSignal", "LineSplitter"),
     *("OutputSignal", "Rh3Base", "Rig", "Station", "Urg"),
 }
-"""Public classes that nobody derives from where they are compiled (docs/compiled.md)."""
+"""Public classes that nobody derives from where they are compiled (docs/howto/compiled.md)."""
 
 
 def derivable(base: type) -> bool:
@@ -141,7 +141,7 @@ def test_of_the_public_classes_users_derive_from_all_but_those_of_the_page() -> 
     assert {name for name, base in classes.items() if not derivable(base)} == (
         KEPT if tickrig.compiled else set()
     )
-    page = (ROOT / "docs" / "compiled.md").read_text("utf-8")
+    page = (ROOT / "docs" / "howto/compiled.md").read_text("utf-8")
     assert not [name for name in KEPT if f"`{name}`" not in page]
 
 

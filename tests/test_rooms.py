@@ -35,6 +35,12 @@ def test_a_room_is_small_and_says_what_lives_there(room: Path) -> None:
     assert ast.get_docstring(ast.parse((room / "__init__.py").read_text("utf-8")))
 
 
+def test_a_folder_of_pages_is_small() -> None:
+    for folder in (ROOT / "docs", *(ROOT / "docs").rglob("*/")):
+        entries = [path.name for path in folder.iterdir() if path.name != "__pycache__"]
+        assert len(entries) <= MOST, f"{folder.relative_to(ROOT)} holds {sorted(entries)}"
+
+
 def test_a_circle_is_found() -> None:
     ring = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a"}}
     assert circles({name: frozenset(used) for name, used in ring.items()}) == [["b", "c"]]

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from tickrig.device.physical import OutputSignal as OutputSignal
     from tickrig.device.physical import SignalType as SignalType
     from tickrig.device.twin import Copyable as Copyable
+    from tickrig.device.twin.snapshot import MachineSnapshot as MachineSnapshot
     from tickrig.emulators.can.wire import CanWire as CanWire
     from tickrig.emulators.canopen.eds import read_eds as read_eds
     from tickrig.emulators.commands.device_type import DeviceType as DeviceType
@@ -48,6 +49,7 @@ else:
             "tickrig.device.core": ("Device",),
             "tickrig.device.physical": ("InputBank", "InputSignal", "OutputSignal", "SignalType"),
             "tickrig.device.twin": ("Copyable",),
+            "tickrig.device.twin.snapshot": ("MachineSnapshot",),
             "tickrig.emulators.can.wire": ("CanWire",),
             "tickrig.emulators.canopen.eds": ("read_eds",),
             "tickrig.emulators.commands.device_type": ("DeviceType",),

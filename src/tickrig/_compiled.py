@@ -1,4 +1,4 @@
-"""Whether this installation is compiled (docs/compiled.md), and what tells mypyc about a class."""
+"""Whether this installation is compiled (docs/howto/compiled.md); what tells mypyc of a class."""
 
 from importlib import import_module
 

@@ -28,7 +28,10 @@ def lazy(
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         from importlib import import_module  # noqa: PLC0415 - not before it is needed
 
-        found: object = getattr(import_module(modules[name]), name)
+        home = import_module(modules[name])
+        if not hasattr(home, name):  # a module of that package
+            return import_module(f"{modules[name]}.{name}")
+        found: object = getattr(home, name)
         return found
 
     return sorted(modules), find, lambda: sorted(modules)

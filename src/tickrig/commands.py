@@ -55,6 +55,21 @@ def urg_emu() -> None:
     _start("urg-emu", "tickrig.emulators.urg.cli")
 
 
+def ucode_reader_emu() -> None:
+    """Call `ucode-reader-emu`."""
+    _start("ucode-reader-emu", "tickrig.emulators.tkernel.reader.cli")
+
+
+def ucode_resolver() -> None:
+    """Call `ucode-resolver`."""
+    _start("ucode-resolver", "tickrig.emulators.tkernel.resolution.cli")
+
+
+def tkernel_emu() -> None:
+    """Call `tkernel-emu`."""
+    _start("tkernel-emu", "tickrig.emulators.tkernel.node.cli")
+
+
 def canopen_slave_emu() -> None:
     """Call `canopen-slave-emu`."""
     _start("canopen-slave-emu", "tickrig.emulators.canopen.cli")

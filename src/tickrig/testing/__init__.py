@@ -14,7 +14,14 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.conformance.written import (
         write_conformance as write_conformance,
     )
-    from tickrig.emulators.testing.properties import strategies as strategies
+    from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz as DeviceFuzz
+    from tickrig.emulators.testing.machine import strategies as strategies
+    from tickrig.emulators.testing.machine.bench_machine import BenchMachine as BenchMachine
+    from tickrig.emulators.testing.machine.bench_machine import host_rule as host_rule
+    from tickrig.emulators.testing.machine.bench_machine import invariant as invariant
+    from tickrig.emulators.testing.machine.check_host import check_host as check_host
+    from tickrig.emulators.testing.machine.check_host import replay_host as replay_host
+    from tickrig.emulators.testing.machine.fuzz_one_input import fuzz_one_input as fuzz_one_input
     from tickrig.emulators.testing.properties.check_device import check_device as check_device
     from tickrig.host.canopen.master.open_master import open_master as open_master
 else:
@@ -27,7 +34,15 @@ else:
                 "conformance_text",
                 "write_conformance",
             ),
-            "tickrig.emulators.testing.properties": ("strategies",),
+            "tickrig.emulators.testing.fuzz.device_fuzz": ("DeviceFuzz",),
+            "tickrig.emulators.testing.machine": ("strategies",),
+            "tickrig.emulators.testing.machine.bench_machine": (
+                "BenchMachine",
+                "invariant",
+                "host_rule",
+            ),
+            "tickrig.emulators.testing.machine.check_host": ("check_host", "replay_host"),
+            "tickrig.emulators.testing.machine.fuzz_one_input": ("fuzz_one_input",),
             "tickrig.emulators.testing.properties.check_device": ("check_device",),
             "tickrig.host.canopen.master.open_master": ("open_master",),
         },
