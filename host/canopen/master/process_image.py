@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from typing import Final
 
@@ -42,6 +43,7 @@ class ProcessImage:
         self._outputs = {key for pdo in self._sent for key in keys(pdo)}
         self._values: dict[Key, int] = {}
         self._seen: set[Key] = set()
+        self._counts: Counter[Key] = Counter()
         self._written: set[int] = set()
         self._syncs = 0
 
@@ -66,6 +68,10 @@ class ProcessImage:
         """Take note that an object may be otherwise by now; its value stays."""
         self._seen.discard(key)
 
+    def count(self, key: Key) -> int:
+        """Return how often an object was received or read."""
+        return self._counts[key]
+
     def read(self, key: Key) -> int:
         """Return the bits of an object."""
         return self._values.get(key, 0)
@@ -84,6 +90,7 @@ class ProcessImage:
         """Take what was read otherwise, as by SDO."""
         self._values[key] = bits
         self._seen.add(key)
+        self._counts[key] += 1
 
     def receive(self, can_id: int, data: bytes) -> None:
         """Take a TPDO; one that is too short is passed over."""

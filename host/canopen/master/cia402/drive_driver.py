@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final, TypeVar
 
 from tickrig.host.canopen.dialogue import QueuedScript, Script
@@ -45,6 +46,9 @@ SUPPORTED: Final = DriveObject(0x6502, 4, signed=False)
 
 AXIS: Final = 0x800
 """From the objects of an axis to those of the next."""
+
+CAUGHT_UP: Final = 3
+"""So many statuswords after an answer, one is of after all that was sent before."""
 
 SWITCH_US: Final = 5_000_000
 """How long a change of state or of mode may take."""
@@ -256,7 +260,30 @@ class DriveDriver:
         """Home, unless the method is 0."""
         method = await self._exchange(self._read(HOMING_METHOD))
         if method and isinstance(self._mode, HomingMode):
-            await home(self.name, self._mode, self._settings.homing_us)
+            await home(self.name, self._mode, self._settings.homing_us, self._catch_up)
+
+    async def _catch_up(self) -> None:
+        """Wait for statuswords of after the controlword, however late drive and bus are.
+
+        Who has answered an SDO has the RPDOs before it; which a SYNC may still have to bring into
+        force, and then a TPDO has to come.
+        """
+        key, late = self._key(STATUSWORD), f"{self.name}: no statusword"
+        await self._next_cycle()
+        await self._exchange(self._ask(key))
+        heard = self._image.count(key) + CAUGHT_UP
+        await Until(lambda: self._image.count(key) >= heard, SWITCH_US, late)
+        await self._next_cycle()
+
+    async def _next_cycle(self) -> None:
+        """Wait until the drive was read and written."""
+        cycles = self.cycles
+        await Until(lambda: self.cycles > cycles, SWITCH_US, f"{self.name}: the node was lost")
+
+    def _ask(self, key: Key) -> Script[None]:
+        """Have the drive answer, whatever it says."""
+        with suppress(SdoAborted):
+            yield from upload(*key)
 
     async def _exchange(self, script: Script[T]) -> T:
         """Say something to the drive between two periods; return what came of it."""

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
 from tickrig.host.canopen.master.cia402.drive_mode import HomingMode
 from tickrig.host.canopen.master.cia402.drive_state import Statusword
-from tickrig.host.canopen.master.waiting import DriveFailed, Until
+from tickrig.host.canopen.master.waiting import DriveFailed, Operation, Until
 
 START_US: Final = 1_000_000
 """So soon the drive is at rest before homing, and homing has begun."""
@@ -20,23 +21,34 @@ ATTAINED: Final = Statusword.MODE_12
 ERROR: Final = Statusword.MODE_13
 
 
-async def home(name: str, mode: HomingMode, within_us: int) -> None:
+async def home(
+    name: str, mode: HomingMode, within_us: int, caught_up: Callable[[], Operation]
+) -> None:
     """Start homing in a drive that is in this mode, and wait for its end.
+
+    Args:
+        name: of the joint.
+        mode: what the drive is in.
+        within_us: how long homing may take.
+        caught_up: waits until the statusword is of after the controlword.
 
     Raises:
         DriveFailed: it does not start, does not end in time, or reports an error.
     """
     try:
-        await _home(name, mode, within_us)
+        await _home(name, mode, within_us, caught_up)
     finally:
         mode.runs = False
 
 
-async def _home(name: str, mode: HomingMode, within_us: int) -> None:
+async def _home(
+    name: str, mode: HomingMode, within_us: int, caught_up: Callable[[], Operation]
+) -> None:
     await _await(name, mode, ERROR | REACHED, 0, START_US, "is not at rest")
     mode.runs = True
     every = ERROR | ATTAINED | REACHED
     if mode.status & ATTAINED:  # by the homing before: the bit may fall and rise unseen
+        await caught_up()
         with suppress(DriveFailed):
             await Until(lambda: not mode.status & ATTAINED, SEEN_US, "")
     else:
