@@ -59,8 +59,7 @@ class DaskWorkers:
     """
 
     def __init__(self, url: str, plan: Plan) -> None:
-        for name in ("distributed", "distributed.client"):  # what is lost, we say
-            logging.getLogger(name).handlers[:] = [logging.NullHandler()]
+        be_quiet()
         self._url, self._plan, self._plugin = url, plan, CrewPlugin(plan.order)
         if re.fullmatch(r"\w+://.+:[0-9]+", url) is None:
             raise Refusal(f"--scheduler {url}: write tcp://HOST:PORT")
@@ -124,6 +123,12 @@ class DaskWorkers:
             self._client.unregister_worker_plugin(self._plugin.name)
         with suppress(OSError, RuntimeError, TimeoutError, CancelledError):
             self._client.close(timeout=1)
+
+
+def be_quiet() -> None:
+    """Let nobody but us tell what is lost: Dask and Tornado log tracebacks of it."""
+    for name in ("distributed", "distributed.client", "tornado", "tornado.application", "asyncio"):
+        logging.getLogger(name).handlers[:] = [logging.NullHandler()]
 
 
 def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[Verdict] | str:

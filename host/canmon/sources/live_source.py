@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 from tickrig.host.canmon.sources.reopening_reader import ReopeningReader
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.get_within import get_within
 from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.mark import Mark
@@ -137,7 +138,7 @@ class LiveSource(AnySource[Item]):
             self._take(reader, chosen, timeout_us)
         if not self._queue and not self._stepped and not self.ended:
             with suppress(Empty):
-                self._came.get(timeout=timeout_us / 1e6)
+                get_within(self._came, timeout_us / 1e6)
         while not self._came.empty():
             self._came.get()
         if self._marking:

@@ -10,6 +10,7 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import Final
 
+from tickrig.host.links.get_within import get_within
 from tickrig.host.text.log import log_of
 
 PeerCall = Callable[[], float | None]
@@ -73,6 +74,6 @@ class PeerThread:
             if wait_s <= 0:
                 return heappop(self._repeated)[2]
         try:
-            return self._calls.get(timeout=wait_s)
+            return get_within(self._calls, wait_s)
         except queue.Empty:
             return heappop(self._repeated)[2]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import signal
@@ -97,6 +98,15 @@ def test_a_cluster_that_is_gone_is_told_and_the_campaign_goes_on_here(
     assert done.stderr == f"Error: --scheduler {cluster[0]} is gone; what was done is kept\n"
     again = tickrig(*words)
     assert re.fullmatch(r"campaign\.csv\.journal: \d+ of 30 runs are done\n", again.stderr)
+
+
+def test_a_traceback_of_tornado_is_not_shown(capfd: pytest.CaptureFixture[str]) -> None:
+    from tickrig.emulators.testing.campaign.dask_workers import be_quiet  # noqa: PLC0415 - an extra
+
+    be_quiet()
+    for name in ("tornado.application", "asyncio", "distributed.client"):
+        logging.getLogger(name).error("Exception in callback")
+    assert capfd.readouterr().err == ""
 
 
 def test_tests_of_a_worker_that_are_not_the_same_are_refused(

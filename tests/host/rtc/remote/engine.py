@@ -54,7 +54,7 @@ class Servant:
                 threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
 
     def _serve(self, connection: socket.socket) -> None:
-        with contextlib.suppress(OSError):
+        with connection, contextlib.suppress(OSError):
             while True:
                 message = receive(connection)
                 self.awake.wait()

@@ -13,6 +13,7 @@ from typing import Any, Final, TypeVar
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.host.control.clock import ServingClock
+from tickrig.host.links.get_within import get_within
 
 T = TypeVar("T")
 
@@ -149,7 +150,7 @@ class RigThread:
     def _serve(self, wait_us: int) -> None:
         """Do one thing that was asked for, within a time."""
         with suppress(Empty):
-            self._calls.get(wait_us > 0, wait_us / 1e6)()
+            get_within(self._calls, wait_us / 1e6)()
 
     def _note_stop(self) -> None:
         self._stopping = True
