@@ -25,26 +25,67 @@ from rich.style import Style
 from rich.terminal_theme import MONOKAI
 from rich.text import Text
 
-EXAMPLES: Final = Path(__file__).parents[1] / "examples"
-SCRIPTS: Final = {
-    "first-test": (
-        "chair",
-        "grep -A 8 '^def drive' test_chair.py",
-        "tail -5 test_chair.py",
-        "pytest -q",
-        "sed -i 's/TRIES = 20/TRIES = 1/' test_chair.py",
-        "pytest -q --tb=line",
-    ),
-    "demo": ("rigs", "tickrig demo fig120"),
-}
-"""By name: a folder of examples/, in a copy of which they run, and the commands."""
+ROOT: Final = Path(__file__).parents[1]
 
-COLUMNS, ROWS = 92, 26
+
+@dataclass(frozen=True)
+class Script:
+    """What is typed, and where.
+
+    Attributes:
+        source: a folder, in a copy of which the commands run; or a page, whose files are written.
+        commands: what is typed, in bash.
+        columns: how wide the terminal is.
+    """
+
+    source: str
+    commands: tuple[str, ...]
+    columns: int = 92
+
+
+SCRIPTS: Final = {
+    "first-test": Script(
+        "examples/chair",
+        (
+            "grep -A 8 '^def drive' test_chair.py",
+            "tail -5 test_chair.py",
+            "pytest -q",
+            "sed -i 's/TRIES = 20/TRIES = 1/' test_chair.py",
+            "pytest -q --tb=line",
+        ),
+    ),
+    "demo": Script("examples/rigs", ("tickrig demo fig120",)),
+    "canmon": Script(
+        "tests/golden/canmon",
+        (
+            "canmon info drive.log",
+            "canmon dump drive.log -t z -F 'node=5 and (nmt or pdo or emcy)'",
+            "canmon check drive.log -t z --rule dlc --rule 'emcy never' --around 1; echo status $?",
+        ),
+        columns=128,
+    ),
+    "robot": Script(
+        "docs/tutorials/robot.md",
+        (
+            "tickrig check rig.toml",
+            "grep -A 6 'def go' robot.py",
+            "pytest -q --bench rig.toml test_robot.py",
+            "tail -5 test_ice.py",
+            "pytest -q --bench rig.toml --tb=short test_ice.py",
+            "sed -i 's/0x6060, 3, size=1)/&; write(wheel, 0x6083, 1000, size=4)/' robot.py",
+            "pytest -q --bench rig.toml",
+        ),
+    ),
+}
+
+ROWS: Final = 26
 ENVIRONMENT: Final = {
-    **{"PY_COLORS": "1", "COLUMNS": str(COLUMNS), "PYTHONDONTWRITEBYTECODE": "1"},
+    **{"PY_COLORS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
     **{"PYTEST_ADDOPTS": "-p no:cacheprovider -p no:randomly -p no:xdist"},
 }
+FILE: Final = re.compile(r"^```\w+\n# ([\w.]+)\n\n?(.*?)^```", re.DOTALL | re.MULTILINE)
 CELL: Final = (8, 17)
+EDGE: Final = 4  # above the first line; what is scrolled out of the screen ends there
 GROUND, INK = "#121212", "#e0e0e0"
 KEY_S, LINE_S, READ_S, END_S = 0.03, 0.06, 1.8, 6.0
 
@@ -58,28 +99,44 @@ class Line:
     typed_s: float = 0.0
 
 
-def lines_of(folder: str, *commands: str) -> list[Line]:
+def draw(name: str) -> str:
+    """Return the picture of a script."""
+    script = SCRIPTS[name]
+    return svg(lines_of(script), script.columns)
+
+
+def lines_of(script: Script) -> list[Line]:
     """Run the commands and return what a terminal shows."""
     lines, now_s = list[Line](), 0.5
     with TemporaryDirectory() as scratch:
-        place = Path(scratch, folder)
-        shutil.copytree(EXAMPLES / folder, place, ignore=shutil.ignore_patterns("[._]*"))
-        for command in commands:
+        place = Path(scratch, Path(script.source).stem)
+        _fill(place, ROOT / script.source)
+        for command in script.commands:
             typed_s = KEY_S * len(command)
             lines.append(Line(Text(f"$ {command}", style="bold"), now_s, typed_s))
             now_s += typed_s + 0.3
-            for text in _output(command, place):
+            for text in _output(command, place, script.columns):
                 lines.append(Line(text, now_s))
                 now_s += LINE_S
             now_s += READ_S
     return lines
 
 
-def _output(command: str, place: Path) -> Iterator[Text]:
+def _fill(place: Path, source: Path) -> None:
+    """Copy a folder, or write the files of a page as they are there first."""
+    if source.is_dir():
+        shutil.copytree(source, place, ignore=shutil.ignore_patterns("[._]*"))
+        return
+    place.mkdir()
+    for name, text in reversed(FILE.findall(source.read_text("utf-8"))):
+        (place / name).write_text(text, "utf-8")
+
+
+def _output(command: str, place: Path, columns: int) -> Iterator[Text]:
     done = subprocess.run(
         ["bash", "-c", command],
         cwd=place,
-        env={**os.environ, **ENVIRONMENT},
+        env={**os.environ, **ENVIRONMENT, "COLUMNS": str(columns)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -89,14 +146,13 @@ def _output(command: str, place: Path) -> Iterator[Text]:
     said = re.sub(r" in [\d.]+s( \([\d:]+\))?", "", said)  # a run of this machine, on that day
     for line in said.rstrip("\n").splitlines():
         text = Text.from_ansi(line)
-        text.truncate(COLUMNS)
-        yield text
+        yield from text.divide(range(columns, len(text), columns))
 
 
-def svg(lines: list[Line]) -> str:
+def svg(lines: list[Line], columns: int) -> str:
     """Return the picture."""
     wide, high = CELL
-    width, height = COLUMNS * wide, ROWS * high + 8
+    width, height = columns * wide, ROWS * high + 2 * EDGE
     end_s = lines[-1].at_s + END_S
     rules = [
         "text{font:13.3px monospace;white-space:pre}.b{font-weight:bold}",
@@ -113,7 +169,7 @@ def svg(lines: list[Line]) -> str:
         f'viewBox="0 0 {width + 16} {height}" fill="{INK}">\n'
         f"<style>\n{chr(10).join(rules)}\n</style>\n"
         f'<rect width="100%" height="100%" rx="6" fill="{GROUND}"/>\n'
-        f'<g id="s">\n{body}\n</g>\n</svg>\n'
+        f'<svg y="{EDGE}"><g id="s">\n{body}\n</g></svg>\n</svg>\n'
     )
 
 
@@ -145,7 +201,7 @@ def _appearing(row: int, line: Line, end_s: float) -> str:
 
 
 def _row(row: int, line: Line) -> str:
-    y = row * CELL[1] + 17
+    y = (row + 1) * CELL[1] - EDGE
     return f'<text id="l{row}" x="8" y="{y}">{"".join(_runs(line.text)) or " "}</text>'
 
 
@@ -165,4 +221,4 @@ def _runs(text: Text) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[2]).write_text(svg(lines_of(*SCRIPTS[sys.argv[1]])), "utf-8")
+    Path(sys.argv[2]).write_text(draw(sys.argv[1]), "utf-8")
