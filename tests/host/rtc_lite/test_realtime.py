@@ -21,7 +21,11 @@ from tickrig.host.rtc_lite import ProxyEvent, ProxySettings, attach
 
 EMULATOR = "tickrig.emulators.rtc_lite.cli"
 DEADLINE_S = 10.0
-TOLERANCE_US = 100_000
+EARLY_US = 100_000
+"""The clocks of two processes, and their ticks."""
+
+LATE_US = 5_000_000
+"""A machine that has much else to do."""
 
 
 def run_until(runner: RealTime, done: Callable[[], bool]) -> None:
@@ -88,9 +92,9 @@ def test_t1_and_t2_on_two_ptys(live: Live) -> None:
     assert [value.data for value in live.sink.received] == [1, -5, 2_147_483_647]
     cut_us = live.cut(0)
     fatal_us = live.await_event("FatalError")
-    assert 500_000 - TOLERANCE_US <= fatal_us - cut_us <= 600_000 + TOLERANCE_US
+    assert 500_000 - EARLY_US <= fatal_us - cut_us <= 600_000 + LATE_US
     removed_us = live.await_event("Removed")
-    assert 1_000_000 <= removed_us - fatal_us <= 1_000_000 + TOLERANCE_US
+    assert 1_000_000 <= removed_us - fatal_us <= 1_000_000 + LATE_US
     assert live.states() == {name: "ACTIVE" for name in ALL if name != "LiteA0"}
     assert [profile.ports for profile in live.manager.connectors] == [JOINTS[2]]
 
@@ -99,7 +103,7 @@ def test_t1_and_t2_on_two_ptys(live: Live) -> None:
 def test_t3_on_two_ptys(live: Live) -> None:
     cut_us = live.cut(1)
     fatal_us = live.await_event("FatalError")
-    assert fatal_us - cut_us <= 1_400_000 + TOLERANCE_US
+    assert fatal_us - cut_us <= 1_400_000 + LATE_US
     assert live.events[0].instance_name == "LiteB0"
 
 

@@ -52,8 +52,10 @@ class OmniNames:
         raise AssertionError("".join(told))
 
     def pause(self) -> None:
-        """Let it hang."""
+        """Let it hang; it does when this returns."""
+        assert self._process is not None
         self._signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, self._process.pid, os.WSTOPPED)
 
     @property
     def hangs(self) -> bool:
