@@ -84,3 +84,10 @@ def test_a_file_that_is_no_state_is_told(
     with pytest.raises(SystemExit, match=said):
         soak(monkeypatch, "rrc", "--inputs", "2", "--state", str(tmp_path))
     assert thrown == []
+
+
+def test_guided_says_what_it_wants(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "atheris", None)
+    with pytest.raises(SystemExit) as ended:
+        soak(monkeypatch, "rrc", "--guided")
+    assert ended.value.code == "--guided wants Atheris: pip install 'tickrig[fuzz]'"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -24,7 +25,7 @@ def fuzz_one_input(
 
     Returns:
         The function. It raises what the device, the host or the machine raises; the exception
-        has a note with what was done.
+        has a note with what was done. As fuzzers show no notes, standard error has it too.
 
     Raises:
         ModuleNotFoundError: of a machine: Hypothesis is not there.
@@ -33,8 +34,21 @@ def fuzz_one_input(
     >>> one_input(b"any bytes")
     """
     if isinstance(what, type) and issubclass(what, BenchMachine):
-        return _OneInput(what, max_steps)
-    return DeviceFuzz(what, **options)
+        return told(_OneInput(what, max_steps))
+    return told(DeviceFuzz(what, **options))
+
+
+def told(one_input: Callable[[bytes], object]) -> Callable[[bytes], None]:
+    """Return the same, which also prints the notes of what it raises."""
+
+    def tell(data: bytes) -> None:
+        try:
+            one_input(data)
+        except Exception as error:
+            print(*getattr(error, "__notes__", ()), sep="\n", file=sys.stderr, flush=True)
+            raise
+
+    return tell
 
 
 class _OneInput:

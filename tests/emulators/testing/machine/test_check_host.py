@@ -319,7 +319,7 @@ def test_without_hypothesis_it_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch
             use(Chair)
 
 
-def test_bytes_are_runs_too() -> None:
+def test_bytes_are_runs_too(capsys: pytest.CaptureFixture[str]) -> None:
     one_input: Callable[[bytes], None] = fuzz_one_input(Fast)
 
     def throw() -> None:
@@ -329,6 +329,7 @@ def test_bytes_are_runs_too() -> None:
     with pytest.raises(AssertionError, match="it is too fast") as caught:
         throw()
     assert "call drive(speed=30)" in caught.value.__notes__[-1]
+    assert capsys.readouterr().err == caught.value.__notes__[-1] + "\n"
 
 
 def test_strategies_draw_what_a_bench_has() -> None:
