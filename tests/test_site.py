@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -83,6 +84,32 @@ def test_the_site_wants_nothing_of_the_network(site: Path) -> None:
     loading = re.compile(r'<(?:script|img|iframe|link)\b[^>]*(?:src|href)="(?:https?:)?//[^"]*"')
     for page in site.rglob("*.html"):
         assert loading.findall(text_of(page)) == []
+    fetching = re.compile(r"""(?:@import\s|url\()\s*["']?(?:https?:)?//[^"')]*""")
+    for path in (*site.rglob("*.css"), *site.rglob("*.svg")):
+        assert fetching.findall(text_of(path)) == [], path.name
+
+
+def test_each_page_is_in_the_menu_of_each_page(site: Path) -> None:
+    pages = {path.relative_to(site) for path in site.rglob("*.html")} - set(map(Path, INDEXES))
+    for page in sorted(pages):
+        _, _, menu = text_of(site / page).partition('<div class="sidebar-tree">')
+        there = re.findall(r'href="([^"#]*)', menu.partition("</aside>")[0])
+        found = {(site / page).parent.joinpath(path).resolve() for path in there if path}
+        missed = {path for path in pages if (site / path).resolve() not in found}
+        assert missed <= {page, Path("index.html")}, page.name
+
+
+def test_no_table_is_torn(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        assert not re.search(r"<p>\s*\|", text_of(page)), page.name
+
+
+def test_headings_go_down_one_level_at_a_time(site: Path) -> None:
+    for page in site.rglob("*.html"):
+        if page.name not in INDEXES:
+            levels = [int(level) for level in re.findall(r"<h([1-6])\b", text_of(page))]
+            assert levels.count(1) == 1, page.name
+            assert all(b <= a + 1 for a, b in pairwise(levels)), page.name
 
 
 def test_the_search_knows_all_pages(site: Path) -> None:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,6 +18,8 @@ from tickrig.host.canmon.tui.tasks.session import Model, open_session
 from tickrig.host.cli.can_options import BusOptions
 
 SIZE: Final = (110, 26)
+FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
+"""Textual names fonts of another site; without them a reader's own are taken."""
 
 
 def picture(log: str, keys: Sequence[str] = ()) -> str:
@@ -33,7 +36,7 @@ async def _draw(log: str, keys: Sequence[str]) -> str:
         await pilot.press(*keys)
         monitor.refresh_view()
         await pilot.pause()
-        svg = monitor.export_screenshot(title="canmon tui")
+        svg = FONTS.sub("", monitor.export_screenshot(title="canmon tui"))
     session.close()
     session.source.close()
     return svg

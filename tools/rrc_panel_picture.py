@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import EmulatorControl
@@ -18,6 +20,9 @@ from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import Object
+
+FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
+"""Textual names fonts of another site; without them a reader's own are taken."""
 
 SCENARIO = """
 0.5  press power_button
@@ -51,7 +56,7 @@ async def _draw(control: EmulatorControl) -> str:
         await pilot.pause()
         await panel.look()
         await pilot.pause()
-        return panel.export_screenshot(title="rrc-emu --panel")
+        return FONTS.sub("", panel.export_screenshot(title="rrc-emu --panel"))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import sys
 from pathlib import Path
 from typing import Final
@@ -17,6 +18,9 @@ from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.host.rtc_canopen.editor.app import SystemEditor
 from tickrig.host.rtc_canopen.editor.session import EditorSession
 from tickrig.host.rtc_canopen.serve import open_server
+
+FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
+"""Textual names fonts of another site; without them a reader's own are taken."""
 
 LOOKS: Final = 5
 LOOK_US: Final = 100_000
@@ -50,7 +54,7 @@ async def _draw(session: EditorSession, link: CanHost) -> str:
         editor.objects.put_cursor(next(n for n, row in enumerate(rows) if row[0] >= OBJECTS) + 12)
         _pass_time(editor, link)
         await pilot.pause()
-        return editor.export_screenshot(title="rtc-canopen-editor fig120.yaml")
+        return FONTS.sub("", editor.export_screenshot(title="rtc-canopen-editor fig120.yaml"))
 
 
 def _pass_time(editor: SystemEditor, link: CanHost) -> None:

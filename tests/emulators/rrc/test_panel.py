@@ -314,6 +314,7 @@ def test_the_picture_is_the_panel() -> None:
     svg = runpy.run_path(str(TOOL))["picture"]().replace("&#160;", " ")
     for text in ("Limit", "within limits", "stick +80 -30", "hello", "ER:CommandUnknown"):
         assert text in svg
+    assert "@font-face" not in svg
 
 
 def test_a_bar_begins_at_zero() -> None:

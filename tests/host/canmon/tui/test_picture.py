@@ -15,6 +15,7 @@ def test_a_picture_shows_the_log_and_what_keys_do(tmp_path: Path) -> None:
     subprocess.run([sys.executable, TOOL, DRIVE, picture, "o"], check=True)
     svg = picture.read_text("utf-8")
     assert svg.startswith("<svg")
+    assert "@font-face" not in svg
     text = svg.replace("&#160;", " ")
     assert "frames CAN-ID" in text
     assert "134 frames" in text
