@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -201,6 +202,16 @@ def test_the_steps_of_the_help_are_those_of_the_page_and_of_the_tool(unreleased:
     assert [line.strip().replace("0.3.0", "0.2.0") for line in told] == commands[1:]
     page = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
     assert "\n".join(commands) in re.sub(r" +#.*", "", page)
+
+
+def test_each_version_of_the_changelog_has_each_group_once_and_no_line_twice() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    for section in re.split(r"^## ", text, flags=re.MULTILINE)[1:]:
+        groups = re.findall(r"^### (.+)$", section, re.MULTILINE)
+        assert len(groups) == len(set(groups))
+        assert set(groups) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}
+        starts = Counter(re.findall(r"^- (.{40})", section, re.MULTILINE))
+        assert [start for start, times in starts.items() if times > 1] == []
 
 
 def test_a_folder_with_files_is_left_alone(tree: Path, tmp_path: Path) -> None:
