@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -27,6 +28,34 @@ def test_its_help_has_examples() -> None:
     status, out, _ = run("--help")
     assert status == 0
     assert "  with-vcan pytest tests/interop\n" in out
+
+
+def test_the_page_has_the_options_of_the_help_with_what_holds_unless_given() -> None:
+    page = (TOOL.parents[1] / "docs" / "howto" / "ci.md").read_text("utf-8")
+    rows = dict(re.findall(r"^\| `(--.+?)` \| (.+) \|$", page, re.MULTILINE))
+    _, out, _ = run("--help")
+    told = dict(re.findall(r"^  (--\S+(?: \S+)?)  +(.+(?:\n {10,}.+)*)$", out, re.MULTILINE))
+    assert [*rows] == [*told]
+    assert {option: given(text) for option, text in rows.items()} == {
+        option: given(text) for option, text in told.items()
+    }
+
+
+def given(text: str) -> str:
+    """Return what stands in brackets: what holds where an option is not given."""
+    return "".join(re.findall(r"\(([^)]+)\)", text)).replace("`", "")
+
+
+@guest
+def test_the_commands_of_the_page_say_where_they_would_run() -> None:
+    page = (TOOL.parents[1] / "docs" / "howto" / "ci.md").read_text("utf-8")
+    commands = re.findall(r"^with-vcan (.*?)pytest  ", page, re.MULTILINE)
+    assert len(commands) == 4
+    for options in commands:
+        names = re.findall(r"can\d", options) or ["vcan0", "vcan1"]
+        status, out, err = run(*options.split(), "--where")
+        assert (status, err) == (0, "")
+        assert re.findall(r"\bv?can\d", out) == names
 
 
 @pytest.mark.parametrize(
