@@ -18,7 +18,7 @@ from types import FrameType, FunctionType, ModuleType
 from typing import Any, Final
 
 from tests.soak_targets import DEVICES, TARGETS, Throw
-from tickrig.emulators.testing.machine.fuzz_one_input import told
+from tickrig.emulators.testing.machine.fuzz_one_input import printing_notes
 
 KEPT_EACH_S: Final = 10.0
 INTERRUPTED: Final = 130
@@ -171,7 +171,7 @@ def _guided(targets: list[str]) -> int:
         sys.exit("--guided wants Atheris: pip install 'tickrig[fuzz]'")
     if len(targets) != 1 or targets[0] not in DEVICES:
         sys.exit(f"--guided is for one device: {', '.join(DEVICES)}")
-    one_input = told(DEVICES[targets[0]]())
+    one_input = printing_notes(DEVICES[targets[0]]())
     for name, module in tuple(sys.modules.items()):
         if name.startswith(("tickrig.device.", "tickrig.wire.")):
             _instrument(module, atheris.instrument_func)

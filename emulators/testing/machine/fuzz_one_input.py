@@ -34,21 +34,21 @@ def fuzz_one_input(
     >>> one_input(b"any bytes")
     """
     if isinstance(what, type) and issubclass(what, BenchMachine):
-        return told(_OneInput(what, max_steps))
-    return told(DeviceFuzz(what, **options))
+        return printing_notes(_OneInput(what, max_steps))
+    return printing_notes(DeviceFuzz(what, **options))
 
 
-def told(one_input: Callable[[bytes], object]) -> Callable[[bytes], None]:
+def printing_notes(one_input: Callable[[bytes], object]) -> Callable[[bytes], None]:
     """Return the same, which also prints the notes of what it raises."""
 
-    def tell(data: bytes) -> None:
+    def print_notes(data: bytes) -> None:
         try:
             one_input(data)
         except Exception as error:
             print(*getattr(error, "__notes__", ()), sep="\n", file=sys.stderr, flush=True)
             raise
 
-    return tell
+    return print_notes
 
 
 class _OneInput:

@@ -270,7 +270,7 @@ class DriveDriver:
         """
         key, late = self._key(STATUSWORD), f"{self.name}: no statusword"
         await self._next_cycle()
-        await self._exchange(self._ask(key))
+        await self._exchange(self._request(key))
         heard = self._image.count(key) + CAUGHT_UP
         await Until(lambda: self._image.count(key) >= heard, SWITCH_US, late)
         await self._next_cycle()
@@ -280,7 +280,7 @@ class DriveDriver:
         cycles = self.cycles
         await Until(lambda: self.cycles > cycles, SWITCH_US, f"{self.name}: the node was lost")
 
-    def _ask(self, key: Key) -> Script[None]:
+    def _request(self, key: Key) -> Script[None]:
         """Have the drive answer, whatever it says."""
         with suppress(SdoAborted):
             yield from upload(*key)
