@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -74,3 +75,30 @@ def test_every_link_and_named_test_is_there(page: Path) -> None:
             assert (page.parent / target).exists(), f"{page.name} points to {target}"
     for named in re.findall(r"`(tests/[\w/]+\.py)`", text):
         assert (ROOT / named).exists(), f"{page.name} names {named}"
+
+
+def decided() -> Iterator[str]:
+    """Yield the decisions that a table of a page has, as K14."""
+    for page in PAGES:
+        letter = ""
+        for line in page.read_text("utf-8").splitlines():
+            first, *rest = (cell.strip() for cell in line.strip("|").split("|"))
+            if [cell for cell in rest if cell] == ["decision"]:
+                letter = first
+            elif not line.startswith("|"):
+                letter = ""
+            for begin, end in re.findall(r"(\d+)(?: to (\d+))?", first) if letter else ():
+                yield from (f"{letter}{n}" for n in range(int(begin), int(end or begin) + 1))
+            if re.fullmatch(r"U\d+", first):
+                yield first
+
+
+def test_a_decision_that_is_cited_is_on_a_page() -> None:
+    there = set(decided())
+    assert {"K3", "K11", "L16", "R28", "U11"} <= there
+    rooms = ("wire", "device", "host", "emulators")
+    for path in (*PAGES, *(path for room in rooms for path in (ROOT / room).rglob("*.py"))):
+        text = path.read_text("utf-8")
+        cited = re.findall(r"(?:DECISION|[Dd]ecisions?) \[?([KLRU]\d+)\b", text)
+        cited += re.findall(r"\[([KLRU]\d+)\]\(", text)
+        assert set(cited) <= there, path
