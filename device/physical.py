@@ -43,7 +43,7 @@ class InputSignal(Immutable):
         high: largest value.
         unit: unit of the value, empty for a plain number.
         initial: value at the start of the rig.
-        real: takes fractions.
+        real: takes fractions; a device keeps it in a `QuantityBank`.
         counts: of a converter: what its object holds at `low` and at `high`, and a step between;
             empty without one.
     """
@@ -78,7 +78,7 @@ class OutputSignal(Immutable):
 class QuantityBank:
     """The values of a device's physical inputs: whole numbers, and fractions where they are real.
 
-    A change takes effect at the device's next tick.
+    `bank["supply_v"]` is the present value. A change takes effect at the device's next tick.
 
     Args:
         table: the inputs.
@@ -89,6 +89,11 @@ class QuantityBank:
         table: the inputs by name, in order of declaration.
         groups: names of several inputs that are set together.
         changed: whether anything was set since the device last looked.
+
+    >>> bank = QuantityBank([InputSignal("supply_v", "supply", high=15, initial=12.5, real=True)])
+    >>> bank.set("supply_v", 11.75)
+    >>> bank["supply_v"]
+    11.75
     """
 
     __slots__ = ("_on_change", "_values", "changed", "groups", "table")
@@ -183,7 +188,7 @@ class QuantityBank:
 class InputBank(QuantityBank):
     """The values of a device whose physical inputs are all whole numbers.
 
-    A change takes effect at the device's next tick.
+    `bank["button"]` is the present value. A change takes effect at the device's next tick.
 
     Args:
         table: the inputs.
@@ -194,9 +199,24 @@ class InputBank(QuantityBank):
         table: the inputs by name, in order of declaration.
         groups: names of several inputs that are set together.
         changed: whether anything was set since the device last looked.
+
+    Raises:
+        ValueError: an input of the table takes fractions, which a `QuantityBank` keeps.
     """
 
     __slots__ = ()
+
+    def __init__(
+        self,
+        table: Iterable[InputSignal] = (),
+        groups: Mapping[str, tuple[str, ...]] | None = None,
+        on_change: Callable[[], None] | None = None,
+    ) -> None:
+        super().__init__(table, groups, on_change)
+        for name, item in self.table.items():
+            if item.real:
+                told = f"InputBank takes whole numbers, and {name} is real: use QuantityBank"
+                raise ValueError(told)
 
     def __getitem__(self, name: str) -> int:
         """Return the present value of an input."""

@@ -27,7 +27,7 @@ class LiteComponent(DeviceComponent):
         out_ports: the out-ports.
 
     Raises:
-        ValueError: no type name, or what a PIC has no room for.
+        ValueError: no type name, an input that takes fractions, or what a PIC has no room for.
 
     >>> from tickrig.wire.rtc_lite.values import LONG
     >>> class Doubler(LiteComponent):
@@ -42,8 +42,12 @@ class LiteComponent(DeviceComponent):
     inputs: InputBank
 
     def __init__(self) -> None:
-        self.inputs = InputBank(self.physical)
         kind = type(self).__name__
+        for item in self.physical:
+            if item.real:
+                told = f"{kind}: input {item.name!r} takes fractions; give it a finer unit"
+                raise ValueError(told)
+        self.inputs = InputBank(self.physical)
         try:
             encode_name(self.type_name)
         except FieldError as error:

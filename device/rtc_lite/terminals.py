@@ -32,15 +32,13 @@ def new_inputs(component: LiteComponent) -> InputBank:
     """Return the inputs of a node at rest.
 
     Raises:
-        ValueError: two inputs have the same name, or one takes fractions.
+        ValueError: two inputs have the same name.
     """
     names = {item.name for item in INPUTS}
     kind = type(component).__name__
     for item in component.physical:
         if item.name in names:
             raise ValueError(f"{kind}: two inputs are called {item.name!r}")
-        if item.real:
-            raise ValueError(f"{kind}: input {item.name!r} takes fractions; give it a finer unit")
         names.add(item.name)
     return InputBank((*INPUTS, *component.physical))
 

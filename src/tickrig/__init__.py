@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from tickrig.device.physical import InputBank as InputBank
     from tickrig.device.physical import InputSignal as InputSignal
     from tickrig.device.physical import OutputSignal as OutputSignal
+    from tickrig.device.physical import QuantityBank as QuantityBank
     from tickrig.device.physical import SignalType as SignalType
     from tickrig.device.twin import Copyable as Copyable
     from tickrig.device.twin.snapshot import MachineSnapshot as MachineSnapshot
@@ -47,7 +48,13 @@ else:
         {
             "tickrig._compiled": ("compiled",),
             "tickrig.device.core": ("Device",),
-            "tickrig.device.physical": ("InputBank", "InputSignal", "OutputSignal", "SignalType"),
+            "tickrig.device.physical": (
+                "InputBank",
+                "InputSignal",
+                "OutputSignal",
+                "QuantityBank",
+                "SignalType",
+            ),
             "tickrig.device.twin": ("Copyable",),
             "tickrig.device.twin.snapshot": ("MachineSnapshot",),
             "tickrig.emulators.can.wire": ("CanWire",),

@@ -2,7 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.physical import InputBank, InputSignal, SignalType
+import tickrig
+from tickrig.device.physical import InputBank, InputSignal, QuantityBank, SignalType
 
 
 def bank() -> InputBank:
@@ -48,3 +49,24 @@ def test_an_input_of_another_kind_is_not_found() -> None:
         bank().find("level_v", SignalType.BUTTON)
     with pytest.raises(ValueError, match="no fault 'key'; known: none"):
         bank().find("key", SignalType.FAULT)
+
+
+def test_a_bank_of_whole_numbers_takes_no_real_input() -> None:
+    supply = InputSignal("supply_v", "supply voltage", high=15, unit="V", initial=12.5, real=True)
+    told = "InputBank takes whole numbers, and supply_v is real: use QuantityBank"
+    with pytest.raises(ValueError, match=told):
+        InputBank([supply])
+    with pytest.raises(ValueError, match=told):
+        InputBank(iter([InputSignal("key", "a key", SignalType.BUTTON), supply]))
+
+
+def test_a_bank_of_quantities_keeps_fractions() -> None:
+    supply = InputSignal("supply_v", "supply voltage", high=15, unit="V", initial=12.5, real=True)
+    inputs = QuantityBank([supply])
+    assert inputs["supply_v"] == 12.5
+    inputs.set("supply_v", 11.75)
+    assert inputs["supply_v"] == 11.75
+
+
+def test_both_banks_are_at_the_public_door() -> None:
+    assert (tickrig.InputBank, tickrig.QuantityBank) == (InputBank, QuantityBank)
