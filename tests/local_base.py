@@ -8,8 +8,8 @@ import tarfile
 from pathlib import Path
 from typing import Final
 
-WANTED: Final = ("passwd", "python3-venv")
-"""What the images of Python have and an essential system has not."""
+WANTED: Final = ("apt", "passwd", "python3-venv")
+"""What the images of Python have and an essential system has not; wheels want apt's libstdc++."""
 
 LEFT_OUT: Final = ("/usr/share/doc", "/usr/share/man", "/usr/share/locale")
 ACCOUNTS: Final = {"passwd": "root:x:0:0:root:/root:/bin/sh\n", "group": "root:x:0:\n"}
@@ -21,7 +21,7 @@ def why_no_base() -> str:
     if missing := [tool for tool in ("dpkg-query", "apt-cache") if not shutil.which(tool)]:
         return f"this is no Debian: there is no {missing[0]}"
     done = subprocess.run(["dpkg-query", "-W", *WANTED], capture_output=True, check=False)
-    return f"a base wants the packages {' and '.join(WANTED)}" if done.returncode else ""
+    return f"a base wants the packages {', '.join(WANTED)}" if done.returncode else ""
 
 
 def write_base(path: Path) -> None:
