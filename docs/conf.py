@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from logging import getLogger
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tickrig import __version__
 
@@ -22,6 +22,8 @@ extensions = [
 html_theme = "furo"
 html_title = f"tickrig {version}"
 html_show_sourcelink = False
+html_static_path = ["site/site.css"]
+html_css_files = ["site.css"]
 
 myst_heading_anchors = 4
 default_role = "code"  # a name between backticks, as in the pages
@@ -38,7 +40,7 @@ napoleon_use_ivar = True
 
 # What of others our signatures name. The lists lie here, so that no build asks the network.
 intersphinx_mapping = {
-    name: (where, f"inventories/{name}.txt")
+    name: (where, f"site/{name}.txt")
     for name, where in {
         "python": "https://docs.python.org/3/",
         "python-can": "https://python-can.readthedocs.io/en/stable/",
@@ -50,6 +52,10 @@ intersphinx_mapping = {
 ELSEWHERE = re.compile(r"(?<!!)\[([^]]*)\]\(((?:\.\./)+)(?!examples/[^)]*\.)[^)]*\)")
 """A link out of the folder of its page, but to a file of examples/, which can be downloaded."""
 
+CELL = re.compile(r"<td>.*?</td>", re.DOTALL)
+LONG_NAME = re.compile(r'(?<=<span class="pre">)[^<]{20,}(?=</span>)')
+"""Of a test, mostly: nothing breaks it, and it takes the width of its neighbours."""
+
 
 def setup(app: Sphinx) -> None:
     """Mend what is right on a code host and not on a site."""
@@ -58,9 +64,22 @@ def setup(app: Sphinx) -> None:
         lambda record: getattr(record, "subtype", "") != "empty_glob"
     )
     app.connect("source-read", _unlink)
+    app.connect("html-page-context", _let_names_break)
 
 
 def _unlink(app: Sphinx, page: str, source: list[str]) -> None:
     """Let links out of docs/ be plain text: the site has no sources beside it."""
     out = "../" * (page.count("/") + 1)
     source[0] = ELSEWHERE.sub(lambda link: link[1] if link[2] == out else link[0], source[0])
+
+
+def _let_names_break(
+    app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object
+) -> None:
+    """Let long names in tables go on in a line below, behind `_` and `/`."""
+
+    def broken(cell: re.Match[str]) -> str:
+        return LONG_NAME.sub(lambda name: re.sub(r"([_/])", r"\1<wbr>", name[0]), cell[0])
+
+    if "body" in context:
+        context["body"] = CELL.sub(broken, context["body"])
