@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 from collections import deque
 from collections.abc import Callable
+from threading import get_ident
 from typing import Final, Generic, Protocol, TypeVar
+
+from tickrig.device.twin import Copyable, restore
+
+LOG = logging.getLogger(__name__)
 
 EPOCH_S: Final = 946_684_800
 """The clock of hosts at the start of a rig: 2000-01-01."""
@@ -14,6 +20,36 @@ LOOK_US: Final = 100
 """What a look at the clock costs: a loop that does nothing else then ends some day."""
 
 T = TypeVar("T")
+
+
+class OneThread(Copyable):
+    """The thread in which hosts make virtual time pass: two would race, and no run be like another.
+
+    It is the one that makes this; a twin's is the one in which it is made.
+    """
+
+    def __init__(self) -> None:
+        self._thread, self._refusal = get_ident(), ""
+
+    def __setstate__(self, state: object) -> None:
+        """Go on in the thread in which it is copied."""
+        restore(self, state)
+        self._thread = get_ident()
+
+    def refusal(self, name: str, instead: str) -> str:
+        """Return why nothing can be done here, now and ever after a second thread has tried; or "".
+
+        Args:
+            name: what is used: a port, a bus.
+            instead: what a host does that has one.
+        """
+        if get_ident() != self._thread and not self._refusal:
+            self._refusal = (
+                f"{name}: a second thread cannot make virtual time pass; {instead}, or run in real"
+                " time"
+            )
+            LOG.error(self._refusal)
+        return self._refusal
 
 
 class Passing(Protocol):

@@ -7,13 +7,20 @@ from typing import Final
 
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
-from tickrig.host.links.errors import LinkClosed, LinkTimeout
+from tickrig.emulators.rig.sim_waits import OneThread
+from tickrig.host.links.errors import LinkClosed, LinkError, LinkTimeout
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
 CHUNK_US: Final = 1_000_000
 """How far the rig runs at once where there is no timeout."""
+
+
+INSTEAD: Final = (
+    "take bench.canopen_network() in place of canopen.Network().connect(), poll in place of a"
+    " can.Notifier"
+)
 
 
 class Repeat:
@@ -46,10 +53,12 @@ class CanHost:
     Args:
         rig: the rig that is stepped meanwhile.
         end: an end of one of its buses that no station has.
+        thread: in which it is used; that which makes it.
     """
 
-    def __init__(self, rig: Rig, end: CanEnd) -> None:
+    def __init__(self, rig: Rig, end: CanEnd, thread: OneThread | None = None) -> None:
         self._rig, self._end, self._closed = rig, end, False
+        self._thread = thread or OneThread()
         rig.move_on(end.wire)
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self._repeats: list[Repeat] = []
@@ -61,7 +70,7 @@ class CanHost:
 
     def send(self, traffic: Frames, /) -> None:
         """Queue frames; no time passes."""
-        self._check_open()
+        self._check_usable()
         self._end.send(self.now_us, traffic)
 
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
@@ -95,9 +104,10 @@ class CanHost:
 
         Raises:
             LinkClosed: the link was closed.
+            LinkError: a second thread uses it.
             LinkTimeout: there is no timeout, and nothing will ever happen.
         """
-        self._check_open()
+        self._check_usable()
         rig, inbox = self._rig, self._inbox
         deadline_us = NEVER if timeout_us is None else rig.now_us + max(0, timeout_us)
         while not inbox:
@@ -140,6 +150,8 @@ class CanHost:
         if due or all(repeat.due_us == NEVER for repeat in self._repeats):
             self._wake()
 
-    def _check_open(self) -> None:
+    def _check_usable(self) -> None:
         if self._closed:
             raise LinkClosed("the link was closed")
+        if refusal := self._thread.refusal("bus", INSTEAD):
+            raise LinkError(refusal)

@@ -13,6 +13,7 @@ from can.typechecking import CanFilters, Channel
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_waits import OneThread
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkError
 from tickrig.host.text.names import near
@@ -36,7 +37,7 @@ class CanChannels:
     """
 
     def __init__(self) -> None:
-        self._channels: dict[str, tuple[Rig, CanWire]] = {}
+        self._channels: dict[str, tuple[Rig, CanWire, OneThread]] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -52,7 +53,7 @@ class CanChannels:
         """
         if name in self._channels:
             raise ValueError(f"channel {name!r} is offered already")
-        self._channels[name] = (rig, wire)
+        self._channels[name] = (rig, wire, OneThread())
         try:
             yield
         finally:
@@ -64,8 +65,8 @@ class CanChannels:
         Raises:
             KeyError: no bus is offered under this name.
         """
-        rig, wire = self._channels[name]
-        return CanHost(rig, wire.end())
+        rig, wire, thread = self._channels[name]
+        return CanHost(rig, wire.end(), thread)
 
 
 CHANNELS: Final = CanChannels()
@@ -77,8 +78,9 @@ class TickrigBus(can.BusABC):
 
     `recv` makes virtual time pass, exactly its timeout if nothing comes; `send`
     takes none. Timestamps are the rig's time in seconds. Periodic messages are
-    sent while time passes. One thread uses it: a `can.Notifier` would make time
-    pass on its own, so hosts that need one take `SimNetwork` or poll.
+    sent while time passes. One thread uses it, that which opened the rig: a
+    `can.Notifier` would make time pass on its own and is refused, so hosts that
+    need one take `SimNetwork`, poll, or run in real time.
 
     Args:
         channel: a name that `CHANNELS` offers.

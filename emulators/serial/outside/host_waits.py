@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from threading import get_ident
 from typing import Final
 
 from serial.serialutil import SerialException
 
-from tickrig.device.twin import Copyable, restore
+from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_waits import OneThread
 from tickrig.wire.instant import NEVER
 
 LOG = logging.getLogger(__name__)
 
 LONGEST_US: Final = 3_600_000_000
 """A wait without a timeout ends with an exception after an hour."""
+
+INSTEAD: Final = "read and write in the thread that made the rig"
 
 MOST_LOOKS: Final = 10_000
 """Looks that a host takes at one instant before it is told that it will wait for ever."""
@@ -31,13 +33,8 @@ class HostWaits(Copyable):
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
-        self._thread, self._wrong_thread = get_ident(), ""
+        self._thread = OneThread()
         self._looks, self._looked_us = 0, NEVER
-
-    def __setstate__(self, state: object) -> None:
-        """Go on in the thread in which it is copied."""
-        restore(self, state)
-        self._thread = get_ident()
 
     def check_thread(self, name: str) -> None:
         """Raise SerialException, now and ever after, if a second thread uses a port.
@@ -45,14 +42,8 @@ class HostWaits(Copyable):
         Args:
             name: the port.
         """
-        if get_ident() != self._thread and not self._wrong_thread:
-            self._wrong_thread = (
-                f"{name}: a second thread cannot make virtual time pass; read and write in the"
-                " thread that made the rig, or run in real time"
-            )
-            LOG.error(self._wrong_thread)
-        if self._wrong_thread:
-            raise SerialException(self._wrong_thread)
+        if refusal := self._thread.refusal(name, INSTEAD):
+            raise SerialException(refusal)
 
     def deadline_us(self, timeout_s: float | None) -> int:
         """Return when a timeout that begins now ends; without one, when `give_up` says so.
