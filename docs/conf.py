@@ -52,9 +52,8 @@ intersphinx_mapping = {
 ELSEWHERE = re.compile(r"(?<!!)\[([^]]*)\]\(((?:\.\./)+)(?!examples/[^)]*\.)[^)]*\)")
 """A link out of the folder of its page, but to a file of examples/, which can be downloaded."""
 
-CELL = re.compile(r"<td>.*?</td>", re.DOTALL)
-LONG_NAME = re.compile(r'(?<=<span class="pre">)[^<]{20,}(?=</span>)')
-"""Of a test, mostly: nothing breaks it, and it takes the width of its neighbours."""
+LONG_WORD = re.compile(r'(?<=<span class="pre">)[^<]{20,}(?=</span>)')
+"""Of code: the name of a test, mostly. Unbroken it takes the room of its neighbours in a table."""
 
 
 def setup(app: Sphinx) -> None:
@@ -64,7 +63,7 @@ def setup(app: Sphinx) -> None:
         lambda record: getattr(record, "subtype", "") != "empty_glob"
     )
     app.connect("source-read", _unlink)
-    app.connect("html-page-context", _let_names_break)
+    app.connect("html-page-context", _let_words_break)
 
 
 def _unlink(app: Sphinx, page: str, source: list[str]) -> None:
@@ -73,13 +72,11 @@ def _unlink(app: Sphinx, page: str, source: list[str]) -> None:
     source[0] = ELSEWHERE.sub(lambda link: link[1] if link[2] == out else link[0], source[0])
 
 
-def _let_names_break(
+def _let_words_break(
     app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object
 ) -> None:
-    """Let long names in tables go on in a line below, behind `_` and `/`."""
-
-    def broken(cell: re.Match[str]) -> str:
-        return LONG_NAME.sub(lambda name: re.sub(r"([_/])", r"\1<wbr>", name[0]), cell[0])
-
+    """Let long words of code go on in a line below, behind `_`, `/` and a hyphen within."""
+    place = re.compile(r"([_/]|(?<=\w)-)")
+    parted = r'\1</span><wbr><span class="pre">'
     if "body" in context:
-        context["body"] = CELL.sub(broken, context["body"])
+        context["body"] = LONG_WORD.sub(lambda word: place.sub(parted, word[0]), context["body"])
