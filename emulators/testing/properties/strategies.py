@@ -24,8 +24,24 @@ def chunks(lines: Sequence[bytes] = (), max_bytes: int = 40) -> st.SearchStrateg
         lines: what the device understands; half of what is drawn are these, the rest is noise.
         max_bytes: the longest noise.
     """
+    _check_words(lines)
     noise = st.binary(max_size=max_bytes)
-    return st.sampled_from(lines) | noise if lines else noise
+    return st.sampled_from([Word(line) for line in lines]) | noise if lines else noise
+
+
+class Word(bytes):
+    """What a device understands, as `chunks` was told."""
+
+    __slots__ = ()
+
+
+def _check_words(words: object) -> None:
+    """Raise ValueError unless words are a list of bytes."""
+    if isinstance(words, str | bytes):
+        raise ValueError(f'a list of bytes, as [b"ON\\n"], got {words!r}')
+    for word in words if isinstance(words, Sequence) else ():
+        if not isinstance(word, bytes):
+            raise ValueError(f"a word is bytes, got {word!r}")
 
 
 def frames(

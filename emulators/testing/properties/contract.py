@@ -1,0 +1,94 @@
+"""What a device must have, and of which types: told in a line with the name of its class."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from tickrig.emulators.testing.properties.strategies import Act
+
+MEMBERS: Final = {
+    "tick_us": "its control period in us",
+    "due_us": "the earliest time at which it does something unasked, or NEVER",
+    "tick": "tick(now_us, rx) returns what it sends",
+    "reset": "reset() is power-on",
+}
+"""What a device on any wire has."""
+
+SIGNALS: Final = {
+    "inputs": "an InputBank, InputBank(()) if there are none",
+    "outputs": "a dict of OutputSignal by name, {} if there are none",
+}
+"""What one on a line has too; of a node they are those of its application."""
+
+
+def must(holds: bool, text: str) -> None:
+    """Raise AssertionError with a text, and nothing else in it, unless something holds."""
+    if not holds:
+        raise AssertionError(text)
+
+
+def check_members(device: Any, nothing: Any) -> None:
+    """Look whether a device has what every device has.
+
+    Args:
+        device: it is looked at only.
+        nothing: traffic without anything in it.
+
+    Raises:
+        AssertionError: something is not there, or a period is none.
+    """
+    kind = type(device).__name__
+    for name, text in (MEMBERS | SIGNALS if nothing == b"" else MEMBERS).items():
+        must(hasattr(device, name), f"{kind} has no {name}: {text}")
+    tick_us = device.tick_us
+    good = type(tick_us) is int and tick_us > 0
+    must(good, f"{kind}.tick_us is {tick_us!r}: whole microseconds above 0")
+    check_due(device)
+
+
+def check_due(device: Any) -> None:
+    """Raise AssertionError unless `due_us` is a time."""
+    due_us, kind = device.due_us, type(device).__name__
+    must(type(due_us) is int, f"{kind}.due_us is {due_us!r}: whole microseconds, or NEVER")
+
+
+def check_acts(device: Any, acts: list[Act], nothing: Any) -> None:
+    """Do acts to a device that is on no wire, and look at the types of all that it returns.
+
+    Args:
+        device: a fresh one.
+        acts: what is done.
+        nothing: traffic without anything in it.
+
+    Raises:
+        AssertionError: something is of another type, or `inputs.changed` stays set.
+    """
+    now_us = device.tick_us
+    for wait_us, verb, what in acts:
+        if verb == "reset":
+            device.reset()
+        elif verb == "set":
+            device.inputs.set(*what)
+        for rx in (what if verb == "send" else nothing, nothing):
+            _tick(device, now_us, rx, nothing)
+            now_us += device.tick_us
+        now_us += wait_us - wait_us % device.tick_us
+
+
+def _tick(device: Any, now_us: int, rx: Any, nothing: Any) -> None:
+    kind, wanted = type(device).__name__, type(nothing)
+    sent = device.tick(now_us, rx)
+    told = f"{kind}.tick returned {_said(sent)}: it returns {wanted.__name__}, {nothing!r} for none"
+    must(isinstance(sent, wanted), told)
+    check_due(device)
+    if nothing == b"":
+        told = f"{kind}.tick leaves inputs.changed set: it is cleared in each tick"
+        must(not device.inputs.changed, told)
+    for name in getattr(device, "outputs", ()):
+        value = device.read(name)
+        told = f"{kind}.read({name!r}) returned {_said(value)}: a number or a text"
+        must(isinstance(value, int | float | str), told)
+
+
+def _said(value: Any) -> str:
+    return "None" if value is None else type(value).__name__
