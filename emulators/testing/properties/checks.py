@@ -14,7 +14,7 @@ from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.replay import read_recording, replay
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.testing.properties.contract import check_acts, must
-from tickrig.emulators.testing.properties.device_bench import DeviceBench, Look, drive
+from tickrig.emulators.testing.properties.device_bench import DeviceBench, Observation, drive
 from tickrig.emulators.testing.properties.difference import TicksDifferError, difference
 from tickrig.emulators.testing.properties.due_probe import check_due_us
 from tickrig.emulators.testing.properties.pauses import check_pauses
@@ -59,7 +59,7 @@ class DeviceChecks:
         if self._pauses and played.nothing == b"":
             check_pauses(played, session)
 
-    def _check_pieces(self, session: Session, wanted: list[Look]) -> None:
+    def _check_pieces(self, session: Session, wanted: list[Observation]) -> None:
         pieces = self._bench(pieces=True)
         if isinstance(pieces.joined, Rs485Line):
             return  # where each piece ends on a whole microsecond
@@ -129,7 +129,12 @@ class DeviceChecks:
 
 
 def _same(  # noqa: PLR0913, PLR0917 - in the order of its text
-    bench: DeviceBench, one: list[Look], other: list[Look], what: str, first: str, second: str
+    bench: DeviceBench,
+    one: list[Observation],
+    other: list[Observation],
+    what: str,
+    first: str,
+    second: str,
 ) -> None:
     text = difference(bench.device, one, other, first, second)
     must(not text, f"{what}: {text}")

@@ -20,7 +20,7 @@ NOTHING: Final[Session] = ()
 AFTERWARDS_US: Final = 2_000_000
 """How long a session is watched when nothing more is done."""
 
-Look = tuple[Any, ...]
+Observation = tuple[Any, ...]
 """What was seen: the time, what was received, and the outputs."""
 
 
@@ -67,7 +67,7 @@ class DeviceBench:
         """Return a session, and that nothing is done for a while after it."""
         return [*session, (afterwards_us, "send", self.nothing)]
 
-    def play(self, session: Session, afterwards_us: int = AFTERWARDS_US) -> list[Look]:
+    def play(self, session: Session, afterwards_us: int = AFTERWARDS_US) -> list[Observation]:
         """Play a session; return what was received of the device and seen on it."""
         log = []
         for act in self.with_end(session, afterwards_us):
@@ -76,7 +76,7 @@ class DeviceBench:
             self.do(act)
         return log
 
-    def look(self) -> Look:
+    def look(self) -> Observation:
         """Return what is seen now."""
         received = self.end.poll(self.rig.now_us)
         return (self.rig.now_us, received, *outputs_of(self.device))
@@ -99,7 +99,7 @@ def outputs_of(device: Any) -> list[Any]:
     return [device.read(name) for name in getattr(device, "outputs", ())]
 
 
-def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Look]:
+def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Observation]:
     """Play a session to a device that is on no wire.
 
     Returns:

@@ -7,7 +7,7 @@ from itertools import zip_longest
 from typing import Any, Final
 
 from tickrig.emulators.rig.station import next_tick_us
-from tickrig.emulators.testing.properties.device_bench import DeviceBench, Look
+from tickrig.emulators.testing.properties.device_bench import DeviceBench, Observation
 from tickrig.emulators.testing.properties.strategies import Session
 from tickrig.wire.instant import NEVER
 
@@ -42,7 +42,7 @@ def due_text(due_us: int) -> str:
 
 
 def difference(
-    device: Any, one: Sequence[Look], other: Sequence[Look], first: str, second: str
+    device: Any, one: Sequence[Observation], other: Sequence[Observation], first: str, second: str
 ) -> str:
     """Return in what two runs differ first; empty if they do not.
 
@@ -57,11 +57,11 @@ def difference(
     for (at_us, *seen), (_, *others) in zip(one, other, strict=True):
         for name, value, another in zip(names, seen, others, strict=True):
             if value != another:
-                return _told(at_us, name, (value, first), (another, second))
+                return _message(at_us, name, (value, first), (another, second))
     return ""
 
 
-def _told(at_us: int, name: str, one: tuple[Any, str], other: tuple[Any, str]) -> str:
+def _message(at_us: int, name: str, one: tuple[Any, str], other: tuple[Any, str]) -> str:
     (value, first), (another, second) = one, other
     if isinstance(value, list):  # of what is sent, with the times
         pairs = zip_longest(value, another, fillvalue=None)

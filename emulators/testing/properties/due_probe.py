@@ -9,7 +9,7 @@ from tickrig.device.physical import InputSignal, SignalType
 from tickrig.device.twin import twin
 from tickrig.emulators.rig.station import next_tick_us
 from tickrig.emulators.testing.properties.contract import must
-from tickrig.emulators.testing.properties.device_bench import DeviceBench, Look, outputs_of
+from tickrig.emulators.testing.properties.device_bench import DeviceBench, Observation, outputs_of
 from tickrig.emulators.testing.properties.difference import difference, due_text, in_ms
 from tickrig.emulators.testing.properties.strategies import Session
 
@@ -124,7 +124,7 @@ class _Probe:
         at_us = self._first_us + high * self._tick_us
         copied = _copy(self._device)
         now = (at_us, copied.tick(at_us, self._nothing), *outputs_of(copied))
-        then: Look = (at_us, self._nothing, *before)
+        then: Observation = (at_us, self._nothing, *before)
         text = difference(copied, [now], [then], "after a tick there", "without it")
         said = f"{in_ms(self._now_us)} due_us said {due_text(self._due_us)}"
         raise AssertionError(

@@ -43,7 +43,7 @@ def check_pauses(played: DeviceBench, session: Session) -> None:
                 continue
             answer = _answer(played, word[:at], word[at:])
             same = sorted(answer[0]) == sorted(wanted[0]) and answer[1] == wanted[1]
-            must(same, _told(word, at, wanted, answer))
+            must(same, _message(word, at, wanted, answer))
 
 
 def _answer(played: DeviceBench, first: bytes, rest: bytes) -> Answer:
@@ -59,7 +59,7 @@ def _answer(played: DeviceBench, first: bytes, rest: bytes) -> Answer:
     return b"".join(sent), outputs_of(device)
 
 
-def _told(word: Word, at: int, wanted: Answer, got: Answer) -> str:
+def _message(word: Word, at: int, wanted: Answer, got: Answer) -> str:
     what = f"{bytes(word[:at])!r}, and {bytes(word[at:])!r} in the next tick"
     told = f"a pause in a word makes a difference: after {what} it sends {shorten(got[0])}, "
     told += f"after {bytes(word)!r} at once {shorten(wanted[0])}"
