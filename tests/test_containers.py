@@ -137,3 +137,26 @@ def test_a_container_runs_the_commands_for_a_user_who_is_not_root(
     shown = store("inspect", "--type", "image", "localhost/tickrig")
     configured = json.loads(shown)["OCIv1"]["config"]
     assert (configured["Entrypoint"], configured["Cmd"]) == (["tickrig"], ["demo"])
+
+
+@pytest.mark.release
+@pytest.mark.timeout(1800)
+def test_the_development_container_has_what_the_source_tree_wants(store: Store) -> None:
+    words = ("--isolation", "chroot", "--layers=false", "--build-arg", "BASE=localhost/base")
+    try:
+        store("build", *words, "--target", "dev", "--tag", "dev", ROOT)
+    except AssertionError as error:
+        if re.search("Unable to locate package|Failed to fetch", str(error)):
+            pytest.skip("no packages to be had")
+        raise
+    container = store("from", "--volume", f"{ROOT}:/tree:ro", "localhost/dev")
+    for command, said in {
+        "id -u": "1000",
+        "make --version": "GNU Make",
+        "git --version": "git version",
+        "echo 'int main(void){return 0;}' | gcc -x c -o /tmp/a - && /tmp/a && echo ran": "ran",
+        "candump --help 2>&1 | head -1": "candump",
+        "/tree/tools/with-vcan --guest --where": "User-Mode Linux: vcan0 vcan1",
+        "python3 -m venv /tmp/venv && /tmp/venv/bin/pip --version": "pip ",
+    }.items():
+        assert said in store("run", container, "--", "sh", "-c", command), command
