@@ -13,12 +13,16 @@ from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.host.cli.extensions import ExtensionGroup
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.trace import Config, Header
+from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
     import click
 
 SEED: Final = "seed"
 """In a trace, that of the wire's faults: a replay has none, what came through is recorded."""
+
+MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "read")
+"""What a device on a line has (docs/howto/extending.md)."""
 
 
 def by_miniterm(link: str, baud: int) -> str:
@@ -76,9 +80,15 @@ class DeviceType:
         if self.configure is not None:
             return self.configure(self, options, seed)
         try:
-            return ConfiguredDevice(self, self.build(options), options)
+            device = self.build(options)
         except ValueError as error:
             raise Refused(str(error)) from None
+        except Exception as error:  # of another package, it may raise anything
+            raise Refused(f"{self.name} cannot be built: {explain_error(error)}") from error
+        if missing := [name for name in MEMBERS if not hasattr(device, name)]:
+            kind = type(device).__name__
+            raise Refused(f"{self.name}: {kind} has no {', '.join(missing)}")
+        return ConfiguredDevice(self, device, options)
 
     def of_trace(self, config: Config) -> Emulated[bytes]:
         """Make the device that a trace was recorded on.

@@ -19,9 +19,17 @@ from tests.emulators.lamp import Lamp
 from tickrig import DeviceType
 
 
+class Bare:
+    tick_us = due_us = 1_000
+
+
 def build(config):
     if config.get("greeting") == "":
         raise ValueError("a lamp greets")
+    if config.get("greeting") == "speed":
+        return Lamp(speed=1)
+    if config.get("greeting") == "bare":
+        return Bare()
     return Lamp(config.get("greeting", "hi").encode() + b"\\n")
 
 
@@ -75,6 +83,19 @@ def test_its_help_shows_its_own_options_and_those_of_all() -> None:
 def test_what_cannot_be_built_is_one_line() -> None:
     run = tickrig("emu", "lamp", "--greeting", "", "--scenario", "-")
     assert (run.exit_code, run.stderr) == (2, "Error: a lamp greets\n")
+
+
+def test_what_build_raises_otherwise_is_one_line_too() -> None:
+    run = tickrig("emu", "lamp", "--greeting", "speed", "--scenario", "-")
+    assert run.exit_code == 2
+    told = "TypeError: Lamp.__init__() got an unexpected keyword argument 'speed'"
+    assert run.stderr == f"Error: lamp cannot be built: {told}\n"
+
+
+def test_so_is_what_is_no_device() -> None:
+    run = tickrig("emu", "lamp", "--greeting", "bare", "--scenario", "-")
+    assert run.exit_code == 2
+    assert run.stderr == "Error: lamp: Bare has no reset, tick, inputs, outputs, read\n"
 
 
 def test_broken_entry_points_are_a_line_each_and_break_nothing_else() -> None:
