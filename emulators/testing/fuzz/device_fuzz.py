@@ -15,15 +15,14 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.fuzz.input_reader import FuzzAct, InputReader
+from tickrig.emulators.testing.fuzz.shortened import shortened
+from tickrig.emulators.testing.fuzz.words import Word, check_words
 from tickrig.wire.can import CanFrame
 
 LOOKS: Final = 60
 """So often a device that shall answer is asked, at ever longer intervals: 92 s in all."""
 
 LOOK_US: Final = 10_000
-
-Word = bytes | str
-"""Bytes of a serial line, or a frame in candump's notation."""
 
 
 class SilentDeviceError(AssertionError):
@@ -42,12 +41,14 @@ class DeviceFuzz:
         words: what it understands, whole lines or frames (`605#40...`); they are sent as they
             are, spoilt, and in any order, with noise between.
         start: what it hears first, 10 ms each, so that it is at work.
-        request: what it is asked afterwards, with what it wants first; nothing is asked if empty.
+        request: what is sent after each throw until the device answers, word after word; the first
+            begins with LF where a line of noise has to be ended. Nothing is asked if empty.
         answer: what is in the bytes that come then; of a frame its beginning.
         wire: makes what it is on; that of its type, `CanWire` for a slave, unless given.
         warm_us: how long it runs before `start`, in microseconds.
 
     Raises:
+        ValueError: words are no list of bytes or frames, or an answer is wanted to nothing.
         SilentDeviceError: when called: it does not answer.
 
     >>> fuzz = DeviceFuzz("rrc", [b"hello\n"], request=[b"\ndevice\n"], answer=b"RRC\n")
@@ -69,6 +70,7 @@ class DeviceFuzz:
         self.device: Any = made.build({}) if isinstance(made, DeviceType) else made()
         joined = _wire_of(self.device, made, wire)
         self._on_can = isinstance(joined, CanWire)
+        self._check_words(words, start, request, answer)
         port, self._end = _ends(joined)
         self.rig = Rig(Station(self.device, port))
         self._inputs = _inputs_of(self.device)
@@ -92,15 +94,41 @@ class DeviceFuzz:
         Raises:
             SilentDeviceError: it does not answer.
         """
-        self._snapshot.restore()
         acts = self.acts(data)
         try:
-            for act in acts:
-                self._do(act)
-            self._check_answer()
+            self._run(acts)
         except Exception as error:
-            error.add_note("\n".join(["what was done:", *map(str, acts)]))
+            wanted = type(error)
+            needed = shortened(acts, lambda fewer: self._fails_so(fewer, wanted))
+            error.add_note("\n".join(["what was done:", *map(str, needed)]))
             raise
+
+    def _run(self, acts: list[FuzzAct]) -> None:
+        self._snapshot.restore()
+        for act in acts:
+            self._do(act)
+        self._check_answer()
+
+    def _fails_so(self, acts: list[FuzzAct], wanted: type[Exception]) -> bool:
+        """Return whether acts end with an error of this type."""
+        try:
+            self._run(acts)
+        except Exception as error:
+            return type(error) is wanted
+        return False
+
+    def _check_words(
+        self, words: object, start: object, request: Sequence[Word], answer: Word
+    ) -> None:
+        """Raise ValueError unless all are of the wire of the device."""
+        for name, given in (("words", words), ("start", start), ("request", request)):
+            check_words(name, given, self._on_can)
+        if answer and not request:
+            raise ValueError("answer without request: nothing is asked")
+        if request and not answer:
+            raise ValueError("request without answer: what is in the bytes that come then?")
+        if answer:
+            check_words("answer", [answer], self._on_can)
 
     def acts(self, data: bytes) -> list[FuzzAct]:
         """Return what bytes mean.
@@ -133,24 +161,32 @@ class DeviceFuzz:
         if not self._request:
             self.rig.run_for(LOOKS * self.device.tick_us)
             return
+        received: Any = b""
         for look in range(LOOKS):
             for word in self._request:
                 self._send(word)
-                if self._has_answered((look + 1) * LOOK_US):
+                received = self._received((look + 1) * LOOK_US) or received
+                if self._is_answer(received):
                     return
-        raise SilentDeviceError(f"it does not answer {self._answer!r}")
+        asked = ", ".join(str(word) if self._on_can else repr(word) for word in self._request)
+        frames = " ".join(map(str, received)) or "nothing"
+        said = frames if self._on_can else repr(received)
+        raise SilentDeviceError(f"asked {asked} it says {said}, without {self._answer!r}")
 
-    def _has_answered(self, step_us: int) -> bool:
-        """Look for the answer for as long as it may take."""
+    def _received(self, step_us: int) -> Any:
+        """Return what comes within five steps, at the latest what has the answer in it."""
+        received: Any = () if self._on_can else b""
         for _ in range(5):
             self.rig.run_for(step_us)
-            received = self._end.poll(self.rig.now_us)
-            if not self._on_can:
-                if self._answer in received:
-                    return True
-            elif any(str(frame).startswith(str(self._answer)) for frame in received):
-                return True
-        return False
+            received += self._end.poll(self.rig.now_us)
+            if self._is_answer(received):
+                break
+        return received
+
+    def _is_answer(self, received: Any) -> bool:
+        if not self._on_can:
+            return self._answer in received
+        return any(str(frame).startswith(str(self._answer)) for frame in received)
 
 
 def _put_back(table: Mapping[str, InputSignal], inputs: Any) -> None:

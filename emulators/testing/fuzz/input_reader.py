@@ -36,12 +36,12 @@ class FuzzAct(NamedTuple):
         """Write it as people read it.
 
         >>> str(FuzzAct("send", b"on", 500)), str(FuzzAct("set", ("stick", 3), 0))
-        ('send 6f6e, wait 500 us', 'set stick 3, wait 0 us')
+        ('send on, wait 500 us', 'set stick 3, wait 0 us')
         """
         what = self.what
         if isinstance(what, tuple):
             what = " ".join(map(str, what))
-        text = what.hex() if isinstance(what, bytes) else "" if what is None else str(what)
+        text = repr(what)[2:-1] if isinstance(what, bytes) else "" if what is None else str(what)
         return f"{self.verb} {text}".rstrip() + f", wait {self.wait_us} us"
 
 

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
         write_conformance as write_conformance,
     )
     from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz as DeviceFuzz
+    from tickrig.emulators.testing.fuzz.device_fuzz import (
+        SilentDeviceError as SilentDeviceError,
+    )
     from tickrig.emulators.testing.machine import strategies as strategies
     from tickrig.emulators.testing.machine.bench_machine import BenchMachine as BenchMachine
     from tickrig.emulators.testing.machine.bench_machine import host_rule as host_rule
@@ -34,7 +37,7 @@ else:
                 "conformance_text",
                 "write_conformance",
             ),
-            "tickrig.emulators.testing.fuzz.device_fuzz": ("DeviceFuzz",),
+            "tickrig.emulators.testing.fuzz.device_fuzz": ("DeviceFuzz", "SilentDeviceError"),
             "tickrig.emulators.testing.machine": ("strategies",),
             "tickrig.emulators.testing.machine.bench_machine": (
                 "BenchMachine",

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 from random import Random
+from typing import Any
 
 import pytest
 
+import tickrig.testing
 from tests.emulators.echo import Echo
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz, SilentDeviceError
@@ -70,15 +72,57 @@ def test_a_device_that_raises_is_found() -> None:
 
 def test_a_device_that_falls_silent_is_found() -> None:
     fuzz = DeviceFuzz(Offended, [b"fool"], request=[b"hello"], answer=b"hello")
-    with pytest.raises(SilentDeviceError, match="it does not answer b'hello'"):
+    with pytest.raises(SilentDeviceError, match="asked b'hello' it says b'', without b'hello'"):
         throw(fuzz)
+
+
+def test_what_it_says_instead_is_told_and_no_act_that_is_not_needed() -> None:
+    fuzz = DeviceFuzz(Offended, [b"fool", b"you"], request=[b"hello", b"?"], answer=b"good day")
+    with pytest.raises(SilentDeviceError) as caught:
+        fuzz(bytes(40))
+    assert str(caught.value) == "asked b'hello', b'?' it says b'', without b'good day'"
+    fuzz = DeviceFuzz(Echo, [b"you"], request=[b"hello"], answer=b"good day")
+    with pytest.raises(SilentDeviceError) as caught:
+        fuzz(bytes(40))
+    assert str(caught.value).startswith("asked b'hello' it says b'hello")
+    assert caught.value.__notes__ == ["what was done:"]
+
+
+def test_the_acts_that_are_needed_are_left() -> None:
+    fuzz = DeviceFuzz(Offended, [b"you\n", b"fool\n"], request=[b"hello"], answer=b"hello")
+    with pytest.raises(SilentDeviceError) as caught:
+        fuzz(bytes([0, 0, 0] * 5 + [0, 0, 1] + [0, 0, 0] * 5))
+    assert caught.value.__notes__ == ["what was done:\nsend fool\\n, wait 0 us"]
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"words": "ON\n"}, r"words: a list, as \[b'ON\\\\n'\], got 'ON"),
+        ({"words": b"ON\n"}, r"words: a list, as \[b'ON\\\\n'\], got b'ON"),
+        ({"words": [1]}, "words: bytes, or a frame as '705#7F', got 1"),
+        ({"words": ["ON"]}, "words: this device is on a line: bytes, got 'ON'"),
+        ({"start": b"ON\n"}, "start: a list"),
+        ({"request": b"\nOFF\n", "answer": b"OK"}, "request: a list"),
+        ({"answer": b"OK"}, "answer without request: nothing is asked"),
+        ({"request": [b"OFF\n"]}, "request without answer"),
+        ({"request": [b"OFF\n"], "answer": "OK"}, "answer: this device is on a line: bytes, got"),
+    ],
+)
+def test_words_that_are_none_are_refused(options: dict[str, Any], text: str) -> None:
+    with pytest.raises(ValueError, match=text):
+        DeviceFuzz(Echo, **options)
+
+
+def test_the_error_of_a_silent_device_is_public() -> None:
+    assert tickrig.testing.SilentDeviceError is SilentDeviceError
 
 
 def test_so_is_one_on_can() -> None:
     from tickrig.emulators.can.wire import CanWire  # noqa: PLC0415 - beside its use
 
     fuzz = DeviceFuzz(DeafNode, ["123#01"], request=["123#0102"], answer="181#0102", wire=CanWire)
-    with pytest.raises(SilentDeviceError, match="it does not answer '181#0102'"):
+    with pytest.raises(SilentDeviceError, match="it says nothing, without '181#0102'"):
         throw(fuzz)
 
 
