@@ -178,7 +178,8 @@ class Operator(Copyable):
         if spec.name in self._wire.fault_types:
             self._wire.check(spec.name, spec.rate)
         elif spec.rate is not None:
-            raise ValueError(f"{spec.name} takes no rate, got {spec.rate:g}")
+            hint = "" if spec.rate else "; clear ends it"
+            raise ValueError(f"{spec.name} takes no rate, got {spec.rate:g}{hint}")
 
     def clear(self, name: str) -> None:
         """Let a fault go, and its future too; ValueError if there is none of this name."""

@@ -40,8 +40,11 @@ def device(name: str, folder: Path) -> None:
         from tickrig.emulators.commands.new_device import files  # noqa: PLC0415 - slow
 
     module = name.replace("-", "_")
-    if not _NAME.fullmatch(name) or keyword.iskeyword(module):
-        raise Refused(f"{name!r} is no name: write small letters, digits and -, as my-lamp")
+    if not _NAME.fullmatch(name):
+        wanted = "a small letter, then small letters, digits and -, as my-lamp"
+        raise Refused(f"{name!r} is no name: {wanted}")
+    if keyword.iskeyword(module):
+        raise Refused(f"{name!r} is a word of Python, and no module: take another, as my-{name}")
     spec = find_spec(module)
     if spec is not None and spec.origin is not None:
         raise Refused(f"{name!r} is the name of a module that is there already")

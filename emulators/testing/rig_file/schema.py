@@ -73,7 +73,9 @@ _DEVICE: Final = {
 }
 
 SERIAL_DEVICE: Final[Schema] = _DEVICE | {
-    "config": Key(table, "a table", "options of `tickrig emu TYPE`, without dashes", NONE)
+    "config": Key(
+        table, "a table", "options of `tickrig emu TYPE`: `--run-s` is `run-s` or `run_s`", NONE
+    )
 }
 CANOPEN_DEVICE: Final[Schema] = _DEVICE | {
     "node_id": Key(node_id, '1..127, "lss"', "its node-ID", "that of the DCF or model"),

@@ -32,9 +32,13 @@ def test_it_names_the_files_that_it_wrote() -> None:
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (["My"], "'My' is no name: write small letters, digits and -, as my-lamp"),
-        (["../x"], "'../x' is no name: write small letters, digits and -, as my-lamp"),
-        (["class"], "'class' is no name: write small letters, digits and -, as my-lamp"),
+        (["My"], "'My' is no name: a small letter, then small letters, digits and -, as my-lamp"),
+        (["2nd"], "'2nd' is no name: a small letter, then small letters, digits and -, as my-lamp"),
+        (
+            ["../x"],
+            "'../x' is no name: a small letter, then small letters, digits and -, as my-lamp",
+        ),
+        (["class"], "'class' is a word of Python, and no module: take another, as my-class"),
         (["json"], "'json' is the name of a module that is there already"),
         (["click"], "'click' is the name of a module that is there already"),
         (["rtc-lite"], "there is a device 'rtc-lite' already: tickrig emu rtc-lite"),
