@@ -26,7 +26,6 @@ def blocks(page: str, language: str) -> list[str]:
     [
         "README.md",
         "docs/reference/bench/fuzzing.md",
-        "docs/howto/property-based.md",
         "docs/reference/canmon/canmon-decode.md",
         "docs/reference/canmon/canmon-logs.md",
         "docs/reference/canmon/canmon-model.md",

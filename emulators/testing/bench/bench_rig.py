@@ -225,6 +225,21 @@ class BenchRig(RunningEmulator):
             self.state.recorder.wire_fault(self.effective_us, source, what)
         self.journal.add(self.effective_us, Mark.PHYSICAL, what.encode(), source)
 
+    def drop_unheard(self) -> None:
+        """Forget what has come on serial lines and no host has taken."""
+        for mount in self.state.mounts.values():
+            if isinstance(mount, LineMount):
+                mount.line.b.poll(self.rig.now_us)
+
+    @property
+    def settling_us(self) -> int:
+        """How long it takes until what hosts have sent is there, and each device had two ticks."""
+        now_us = self.rig.now_us
+        lines = [one.line for one in self.state.mounts.values() if isinstance(one, LineMount)]
+        sent_us = [line.b.sent_us for line in lines if line.b.sent_us < NEVER]
+        tick_us = max((station.tick_us for station in self.rig.stations), default=0)
+        return max([now_us, *sent_us]) - now_us + 2 * tick_us
+
     def save_trace(self, path: Path) -> None:
         """Write what was recorded in memory; OSError if it cannot be."""
         if self.state.recorder is None:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from typing import Any, Final, Self
 
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine
 from tickrig.emulators.testing.machine.step import CALL, HostStep
@@ -58,6 +59,7 @@ class HostRuns:
         with self._time():
             machine.warm_up()
         machine.world.begin()
+        bench._mode.act(BenchRig.drop_unheard)
         self._snapshot = bench.snapshot(machine)
 
     def _time(self) -> AbstractContextManager[object]:
@@ -87,9 +89,15 @@ class HostRuns:
             self._judged(self.machine.connect)
             for step in steps:
                 self._do(step)
+            self._judged(self._settle)
             self._judged(self.machine.end)
         finally:
             self.machine.disconnect()
+
+    def _settle(self) -> None:
+        """Let the devices act on what was asked last: a run is judged after that."""
+        bench = self.machine.bench
+        bench.run_for(bench._mode.act(lambda rig: rig.settling_us))
 
     def _do(self, step: HostStep) -> None:
         self._judged(step.do, self.machine.bench)

@@ -246,6 +246,34 @@ def test_a_host_that_waits_while_nothing_happens_is_found() -> None:
         replay_host(Quiet, "+0us fault cut for 3600s\n+0us call listen()\n")
 
 
+class Hasty(Chair):
+    """Drives without waiting for anything."""
+
+    @host_rule(speed=[10, 20, 30])
+    def drive(self, speed: int) -> None:
+        self.link.send(b"output%02x00\n" % speed)
+
+    @invariant()
+    def it_is_slow(self) -> None:
+        assert int(self.bench.get("out_v_pct")) < 30, "it is too fast"
+
+
+def test_a_run_is_judged_when_its_last_step_has_come_to_the_device() -> None:
+    replay_host(Hasty, "+0us call drive(speed=20)\n")
+    with pytest.raises(AssertionError, match="it is too fast"):
+        replay_host(Hasty, "+0us call drive(speed=30)\n")
+
+
+def test_the_host_of_a_run_hears_nothing_of_the_warm_up() -> None:
+    class Listening(Chair):
+        def connect(self) -> None:
+            super().connect()
+            heard = self.link.receive(0)
+            assert heard == b"", f"it hears {heard!r}"
+
+    replay_host(Listening, "+0us wait\n+0us call ask()\n")
+
+
 def test_a_seed_is_the_same_search_again() -> None:
     def drawn() -> list[list[str]]:
         runs: list[list[str]] = []
