@@ -158,6 +158,11 @@ class RigState(Copyable):
         """What has faults by chance, in the order of the wires."""
         return [chance for mount in self.mounts.values() for chance in mount.chances]
 
+    def draw_by(self, seed: int) -> None:
+        """Let faults that begin from now on draw by another seed, each wire otherwise."""
+        for number, chance in enumerate(self.chances):
+            chance.seed = seed * len(self.chances) + number
+
     def fault_name(self, owner: str, fault: str) -> str:
         """Return the full name of a fault of a device, or of its wire, or of a wire.
 

@@ -141,7 +141,10 @@ class CampaignRun:
             if not collected.left_out:
                 raise Refusal("no tests were collected")
             without = known(collected.left_out)
-            raise Refusal(f"no test has a bench, so no seed changes anything: {without}")
+            raise Refusal(
+                f"no test takes the fixture bench, so no seed changes anything: {without};"
+                " a search takes its own: check_host(..., seed=1)"
+            )
         if collected.left_out:
             say(f"{counted(len(collected.left_out), 'test')} without a bench left out")
         plan = Plan(self._options.order, collected, self._seeds, self._shard)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from typing import Any, Final, Self
 
+from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine
@@ -35,6 +36,8 @@ class HostRuns:
     """
 
     def __init__(self, kind: type[BenchMachine]) -> None:
+        if not isinstance(kind, type):
+            raise TypeError(f"give the class {type(kind).__name__}, not an object of it")
         self.machine, self._stack = kind(), ExitStack()
         self.done: list[HostStep] = []
         self._broken: Exception | None = None
@@ -52,7 +55,10 @@ class HostRuns:
 
     def _open(self) -> None:
         machine = self.machine
-        machine.bench = bench = self._stack.enter_context(machine.make_bench())
+        made = machine.make_bench()
+        if not isinstance(made, Bench):
+            raise TypeError(f"{type(machine).__name__}.make_bench returned {made!r:.60}, no Bench")
+        machine.bench = bench = self._stack.enter_context(made)
         if bench.mode != "virtual":
             raise NotOnThisBench(f"a search is in virtual time, not {bench.mode}")
         machine.world = World(bench, machine.faults, machine.inputs)

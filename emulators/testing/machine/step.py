@@ -16,7 +16,8 @@ from tickrig.host.text.values import parse_setting, parse_time_us
 from tickrig.wire.can import CanFrame
 
 CALL: Final = "call"
-VERBS: Final = (CALL, "set", "press", "fault", "send", "wait")
+SEED: Final = "seed"
+VERBS: Final = (CALL, "set", "press", "fault", "send", "wait", SEED)
 
 _LINE: Final = re.compile(r"\+(\S+)\s+(\w+)(?:\s+(.*))?")
 
@@ -27,7 +28,8 @@ class HostStep:
 
     Attributes:
         wait_us: how long nothing is done before it.
-        verb: `call` of a rule, `set`, `press`, `fault`, `send`, or `wait` for nothing more.
+        verb: `call` of a rule, `set`, `press`, `fault`, `send`, `wait` for nothing more, or
+            `seed` of the chance in faults that begin from then on.
         what: the rule, or what stands behind the verb in a scenario: `stick_v_pct 50`,
             `drop=0.1`, `705#00` or bytes in hex, with the device before them where there are
             several wires: `drive/705#00`.
@@ -84,6 +86,9 @@ class HostStep:
             frame = "#" in text
             traffic = (CanFrame.parse(text),) if frame else bytes.fromhex(text)
             (bench[owner] if owner else bench).link.send(traffic)
+        elif self.verb == SEED:
+            seed = int(self.what)
+            bench._mode.act(lambda rig: rig.state.draw_by(seed))
 
 
 def parse_steps(text: str, file: str) -> tuple[HostStep, ...]:
@@ -115,6 +120,8 @@ def _parse(content: str) -> HostStep:
     if verb == CALL:
         name, arguments = _parse_call(rest)
         return HostStep(wait_us, verb, name, arguments=arguments)
+    if verb == SEED and not rest.isdecimal():
+        raise ValueError(f"a seed is a whole number from 0, not {rest!r}")
     what, lasting, time = rest.partition(" for ")
     return HostStep(wait_us, verb, what, parse_time_us(time) if lasting else 0)
 

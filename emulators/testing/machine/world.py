@@ -97,7 +97,15 @@ def _known(
     """Return the wanted names, the usual ones if none are given."""
     if wanted is None:
         return list(usual)
+    if isinstance(wanted, str):
+        raise ValueError(f"{noun}s is a tuple of names: ({wanted!r},), not {wanted!r}")
     for name in wanted:
         if name not in known:
+            bare, rate, _ = name.partition("=")
+            if rate and bare in known:
+                raise ValueError(
+                    f"{noun} {name!r}: the search draws rates, so name {bare!r}; for a rate of"
+                    f" yours write a host_rule with self.bench.fault({name!r}, for_='1s')"
+                )
             raise ValueError(f"no {noun} {name!r}; {near(name, known)}")
     return list(wanted)

@@ -35,7 +35,7 @@ class Chair(BenchMachine):
     """Asks an RRC, which is on."""
 
     faults: ClassVar[Sequence[str]] = ("cut",)
-    inputs = ("power_button",)
+    inputs: ClassVar[Sequence[str]] = ("power_button",)
     link: Link[bytes]
 
     def make_bench(self) -> Bench:
@@ -324,8 +324,6 @@ def test_a_machine_that_cannot_be_is_refused() -> None:
             raise NotImplementedError
 
     class Empty(BenchMachine):
-        faults = inputs = ()
-
         def make_bench(self) -> Bench:
             return Bench("rrc")
 
@@ -333,10 +331,71 @@ def test_a_machine_that_cannot_be_is_refused() -> None:
         check_host(Misspelt)
     with pytest.raises(TypeError, match="5 says not what an argument may be"):
         check_host(Odd)
-    with pytest.raises(ValueError, match="Empty has no rule, fault, input or traffic"):
+    with pytest.raises(ValueError, match="Empty has no host_rule"):
         check_host(Empty)
     with pytest.raises(NotImplementedError, match="BenchMachine makes no bench: write make_bench"):
         check_host(BenchMachine)
+
+
+def test_mistakes_in_a_machine_are_told_in_a_line() -> None:
+    class Rated(Chair):
+        faults = ("flip=0.01",)
+
+    class Bare(Chair):
+        faults = "cut"
+
+    class Forgot(Chair):
+        def make_bench(self) -> Bench:
+            return None  # type: ignore[return-value]  # the mistake
+
+    with pytest.raises(ValueError, match="the search draws rates, so name 'flip'"):
+        check_host(Rated)
+    with pytest.raises(ValueError, match="faults is a tuple of names"):
+        check_host(Bare)
+    with pytest.raises(TypeError, match="make_bench returned None, no Bench"):
+        check_host(Forgot)
+    with pytest.raises(TypeError, match="give the class Chair, not an object of it"):
+        check_host(Chair())  # type: ignore[arg-type]  # the mistake
+
+
+class Noisy(Chair):
+    """Notes what the device hears of a question on a noisy line."""
+
+    faults = ("flip",)
+    inputs = ()
+    heard: ClassVar[list[str]] = []
+
+    def end(self) -> None:
+        lines = self.bench.transcript().splitlines()
+        self.heard.append("".join(line for line in lines if " ~ " in line))
+
+
+def test_a_seed_in_a_scenario_is_other_noise_and_the_same_each_time() -> None:
+    Noisy.heard.clear()
+    asked = "+0us fault flip=0.02 for 3s\n" + "+0us call ask()\n" * 8
+    for head in ("", "+0us seed 1\n", "+0us seed 2\n", "+0us seed 1\n"):
+        replay_host(Noisy, head + asked)
+    bare, one, two, again = Noisy.heard
+    assert one == again
+    assert len({bare, one, two}) == 3
+
+
+def test_a_search_draws_seldom_noise_and_other_noise_in_each_run() -> None:
+    seen: set[str] = set()
+
+    class Watched(Noisy):
+        def end(self) -> None:
+            seen.update(
+                line.split(" ! ")[1]
+                for line in self.bench.transcript().splitlines()
+                if " ! flip=" in line
+            )
+            super().end()
+
+    Noisy.heard.clear()
+    check_host(Watched, max_examples=150, seed=1)
+    assert {"flip=0.0003", "flip=0.003"} <= {each.split()[0] for each in seen}
+    assert len(set(Noisy.heard)) > 30
 
 
 def test_without_hypothesis_it_is_told_in_a_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -38,7 +38,8 @@ def test_what_is_written_is_read_again(steps: list[HostStep]) -> None:
     ("line", "said"),
     [
         ("call heat()", "'call heat()' is not '+TIME ACTION ...', as '+5ms call heat()'"),
-        ("+5ms heat", "no action 'heat'; known: call, set, press, fault, send, wait"),
+        ("+5ms heat", "no action 'heat'; known: call, set, press, fault, send, wait, seed"),
+        ("+0us seed x", "a seed is a whole number from 0, not 'x'"),
         ("+5ms call heat", "'heat' is not a call, as 'write(data=b\"a\", to=3)'"),
         ("+5ms call heat(3)", "'heat(3)' is not a call, as 'write(data=b\"a\", to=3)'"),
         ("+5ms call a(b=open('x'))", "\"a(b=open('x'))\": an argument is no plain value"),
