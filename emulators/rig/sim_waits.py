@@ -10,6 +10,7 @@ from threading import get_ident
 from typing import Final, Generic, Protocol, TypeVar
 
 from tickrig.device.twin import Copyable, restore
+from tickrig.wire.instant import NEVER
 
 LOG = logging.getLogger(__name__)
 
@@ -18,6 +19,9 @@ EPOCH_S: Final = 946_684_800
 
 LOOK_US: Final = 100
 """What a look at the clock costs: a loop that does nothing else then ends some day."""
+
+MOST_LOOKS: Final = 10_000
+"""Looks that a host takes at one instant before it is told that it will wait for ever."""
 
 T = TypeVar("T")
 
@@ -50,6 +54,30 @@ class OneThread(Copyable):
             )
             LOG.error(self._refusal)
         return self._refusal
+
+
+class Looks(Copyable):
+    """Looks that found nothing at one instant: they make no time pass, so a loop of them hangs."""
+
+    def __init__(self) -> None:
+        self._count, self._at_us = 0, NEVER
+
+    def refusal(self, now_us: int, instead: str) -> str:
+        """Count a look; return why the host would wait for ever, or "".
+
+        Args:
+            now_us: when it is.
+            instead: what makes time pass.
+        """
+        if self._at_us != now_us:
+            self._count, self._at_us = 0, now_us
+        self._count += 1
+        if self._count <= MOST_LOOKS:
+            return ""
+        return (
+            f"looked {MOST_LOOKS} times at {now_us / 1e6:.6f} s: looking makes no time pass;"
+            f" {instead}"
+        )
 
 
 class Passing(Protocol):

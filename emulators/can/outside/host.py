@@ -7,7 +7,7 @@ from typing import Final
 
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.sim_waits import OneThread
+from tickrig.emulators.rig.sim_waits import Looks, OneThread
 from tickrig.host.links.errors import LinkClosed, LinkError, LinkTimeout
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
@@ -21,6 +21,8 @@ INSTEAD: Final = (
     "take bench.canopen_network() in place of canopen.Network().connect(), poll in place of a"
     " can.Notifier"
 )
+
+LOOKING: Final = "give recv or receive a timeout, or sleep, with the fixture bench_time"
 
 
 class Repeat:
@@ -58,7 +60,7 @@ class CanHost:
 
     def __init__(self, rig: Rig, end: CanEnd, thread: OneThread | None = None) -> None:
         self._rig, self._end, self._closed = rig, end, False
-        self._thread = thread or OneThread()
+        self._thread, self._looks = thread or OneThread(), Looks()
         rig.move_on(end.wire)
         self._inbox: deque[tuple[int, CanFrame]] = deque()
         self._repeats: list[Repeat] = []
@@ -104,7 +106,7 @@ class CanHost:
 
         Raises:
             LinkClosed: the link was closed.
-            LinkError: a second thread uses it.
+            LinkError: a second thread uses it, or a loop that only looks would never end.
             LinkTimeout: there is no timeout, and nothing will ever happen.
         """
         self._check_usable()
@@ -114,6 +116,7 @@ class CanHost:
             inbox += self._end.poll_stamped(rig.now_us)
             if not inbox:
                 if rig.now_us >= deadline_us:
+                    self._look(timeout_us)
                     return None
                 self._step(deadline_us)
         return inbox.popleft()
@@ -124,6 +127,13 @@ class CanHost:
         if self._repeats:
             self._rig.watchers.remove(self._send_due)
         self._repeats.clear()
+
+    def _look(self, timeout_us: int | None) -> None:
+        """Count a look that found nothing; a wait that is over was none."""
+        if timeout_us is None or timeout_us > 0:
+            return
+        if refusal := self._looks.refusal(self.now_us, LOOKING):
+            raise LinkError(refusal)
 
     def _step(self, deadline_us: int) -> None:
         """Let the rig run until a frame has come."""

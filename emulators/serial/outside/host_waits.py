@@ -10,8 +10,7 @@ from serial.serialutil import SerialException
 
 from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.sim_waits import OneThread
-from tickrig.wire.instant import NEVER
+from tickrig.emulators.rig.sim_waits import Looks, OneThread
 
 LOG = logging.getLogger(__name__)
 
@@ -20,8 +19,7 @@ LONGEST_US: Final = 3_600_000_000
 
 INSTEAD: Final = "read and write in the thread that made the rig"
 
-MOST_LOOKS: Final = 10_000
-"""Looks that a host takes at one instant before it is told that it will wait for ever."""
+LOOKING: Final = "read with a timeout, or let time.sleep be that of the rig"
 
 
 class HostWaits(Copyable):
@@ -34,7 +32,7 @@ class HostWaits(Copyable):
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
         self._thread = OneThread()
-        self._looks, self._looked_us = 0, NEVER
+        self._looks = Looks()
 
     def check_thread(self, name: str) -> None:
         """Raise SerialException, now and ever after, if a second thread uses a port.
@@ -68,14 +66,8 @@ class HostWaits(Copyable):
         Raises:
             SerialException: there were too many at one instant: the host would wait for ever.
         """
-        if self._looked_us != self.rig.now_us:
-            self._looks, self._looked_us = 0, self.rig.now_us
-        self._looks += 1
-        if self._looks > MOST_LOOKS:
-            raise SerialException(
-                f"looked {MOST_LOOKS} times at {self._looked_us / 1e6:.6f} s: looking makes no"
-                " time pass; read with a timeout, or let time.sleep be that of the rig"
-            )
+        if refusal := self._looks.refusal(self.rig.now_us, LOOKING):
+            raise SerialException(refusal)
 
     def wait(
         self, until_us: int, due_us: Callable[[], int], done: Callable[[], bool] = lambda: False

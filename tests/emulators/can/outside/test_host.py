@@ -7,8 +7,9 @@ from tests.emulators.can.test_can_rig import Node
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_waits import MOST_LOOKS
 from tickrig.emulators.rig.station import Station
-from tickrig.host.links.errors import LinkClosed, LinkTimeout
+from tickrig.host.links.errors import LinkClosed, LinkError, LinkTimeout
 from tickrig.wire.can_bits import frame_bits
 
 
@@ -75,3 +76,16 @@ def test_waiting_for_ever_for_nothing_is_told() -> None:
     host, _, _ = hosted()
     with pytest.raises(LinkTimeout, match="nothing will ever happen"):
         host.take(None)
+
+
+@pytest.mark.parametrize("timeout_us", [0, -1])
+def test_looking_for_ever_is_told(timeout_us: int) -> None:
+    host, _, _ = hosted()
+    for _ in range(3):
+        for _ in range(MOST_LOOKS):
+            assert host.receive(timeout_us) == ()
+        host.receive(1)
+    with pytest.raises(
+        LinkError, match=r"looked 10000 times at 0\.000003 s: looking makes no time"
+    ):
+        all(host.receive(timeout_us) == () for _ in range(2 * MOST_LOOKS))

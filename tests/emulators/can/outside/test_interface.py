@@ -16,6 +16,7 @@ from tests.emulators.sim_bench import eds
 from tickrig.emulators.can.outside.interface import CHANNELS, TickrigBus
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.sim_waits import MOST_LOOKS
 from tickrig.emulators.rig.station import Station
 from tickrig.host.links.can_message import to_frame, to_message
 
@@ -127,3 +128,10 @@ def test_the_canopen_library_can_use_it_by_hand(log: Log) -> None:
         while (message := bus.recv(0.01)) is not None:
             network.listeners[0].on_message_received(message)  # type: ignore[no-untyped-call]
     assert log.text == "000#0105"
+
+
+def test_a_loop_that_only_polls_is_told_what_to_do(log: Log) -> None:
+    with open_bus() as bus:
+        with pytest.raises(can.CanOperationError, match="give recv or receive a timeout, or sleep"):
+            all(bus.recv(0) is None for _ in range(2 * MOST_LOOKS))
+        assert (bus.recv(0.001), bus.recv(0), bus.now_us) == (None, None, 1_000)
