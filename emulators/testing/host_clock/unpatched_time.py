@@ -40,9 +40,10 @@ def unpatched_time_fails(
     """Raise UnpatchedTimeError where a host sleeps, or looks at a clock that does not pass.
 
     It is raised at the first such call with its file and line, and once more at the end if the
-    host has swallowed it. Whose code it is that counts, `patched_time` says; where that holds
-    nothing is refused. `perf_counter` is let through, and `time.time` in installed packages, and
-    what a test has put in place of these functions.
+    host has swallowed it; if another exception came of that, it is a note of that one. Whose code
+    it is that counts, `patched_time` says; where that holds nothing is refused. `perf_counter` is
+    let through, and `time.time` in installed packages, and what a test has put in place of these
+    functions.
 
     Args:
         allowed: names of packages that may do so.
@@ -69,6 +70,11 @@ def unpatched_time_fails(
 
     own = [name for name in (*WAITS, *STAMPS) if id(root_of(vars(time)[name])) in KEEPABLE]
     with Switches({(time, name): partial(refuse, name) for name in own}):
-        yield
+        try:
+            yield
+        except BaseException as error:  # it may come of what the host has swallowed
+            if refusals and not isinstance(error, UnpatchedTimeError):
+                error.add_note(refusals[0])
+            raise
     if refusals:
         raise UnpatchedTimeError(refusals[0])

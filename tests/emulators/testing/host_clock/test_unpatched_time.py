@@ -126,8 +126,16 @@ def test_what_fails_otherwise_stays_what_it_is() -> None:
         swallow()
         raise ZeroDivisionError
 
-    with pytest.raises(ZeroDivisionError), unpatched_time_fails():
+    with pytest.raises(ZeroDivisionError) as failed, unpatched_time_fails():
         fail()
+    (note,) = failed.value.__notes__
+    assert "time.sleep is called, but" in note
+
+
+def test_what_fails_by_itself_has_no_note() -> None:
+    with pytest.raises(ZeroDivisionError) as failed, unpatched_time_fails():
+        raise ZeroDivisionError
+    assert not hasattr(failed.value, "__notes__")
 
 
 def test_nobody_else_is_refused() -> None:
