@@ -272,6 +272,11 @@ def test_it_works_ahead_in_real_time_too(swinging: Bench) -> None:
     assert ticks(swinging, lambda: swinging.go_on(1_000_000, UNSEEN_US)) < 150
 
 
+def test_it_works_ahead_after_an_action_too(swinging: Bench) -> None:
+    swinging.rig.event_queue.wake("action", swinging.rig.now_us + 5_000)
+    assert ticks(swinging, lambda: swinging.rig.run_for(1_000_000)) < 150
+
+
 def test_who_waits_for_something_sees_each_tick(swinging: Bench) -> None:
     seen: list[float | str] = []
 

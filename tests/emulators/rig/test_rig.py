@@ -119,6 +119,21 @@ def test_late_steps_are_known_by_their_times() -> None:
     assert (rig.late_since(20_000), rig.late_since(rig.now_us - 100_000)) == (9_000, 2_000)
 
 
+def test_of_more_than_a_thousand_late_steps_the_worst_of_all_counts() -> None:
+    clock = SlowClock(late_us=9_000)
+    rig = Rig(Station(Echo(period_us=10_000), SerialLine().a), clock=clock)
+    rig.run_for(10_000)
+    clock.worst_late_us = 2_000
+    rig.run_for(10_000 * 1_000)
+    assert (rig.late_since(15_000), rig.late_since(20_000)) == (9_000, 2_000)
+
+
+def test_a_step_may_be_late_by_a_microsecond() -> None:
+    rig = Rig(Station(Echo(period_us=10_000), SerialLine().a), clock=SlowClock(late_us=1))
+    rig.run_for(10_000)
+    assert (rig.worst_late_us, rig.late_ticks) == (1, 0)
+
+
 def test_a_rig_in_real_time_wakes_at_each_tick_but_runs_only_those_with_work() -> None:
     clock, echo = SlowClock(late_us=0), Echo(period_us=30_000)
     Rig(Station(echo, SerialLine().a), clock=clock).run_for(60_000)
