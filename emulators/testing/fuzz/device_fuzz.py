@@ -17,6 +17,7 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.fuzz.input_reader import FuzzAct, InputReader
 from tickrig.emulators.testing.fuzz.shortened import shortened
 from tickrig.emulators.testing.fuzz.words import Word, check_words
+from tickrig.emulators.testing.properties.contract import check_period
 from tickrig.wire.can import CanFrame
 
 LOOKS: Final = 60
@@ -68,6 +69,7 @@ class DeviceFuzz:
     ) -> None:
         made = DEVICES.load(device) if isinstance(device, str) else device
         self.device: Any = made.build({}) if isinstance(made, DeviceType) else made()
+        check_period(self.device)
         joined = _wire_of(self.device, made, wire)
         self._on_can = isinstance(joined, CanWire)
         self._check_words(words, start, request, answer)

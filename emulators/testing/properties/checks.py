@@ -16,7 +16,12 @@ from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.testing.properties.contract import check_acts, must
 from tickrig.emulators.testing.properties.device_bench import DeviceBench, Observation, drive
 from tickrig.emulators.testing.properties.difference import TicksDifferError, difference
-from tickrig.emulators.testing.properties.due_probe import check_due_us
+from tickrig.emulators.testing.properties.due_probe import (
+    SETTLES,
+    changed_input,
+    check_due_us,
+    some_inputs,
+)
 from tickrig.emulators.testing.properties.pauses import check_pauses
 from tickrig.emulators.testing.properties.strategies import Session
 from tickrig.host.text.trace import Header
@@ -72,18 +77,28 @@ class DeviceChecks:
         once.play([*session, (0, "reset", None)])
         twice.play([*session, (0, "reset", None), (0, "reset", None)])
         if not self._remembers:
-            self._check_fresh(once, after)
+            self._check_fresh(once, once.device, after)
+            self._check_inputs_forgotten(session)
         what = "a second reset makes a difference"
         _same(once, twice.play(after), once.play(after), what, "after two", "after one")
 
-    def _check_fresh(self, once: DeviceBench, after: Session) -> None:
+    def _check_inputs_forgotten(self, session: Session) -> None:
+        """What an input does, and a reset after it, leaves the input alone."""
+        played = self._bench()
+        played.play(session)
+        for item in some_inputs(played.device, len(session)):
+            device, _ = changed_input(played, item)
+            self._check_fresh(played, device, ())
+
+    def _check_fresh(self, once: DeviceBench, device: Any, after: Session) -> None:
         """A device that was reset is as one that was made now, or at 0, with the same inputs."""
-        was_reset, now_us = twin(once.device), once.rig.now_us
+        was_reset, now_us = twin(device), once.rig.now_us
+        now_us += (SETTLES + 1) * device.tick_us  # it may have been ticked so often since then
         was_reset.reset()
         devices = (was_reset, once.make(), once.make())
-        for name in once.device.inputs.table if hasattr(was_reset, "inputs") else ():
-            for device in devices:  # all know that something was set
-                device.inputs.set(name, once.device.inputs[name])
+        for name in device.inputs.table if hasattr(device, "inputs") else ():
+            for each in devices:  # all know that something was set
+                each.inputs.set(name, device.inputs[name])
         times = (now_us, now_us, 0)
         one, *others = map(drive, devices, times, [after] * 3, [once.nothing] * 3)
         if one not in others:

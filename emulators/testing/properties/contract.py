@@ -40,7 +40,12 @@ def check_members(device: Any, nothing: Any) -> None:
     kind = type(device).__name__
     for name, text in (MEMBERS | SIGNALS if nothing == b"" else MEMBERS).items():
         must(hasattr(device, name), f"{kind} has no {name}: {text}")
-    tick_us = device.tick_us
+    check_period(device)
+
+
+def check_period(device: Any) -> None:
+    """Raise AssertionError unless `tick_us` is a period, and `due_us` a time."""
+    tick_us, kind = device.tick_us, type(device).__name__
     good = type(tick_us) is int and tick_us > 0
     must(good, f"{kind}.tick_us is {tick_us!r}: whole microseconds above 0")
     check_due(device)

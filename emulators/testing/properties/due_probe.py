@@ -49,11 +49,11 @@ def check_due_us(bench: Callable[..., DeviceBench], session: Session) -> None:
         probe.check()
         played.do(act)
     probe.check_answers([*words][:MOST_WORDS])
-    for item in _some_inputs(played.device, len(session)):
+    for item in some_inputs(played.device, len(session)):
         _probe_after(played, item)
 
 
-def _some_inputs(device: Any, number: int) -> list[InputSignal]:
+def some_inputs(device: Any, number: int) -> list[InputSignal]:
     """Return a part of the inputs, in each session another one."""
     table = device.inputs.table.values() if hasattr(device, "inputs") else ()
     items = [item for item in table if item.type is not SignalType.TEXT]
@@ -61,8 +61,12 @@ def _some_inputs(device: Any, number: int) -> list[InputSignal]:
     return items[number % parts :: parts]
 
 
-def _probe_after(played: DeviceBench, item: InputSignal) -> None:
-    """Change an input of a copy, let it come to rest, and look whether it is due in time."""
+def changed_input(played: DeviceBench, item: InputSignal) -> tuple[Any, int]:
+    """Change an input of a copy, and let it come to rest.
+
+    Returns:
+        The copy, and the time.
+    """
     device, now_us = _copy(played.device), played.rig.now_us
     device.inputs.set(item.name, item.low if device.inputs[item.name] == item.high else item.high)
     for _ in range(SETTLES):
@@ -70,6 +74,12 @@ def _probe_after(played: DeviceBench, item: InputSignal) -> None:
         device.tick(now_us, played.nothing)
         if device.due_us > now_us + device.tick_us:
             break
+    return device, now_us
+
+
+def _probe_after(played: DeviceBench, item: InputSignal) -> None:
+    """Look whether a copy is due in time after a change of an input."""
+    device, now_us = changed_input(played, item)
     try:
         _Probe(device, now_us, played.nothing).check()
     except AssertionError as error:

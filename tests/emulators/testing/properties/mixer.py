@@ -124,6 +124,19 @@ class KeepsError(Mixer):
         self.state = state if state == "Error" else "Idle"
 
 
+class KeepsFault(Mixer):
+    """A reset leaves that its supply was cut while it was mixing."""
+
+    cut = False
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        self.cut = self.cut or bool(self.inputs["no_power"] and self.state == "Mixing")
+        return super().tick(now_us, rx)
+
+    def read(self, name: str, /) -> int | float | str:
+        return "Error" if self.cut else super().read(name)
+
+
 CLOCK = count()
 
 

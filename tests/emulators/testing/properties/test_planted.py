@@ -12,7 +12,7 @@ from tests.emulators.testing.properties import mixer
 from tests.emulators.testing.properties.mixer import Mixer
 from tickrig import CanFrame, DeviceType, LineSettings
 from tickrig.emulators.can.wire import CanWire
-from tickrig.testing import check_device, strategies
+from tickrig.testing import DeviceFuzz, check_device, strategies
 
 WORDS = strategies.chunks([b"ON\n", b"OFF\n", b"?\n"])
 
@@ -50,6 +50,12 @@ def test_a_forgotten_timer_of_half_a_minute_is_found() -> None:
 
 def test_a_forgotten_timer_that_an_input_starts_is_found() -> None:
     assert "state 'Error'" in found(mixer.ForgetsTrip)
+
+
+@pytest.mark.parametrize(("bad", "text"), [(mixer.NoPeriod, "tick_us"), (mixer.DueNone, "due_us")])
+def test_a_fuzzer_tells_a_period_that_is_none(bad: Callable[[], Any], text: str) -> None:
+    with pytest.raises(AssertionError, match=text):
+        DeviceFuzz(bad)
 
 
 def test_a_forgotten_timer_that_only_answers_show_is_found() -> None:
@@ -93,6 +99,11 @@ def test_chance_and_what_devices_share_are_told_as_such(bad: Callable[[], Mixer]
         "they share): by "
     )
     assert " of one, b'" in text
+
+
+def test_what_a_reset_leaves_of_an_input_is_found_by_the_first_session() -> None:
+    text = found(mixer.KeepsFault, start=[(5_000, "send", b"ON\n")], max_examples=1)
+    assert text.startswith("reset keeps something")
 
 
 def test_what_a_reset_leaves_is_found() -> None:
