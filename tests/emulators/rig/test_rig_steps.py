@@ -122,7 +122,7 @@ def test_a_wire_without_work_has_come_as_far_as_the_rig(go: Way) -> None:
 
 def test_a_watcher_sees_a_wire_without_work_as_far_as_the_rig() -> None:
     wire, quiet, seen = CanWire(), CanWire(), list[tuple[int, int]]()
-    rig = Rig(Station(Node(1, period_us=10_000), wire.end()))
+    _, rig = wire.end(), Rig(Station(Node(1, period_us=10_000), wire.end()))
     rig.move_on(quiet)
     rig.watchers.append(lambda now_us: seen.append((now_us, quiet.bus.now_us)))
     rig.run_to(15_000)
