@@ -68,7 +68,8 @@ def changed_input(played: DeviceBench, item: InputSignal) -> tuple[Any, int]:
         The copy, and the time.
     """
     device, now_us = _copy(played.device), played.rig.now_us
-    device.inputs.set(item.name, item.low if device.inputs[item.name] == item.high else item.high)
+    value = item.low if device.inputs[item.name] == item.high else item.high
+    device.inputs.set(item.name, value if item.real else int(value))  # compiled, bounds are floats
     for _ in range(SETTLES):
         now_us = next_tick_us(now_us, 0, device.tick_us)
         device.tick(now_us, played.nothing)
