@@ -26,10 +26,13 @@ GREEDY: Final = ("--timing", "--bus-kwargs")
 """Options that take one or more values in python-can's tools."""
 
 HINTS: Final = {
-    errno.EAFNOSUPPORT: "this kernel has no SocketCAN",
+    errno.EAFNOSUPPORT: "this kernel has no SocketCAN; udp_multicast needs none",
     errno.ENODEV: "no such CAN interface; a virtual one is made by"
     " 'ip link add dev NAME up type vcan'",
 }
+NO_MSGPACK: Final = "msgpack not installed"
+"""What python-can says where its interface udp_multicast lacks a package."""
+
 UNNAMED: Final = '"None"'
 """In what python-can says where no interface is named."""
 
@@ -214,7 +217,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     except Exception as error:  # its drivers raise whatever they come across, NameError even
         _let_go(error)
         name = interface if channel is None else f"{interface} {channel}"
-        raise BusUnavailable(f"CAN bus {name}: {_reason(error)}") from None
+        raise BusUnavailable(f"CAN bus {name}: {bus_reason(error)}") from None
     return bus, interface, channel
 
 
@@ -278,9 +281,12 @@ def _nothing_named(instead: str) -> str:
     )
 
 
-def _reason(error: BaseException) -> str:
+def bus_reason(error: BaseException) -> str:
+    """Return in a line why a bus cannot be opened, and what to do where that is known."""
     number = getattr(error, "errno", None) or getattr(error, "error_code", None)
     hint = HINTS.get(number) if isinstance(number, int) else None
+    if NO_MSGPACK in str(error):
+        hint = "pip install 'python-can[multicast]'"
     return f"{_one_line(error)} ({hint})" if hint else _one_line(error)
 
 

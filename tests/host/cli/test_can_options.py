@@ -132,7 +132,10 @@ def test_what_cannot_be_opened_is_one_line(options: dict[str, Any], error: str) 
 
 @pytest.mark.parametrize(
     ("number", "hint"),
-    [(97, "(this kernel has no SocketCAN)"), (19, "'ip link add dev NAME up type vcan')")],
+    [
+        (97, "(this kernel has no SocketCAN; udp_multicast needs none)"),
+        (19, "'ip link add dev NAME up type vcan')"),
+    ],
 )
 def test_what_linux_lacks_is_explained(
     number: int, hint: str, monkeypatch: pytest.MonkeyPatch
@@ -142,6 +145,15 @@ def test_what_linux_lacks_is_explained(
 
     monkeypatch.setattr("can.Bus", fail)
     assert refused(interface="socketcan", channel="can0").endswith(hint)
+
+
+def test_what_python_can_lacks_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(**keywords: Any) -> can.BusABC:
+        raise can.CanInterfaceNotImplementedError("msgpack not installed")
+
+    monkeypatch.setattr("can.Bus", fail)
+    said = refused(interface="udp_multicast", channel="239.74.163.2")
+    assert said.endswith("(pip install 'python-can[multicast]')")
 
 
 def test_a_wrong_configuration_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,6 +13,7 @@ import can
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
+from tickrig.host.cli.can_options import bus_reason
 from tickrig.host.links.can_link import prepare_bus
 from tickrig.host.links.can_message import to_error_frame, to_frame
 from tickrig.host.text.trace import Mark
@@ -83,7 +84,7 @@ def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     try:
         bus = can.Bus(plan.channel, plan.interface, **{**rate, **dict(plan.options), **options})
     except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
-        raise BusGone(f"cannot open {name_of(plan)}: {error}") from error
+        raise BusGone(f"cannot open {name_of(plan)}: {bus_reason(error)}") from None
     prepare_bus(bus, plan.interface)
     return bus
 

@@ -66,3 +66,13 @@ def test_a_bus_that_takes_nothing_is_there_still(monkeypatch: pytest.MonkeyPatch
 def test_a_bus_that_cannot_be_opened_is_not_there() -> None:
     with pytest.raises(PortGone, match="cannot open nothing_such x: "):
         open_watched(BusPlan(interface="nothing_such", channel="x"), Watch(), {})
+
+
+def test_why_a_bus_cannot_be_opened_is_all_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object, **options: object) -> None:
+        raise OSError(errno.EAFNOSUPPORT, "not supported")
+
+    monkeypatch.setattr("can.Bus", fail)
+    with pytest.raises(PortGone, match="udp_multicast needs none") as caught:
+        open_watched(BusPlan(interface="socketcan", channel="vcan0"), Watch(), {})
+    assert caught.value.__suppress_context__
