@@ -1,0 +1,71 @@
+"""The table of commands on the RRC's page is that of the code, and what the emulator answers."""
+
+from __future__ import annotations
+
+import re
+from itertools import groupby
+from pathlib import Path
+
+from tickrig import Bench
+from tickrig.wire.rrc.check import check_digit
+from tickrig.wire.rrc.commands import COMMANDS, Command, Parameter, parse_command
+
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "devices" / "rrc.md"
+
+
+def rows() -> dict[str, tuple[str, str, str, str]]:
+    """Return what the page says of each command: digits, ranges, an example, its answer."""
+    table = PAGE.read_text("utf-8").partition("| command |")[2].partition("\n\n")[0]
+    cells = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    return {c[0].strip("`"): (c[1], c[2], c[3].strip("`"), c[4]) for c in cells}
+
+
+def ranges(kind: type[Command]) -> str:
+    """Write the ranges of a command, equal neighbours once."""
+    runs = groupby(kind.parameters, lambda each: (each.width, each.low, each.high))
+    return ", ".join(span(same[0], len(same)) for same in ([*run] for _, run in runs)) or "-"
+
+
+def span(parameter: Parameter, count: int) -> str:
+    times = f"{count} x " if count > 1 else ""
+    return f"{times}{parameter.low}..{parameter.high}"
+
+
+def answer(line: bytes) -> str:
+    """Return what an RRC that is on answers, without its stream and its events."""
+    with Bench("rrc") as bench:
+        bench.run_for("1s")
+        bench.press("power_button")
+        bench.run_for("1s")
+        link = bench.link
+        link.receive(0)
+        link.send(line + b"\n")
+        bench.run_for("50ms")
+        heard: bytes = link.receive(0)
+        lines = heard.decode().splitlines()
+        return ", ".join(f"`{one}`" for one in lines if not one.startswith(("SA:", "EV:")))
+
+
+def test_the_table_has_each_command_with_its_digits_and_ranges() -> None:
+    said = {name: cells[:2] for name, cells in rows().items()}
+    assert said == {
+        (name + kind.literal).decode(): (
+            "+".join(str(each.width) for each in kind.parameters) or "-",
+            ranges(kind),
+        )
+        for name, kind in COMMANDS.items()
+    }
+
+
+def test_each_example_is_that_command_and_is_answered_as_it_says() -> None:
+    for name, (_, _, example, answered) in rows().items():
+        line = example.encode()
+        assert name.startswith(parse_command(line).name.decode())
+        assert answer(line) == answered, name
+
+
+def test_the_example_of_check_is_right() -> None:
+    found = re.findall(r"`(\w+)` has CHECK `([0-9A-F])`", PAGE.read_text("utf-8"))
+    assert found
+    for line, check in found:
+        assert check_digit(line.encode()) == check.encode()
