@@ -46,14 +46,14 @@ def us_of(duration: int | str) -> int:
 
     Raises:
         TypeError: a number that is not whole: nobody knows its unit.
-        ValueError: a text that is no time, or a negative number.
+        ValueError: a text that is no time or has no unit, or a negative number.
 
     >>> us_of("1.5s"), us_of(250)
     (1500000, 250)
     """
     if isinstance(duration, bool) or not isinstance(duration, int | str):
         raise TypeError(f'{duration!r} is not a time: write "1.5s", or whole microseconds')
-    duration_us = parse_time_us(duration) if isinstance(duration, str) else duration
+    duration_us = parse_time_with_unit_us(duration) if isinstance(duration, str) else duration
     if duration_us < 0:
         raise ValueError(f"a duration is not negative, got {duration_us} us")
     return duration_us

@@ -343,3 +343,12 @@ def test_real_time_does_not_come_back() -> None:
         pytest.raises(NotOnThisBench, match="time that has passed comes back in virtual time"),
     ):
         bench.snapshot()
+
+
+def test_a_time_as_text_has_its_unit() -> None:
+    with Bench("rrc") as bench:
+        with pytest.raises(ValueError, match="'5' has no unit: write 5s, 5ms or 5us"):
+            bench.run_for("5")
+        with pytest.raises(ValueError, match="'5' has no unit: write 5s, 5ms or 5us"):
+            bench.press("power_button", for_="5")
+        assert bench.now_us == 0
