@@ -28,7 +28,8 @@ def find_class(spec: str, base: type[Any]) -> type[Any]:
     found = getattr(module, name, None)
     if not (isinstance(found, type) and issubclass(found, base)):
         known = ", ".join(_classes(module, base)) or "none"
-        raise ValueError(f"{file} has no component {name!r}; it has {known}")
+        noun = "component" if base.__name__.endswith("Component") else base.__name__
+        raise ValueError(f"{file} has no {noun} {name!r}; it has {known}")
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -77,14 +78,21 @@ def _row(plan: Plan, verdict: Verdict) -> Row:
 
 
 def _sorted(rows: Iterable[Row]) -> list[Row]:
-    places: dict[str, tuple[object, str]] = {}
+    places: dict[str, tuple[object, object, str]] = {}
 
     def place(row: Row) -> tuple[object, int]:
         if row.test not in places:
-            places[row.test] = (natural(row.test), row.test)
+            test, _, values = row.test.partition("[")
+            places[row.test] = (natural(test), _by_value(values), row.test)
         return places[row.test], row.seed
 
     return sorted(rows, key=place)
+
+
+def _by_value(values: str) -> list[tuple[float, str]]:
+    """Return a key by which `flip=0.003]` comes before `flip=0.02]`."""
+    pieces = re.split(r"([0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?)", values)
+    return [(float(each), "") if each[:1].isdecimal() else (-1, each) for each in pieces]
 
 
 def write_table(table: Table, path: Path) -> None:

@@ -47,6 +47,8 @@ def replay_command(
 
     try:
         data = file.read_bytes()
+        if any(line.startswith(b"+") for line in data.splitlines()[:2]):
+            raise Refused(f"{file} is a scenario of check_host: --host FILE.py:Class replays it")
         play = _replay_bench if data.startswith(PREFIX.encode()) else _replay
         played = play(file, data)
     except OSError as error:

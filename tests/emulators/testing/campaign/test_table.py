@@ -94,3 +94,10 @@ def test_a_summary_has_each_way_to_fail_and_its_commands() -> None:
     ]
     assert lines[5:7] == ["  pytest x", "  pytest 20"]
     assert lines[14:] == ["  pytest 28", "  ... and 3 more in the column replay"]
+
+
+def test_values_of_parameters_are_in_the_order_of_numbers() -> None:
+    rates = ("0.003", "0.02", "0.1", "2", "10")
+    rows = [Row(f"t.py::test_a[flip={r}]", 1, (r,), "passed", 1, "", "", "") for r in rates]
+    parts = [(Path(row.values[0]), Table(("flip",), [row])) for row in reversed(rows)]
+    assert [row.values[0] for row in merge_tables(parts).rows] == list(rates)

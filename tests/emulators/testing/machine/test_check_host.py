@@ -204,7 +204,7 @@ class Chair(BenchMachine):
         (
             "+0us call drive(speed=1)\n",
             "chair.py:Bike",
-            "chair.py has no component 'Bike'; it has Chair",
+            "chair.py has no BenchMachine 'Bike'; it has Chair",
         ),
         ("nothing\n", "chair.py:Chair", "found.txt:1: 'nothing' is not '+TIME ACTION"),
         (None, "chair.py:Chair", "found.txt"),
@@ -220,6 +220,15 @@ def test_a_call_that_cannot_be_is_told_in_a_line(
     result = CliRunner().invoke(main, ["replay", "found.txt", "--host", host])
     assert (result.exit_code, result.output.count("\n")) == (2, 1)
     assert said in result.output
+
+
+def test_a_scenario_without_its_host_is_told_what_replays_it(tmp_path: Path) -> None:
+    for head in ("", "# a scenario of chair.py:Chair, 1 step\n"):
+        found = tmp_path / "found.txt"
+        found.write_text(f"{head}+0us call drive(speed=1)\n", "utf-8")
+        result = CliRunner().invoke(main, ["replay", str(found)])
+        assert result.exit_code == 2
+        assert "is a scenario of check_host: --host FILE.py:Class replays it" in result.output
 
 
 def test_a_host_that_does_not_come_back_is_found() -> None:
