@@ -83,6 +83,7 @@ ENVIRONMENT: Final = {
     **{"PY_COLORS": "1", "PYTHONDONTWRITEBYTECODE": "1"},
     **{"PYTEST_ADDOPTS": "-p no:cacheprovider -p no:randomly -p no:xdist"},
 }
+CI: Final = ("CI", "BUILD_NUMBER")  # where pytest prints its summary in full
 FILE: Final = re.compile(r"^```\w+\n# ([\w.]+)\n\n?(.*?)^```", re.DOTALL | re.MULTILINE)
 CELL: Final = (8, 17)
 EDGE: Final = 4  # above the first line; what is scrolled out of the screen ends there
@@ -133,10 +134,11 @@ def _fill(place: Path, source: Path) -> None:
 
 
 def _output(command: str, place: Path, columns: int) -> Iterator[Text]:
+    here = {name: value for name, value in os.environ.items() if name not in CI}
     done = subprocess.run(
         ["bash", "-c", command],
         cwd=place,
-        env={**os.environ, **ENVIRONMENT, "COLUMNS": str(columns)},
+        env={**here, **ENVIRONMENT, "COLUMNS": str(columns)},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -59,7 +59,7 @@ def test_a_fuzzer_tells_a_period_that_is_none(bad: Callable[[], Any], text: str)
 
 
 def test_a_forgotten_timer_that_only_answers_show_is_found() -> None:
-    text = found(mixer.Unseen, start=[(5_000, "send", b"ON\n")], max_examples=100)
+    text = found(mixer.Unseen, start=[(5_000, "send", b"ON\n")], max_examples=2_000)
     assert r"a tick that is not due changes what follows b'?\n': by 8640" in text
     assert r"it sends b'Idle\n' after a tick before, b'Mixing\n' without it" in text
 
