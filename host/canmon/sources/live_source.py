@@ -7,13 +7,13 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from itertools import repeat
-from queue import Empty, SimpleQueue
+from queue import Empty
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
 from tickrig.host.canmon.sources.reopening_reader import ReopeningReader
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.get_within import get_within
+from tickrig.host.links.waiting_queue import WaitingQueue
 from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.mark import Mark
@@ -89,8 +89,7 @@ class LiveSource(AnySource[Item]):
         self._readers, self._queue_frames = readers, queue_frames
         self._queue: deque[Item | Mark] = deque()
         self._marking: deque[None] = deque()  # an entry for each mark in the queue
-        # No Event: Ctrl-C in the middle of its wait can leave its lock taken, for good.
-        self._came: SimpleQueue[None] = SimpleQueue()
+        self._came: WaitingQueue[None] = WaitingQueue()
         self._stop, self._overruns, self.failed = False, 0, ""
         pairs = list(zip(readers, chosen, strict=False))
         self._stepped = [pair for pair in pairs if pair[0].stepped]
@@ -138,9 +137,8 @@ class LiveSource(AnySource[Item]):
             self._take(reader, chosen, timeout_us)
         if not self._queue and not self._stepped and not self.ended:
             with suppress(Empty):
-                get_within(self._came, timeout_us / 1e6)
-        while not self._came.empty():
-            self._came.get()
+                self._came.get(timeout_us / 1e6)
+        self._came.clear()
         if self._marking:
             return self._up_to_mark()
         return [self._queue.popleft() for _ in range(len(self._queue))]  # type: ignore[misc]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 import time
 from collections.abc import Callable
 from heapq import heappop, heappush
 from itertools import count
+from queue import Empty
 from typing import Final
 
-from tickrig.host.links.get_within import get_within
+from tickrig.host.links.waiting_queue import WaitingQueue
 from tickrig.host.text.log import log_of
 
 PeerCall = Callable[[], float | None]
@@ -37,7 +37,7 @@ class PeerThread:
 
     def __init__(self, name: str, retry_us: int = RETRY_US) -> None:
         self.retry_s, self._order = retry_us / 1e6, count()
-        self._calls: queue.SimpleQueue[PeerCall | None] = queue.SimpleQueue()
+        self._calls: WaitingQueue[PeerCall | None] = WaitingQueue()
         self._repeated: list[tuple[float, int, PeerCall]] = []
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
@@ -74,6 +74,6 @@ class PeerThread:
             if wait_s <= 0:
                 return heappop(self._repeated)[2]
         try:
-            return get_within(self._calls, wait_s)
-        except queue.Empty:
+            return self._calls.get(wait_s)
+        except Empty:
             return heappop(self._repeated)[2]

@@ -7,13 +7,13 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
-from queue import Empty, SimpleQueue
+from queue import Empty
 from typing import Any, Final, TypeVar
 
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.host.control.clock import ServingClock
-from tickrig.host.links.get_within import get_within
+from tickrig.host.links.waiting_queue import WaitingQueue
 
 T = TypeVar("T")
 
@@ -33,7 +33,7 @@ class RigThread:
     """
 
     def __init__(self, emulator: RunningEmulator, clock: ServingClock) -> None:
-        self._emulator, self._calls = emulator, SimpleQueue[Callable[[], None]]()
+        self._emulator, self._calls = emulator, WaitingQueue[Callable[[], None]]()
         self._lock, self._awaited = threading.Lock(), set[Future[Any]]()
         self._thread: threading.Thread | None = None
         self._error: BaseException | None = None
@@ -150,7 +150,7 @@ class RigThread:
     def _serve(self, wait_us: int) -> None:
         """Do one thing that was asked for, within a time."""
         with suppress(Empty):
-            get_within(self._calls, wait_us / 1e6)()
+            self._calls.get(wait_us / 1e6)()
 
     def _note_stop(self) -> None:
         self._stopping = True
