@@ -22,6 +22,19 @@ from tickrig.host.engines.engines_joined import engines_joined
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.remote.call_queue import CallQueue
 
+CHAIN = """
+[[component]]
+name = "ConsoleIn0"
+type = "ConsoleIn"
+active = true
+
+[[component]]
+name = "ConsoleOut0"
+type = "ConsoleOut"
+active = true
+"""
+"""A system file for `tickrig rtc run`: what is typed, and what is shown."""
+
 DEADLINE_S = 30.0
 """Far more than anything here takes."""
 

@@ -14,21 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.host.engines.ros2.extra import CYCLONE
-from tests.host.engines.ros2.joined import DEADLINE_S, Peer, command, own_domain
+from tests.host.engines.ros2.joined import CHAIN, DEADLINE_S, Peer, command, own_domain
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
-
-CHAIN = """
-[[component]]
-name = "ConsoleIn0"
-type = "ConsoleIn"
-active = true
-
-[[component]]
-name = "ConsoleOut0"
-type = "ConsoleOut"
-active = true
-"""
 
 TABLE = """
 [[topic]]

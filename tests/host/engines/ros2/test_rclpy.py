@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.host.engines.ros2.joined import DEADLINE_S, Peer, command, own_domain
+from tests.host.engines.ros2.joined import CHAIN, DEADLINE_S, Peer, command, own_domain
 
 PYTHON = os.environ.get("ROS2_PYTHON", "")
 NODE = Path(__file__).with_name("rclpy_node.py")
@@ -26,18 +26,6 @@ READ = {
     "scan": "sensor_msgs/msg/LaserScan",
     "diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
 }
-
-CHAIN = """
-[[component]]
-name = "ConsoleIn0"
-type = "ConsoleIn"
-active = true
-
-[[component]]
-name = "ConsoleOut0"
-type = "ConsoleOut"
-active = true
-"""
 
 
 def environment(domain: int) -> dict[str, str]:
