@@ -34,7 +34,8 @@ class HostTransmitter(Copyable):
     Attributes:
         setting: the host's, for what is sent from now on.
         waits_for_cts: whether nothing is sent while CTS is off.
-        held: what waits for that.
+        suspended: whether nothing is sent until the host resumes its output.
+        held: what waits for either.
         errors: how many characters the device received with an error.
     """
 
@@ -43,7 +44,8 @@ class HostTransmitter(Copyable):
     ) -> None:
         self._event_queue, self._end, self._device, self._lines = event_queue, end, device, lines
         self.setting, self.errors = device, UartErrors()
-        self.waits_for_cts, self.held = False, bytearray()
+        self.waits_for_cts = self.suspended = False
+        self.held = bytearray()
         self._break_us = NEVER  # since when there is a break
         self._waiting: deque[tuple[int, int, UartSetting]] = deque()  # characters, by their start
         self._begun_ps = self._free_ps = 0  # when the last that has begun ends; when all have
@@ -96,19 +98,23 @@ class HostTransmitter(Copyable):
         return len(data)
 
     def release(self, now_us: int) -> None:
-        """Send what waited for CTS, if it is on or does not matter any more.
+        """Send what was held, unless the output is suspended or still waits for CTS.
 
         Args:
             now_us: the present.
         """
-        if self.held and (self._lines.cts or not self.waits_for_cts):
+        if self.held and not self._stopped:
             held = bytes(self.held)
             self.held.clear()
             self.held += held[self.send(now_us, held) :]
 
     @property
     def _holds(self) -> bool:
-        return bool(self.held) or (self.waits_for_cts and not self._lines.cts)
+        return bool(self.held) or self._stopped
+
+    @property
+    def _stopped(self) -> bool:
+        return self.suspended or (self.waits_for_cts and not self._lines.cts)
 
     def _send_sampled(self, now_us: int, data: bytes) -> None:
         self._advance(now_us)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, get_args
 
 import serial
 
-from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.serial_side import Mismatch, SerialSide
+from tickrig.host.text.names import near
 
 HANDLERS: Final = "tickrig.emulators.serial.outside"
 """The package in which pyserial finds the module `protocol_tickrig`."""
+
+FORM: Final = "tickrig://NAME or tickrig://NAME?mismatch=refuse"
 
 
 def register_handler() -> None:
@@ -61,16 +64,40 @@ class SerialPorts:
         finally:
             del self._sides[name]
 
-    def find(self, name: str) -> SerialSide:
-        """Return the host's side of a line.
+    def find(self, url: str) -> tuple[SerialSide, Mismatch | None]:
+        """Return the host's side of a line, and what the URL says of a setting that differs.
 
         Args:
-            name: its name.
+            url: such as `tickrig://rrc?mismatch=refuse`.
 
         Raises:
-            KeyError: no rig offers it.
+            SerialException: it is not such a URL, or no rig offers the name.
         """
-        return self._sides[name]
+        name, mismatch = parse_url(url)
+        if name not in self._sides:
+            hint = near(url, [f"tickrig://{each}" for each in self.names])
+            raise serial.SerialException(f"could not open port {url}: no rig offers it; {hint}")
+        return self._sides[name], mismatch
+
+
+def parse_url(url: str) -> tuple[str, Mismatch | None]:
+    """Return the name in a URL, and what it says of a setting that differs.
+
+    Args:
+        url: such as `tickrig://rrc?mismatch=refuse`.
+
+    Raises:
+        SerialException: it is not such a URL.
+
+    >>> parse_url("tickrig://rrc"), parse_url("tickrig://rrc?mismatch=refuse")
+    (('rrc', None), ('rrc', 'refuse'))
+    """
+    scheme, _, rest = url.partition("://")
+    name, _, query = rest.partition("?")
+    options = {"": None, **{f"mismatch={choice}": choice for choice in get_args(Mismatch)}}
+    if scheme.lower() != "tickrig" or not name or query not in options:
+        raise serial.SerialException(f"could not open port {url}: expected is {FORM}")
+    return name.rstrip("/"), options[query]
 
 
 SERIAL_PORTS: Final = SerialPorts()

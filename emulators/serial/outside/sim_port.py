@@ -5,9 +5,10 @@ from __future__ import annotations
 import copyreg
 import io
 import logging
+import warnings
 from typing import Any, NoReturn, cast
 
-from serial.serialutil import PortNotOpenError, SerialBase, SerialException
+from serial.serialutil import XOFF, XON, PortNotOpenError, SerialBase, SerialException
 
 from tickrig.device.twin import twin
 from tickrig.emulators.serial.outside.modem_lines import ModemLines
@@ -74,6 +75,7 @@ class SimPort(SerialBase):
         self.is_open = self.side.in_use = False
         self.side.modem_lines.dtr = self.side.modem_lines.rts = False
         self.side.transmitter.held.clear()
+        self.side.transmitter.suspended = False
         if self.break_condition:
             self.side.transmitter.set_break(self.side.rig.now_us, on=False)
 
@@ -145,6 +147,37 @@ class SimPort(SerialBase):
         side = self._side()
         side.waits.look()
         return side.modem_lines
+
+    def set_output_flow_control(self, enable: bool = True) -> None:
+        """Suspend or resume the output; what is written meanwhile is held.
+
+        Args:
+            enable: whether to send.
+        """
+        side = self._side()
+        side.transmitter.suspended = not enable
+        side.transmitter.release(side.rig.now_us)
+
+    def set_input_flow_control(self, enable: bool = True) -> None:
+        """Send XON or XOFF to the device.
+
+        Args:
+            enable: XON if true, else XOFF.
+        """
+        side = self._side()
+        side.transmitter.send(side.rig.now_us, XON if enable else XOFF)
+
+    def nonblocking(self) -> None:
+        """Warn and change nothing, as the ports of pyserial do."""
+        warnings.warn("nonblocking() has no effect", DeprecationWarning, stacklevel=2)
+
+    def set_low_latency_mode(self, low_latency_settings: bool) -> None:
+        """Change nothing: a byte is there when its stop bit has passed.
+
+        Args:
+            low_latency_settings: as pyserial takes it.
+        """
+        self._side()
 
     def fileno(self) -> NoReturn:
         """Refuse: there is nothing that `select` could wait for."""

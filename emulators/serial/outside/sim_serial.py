@@ -5,8 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from serial.serialutil import LF, SerialTimeoutException
+from serial.serialutil import LF, SerialException, SerialTimeoutException
 
+from tickrig.emulators.serial.outside.serial_ports import FORM, SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_port import SimPort
 from tickrig.wire.instant import NEVER
@@ -48,6 +49,8 @@ class SimSerial(SimPort):
         ValueError: a setting that no UART has.
     """
 
+    _own: tuple[str | None, SerialSide | None] = None, None  # the line that it was made with
+
     def __init__(self, side: SerialSide, /, **options: Any) -> None:
         device = side.device or UartSetting()
         own = {
@@ -58,9 +61,26 @@ class SimSerial(SimPort):
         }
         name = options.pop("port", None) or "rig"
         self._begin(**{**own, **options})
-        self.side = side
+        self._own = name, side
         self.port = name
         self.open()
+
+    def open(self) -> None:
+        """Open the port: the line that it was made with, or that of a `tickrig://` URL.
+
+        Raises:
+            SerialException: no rig offers the name; see `SimPort.open`.
+        """
+        own_name, own_side = self._own
+        if not self.is_open and self.port is not None:
+            if self.port == own_name:
+                self.side, self.mismatch = own_side, None
+            elif own_name is None or "://" in self.port:
+                self.side, self.mismatch = SERIAL_PORTS.find(self.port)
+            else:
+                what = f"could not open port {self.port}: this port is on a rig, as {own_name}"
+                raise SerialException(f"{what}; others are {FORM}")
+        super().open()
 
     def _begin(self, *positional: Any, **options: Any) -> None:
         self._read_cancelled = self._write_cancelled = False
@@ -77,7 +97,7 @@ class SimSerial(SimPort):
             side.waits.look()
         return len(self._input)
 
-    def read(self, size: int = 1, /) -> bytes:
+    def read(self, size: int = 1) -> bytes:
         """Read bytes; time passes until they are there, or the timeout is over.
 
         Args:
@@ -198,7 +218,7 @@ class SimSerial(SimPort):
             side.waits.look()
         return waiting
 
-    def write(self, data: ReadableBuffer, /) -> int:
+    def write(self, data: ReadableBuffer) -> int:
         """Write bytes; time passes until the buffer of the line has taken them.
 
         Args:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import os
 import tty
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -14,6 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.emulators.serial.outside.lines import OpenLine
+from tickrig.emulators.serial.outside import protocol_tickrig
+from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
+from tickrig.emulators.serial.outside.sim_serial import SimSerial
+from tickrig.emulators.testing.bench.modes.real.watched_serial import WatchedPort
 
 OPTIONS: dict[str, Any] = {"timeout": 0, "write_timeout": 1}
 
@@ -211,15 +216,89 @@ def test_an_open_and_a_closed_port_answer_as_a_pseudo_terminal() -> None:
         assert list(attempts(rig.port)) == list(attempts(real.port))
 
 
-PUBLIC_ELSEWHERE = {
+INSIDE = {
     *("fd", "pipe_abort_read_r", "pipe_abort_read_w", "pipe_abort_write_r", "pipe_abort_write_w"),
-    *("set_input_flow_control", "set_output_flow_control", "nonblocking", "BAUDRATE_CONSTANTS"),
-    *("TIOCSBRK", "TIOCCBRK", "osx_version", "set_low_latency_mode"),
+    *("BAUDRATE_CONSTANTS", "TIOCSBRK", "TIOCCBRK", "osx_version"),
 }
-"""What pyserial documents as not portable, and what is inside."""
+"""Attributes of pyserial's port of this system that it does not document."""
 
 
 def test_it_has_what_a_port_of_this_system_has() -> None:
     with pty() as real:
         names = {name for name in dir(real.port) if not name.startswith("_")}
-    assert names - PUBLIC_ELSEWHERE <= set(dir(OnRig().port))
+    assert names - INSIDE <= set(dir(OnRig().port))
+
+
+def parameters(function: Callable[..., object]) -> list[tuple[str, object, object]]:
+    """Return name, kind and default of each parameter."""
+    signature = inspect.signature(function)
+    return [(each.name, each.kind, each.default) for each in signature.parameters.values()]
+
+
+METHODS = [
+    name
+    for name, member in inspect.getmembers_static(serial.Serial, inspect.isfunction)
+    if not name.startswith("_")
+]
+
+
+class InRealTime(WatchedPort, serial.Serial):
+    """What `bench.serial()` returns in real time and on hardware."""
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("kind", [SimSerial, protocol_tickrig.Serial, InRealTime])
+def test_a_call_takes_the_arguments_that_pyserial_takes(kind: type, name: str) -> None:
+    assert parameters(getattr(kind, name)) == parameters(getattr(serial.Serial, name))
+
+
+def keyword_calls(bench: OnRig | OnPty) -> Iterator[object]:
+    port: Any = bench.port
+    yield port.write(data=b"ab")
+    yield bench.heard(2)
+    bench.feed(b"one>two")
+    yield port.read(size=2)
+    yield port.read_until(expected=b">", size=9)
+    yield port.read_until("\n")
+    yield port.set_input_flow_control(enable=False), bench.heard(1)
+    yield port.set_input_flow_control(), bench.heard(1)
+    with pytest.warns(DeprecationWarning, match="no effect"):
+        yield port.nonblocking()
+    yield port.set_output_flow_control(enable=False), port.set_output_flow_control(enable=True)
+    yield port.write(b"on"), bench.heard(2)
+    yield isinstance(port, serial.SerialBase)
+    port.close()
+    for name in ("set_input_flow_control", "set_output_flow_control"):
+        with pytest.raises(serial.PortNotOpenError):
+            getattr(port, name)()
+
+
+def test_calls_by_keyword_and_seldom_ones_do_as_on_a_pseudo_terminal() -> None:
+    with pty() as real:
+        assert list(keyword_calls(OnRig())) == list(keyword_calls(real))
+
+
+def test_what_is_written_to_a_suspended_output_waits_as_at_a_uart() -> None:
+    rig = OnRig()
+    rig.port.set_output_flow_control(False)
+    rig.port.write(b"held")
+    rig.line.rig.run_for(1_000_000)
+    assert (rig.line.heard(), rig.port.out_waiting) == (b"", 4)
+    rig.port.set_output_flow_control()
+    assert rig.heard(4) == b"held"
+
+
+def test_a_port_that_is_renamed_is_opened_by_its_new_name() -> None:
+    rig, other = OnRig(), OpenLine(**OPTIONS)
+    other.port.close()
+    with SERIAL_PORTS.offer("other", other.side):
+        rig.port.port = "tickrig://other"
+        rig.port.write(b"x")
+        rig.port.flush()
+        assert (other.heard(), rig.line.heard()) == (b"x", b"")
+        rig.port.port = "rig"  # the name that it was made with
+        rig.port.write(b"y")
+        assert (other.heard(), rig.heard(1)) == (b"", b"y")
+        with pytest.raises(serial.SerialException, match="not open port /dev/ttyUSB0"):
+            rig.port.port = "/dev/ttyUSB0"
+    assert not rig.port.is_open

@@ -17,12 +17,13 @@ class SerialGone(PortGone, serial.SerialException):
     """A port is there no more; for hosts, pyserial's own error."""
 
 
-class _Watched(serial.SerialBase):
+class WatchedPort(serial.SerialBase):
     """What a watched port does beside what its class does."""
 
     _watch: DoorWatch
 
-    def read(self, size: int = 1, /) -> bytes:
+    def read(self, size: int = 1) -> bytes:
+        """Read as the port does, and note what came and how late."""
         self._watch.used()
         wanted_s, begun_ns = self.timeout, monotonic_ns()
         try:
@@ -38,7 +39,8 @@ class _Watched(serial.SerialBase):
             self._watch.waited(round(wanted_s * 1e6), took_us)
         return data
 
-    def write(self, data: Any, /) -> int | None:
+    def write(self, data: Any) -> int | None:
+        """Write as the port does, and note what went out."""
         self._watch.used()
         try:
             written = super().write(data)
@@ -65,7 +67,7 @@ def open_watched(url: str, watch: DoorWatch, options: dict[str, Any]) -> serial.
     try:
         port = serial.serial_for_url(url, do_not_open=True, **options)
         kind = type(port)
-        port.__class__ = type(kind.__name__, (_Watched, kind), {"_watch": watch})
+        port.__class__ = type(kind.__name__, (WatchedPort, kind), {"_watch": watch})
         port.open()
     except (serial.SerialException, OSError) as error:
         raise SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
