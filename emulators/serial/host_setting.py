@@ -26,9 +26,14 @@ class HostSetting:
         self._next_us = 0
         self.differing = ""
 
-    def look(self, now_us: int) -> None:
-        """Look whether it differs, every now and then."""
-        if now_us < self._next_us:
+    def look(self, now_us: int, *, at_once: bool = False) -> None:
+        """Look whether it differs: twice a second, or at once.
+
+        Args:
+            now_us: the present.
+            at_once: whether the host did something.
+        """
+        if now_us < self._next_us and not at_once:
             return
         self._next_us = now_us + LOOK_US
         setting = self._read()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import select
+import sys
 import termios
 import tty
 from collections.abc import Callable
@@ -26,7 +29,7 @@ def setting_of(terminal: int) -> str:
     """Return rate, bits, parity and stop bits, as `115200 8N1`.
 
     Linux keeps the bit rate, the stop bits and whether parity is odd. A pseudo-terminal always
-    has 8 bits, and even parity cannot be told from none.
+    has 8 bits, and even parity looks like none.
     """
     _, _, flags, _, _, speed, _ = termios.tcgetattr(terminal)
     bits = {termios.CS5: 5, termios.CS6: 6, termios.CS7: 7}.get(flags & termios.CSIZE, 8)
@@ -36,6 +39,51 @@ def setting_of(terminal: int) -> str:
 
 
 READ_BYTES: Final = 4_096
+
+IN_OPEN: Final = 0x20
+IN_CLOSE: Final = 0x08 | 0x10
+
+
+class PtyVisits(NonCopyable):
+    """Wakes the emulator when a host opens or closes the terminal, or sends something.
+
+    Args:
+        master: the emulator's side.
+        path: the host's side.
+
+    Attributes:
+        wakes: the descriptor to wait on. Without inotify, which Linux alone has, it is `master`.
+    """
+
+    why_not_copied = "it is a pty of this machine"
+
+    def __init__(self, master: int, path: str) -> None:
+        self.wakes, self._inotify = master, -1
+        if sys.platform == "linux":
+            libc = ctypes.CDLL(None, use_errno=True)
+            self._inotify = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
+            if self._inotify < 0:  # the user has used up all instances
+                return
+            libc.inotify_add_watch(self._inotify, os.fsencode(path), IN_OPEN | IN_CLOSE)
+            epoll = select.epoll()
+            for fd in (master, self._inotify):
+                epoll.register(fd, select.EPOLLIN)
+            self.wakes = epoll.fileno()
+            self._epoll = epoll
+
+    def any(self) -> bool:
+        """Return whether a host came or left since the last call."""
+        try:
+            return self._inotify >= 0 and bool(os.read(self._inotify, READ_BYTES))
+        except BlockingIOError:
+            return False
+
+    def close(self) -> None:
+        """Watch no more."""
+        if self._inotify >= 0:
+            self._epoll.close()
+            os.close(self._inotify)
+            self._inotify = -1
 
 
 class PtyPort(NonCopyable):
@@ -72,6 +120,7 @@ class PtyPort(NonCopyable):
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
+        self._visits = PtyVisits(self._master, self.path)
         self.lost, self.spoken = 0, False
         self._buffer_bytes, self._unsent = buffer_bytes, b""
         self._link: PtyLink | None = None
@@ -84,8 +133,8 @@ class PtyPort(NonCopyable):
                 raise
 
     def fileno(self) -> int:
-        """Return the descriptor to wait on for what the host sends."""
-        return self._master
+        """Return the descriptor to wait on for what the host does."""
+        return self._visits.wakes
 
     @property
     def due_us(self) -> int:
@@ -120,12 +169,12 @@ class PtyPort(NonCopyable):
         except BlockingIOError:
             return b""
         self.spoken = True
+        self._look(now_us, at_once=True)
         return data
 
     def attend(self, now_us: int, /) -> None:
         """Look at what the host has set, and give it what is kept for it."""
-        if self._setting is not None:
-            self._setting.look(now_us)
+        self._look(now_us, at_once=self._visits.any())
         self._flush()
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
@@ -141,10 +190,26 @@ class PtyPort(NonCopyable):
         if self._link is not None:
             self._link.close()
         self._link = self._setting = None
+        self._visits.close()
         for fd in (self._master, self._slave):
             if fd >= 0:
                 os.close(fd)
         self._master = self._slave = -1
+
+    def _look(self, now_us: int, *, at_once: bool) -> None:
+        """Look at what the host has set, and let the next one set it again.
+
+        A pseudo-terminal drops even parity and 7 bits. glibc reports EINVAL if nothing is left of
+        what a host asked for, so the second host of such a setting fails. Hosts set CLOCAL, which
+        means nothing here: as it is cleared, their requests always change something.
+        """
+        if self._setting is not None:
+            self._setting.look(now_us, at_once=at_once)
+        if at_once:
+            attributes = termios.tcgetattr(self._slave)
+            if attributes[2] & termios.CLOCAL:
+                attributes[2] &= ~termios.CLOCAL
+                termios.tcsetattr(self._slave, termios.TCSANOW, attributes)
 
     def _flush(self) -> None:
         if self._unsent:

@@ -80,6 +80,7 @@ class SimSerial(SimPort):
             else:
                 what = f"could not open port {self.port}: this port is on a rig, as {own_name}"
                 raise SerialException(f"{what}; others are {FORM}")
+            self._read_cancelled = self._write_cancelled = False
         super().open()
 
     def _begin(self, *positional: Any, **options: Any) -> None:

@@ -198,6 +198,46 @@ def test_each_setting_is_told_once_and_the_present_one_is_known() -> None:
     assert told == ["9600 8N1", "19200 8N1"]
 
 
+EVEN: dict[str, Any] = {"bytesize": 7, "parity": "E"}
+
+
+def test_hosts_of_even_parity_come_one_after_another() -> None:
+    with closing(PtyPort()) as port:
+        port.watch_setting(115_200, pytest.fail)
+        for number in range(3):
+            with serial.Serial(port.path, 115_200, **EVEN):
+                pass
+            assert select.select([port], [], [], 0)[0]  # the close wakes the emulator
+            port.attend(number)
+
+
+def test_a_host_of_even_parity_changes_its_settings_after_a_request() -> None:
+    with closing(PtyPort()) as port, serial.Serial(port.path, 9_600, **EVEN) as host:
+        host.write(b"?")
+        assert arrived(port, 1) == b"?"
+        host.timeout = 1
+
+
+def test_what_wakes_the_emulator_is_taken() -> None:
+    with closing(PtyPort()) as port:
+        with serial.Serial(port.path, 115_200) as host:
+            host.write(b"x")
+        assert select.select([port], [], [], 0)[0]
+        assert arrived(port, 1) == b"x"
+        assert not select.select([port], [], [], 0)[0]
+
+
+def test_a_host_that_has_left_before_the_next_look_is_told() -> None:
+    told: list[str] = []
+    with closing(PtyPort()) as port:
+        port.watch_setting(115_200, told.append)
+        port.attend(0)
+        with serial.Serial(port.path, 19_200):
+            pass
+        port.attend(1)
+        assert (told, port.host_setting) == (["19200 8N1"], "19200 8N1")
+
+
 @pytest.mark.parametrize("make", [Path.mkdir, Path.touch, lambda path: path.symlink_to("/")])
 def test_what_is_no_dead_link_stays(make: object, tmp_path: Path) -> None:
     link = tmp_path / "tty"

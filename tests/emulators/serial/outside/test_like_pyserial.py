@@ -138,6 +138,16 @@ def test_reading_is_as_on_a_pseudo_terminal(steps: list[tuple[str, Any]]) -> Non
             assert do(rig, *step) == do(real, *step), step
 
 
+def test_what_was_cancelled_before_a_port_is_opened_again_is_over() -> None:
+    rig = OnRig()
+    with pty() as real:
+        for bench in (rig, real):
+            bench.port.cancel_read()
+            do(bench, "reopen", None)
+            bench.feed(b">")
+            assert bench.port.read(1) == b">"
+
+
 @given(st.lists(reads().filter(lambda step: step[0] not in {"cancel", "reopen"}), max_size=25))
 def test_reading_is_as_on_a_loop(steps: list[tuple[str, Any]]) -> None:
     rig, loop = OnRig(), OnLoop()
