@@ -26,6 +26,11 @@ _SHARED: Final[Decorator] = add_options(
     ),
     click.option("--device", metavar="URL", help="Serial port of a base; else one is emulated."),
     click.option(
+        "--any-device",
+        is_flag=True,
+        help="Drive what --device names without asking whether it is an RH3 base.",
+    ),
+    click.option(
         "--baud",
         type=click.IntRange(1_200, 4_000_000),
         default=115_200,

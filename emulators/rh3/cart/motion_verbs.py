@@ -75,6 +75,8 @@ def _checked(options: dict[str, Any]) -> MotionOptions:
     given = {name: options.pop(name) for name in (*NAMES, "seed")}
     if options["device"] is not None and options["pace"] is not None:
         raise Refused("--pace is for the emulated base; a --device has real time")
+    if options["any_device"] and options["device"] is None:
+        raise Refused("--any-device is for a --device; the emulated base is known")
     if options["show_map"] is None:
         options["show_map"] = sys.stdout.isatty()
     checked = MotionOptions(**options, base=read_parameters(given))

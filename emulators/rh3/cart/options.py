@@ -48,6 +48,7 @@ class MotionOptions:
         set_id: configuration set.
         device: a serial port, None for an emulated base in virtual time.
         baud: its bit rate.
+        any_device: whether to drive it without asking who it is.
         pace: how many times as fast as the machine's virtual time passes, None as it goes.
         conf: Odometry.conf.
         show_map: draw the track while it runs.
@@ -68,6 +69,7 @@ class MotionOptions:
     plot: Path | None = None
     clock: RealClock = field(default_factory=RealClock)
     room_m: tuple[float, float] | None = None
+    any_device: bool = False
 
     def begin(self, wheels: Wheels | None = None) -> BaseConnection:
         """Return a cart at the origin with its components active."""
@@ -88,7 +90,9 @@ class MotionOptions:
 
     def _connection(self) -> BaseConnection:
         if self.device is not None:
-            return SerialBaseConnection(self.device, self.baud, self.clock)
+            connection = SerialBaseConnection(self.device, self.baud, self.clock)
+            connection.chain.ref_hard.configuration.set("AnyDevice", str(int(self.any_device)))
+            return connection
         world = room(*self.room_m) if self.room_m else None
         loop = ClosedLoop(self.base, world=world, pace=self.pace, clock=self.clock)
         for eye in loop.range_finders:

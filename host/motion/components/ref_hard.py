@@ -26,7 +26,17 @@ from tickrig.host.rtc import (
 from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.text.log import log_of
 from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, ExceptionCode, Request
-from tickrig.wire.modbus.rh3 import REPORT, Address, Command, Fault, Mode, Report, Status, wide
+from tickrig.wire.modbus.rh3 import (
+    DEVICE_ID,
+    REPORT,
+    Address,
+    Command,
+    Fault,
+    Mode,
+    Report,
+    Status,
+    wide,
+)
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
 
@@ -43,6 +53,8 @@ WATCHDOG_MS: Final = 500
 """Silence after which the base stops by itself."""
 
 _TURN: Final = 2**32  # counts after which a counter begins again
+
+_IDENTITY: Final = Request(READ, (Address.DEVICE_ID, 1))
 
 _MODE: Final = Request(READ, (Address.MODE, 1))
 
@@ -74,6 +86,9 @@ class RefHardRh3(RtComponent):
     bumper is pressed or after `Stop` it commands standstill. Where a wheel would have to be
     faster than Velocity_limit, both are slowed down alike.
 
+    First it asks the device who it is, and writes nothing before it has answered as a base
+    does; with `AnyDevice` set to 1 it does not ask.
+
     Not there: the library libsvm and its protocol, whose texts are not public.
 
     Args:
@@ -104,6 +119,7 @@ class RefHardRh3(RtComponent):
     def _bind(self) -> None:
         bind = self.configuration.bind
         self.device = bind("DeviceFileName", "/dev/ttyUSB0")
+        self.any_device = bind("AnyDevice", 0, "0<=x<=1")
         self.gains = tuple(
             bind(f"gain_{name}", default, "0<=x<=32767") for name, default in GAINS.items()
         )
@@ -119,6 +135,7 @@ class RefHardRh3(RtComponent):
     def _forget(self) -> None:
         self._orders: deque[Request] = deque()
         self._twist, self._stopped, self._refused = Twist(), False, 0
+        self._identified = False
         self.report: Report | None = None
 
     @property
@@ -147,6 +164,9 @@ class RefHardRh3(RtComponent):
         gains = (gain.value for gain in self.gains)
         limits = (self._limit(self.velocity_limit), self._limit(self.acceleration_limit))
         settings = (*gains, *(word for limit in limits for word in wide(limit)))
+        self._identified = bool(self.any_device.value)
+        if not self._identified:
+            self._orders.append(_IDENTITY)
         self._orders.append(_MODE)
         self._orders.append(_write(Address.GAIN_P, *settings))
         self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, WATCHDOG_MS))
@@ -157,7 +177,8 @@ class RefHardRh3(RtComponent):
         """Stop the base on its ramp, and give the line back."""
         if self._master is not None:
             try:
-                self._master.begin(_write(Address.COMMAND, Command.STOP))
+                if self._identified:
+                    self._master.begin(_write(Address.COMMAND, Command.STOP))
             except LinkError as error:
                 _LOG.warning("%s: %s", self.instance_name, error)
             self._master.close()
@@ -215,12 +236,17 @@ class RefHardRh3(RtComponent):
         if answer.refusal is not None:
             self._refused += 1  # noise may have made another request of it
             if self._refused >= MAX_MISSES:
-                return self._failed(
-                    f"the base refuses {refusal_text(answer.request, answer.refusal)}"
-                )
+                refusal = refusal_text(answer.request, answer.refusal)
+                return self._failed(f"the base refuses {refusal}{self._stranger}")
             return ReturnCode.RTC_OK
         self._refused = 0
         if self._orders:
+            if self._orders[0] == _IDENTITY:
+                if answer.values != (DEVICE_ID,):
+                    says = ", ".join(f"{value:04X}h" for value in answer.values)
+                    what = f"register 0000h is {says}, not {DEVICE_ID:04X}h"
+                    return self._failed(f"{self.device.value}: {what}{self._stranger}")
+                self._identified = True
             if self._orders.popleft() == _MODE and answer.values == (Mode.FREE,):
                 self._counts = (0, 0)  # it was without power
             return ReturnCode.RTC_OK
@@ -232,6 +258,13 @@ class RefHardRh3(RtComponent):
             faults = fault_text(report.fault_left, report.fault_right)
             return self._failed(f"fault of the base: {faults}")
         return ReturnCode.RTC_OK
+
+    @property
+    def _stranger(self) -> str:
+        """What a failure adds as long as the device may be something else than a base."""
+        if self._identified:
+            return ""
+        return "; not an RH3 base, so nothing was written (rh3 --any-device goes on)"
 
     def _turn(self, report: Report) -> None:
         """Add what the counters counted; they begin again after 2**32."""

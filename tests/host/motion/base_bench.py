@@ -63,7 +63,7 @@ class BaseBench(PortBench[RefHardRh3]):
         self.manager.reset("RefHardRh3")
         self.period()
         self.activate()
-        self.period(6)
+        self.period(7)
 
     def speeds(self) -> tuple[int, int]:
         """Return the wheel speeds that were ordered last, counts/s."""

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from math import inf, nan
 
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.host.motion.base_bench import COUNTS_PER_RAD, COUNTS_PER_TURN, BaseBench
 from tests.host.motion.port_bench import PortBench
-from tickrig.device.modbus.registers import Registers
+from tickrig.device.modbus.registers import Register, Registers
 from tickrig.device.modbus.slave import ModbusSlave
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.emulators.rig.rig import Rig
@@ -35,8 +36,9 @@ def moving(bench: BaseBench) -> bool:
 
 
 def test_settings_and_power_are_ordered_first() -> None:
-    sent = [data[:-2].hex(" ") for _, data in running().link.sent][:5]
+    sent = [data[:-2].hex(" ") for _, data in running().link.sent][:6]
     assert sent == [
+        "01 03 00 00 00 01",
         "01 03 00 10 00 01",
         "01 10 00 20 00 0a 14 00 0a 00 00 00 00 00 0a 00 00 00 01 00 03 a3 6e 00 12 31 26",
         "01 10 00 10 00 03 06 00 01 00 05 01 f4",
@@ -268,6 +270,58 @@ class RefusingBench(BaseBench):
         return super()._open(url)
 
 
+class Inverter(ModbusSlave):
+    """Another slave with registers where a base has its own: a master would start its motor."""
+
+    tick_us = 1_000
+
+    def __init__(self, device_id: int) -> None:
+        table = (Register(0, "id", "", initial=device_id), Register(0x10, "run", "", writable=True))
+        super().__init__(Registers(table, {}), self._ran)
+        self.ran: list[Mapping[str, int]] = []
+
+    def _ran(self, values: Mapping[str, int]) -> None:
+        self.ran.append(values)
+
+
+class StrangerBench(BaseBench):
+    """A bench with a slave that is not a base."""
+
+    def __init__(self, device_id: int, **configuration: str) -> None:
+        self.inverter = Inverter(device_id)
+        super().__init__(0, **configuration)
+
+    def _open(self, url: str) -> Link[bytes]:
+        self.rig = Rig(Station(self.inverter, self.port))
+        return super()._open(url)
+
+
+def test_a_device_that_is_not_a_base_is_refused_before_anything_is_written(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    bench = StrangerBench(0x1234, DeviceFileName="/dev/ttyUSB7")
+    bench.drive(0.3, periods=30)
+    assert bench.state == "ERROR"
+    assert "/dev/ttyUSB7: register 0000h is 1234h, not 5248h; not an RH3 base" in caplog.text
+    assert {data[1] for _, data in bench.link.sent} == {0x03}
+    assert not bench.inverter.ran
+
+
+def test_nothing_is_written_to_a_device_that_has_not_said_who_it_is() -> None:
+    bench = BaseBench()
+    bench.port.arm("cut")
+    bench.period(2)
+    bench.deactivate()
+    assert {data[1] for _, data in bench.link.sent} == {0x03}
+
+
+def test_any_device_is_driven_if_the_user_says_so() -> None:
+    bench = StrangerBench(0x1234, AnyDevice="1")
+    bench.drive(0.3, periods=30)
+    assert bench.state == "ERROR"  # it has no gains
+    assert {data[1] for _, data in bench.link.sent} == {0x03, 0x10}
+
+
 def test_a_request_that_was_refused_is_made_again() -> None:
     bench = RefusingBench(4)
     bench.drive(0.3, periods=60)
@@ -279,12 +333,13 @@ def test_a_base_that_goes_on_to_refuse_is_an_error(caplog: pytest.LogCaptureFixt
     bench = RefusingBench(5)
     bench.period(12)
     assert bench.state == "ERROR"
-    assert "the base refuses function 03h at 0010h: " in caplog.text
+    refused = "the base refuses function 03h at 0000h: illegal data address; not an RH3 base"
+    assert refused in caplog.text
 
 
 def test_a_limit_beyond_32_bits_is_the_highest_there_is() -> None:
     bench = running(0.3, Velocity_limit="1e9")
-    assert bench.link.sent[1][1][19:23].hex() == "7fffffff"
+    assert bench.link.sent[2][1][19:23].hex() == "7fffffff"
     assert bench.state == "ACTIVE"
 
 
