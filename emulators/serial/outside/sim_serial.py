@@ -30,10 +30,9 @@ class SimSerial(SimPort):
     until a byte is there, its stop bit too, and exactly its timeout if none comes; `write` until
     the line's buffer takes all; `flush`, a break and `send_break`. Nothing else does.
 
-    Where the systems differ it is as Linux, but for `inter_byte_timeout`, which is as documented
-    and on Windows (on POSIX pyserial ignores it). Not emulated: XON and XOFF, DSR and DTR as flow
-    control, RS485 modes (the emulated line turns round by itself); they can be set and change
-    nothing. With `rtscts` nothing is sent before CTS is on; what was sent while it was on goes.
+    Where the systems differ it is as Linux, where pyserial ignores `inter_byte_timeout`. Not
+    emulated: XON and XOFF, DSR and DTR as flow control, RS485 modes (the emulated line turns round
+    by itself); they can be set and change nothing. With `rtscts` nothing is sent before CTS is on; what was sent while it was on goes.
 
     Args:
         side: the host's side of the line.
@@ -105,7 +104,7 @@ class SimSerial(SimPort):
             size: how many at most.
 
         Returns:
-            As many, or fewer after the timeout, a gap of `inter_byte_timeout`, or `cancel_read`.
+            As many, or fewer after the timeout or `cancel_read`.
 
         Raises:
             SerialException: the port is closed; nothing came for an hour, and there is no timeout.
@@ -123,19 +122,16 @@ class SimSerial(SimPort):
 
     def _read_by(self, side: SerialSide, size: int, until_us: int) -> bytes:
         """Read up to `size` bytes, and wait for them until a time."""
-        data, end_us = bytearray(), until_us
-        gap_s = self.inter_byte_timeout or None  # 0 is none
+        data = bytearray()
         waits = not self._read_cancelled
         while waits:
             self._receive(side)
-            if new := self._take(max(0, size - len(data))):
-                data += new
-                end_us = min(until_us, side.waits.deadline_us(gap_s)) if gap_s else until_us
-            if len(data) >= size or side.rig.now_us >= end_us:
+            data += self._take(max(0, size - len(data)))
+            if len(data) >= size or side.rig.now_us >= until_us:
                 return bytes(data)
             if waits := not self._reading_ended():
-                there_us = partial(side.receiver.arrival_us, 1 if gap_s else size - len(data))
-                side.waits.wait(end_us, there_us, self._reading_ended)
+                there_us = partial(side.receiver.arrival_us, size - len(data))
+                side.waits.wait(until_us, there_us, self._reading_ended)
         self._read_cancelled = False
         return bytes(data)
 
@@ -163,7 +159,7 @@ class SimSerial(SimPort):
         """Read until a sequence has come, or the timeout is over.
 
         Args:
-            expected: the sequence.
+            expected: the sequence; text never comes, as with pyserial.
             size: how many bytes at most.
         """
         side = self._side()
@@ -173,7 +169,7 @@ class SimSerial(SimPort):
             full = size is not None and len(data) >= size
             if data[-len(expected) :] == expected or full or side.rig.now_us >= until_us:
                 break
-            if size is None and not self._input:
+            if size is None and not self._input and not isinstance(expected, str):
                 self._gather(side, expected, until_us)
                 if self._reading_ended() and expected not in data + self._input:
                     self._read_cancelled = False
