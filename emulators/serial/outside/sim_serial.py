@@ -32,7 +32,8 @@ class SimSerial(SimPort):
 
     Where the systems differ it is as Linux, where pyserial ignores `inter_byte_timeout`. Not
     emulated: XON and XOFF, DSR and DTR as flow control, RS485 modes (the emulated line turns round
-    by itself); they can be set and change nothing. With `rtscts` nothing is sent before CTS is on; what was sent while it was on goes.
+    by itself); they can be set and change nothing. With `rtscts` nothing is sent before CTS is on;
+    what was sent while it was on goes.
 
     Args:
         side: the host's side of the line.
@@ -155,7 +156,7 @@ class SimSerial(SimPort):
             return self._take(len(self._input))
         return super().readline()
 
-    def read_until(self, expected: bytes = LF, size: int | None = None) -> bytes:
+    def read_until(self, expected: bytes | str = LF, size: int | None = None) -> bytes:
         """Read until a sequence has come, or the timeout is over.
 
         Args:
@@ -164,14 +165,16 @@ class SimSerial(SimPort):
         """
         side = self._side()
         until_us, data = side.waits.deadline_us(self.timeout), bytearray()
+        end = None if isinstance(expected, str) else expected
         while byte := self.read(1):
             data += byte
             full = size is not None and len(data) >= size
-            if data[-len(expected) :] == expected or full or side.rig.now_us >= until_us:
+            ended = end is not None and data[-len(end) :] == end
+            if ended or full or side.rig.now_us >= until_us:
                 break
-            if size is None and not self._input and not isinstance(expected, str):
-                self._gather(side, expected, until_us)
-                if self._reading_ended() and expected not in data + self._input:
+            if size is None and not self._input and end is not None:
+                self._gather(side, end, until_us)
+                if self._reading_ended() and end not in data + self._input:
                     self._read_cancelled = False
                     data += self._take(len(self._input))
                     break
