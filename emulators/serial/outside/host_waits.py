@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable
 from typing import Final
 
@@ -18,6 +19,11 @@ LONGEST_US: Final = 3_600_000_000
 """A wait without a timeout ends with an exception after an hour."""
 
 INSTEAD: Final = "read and write in the thread that made the rig"
+
+NO_ASYNCIO: Final = (
+    "a port in virtual time has no file descriptor; hosts that wait on one (asyncio, select) run in"
+    " real time: --bench-mode real"
+)
 
 LOOKING: Final = "read with a timeout, or let time.sleep be that of the rig"
 
@@ -40,6 +46,8 @@ class HostWaits(Copyable):
         Args:
             name: the port.
         """
+        if threading.current_thread().name.startswith("asyncio"):  # of an event loop's executor
+            raise SerialException(f"{name}: {NO_ASYNCIO}")
         if refusal := self._thread.refusal(name, INSTEAD):
             raise SerialException(refusal)
 

@@ -11,6 +11,7 @@ from typing import Any, NoReturn, cast
 from serial.serialutil import XOFF, XON, PortNotOpenError, SerialBase, SerialException
 
 from tickrig.device.twin import twin
+from tickrig.emulators.serial.outside.host_waits import NO_ASYNCIO
 from tickrig.emulators.serial.outside.modem_lines import ModemLines
 from tickrig.emulators.serial.outside.serial_side import Mismatch, SerialSide
 from tickrig.wire.serial.uart import Parity, UartSetting
@@ -181,4 +182,4 @@ class SimPort(SerialBase):
 
     def fileno(self) -> NoReturn:
         """Refuse: there is nothing that `select` could wait for."""
-        raise io.UnsupportedOperation(f"{self.port} is in virtual time: it has no file descriptor")
+        raise io.UnsupportedOperation(f"{self.port}: {NO_ASYNCIO}")

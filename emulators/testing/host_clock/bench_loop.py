@@ -5,14 +5,21 @@ from __future__ import annotations
 import asyncio
 import selectors
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from math import ceil
 from selectors import SelectorKey
 from threading import get_ident
-from typing import Any
+from typing import Any, Final, TypeVar, TypeVarTuple
 
 from tickrig.emulators.rig.sim_waits import Passing
 from tickrig.emulators.testing.host_clock.errors import HostTimeError
+
+T = TypeVar("T")
+Ts = TypeVarTuple("Ts")
+
+EXECUTOR_S: Final = 5.0
+"""So long, in real time, a loop waits for a function that it runs in a thread."""
 
 Events = list[tuple[SelectorKey, int]]
 
@@ -29,12 +36,37 @@ class BenchLoop(asyncio.SelectorEventLoop):
 
     def __init__(self, passing: Passing) -> None:
         self._passing = passing
+        self._threads: ThreadPoolExecutor | None = None
         super().__init__(_PassingSelector(passing, self._called))
         self._clock_resolution = 1e-6  # of the rig, not of this machine
 
     def time(self) -> float:
         """Return the time in seconds."""
         return self._passing.time_s
+
+    def run_in_executor(
+        self, executor: Executor | None, func: Callable[[*Ts], T], *args: *Ts
+    ) -> asyncio.Future[T]:
+        """Run a function in a thread, and wait for it: meanwhile no virtual time passes.
+
+        Args:
+            executor: as asyncio takes it.
+            func: the function.
+            args: its arguments.
+        """
+        if executor is None:
+            if self._threads is None:
+                self._threads = ThreadPoolExecutor(thread_name_prefix="asyncio")
+            executor = self._threads
+        running = executor.submit(func, *args)
+        wait([running], EXECUTOR_S)
+        return asyncio.wrap_future(running, loop=self)
+
+    def close(self) -> None:
+        """Close it, and let its threads end."""
+        if self._threads is not None:
+            self._threads.shutdown(wait=False)
+        super().close()
 
     def _called(self) -> bool:
         """Say whether something is to be called at once, by whom that may be."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import select
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -19,6 +20,27 @@ from tickrig.emulators.testing.host_clock.switches import Acts
 FOR_EVER: Final = (
     "waits for ever: nothing that happens on the bench ends it, and another thread cannot"
 )
+
+
+OTHER_CLOCKS: Final = {
+    "freezegun": ("freezegun.api", ("freeze_factories",)),
+    "time-machine": ("time_machine", ("traveller_stack", "coordinates_stack")),
+}
+"""Packages that replace the clock, and where each keeps what replaces it at present."""
+
+
+def check_clock() -> None:
+    """Raise HostTimeError if freezegun or time-machine has replaced the clock.
+
+    Both tell `datetime` and `time` another time, and freezegun's `monotonic` stands still, so
+    that a host that polls until a deadline never reaches it.
+    """
+    for package, (module, stacks) in OTHER_CLOCKS.items():
+        if (found := sys.modules.get(module)) and any(getattr(found, s, None) for s in stacks):
+            raise HostTimeError(
+                f"{package} has replaced the clock, and so does bench_time (bench.patched_time):"
+                " use one of them; bench_time begins at 2000-01-01 and moves datetime not at all"
+            )
 
 
 class HostWaits:
@@ -57,6 +79,7 @@ class HostWaits:
             thread = threading.get_ident()
             if thread in self._others:
                 return original()
+            check_clock()
             return getattr(self._clock if thread == self._owner else self._standing, name)()
 
         return act
@@ -69,6 +92,7 @@ class HostWaits:
             try:
                 if thread != self._owner:
                     raise HostTimeError(_other_thread())
+                check_clock()
                 return wait(original, *args, **kwargs)
             except _ForEver as error:
                 raise HostTimeError(f"{line_of(frame)}: {name} {error}") from None

@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from tickrig.emulators.rig.sim_waits import Passing, SimTime
 from tickrig.emulators.testing.host_clock.errors import HostTimeError
-from tickrig.emulators.testing.host_clock.host_waits import HostWaits
+from tickrig.emulators.testing.host_clock.host_waits import HostWaits, check_clock
 from tickrig.emulators.testing.host_clock.switches import Switches
 
 
@@ -38,8 +38,10 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
 
     Raises:
         HostTimeError: another thread waited, or something that the rig had called back; it is
-            raised there, and once more at the end: such things are swallowed easily.
+            raised there, and once more at the end: such things are swallowed easily. Or freezegun
+            or time-machine has replaced the clock.
     """
+    check_clock()
     clock = SimTime(passing)
     waits = HostWaits(passing, clock)
     with Switches(waits.acts()), _loops(passing):

@@ -292,7 +292,7 @@ def test_a_port_without_a_line_says_so() -> None:
 
 
 def test_there_is_no_file_descriptor() -> None:
-    with pytest.raises(io.UnsupportedOperation, match="rig is in virtual time: it has no file"):
+    with pytest.raises(io.UnsupportedOperation, match="rig: a port in virtual time has no file"):
         OpenLine().port.fileno()
 
 

@@ -7,9 +7,18 @@ import socket
 import threading
 
 import pytest
+import serial
+import serial_asyncio_fast
 
 from tests.emulators.testing.host_clock.test_patched_time import RrcBench
+from tickrig.device.rrc.machine import Rrc
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
+from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
+from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
+from tickrig.emulators.testing.host_clock.rig_passing import RigPassing
 
 
 def test_sleeping_and_timeouts_are_those_of_the_rig() -> None:
@@ -60,6 +69,34 @@ def test_what_happens_on_the_bench_wakes_it() -> None:
     with patched_time(bench.passing):
         assert asyncio.run(host()) == 70_000
     assert bench.rig.now_us <= 70_000
+
+
+def test_a_loop_waits_for_its_threads_while_no_virtual_time_passes() -> None:
+    bench = RrcBench()
+
+    async def host() -> list[int]:
+        loop = asyncio.get_running_loop()
+        return [await loop.run_in_executor(None, pow, 2, 5), await asyncio.to_thread(pow, 2, 6)]
+
+    with patched_time(bench.passing):
+        assert asyncio.run(host()) == [32, 64]
+    assert bench.rig.now_us == 0
+
+
+def test_a_serial_host_of_asyncio_is_told_to_run_in_real_time() -> None:
+    line = SerialLine()
+    rig = Rig(Station(Rrc(), line.a))
+
+    async def host() -> None:
+        url = "tickrig://asyncio"
+        await serial_asyncio_fast.open_serial_connection(url=url, baudrate=115_200)
+
+    with (
+        SERIAL_PORTS.offer("asyncio", SerialSide(rig, line.b)),
+        patched_time(RigPassing(rig)),
+        pytest.raises(serial.SerialException, match="run in real time: --bench-mode real"),
+    ):
+        asyncio.run(host())
 
 
 def test_what_will_never_come_is_told() -> None:

@@ -8,11 +8,13 @@ import select
 import socket
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, suppress
 from types import ModuleType
 
+import freezegun
 import pytest
+import time_machine
 
 from tests.emulators.sim_bench import SimBench
 from tests.emulators.testing.host_clock import user_host
@@ -281,3 +283,23 @@ def test_it_costs_nothing_where_nobody_looks(bench: RrcBench) -> None:
     with patched_time(bench.passing) as clock:
         clock.sleep(1)
     assert bench.rig.now_us == 1_000_000
+
+
+OTHER_CLOCKS: dict[str, Callable[[], AbstractContextManager[object]]] = {
+    "freezegun": lambda: freezegun.freeze_time("2020-01-01", ignore=["tickrig"]),
+    "time-machine": lambda: time_machine.travel(1_577_836_800, tick=False),
+}
+
+
+@pytest.mark.parametrize("package", OTHER_CLOCKS)
+def test_another_clock_is_refused_before_and_while_time_is_patched(
+    package: str, bench: RrcBench
+) -> None:
+    other = OTHER_CLOCKS[package]
+    refused = f"{package} has replaced the clock, and so does bench_time"
+    with other(), pytest.raises(HostTimeError, match=refused), patched_time(bench.passing):
+        pass
+    with pytest.raises(HostTimeError, match=refused), patched_time(bench.passing), other():
+        time.sleep(0.001)
+    with patched_time(bench.passing):
+        time.sleep(0.001)
