@@ -47,6 +47,8 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
     (['epos'], ['left/stick'])
     >>> closest("0x5000", ["0x2000", "3/0x5000"]), closest("0x5000", ["0x2000"])
     (['3/0x5000'], [])
+    >>> closest("rh3", ["rrc", "rh3-base"]), closest("rtc", ["rtc-lite", "rtc-echo"])
+    (['rh3-base'], [])
     >>> closest("left/speed_rpm", ["left/load_nm"]), closest("left/lod_nm", ["left/load_nm"])
     ([], ['left/load_nm'])
     """
@@ -63,6 +65,9 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
         alike.setdefault(each.rpartition("/")[2].casefold(), each)
     wanted = name.casefold()
     meant = [each for each in alike if not _is_another(wanted, each)]
+    begun = [each for each in meant if re.match(r"[-_]", each.removeprefix(wanted))]
+    if len(begun) == 1 and wanted:
+        return [alike[begun[0]]]
     return [alike[each] for each in get_close_matches(wanted, meant, n=1)]
 
 

@@ -168,8 +168,8 @@ def bench_time(bench: Bench) -> Iterator[Any]:
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, None, None]:
     """Note requirements; skip a test whose fixtures its bench cannot give."""
-    for marker in item.iter_markers("req"):
-        item.user_properties.extend(("req", name) for name in marker.args)
+    names = (("req", name) for marker in item.iter_markers("req") for name in marker.args)
+    item.user_properties.extend(each for each in names if each not in item.user_properties)
     with skipped_where_it_cannot():
         return (yield)
 

@@ -128,6 +128,26 @@ def test_requirements_stand_in_junit_files(pytester: pytest.Pytester, run: Run) 
     ]
 
 
+def test_requirements_of_a_test_that_runs_again_stand_in_junit_files_once(
+    pytester: pytest.Pytester, run: Run
+) -> None:
+    pytester.makepyfile(
+        """
+        import pytest
+
+        runs = []
+
+        @pytest.mark.req("SAF-12")
+        def test_one():
+            runs.append(1)
+            assert len(runs) == 3
+        """
+    )
+    run("-p", "pytest_rerunfailures", "--reruns=2", "--junitxml=out.xml").assert_outcomes(passed=1)
+    cases = Xml.parse(pytester.path / "out.xml").iter("testcase")
+    assert [len(list(case.iter("property"))) for case in cases] == [1, 1, 1]
+
+
 def test_markers_are_told(run: Run) -> None:
     run("--markers").stdout.fnmatch_lines(
         ["@pytest.mark.needs([*]what): *(tickrig)", "@pytest.mark.req([*]names): *(tickrig)"]
