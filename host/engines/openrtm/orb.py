@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -24,6 +25,9 @@ _CLOSE_S: Final = 2.0
 _POLL_S: Final = 0.005
 
 _LOG: Final = log_of(__name__)
+
+_NOT_CARRIED: Final = re.compile("[\0\ud800-\udfff]")
+"""NUL ends a string of CORBA, and half of a surrogate pair is no character of UTF-8."""
 
 _REFUSALS: Final = {
     ReturnCode.BAD_PARAMETER: CORBA.BAD_PARAM,
@@ -141,8 +145,24 @@ def _serves() -> bool:
 
 
 def nvlist(values: dict[str, str], name_value: Callable[[str, Any], Any]) -> list[Any]:
-    """Return an NVList of strings, made of the `NameValue` of the stubs."""
-    return [name_value(name, omni_any.to_any(value)) for name, value in values.items()]
+    """Return an NVList of strings, made of the `NameValue` of the stubs.
+
+    What a string of CORBA cannot carry becomes U+FFFD, with a line in the log: the ORB would
+    refuse the whole answer behind the servant, where nothing can be logged.
+    """
+    return [
+        name_value(_carried(name, name), omni_any.to_any(_carried(name, value)))
+        for name, value in values.items()
+    ]
+
+
+def _carried(name: str, text: str) -> str:
+    carried = _NOT_CARRIED.sub("\N{REPLACEMENT CHARACTER}", text)
+    if carried != text:
+        _LOG.warning(
+            "OpenRTM: %r: a CORBA string cannot carry %r, it is sent as %r", name, text, carried
+        )
+    return carried
 
 
 def explain(error: Exception) -> str:
@@ -157,6 +177,7 @@ def _options(endpoint: Endpoint) -> dict[str, str]:
         "endPoint": endpoint.uri,
         "clientCallTimeOutPeriod": str(CALL_TIMEOUT_MS),
         "clientConnectTimeOutPeriod": str(CALL_TIMEOUT_MS),
+        "nativeCharCodeSet": "UTF-8",  # else only Latin-1 can be sent
         "traceLevel": "0",  # it would write to standard error
     }
 

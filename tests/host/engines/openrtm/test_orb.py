@@ -5,7 +5,7 @@ import pytest
 from omniORB import CORBA
 
 from tests.host.engines.openrtm.extra import OMNIORB
-from tickrig.host.engines.openrtm.orb import Orb, explain
+from tickrig.host.engines.openrtm.orb import Orb, explain, nvlist
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 
 pytestmark = OMNIORB
@@ -70,3 +70,15 @@ def test_an_object_that_is_served_here_is_known_by_its_key(orb: Orb) -> None:
     assert orb.key(first) == orb.key(orb.reference(orb.text(first))) != orb.key(second)
     assert orb.key(orb.reference("corbaloc::127.0.0.1:1/other")) == b""
     assert orb.key(None) == b""
+
+
+def test_text_that_corba_cannot_carry_is_sent_without_it_and_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    sent = nvlist({"price": "10 €\0\udc80", "name": "Ω"}, lambda name, value: (name, value.value()))
+    assert sent == [
+        ("price", "10 €\N{REPLACEMENT CHARACTER}\N{REPLACEMENT CHARACTER}"),
+        ("name", "Ω"),
+    ]
+    (message,) = caplog.messages
+    assert message.startswith("OpenRTM: 'price': a CORBA string cannot carry '10 €\\x00\\udc80'")

@@ -129,6 +129,17 @@ def test_rtconf_lists_sets_and_activates(system: LiveSystem) -> None:
     assert system.tool("rtconf", "@/ConfigSample0.rtc", "set", "int_param0", "0")[0] == 0
 
 
+def test_rtconf_lists_gets_and_sets_text_beyond_latin_1(system: LiveSystem) -> None:
+    system.ours("conf", "set", "ConfigSample0", "str_param0", "10 €")
+    code, out, error = system.tool("rtconf", "-l", "@/ConfigSample0.rtc", "list")
+    assert (code, error) == (0, "")
+    assert "10 €" in out
+    assert system.tool("rtconf", "@/ConfigSample0.rtc", "get", "str_param0") == (0, "10 €\n", "")
+    assert system.tool("rtconf", "@/ConfigSample0.rtc", "set", "str_param0", "Ω") == (0, "", "")
+    assert system.tool("rtconf", "@/ConfigSample0.rtc", "get", "str_param0") == (0, "Ω\n", "")
+    system.ours("conf", "set", "ConfigSample0", "str_param0", "dara")
+
+
 def test_rtconf_hides_what_is_for_editors(system: LiveSystem) -> None:
     shown = system.tool("rtconf", "@/ConfigSample0.rtc", "list")[1]
     assert "__constraints__" not in shown
