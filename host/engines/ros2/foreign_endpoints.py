@@ -25,6 +25,8 @@ MATCH_S: Final = 5.0
 
 MOST: Final = 1_000
 
+_INFINITE_NS: Final = 0x7FFF_FFFF_FFFF_FFFF
+
 _UNSIGNED: Final = 0xFFFF_FFFF_FFFF_FFFF
 """Handles are 64 bits, which Cyclone DDS's Python has with a sign or without."""
 
@@ -101,6 +103,9 @@ class ForeignEndpoints:
             self._warn(f"a reader of {entry.topic} wants it reliably: set reliable = true")
         elif not reads and entry.reliable and not reliable:
             self._warn(f"a writer of {entry.topic} does not send reliably: set reliable = false")
+        elif policy := _refused_policy(endpoint.qos, reads=reads):
+            does = f"a {'reader' if reads else 'writer'} of {entry.topic}"
+            self._warn(f"{does} has a QoS policy that does not fit ours: {policy}")
         else:
             text = f"{does} {entry.type} with other fields on {entry.topic}"
             self._awaited[handle] = time.monotonic() + MATCH_S, own, text
@@ -117,6 +122,29 @@ class ForeignEndpoints:
         if text not in self._warned:
             self._warned.add(text)
             _LOG.warning("ros2: %s; it is not joined", text)
+
+
+def _refused_policy(qos: Any, *, reads: bool) -> str:  # noqa: PLR0911 - a table
+    """Return which policy of a peer cannot be met, with its value; empty if all can.
+
+    Ours are the defaults of DDS: no deadline, automatic liveliness without a lease, shared
+    ownership, order by reception (DDS 1.4, 2.2.3: requested and offered must be compatible).
+    """
+    for policy in qos:
+        match policy:
+            case Policy.Ownership.Exclusive:
+                return "ownership exclusive"
+            case Policy.Deadline(deadline=ns) if reads and ns < _INFINITE_NS:
+                return f"deadline {ns / 1e6:g} ms"
+            case Policy.DestinationOrder.BySourceTimestamp if reads:
+                return "destination order by source timestamp"
+            case Policy.Liveliness.Automatic(lease_duration=ns) if reads and ns < _INFINITE_NS:
+                return f"liveliness automatic, lease {ns / 1e6:g} ms"
+            case Policy.Liveliness.ManualByParticipant() if reads:
+                return "liveliness manual by participant"
+            case Policy.Liveliness.ManualByTopic() if reads:
+                return "liveliness manual by topic"
+    return ""
 
 
 def _is_reliable(qos: Any) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from math import isfinite
 from typing import Any, Final
 
 from cyclonedds.core import DDSException, Listener
@@ -13,6 +14,9 @@ from tickrig.host.engines.ros2.participant import HISTORY, Participant, reason_o
 from tickrig.host.engines.ros2.topic_entry import TopicEntry
 from tickrig.host.rtc.remote.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
+
+SMALLEST: Final = 1.2e-38
+"""Below it a float32 is denormal; nothing on a robot is so small."""
 
 _LOG: Final = log_of(__name__)
 
@@ -53,7 +57,7 @@ class TopicReader:
         self._participant, self.entry, self._thread = participant, entry, thread
         self._put = put
         self._reader: Any = None
-        self._closed = self._spoilt = self._watched = False
+        self._closed = self._spoilt = self._odd = self._watched = False
         self._heard_s, self._stop_s = 0.0, entry.stop_after_us / 1e6
 
     def open(self) -> None:
@@ -104,6 +108,11 @@ class TopicReader:
         self._spoilt = True
 
     def _hand_on(self, message: Any) -> None:
+        if not self._odd and (odd := odd_number(message)):
+            self._odd = True
+            text = "%s: %s on %s: an rclpy that puts an int into a float field sends this, and"
+            text += " ROS_PYTHON_CHECK_FIELDS=1 in its environment finds it"
+            _LOG.warning(text, self.entry, odd, self.entry.topic)
         self._put(message)
         self._heard_s = time.monotonic()
         if self._stop_s and not self._watched:
@@ -119,3 +128,18 @@ class TopicReader:
         if not self._closed:
             self._put(None)
         return None
+
+
+def odd_number(message: object, path: str = "") -> str:
+    """Return which number of a message no sender can mean, with its value; empty if none.
+
+    That is one that is not finite, or so small that it is a whole number in the bits of a float.
+    Sequences are passed over: a range without an echo is infinite (REP 117).
+    """
+    for name, value in vars(message).items():
+        if isinstance(value, float):
+            if not isfinite(value) or 0 < abs(value) < SMALLEST:
+                return f"{path}{name} is {value:g}"
+        elif hasattr(value, "__dict__") and (odd := odd_number(value, f"{path}{name}.")):
+            return odd
+    return ""

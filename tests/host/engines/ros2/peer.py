@@ -4,7 +4,8 @@
 read TOPIC TYPE           what comes is printed, a line each
 write TOPIC TYPE NUMBER...
 offer TOPIC TYPE          be a writer that writes nothing
-best_effort | reliable    of what is made from now on
+best_effort               of what is made from now on
+policy EXPRESSION         likewise: Deadline(1_000_000)
 """
 
 import json
@@ -177,6 +178,7 @@ class Peer:
         self.readers: dict[str, Any] = {}
         self.writers: dict[str, Any] = {}
         self.reliability: Any = Policy.Reliability.Reliable(100_000_000)
+        self.policies: list[Any] = []
 
     def run(self) -> None:
         print(json.dumps({"ready": True}), flush=True)
@@ -201,6 +203,8 @@ class Peer:
                 self.writer(topic, kind).write(made(kind, numbers))
             case ["best_effort"]:
                 self.reliability = Policy.Reliability.BestEffort
+            case ["policy", expression]:
+                self.policies = [eval(f"Policy.{expression}")]
             case _:
                 raise ValueError(words)
 
@@ -209,6 +213,7 @@ class Peer:
             self.reliability,
             Policy.History.KeepLast(10),
             Policy.DataRepresentation(use_cdrv0_representation=True),
+            *self.policies,
         )
         return Topic(self.participant, f"rt/{name}", globals()[kind]), qos
 

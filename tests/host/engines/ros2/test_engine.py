@@ -226,6 +226,43 @@ def test_a_peer_that_does_not_send_reliably_is_told_in_a_line(
     arrived(joined, driven, peer, "write cmd_vel Twist 2 0 0 0 0 0")
 
 
+@pytest.mark.parametrize(
+    ("policy", "said"),
+    [
+        ("Deadline(50_000_000)", "deadline 50 ms"),
+        ("Liveliness.Automatic(100_000_000)", "liveliness automatic, lease 100 ms"),
+        ("Liveliness.ManualByTopic(100_000_000)", "liveliness manual by topic"),
+        ("Ownership.Exclusive", "ownership exclusive"),
+        ("DestinationOrder.BySourceTimestamp", "destination order by source timestamp"),
+    ],
+)
+def test_a_reader_whose_policy_cannot_be_met_is_told_by_its_name(
+    joined: Joined, caplog: pytest.LogCaptureFixture, policy: str, said: str
+) -> None:
+    _, peer = robot(joined)
+    peer.say(f"policy {policy}")
+    peer.say("read odom Odometry")
+    joined.until(lambda: caplog.messages)
+    (line,) = caplog.messages
+    assert line == (
+        f"ros2: a reader of odom has a QoS policy that does not fit ours: {said}; it is not joined"
+    )
+
+
+@pytest.mark.parametrize(
+    ("number", "said"), [("nan", "nan"), ("-inf", "-inf"), ("5e-324", "4.94066e-324")]
+)
+def test_a_number_that_no_sender_means_is_told_once(
+    joined: Joined, caplog: pytest.LogCaptureFixture, number: str, said: str
+) -> None:
+    driven, peer = robot(joined)
+    for _ in range(3):
+        arrived(joined, driven, peer, f"write cmd_vel Twist {number} 0 0 0 0 0")
+    (line,) = caplog.messages
+    assert f"linear.x is {said} on cmd_vel" in line
+    assert "ROS_PYTHON_CHECK_FIELDS=1" in line
+
+
 def test_a_stopped_peer_delays_nobody(joined: Joined) -> None:
     driven, stopped = robot(joined)
     awake = joined.peer()
