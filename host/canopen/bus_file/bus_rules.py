@@ -61,6 +61,12 @@ _ERRORS: Final = (
 )
 _WARNINGS: Final = (
     (
+        "yaml-number",
+        READERS,
+        "dcfgen and the drivers have two numbers",
+        "write 10, 0xA, 1.5 or 1.5e+3",
+    ),
+    (
         "eds-check",
         "canmon eds check",
         "dcfgen stops, or misreads it",

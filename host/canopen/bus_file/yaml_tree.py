@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from typing import Final, NamedTuple
 
 import yaml
@@ -17,8 +18,29 @@ from tickrig.wire.canopen.eds.eds_file import shorten
 
 WIDEST: Final = 1_000
 """Bits of a number; a longer one stays a text."""
+DIGITS: Final = frozenset("0123456789.")
 MERGE: Final = "tag:yaml.org,2002:merge"
 
+
+READ_APART: Final = (
+    (
+        "[-+]?0[0-7_]+",
+        "{!r} is octal for PyYAML, and for yaml-cpp in whole numbers; decimal in others",
+    ),
+    ("[-+]?0[0-9]*[89][0-9]*", "{!r} is a text for PyYAML, and no whole number for yaml-cpp"),
+    (
+        "[-+]?[0-9][0-9_]*(?::[0-5]?[0-9])+(?:[.][0-9_]*)?",
+        "{!r} is base 60 for PyYAML, no number for yaml-cpp",
+    ),
+    ("[-+]?0b[01_]+", "{!r} is binary for PyYAML, no number for yaml-cpp"),
+    ("[-+]?(?:0x)?[0-9][0-9a-fA-F.]*_[0-9a-fA-F_.]*", "{!r} has _, which only PyYAML passes over"),
+    (
+        "[-+]?(?:[0-9]+[.]?[0-9]*|[.][0-9]+)[eE][0-9]+",
+        "{!r} is a text for PyYAML, a number for yaml-cpp",
+    ),
+    ("[-+]?[0-9]+[eE][-+][0-9]+", "{!r} is a text for PyYAML, a number for yaml-cpp"),
+)
+"""Numbers that dcfgen (PyYAML, YAML 1.1) and ros2_canopen (yaml-cpp) read apart."""
 
 LONGEST: Final = 120
 MEANT: Final = {
@@ -111,6 +133,7 @@ class _Tree:
             return Item(tuple(map(self.item, node.value)), place)
         if isinstance(node, yaml.MappingNode):
             return self._mapping(node, place)
+        self._check_number(node)
         return Item(self._scalar(node), place, shorten(str(node.value)))
 
     def _mapping(self, node: yaml.MappingNode, place: Place) -> Item:
@@ -147,6 +170,15 @@ class _Tree:
             if not item.is_mapping:
                 self._wrong("yaml-merge", each, "<< takes a mapping, or a list of some")
         return [item for item in items if item.is_mapping]
+
+    def _check_number(self, node: yaml.Node) -> None:
+        """Note a number that the two readers of the file read apart; quotes make it a text."""
+        text = str(node.value)
+        if node.style is None and len(text) <= LONGEST and text.strip("-+")[:1] in DIGITS:
+            for form, said in READ_APART:
+                if re.fullmatch(form, text):
+                    self._wrong("yaml-number", node, said.format(shorten(text)))
+                    return
 
     def _scalar(self, node: yaml.Node) -> Scalar:
         """Return what YAML 1.1 makes of a scalar; dates stay texts."""
