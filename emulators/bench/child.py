@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-START_S: Final = 10.0
+START_S: Final = 60.0
+"""How long an emulator may take to come up on a busy machine; one that ends is seen at once."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,6 +60,9 @@ WRITES: Final = (
 )
 """In this order (NEDO report, 3.4.43.3, Fig. 120: PDO linking)."""
 
+PATIENCE_S: Final = 30.0
+"""How long an SDO answer may take on a busy machine; the library waits 0.3 s and tries once."""
+
 START_ORDER: Final = (MOTOR, PALETTE)
 
 
@@ -74,6 +77,8 @@ def set_up(network: canopen.Network) -> None:
         node_id: network.add_node(node_id, canopen.ObjectDictionary())  # type: ignore[no-untyped-call]  # canopen's
         for node_id in (PALETTE, MOTOR)
     }
+    for node in nodes.values():
+        node.sdo.RESPONSE_TIMEOUT = PATIENCE_S
     for write in WRITES:
         data = write.value.to_bytes(write.size, "little")
         nodes[write.node_id].sdo.download(write.index, write.sub, data)

@@ -16,7 +16,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, Model
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
-from tickrig.emulators.fig120.set_up import MOTOR, PALETTE
+from tickrig.emulators.fig120.set_up import MOTOR, PALETTE, PATIENCE_S
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
@@ -138,7 +138,7 @@ def bus_stage(options: BusOptions) -> Iterator[Stage]:
     nodes = [f"--node={node_id}={model}" for node_id, model in CAST.items()]
     with ExitStack() as stack:
         child = stack.enter_context(running(EMULATOR, *nodes, *options.arguments(), linked=False))
-        hand = stack.enter_context(ControlClient(child.control))
+        hand = stack.enter_context(ControlClient(child.control, PATIENCE_S))
         bus, *_ = open_raw(options)
         stack.callback(bus.shutdown)
         network = canopen.Network(bus)

@@ -7,14 +7,23 @@ from typing import Final, NamedTuple
 
 from tickrig.emulators.bench.child import running
 from tickrig.host.control.client import ControlClient
+from tickrig.host.control.requests import Object
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rrc import RrcClient
+from tickrig.host.rrc import RrcClient, RrcRefused
 from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.replies import RrcEvent
 from tickrig.wire.serial.lines import LineSplitter
 
 Echo = Callable[[str], None]
+Ask = Callable[..., Object]
+"""Makes a request to the emulator, as `ControlClient.request`."""
+
+PATIENCE_US: Final = 30_000_000
+"""How long an answer or an event may take on a busy machine."""
+
+MAX_REFUSALS: Final = 1_000
+"""Renewals of a watchdog are refused while the event that ended it is still on its way."""
 
 STATUS_SHOWN: Final = 2
 """So many status lines in a row are printed; the rest is counted."""
@@ -97,32 +106,44 @@ def run_demo(echo: Echo) -> None:
         RuntimeError: the emulator does not start.
         LinkError, DeviceRefused: something went wrong on the way.
     """
-    with running("tickrig.emulators.rrc.cli") as child, ControlClient(child.control) as hand:
+    with (
+        running("tickrig.emulators.rrc.cli") as child,
+        ControlClient(child.control, PATIENCE_US / 1e6) as hand,
+    ):
         echo(f"An RRC runs on {child.link.resolve()}, in a process of its own.")
-        echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
-        transcript = Transcript(SerialLink(str(child.link)), echo)
-        with RrcClient(transcript) as rrc:
-            for title in _chapters(rrc, transcript, hand, echo):
-                echo(f"\n{title}")
-        status = hand.request("status")
-        echo(f"\nDone. Late ticks: {status['late_steps']}, lost bytes: {status['lost_bytes']}.")
+        play(SerialLink(str(child.link)), hand.request, echo)
 
 
-def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo) -> Iterator[str]:
+def play(link: Link[bytes], ask: Ask, echo: Echo) -> None:
+    """Run the demonstration on an emulator that is there.
+
+    Raises:
+        LinkError, DeviceRefused: something went wrong on the way.
+    """
+    echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
+    transcript = Transcript(link, echo)
+    with RrcClient(transcript, timeout_us=PATIENCE_US, max_refusals=MAX_REFUSALS) as rrc:
+        for title in _chapters(rrc, transcript, ask, echo):
+            echo(f"\n{title}")
+    status = ask("status")
+    echo(f"\nDone. Late ticks: {status['late_steps']}, lost bytes: {status['lost_bytes']}.")
+
+
+def _chapters(rrc: RrcClient, link: Link[bytes], ask: Ask, echo: Echo) -> Iterator[str]:
     """Give the title of each chapter, then play it."""
     yield "Begin as the manual advises: a dummy command, a pause, then talk."
     rrc.start()
     yield "The operator presses the power button."
-    _switch_on(rrc, hand)
+    _switch_on(rrc, ask)
     yield "The nine sample commands of the manual's test procedure."
     for sample in SAMPLES:
         echo(f"  # {sample.effect}")
-        rrc.command(sample.command)
+        _send(rrc, sample.command, echo)
     yield "The operator switches VR2 off and on again."
-    hand.request("press", name="power_button")
-    rrc.wait_for(RrcEvent.INITIALIZED, 2_000_000)
+    ask("press", name="power_button")
+    rrc.wait_for(RrcEvent.INITIALIZED, PATIENCE_US)
     rrc.run_for(300_000)
-    _switch_on(rrc, hand)
+    _switch_on(rrc, ask)
     yield "Output mode: the slowest speed mode first, then 30 % forward; the status shows it (1E)."
     rrc.status()
     rrc.drive_by_host(30, 0)
@@ -136,6 +157,15 @@ def _chapters(rrc: RrcClient, link: Link[bytes], hand: ControlClient, echo: Echo
         link.receive(500_000)
 
 
-def _switch_on(rrc: RrcClient, hand: ControlClient) -> None:
-    hand.request("press", name="power_button")
-    rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, 2_000_000)
+def _send(rrc: RrcClient, command: cmd.Command, echo: Echo) -> None:
+    try:
+        rrc.command(command)
+    except RrcRefused:
+        if not isinstance(command, cmd.PowerOff):
+            raise
+        echo("  # refused: this machine was busy for 1 s, and the watchdog stopped VR2 before")
+
+
+def _switch_on(rrc: RrcClient, ask: Ask) -> None:
+    ask("press", name="power_button")
+    rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, PATIENCE_US)

@@ -1,4 +1,4 @@
-"""A link that keeps what passes, and lets a test spoil it."""
+"""Links around another one: one keeps what passes and spoils it, one delivers late."""
 
 from __future__ import annotations
 
@@ -44,3 +44,34 @@ class SpyLink:
 
     def close(self) -> None:
         self._link.close()
+
+
+class LateLink:
+    """A `Link[bytes]` that holds back what a device answers in one stretch of time.
+
+    With `stopped` the host itself does nothing in that time, as a process that gets no processor.
+    """
+
+    def __init__(
+        self, link: Link[bytes], from_us: int, to_us: int, *, stopped: bool = False
+    ) -> None:
+        self._link, self._from_us, self._to_us, self._held = link, from_us, to_us, b""
+        self._stopped = stopped
+        self.send, self.close = link.send, link.close
+
+    @property
+    def now_us(self) -> int:
+        return self._link.now_us
+
+    def receive(self, timeout_us: int, /) -> bytes:
+        until_us = self.now_us + timeout_us
+        if self.now_us < self._from_us:
+            return self._link.receive(timeout_us)
+        if self._stopped and self.now_us < self._to_us:
+            until_us = max(until_us, self._to_us)
+        while self.now_us < min(until_us, self._to_us):
+            self._held += self._link.receive(min(until_us, self._to_us) - self.now_us)
+        if self.now_us < self._to_us:
+            return b""
+        held, self._held = self._held, b""
+        return held or self._link.receive(until_us - self.now_us)

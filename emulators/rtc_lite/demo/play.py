@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from typing import Final
 
 from tickrig.emulators.rtc_lite.demo.setup import NODES, DemoSetup
 from tickrig.emulators.rtc_lite.frame_log import MonitoredLink
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc_lite import ProxyEvent, ProxyEventType, ProxySettings, attach
 from tickrig.wire.rtc_types.basic import TimedLong
 
@@ -17,14 +19,18 @@ Echo = Callable[[str], None]
 RATE_HZ: Final = 10.0
 NUMBERS: Final = (1, -5, 2_147_483_647)
 LAST: Final = 42
-PATIENCE_US: Final = 8_000_000
-"""The longest that a step of the demonstration may take."""
+PATIENCE_US: Final = 60_000_000
+"""The longest that a chapter may take, on a machine so busy that it has to recover repeatedly."""
+
+LOST: Final = "LiteA0"
+"""The proxy of the device whose power is cut."""
 
 CONNECTIONS: Final = (
     ("ConsoleIn0.out", "LiteA0.in"),
     ("LiteA0.out", "LiteB0.in"),
     ("LiteB0.out", "ConsoleOut0.in"),
 )
+COMPONENTS: Final = ("ConsoleIn0", "LiteA0", "LiteB0", "ConsoleOut0")
 SETTINGS: Final = ProxySettings(rediscover=True)
 
 
@@ -39,13 +45,18 @@ def run_demo(setup: DemoSetup, echo: Echo) -> None:
 
 
 class DemoRun:
-    """The system on a stage, and what it looks like."""
+    """The system on a stage, and what it looks like.
+
+    In real time an answer may come later than its proxy waits. The proxy then goes to Error, or
+    is removed and comes back; `_restore` brings the system to Active from any of these states.
+    """
 
     def __init__(self, setup: DemoSetup, echo: Echo) -> None:
         self._setup, self._echo, self._manager = setup, echo, setup.manager
         self._events: list[ProxyEvent] = []
         self._links = {name: MonitoredLink(link, self._say) for name, link in setup.links.items()}
         self._start_us = self._zero_us = self._now_us
+        self._deadline_us = self._now_us + PATIENCE_US
 
     def run(self) -> None:
         """Give the title of each chapter, then play it."""
@@ -54,6 +65,7 @@ class DemoRun:
         self._echo("Times are seconds.")
         for title in self._chapters():
             self._echo(f"\n{title}")
+            self._deadline_us = self._now_us + PATIENCE_US
 
     def _chapters(self) -> Iterator[str]:
         yield "A proxy for each device makes it an RT component. All are connected and activated."
@@ -64,12 +76,12 @@ class DemoRun:
         self._cut()
         yield "Until the device is back, the others run on."
         self._run_until(lambda: self._now_us >= self._zero_us + 3_000_000)
+        self._restore(*(name for name in COMPONENTS if name != LOST))
         self._show_system()
         yield "The power of LiteA is back. Times count from now."
         self._give_back()
         yield "Connected and activated again, it works."
-        self._join()
-        self._activate()
+        self._restore()
         self._type(LAST)
 
     @property
@@ -81,29 +93,48 @@ class DemoRun:
         self._context = context
         self._source = manager.add(ConsoleIn("ConsoleIn0"), context=context)
         for name in NODES:
-            attach(
-                *(manager, self._links[name], name, SETTINGS),
-                listener=self._on_event,
-                context=context,
-            )
+            self._attach(name)
         self._sink = manager.add(ConsoleOut("ConsoleOut0"), context=context)
         self._sink.show = self._arrived
         context.start()
-        self._join()
-        self._activate()
+        self._restore()
         self._show_system()
 
+    def _attach(self, name: str) -> None:
+        """Add the proxy of a device; try again if the device starts up too slowly."""
+        link, context, listener = self._links[name], self._context, self._on_event
+        while True:
+            try:
+                attach(self._manager, link, name, SETTINGS, listener=listener, context=context)
+            except RtcRefused:
+                if self._now_us > self._deadline_us:
+                    raise
+            else:
+                return
+
     def _type(self, *numbers: int) -> None:
-        wanted = len(self._sink.received) + len(numbers)
-        self._source.enter(*numbers)
-        self._run_until(lambda: len(self._sink.received) == wanted)
+        for number in numbers:
+            self._source.enter(number)
+            while not self._arrives(number):  # a proxy that went to Error may have lost it
+                self._restore()
+                self._source.enter(number)
+
+    def _arrives(self, number: int) -> bool:
+        """Wait for a number; return False if a component is no longer Active before it comes."""
+        received = self._sink.received
+        self._run_until(
+            lambda: any(value.data == number for value in received) or not self._active(COMPONENTS)
+        )
+        return any(value.data == number for value in received)
 
     def _cut(self) -> None:
+        self._restore()
+        self._events.clear()
         self._links["LiteA"].shown = True
         self._zero_us = self._now_us
         self._setup.power("LiteA", on=False)
         self._await(ProxyEventType.FATAL_ERROR)
-        self._run_until(lambda: self._states()["LiteA0"] == "ERROR")
+        self._run_until(lambda: self._states().get(LOST, "ERROR") == "ERROR")
         self._show_system()
         self._links["LiteA"].shown = False
         self._await(ProxyEventType.REMOVED)
@@ -117,26 +148,42 @@ class DemoRun:
         self._links["LiteA"].shown = False
         self._show_system()
 
-    def _join(self) -> None:
-        present = {profile.ports for profile in self._manager.connectors}
-        for connection in CONNECTIONS:
-            if connection not in present:
-                self._manager.connect(*connection)
+    def _restore(self, *names: str) -> None:
+        """Reset components in Error, join and activate what is Inactive, until all are Active."""
+        names = names or COMPONENTS
 
-    def _activate(self) -> None:
+        def restored() -> bool:
+            self._lead_on()
+            return self._active(names)
+
+        self._run_until(restored)
+
+    def _lead_on(self) -> None:
         states = self._states()
-        self._manager.activate(*(name for name, state in states.items() if state == "INACTIVE"))
-        self._run_until(lambda: set(self._states().values()) == {"ACTIVE"})
+        present = {profile.ports for profile in self._manager.connectors}
+        for ports in CONNECTIONS:
+            if ports not in present and all(port.partition(".")[0] in states for port in ports):
+                self._manager.connect(*ports)
+        with suppress(RtcRefused):  # on its way to Error: the next step finds it there
+            for name, state in states.items():
+                if state == "ERROR":
+                    self._manager.reset(name)
+                elif state == "INACTIVE":
+                    self._manager.activate(name)
+
+    def _active(self, names: Iterable[str]) -> bool:
+        states = self._states()
+        return all(states.get(name) == "ACTIVE" for name in names)
 
     def _run_until(self, done: Callable[[], bool]) -> None:
-        deadline_us = self._now_us + PATIENCE_US
         while not done():
-            if self._now_us > deadline_us:
+            if self._now_us > self._deadline_us:
                 raise RuntimeError(f"nothing came in {PATIENCE_US // 1_000_000} s")
             self._setup.step()
 
     def _await(self, kind: ProxyEventType) -> None:
-        self._run_until(lambda: any(event.kind is kind for event in self._events))
+        wanted = kind, LOST
+        self._run_until(lambda: wanted in {(it.kind, it.instance_name) for it in self._events})
 
     def _on_event(self, event: ProxyEvent) -> None:
         self._events.append(event)

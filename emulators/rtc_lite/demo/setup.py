@@ -26,6 +26,9 @@ NODES: Final = {"LiteA": "lite-a", "LiteB": "lite-b"}
 
 BAUD: Final = 57_600
 EMULATOR: Final = "tickrig.emulators.rtc_lite.cli"
+PATIENCE_S: Final = 30.0
+"""How long an emulator may take to answer on a busy machine."""
+
 POWER_CUT: Final = "power_cut"
 
 
@@ -110,7 +113,8 @@ def pty_setup() -> Iterator[PtySetup]:
         links, controls, places = dict[str, Link[bytes]](), dict[str, ControlClient](), {}
         for name, node in NODES.items():
             child = stack.enter_context(running(EMULATOR, f"--node={node}", f"--baud={BAUD}"))
-            controls[name] = stack.enter_context(ControlClient(child.control))
+            control = ControlClient(child.control, PATIENCE_S)
+            controls[name] = stack.enter_context(control)
             links[name] = stack.enter_context(closing(SerialLink(str(child.link), BAUD)))
             places[name] = str(child.link.resolve())
         yield PtySetup(links, controls, places)

@@ -10,11 +10,15 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.interop.buses import GROUP
+from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.commands.cli import main
+from tickrig.emulators.fig120 import stage as stage_module
 from tickrig.emulators.fig120.demo import run_demo
 from tickrig.emulators.fig120.samples import Sample
 from tickrig.emulators.fig120.set_up import set_up
-from tickrig.emulators.fig120.stage import VirtualStage
+from tickrig.emulators.fig120.stage import CAST, VirtualStage
+from tickrig.emulators.rig.rig import Rig
 
 GOLDEN = Path(__file__).parents[2] / "golden/canopen/fig120.json"
 ANGLES = (45.0014, 90.0027, 134.9602, 179.9615)
@@ -84,6 +88,30 @@ def test_what_cannot_be_done_is_said_before_anything_moves(
 ) -> None:
     result = fig120(*words)
     assert (result.exit_code, result.output) == (2, f"Error: {reason}\n")
+
+
+class LateNetwork(SimNetwork):
+    """Delivers each SDO answer 400 ms late."""
+
+    def __init__(self, rig: Rig, end: CanEnd) -> None:
+        super().__init__(rig, end)
+        self._held: list[tuple[float, int, bytearray]] = []
+
+    def notify(self, can_id: int, data: bytearray, timestamp: float) -> None:
+        if can_id - 0x580 in CAST:
+            self._held.append((timestamp + 0.4, can_id, data))
+        else:  # a heartbeat, of which there is one each 100 ms
+            super().notify(can_id, data, timestamp)
+        while self._held and self._held[0][0] <= timestamp:
+            _, answer_id, answer = self._held.pop(0)
+            super().notify(answer_id, answer, timestamp)
+
+
+def test_nodes_that_answer_late_are_set_up_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stage_module, "SimNetwork", LateNetwork)
+    stage = VirtualStage()
+    samples = run_demo(stage, lambda text: None)
+    assert max(sample.reference_deg for sample in samples) == pytest.approx(ANGLES[-1], abs=1e-4)
 
 
 @pytest.mark.realtime
