@@ -54,7 +54,7 @@ def test_a_command_is_run_with_the_options_that_are_given(runner: Runner) -> Non
         ROOT, {"install": "false", "run": "cat /sys/class/net/can0/mtu", "options": options}
     )
     assert outputs["where"].endswith(": can0")
-    assert runner.said.splitlines()[-1] == "16"
+    assert "16" in runner.said.splitlines()
 
 
 @guest

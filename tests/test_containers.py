@@ -156,7 +156,7 @@ def test_the_development_container_has_what_the_source_tree_wants(store: Store) 
         "git --version": "git version",
         "echo 'int main(void){return 0;}' | gcc -x c -o /tmp/a - && /tmp/a && echo ran": "ran",
         "candump --help 2>&1 | head -1": "candump",
-        "/tree/tools/with-vcan --guest --where": "User-Mode Linux: vcan0 vcan1",
+        "/tree/tools/with-vcan --guest --where": ": vcan0 vcan1",
         "python3 -m venv /tmp/venv && /tmp/venv/bin/pip --version": "pip ",
     }.items():
         assert said in store("run", container, "--", "sh", "-c", command), command

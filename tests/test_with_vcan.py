@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 import shutil
@@ -19,9 +20,43 @@ guest = pytest.mark.skipif(
 )
 
 
-def run(*words: str) -> tuple[int, str, str]:
-    done = subprocess.run([str(TOOL), *words], capture_output=True, text=True, check=False)
+compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler here")
+
+
+def run(*words: str, **environment: str) -> tuple[int, str, str]:
+    done = subprocess.run(
+        [str(TOOL), *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | environment,
+    )
     return done.returncode, done.stdout, done.stderr
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path) -> dict[str, str]:
+    """An environment in which nothing is remembered, and QEMU is not installed."""
+    return {"XDG_CACHE_HOME": str(tmp_path / "cache"), "WITH_VCAN_QEMU": "no-qemu"}
+
+
+def kernel(folder: Path, script: str) -> dict[str, str]:
+    """Put a script in the place of the program of User-Mode Linux."""
+    program = folder / "uml"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    return {"WITH_VCAN_UML": str(program)}
+
+
+@pytest.fixture(scope="module")
+def amx(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """User-Mode Linux as it is on a processor with AMX: ptrace has a larger state for it."""
+    folder = tmp_path_factory.mktemp("amx")
+    library = folder / "large.so"
+    source = Path(__file__).with_name("large_xstate.c")
+    subprocess.run(["cc", "-shared", "-fPIC", "-O2", "-o", library, source], check=True)
+    uml = shutil.which("linux.uml")
+    return kernel(folder, f'LD_PRELOAD="$LD_PRELOAD {library}" exec {uml} "$@"')
 
 
 def test_its_help_has_examples() -> None:
@@ -72,6 +107,7 @@ def test_the_commands_of_the_page_say_where_they_would_run() -> None:
         (["--vxcan", "can0", "true"], "--vxcan can0: two names are wanted, as can0,can1"),
         (["--vxcan", "a,b,c", "true"], "--vxcan a,b,c: two names are wanted, as can0,can1"),
         (["--bus", "a", "--vxcan", "b,a", "true"], "a: named twice"),
+        (["--way", "ulm"], "--way ulm: one of kernel uml uml-preload kvm qemu is wanted"),
         (["--fd", "--classic", "true"], "one of --fd and --classic is wanted, once"),
     ],
 )
@@ -108,6 +144,131 @@ BUSES = ("--vxcan", "can_left,can_right", "--bus", "can-else", "--timeout", "60"
 def test_a_vxcan_is_a_cable_between_two_adapters(option: str, long: str) -> None:
     status, out, err = run("--guest", option, *BUSES, sys.executable, "-c", CABLE)
     assert (status, out.splitlines()) == (0, ["7 None None", "7 None None", long]), err
+
+
+@guest
+@pytest.mark.realtime
+def test_a_guest_that_dies_is_not_promised(tmp_path: Path, elsewhere: dict[str, str]) -> None:
+    elsewhere |= kernel(tmp_path, "exit 1")
+    status, out, err = run("--guest", "--where", **elsewhere)
+    assert (status, out, err.count("\n")) == (125, "", 1)
+    assert err.startswith("with-vcan: no way to SocketCAN: this kernel: left out by --guest; User-")
+    assert "; User-Mode Linux: its guest does not run `true`; User-Mode Linux with a preload" in err
+    assert "; QEMU without KVM, about 20 times slower: apt-get install qemu-system-x86" in err
+    assert run("--guest", "true", **elsewhere) == (125, "", err)
+    assert run("--way", "uml", "--where", **elsewhere)[::2] == (
+        125,
+        "with-vcan: User-Mode Linux: its guest does not run `true`, see with-vcan --way uml true\n",
+    )
+
+
+def test_what_is_missing_is_said_with_its_packages(elsewhere: dict[str, str]) -> None:
+    elsewhere["WITH_VCAN_UML"] = "no-uml"
+    status, out, err = run("--guest", "true", **elsewhere)
+    assert (status, out, err.count("\n")) == (125, "", 1)
+    assert "; User-Mode Linux: apt-get install user-mode-linux" in err
+
+
+@guest
+@compiler
+@pytest.mark.realtime
+def test_a_guest_runs_where_the_processor_has_amx(
+    amx: dict[str, str], elsewhere: dict[str, str]
+) -> None:
+    elsewhere |= amx
+    status, out, err = run("--way", "uml", "true", **elsewhere)
+    assert (status, out) == (125, "")
+    assert "put_fp_registers" in err
+    status, out, err = run("--guest", "cat", "/sys/class/net/vcan0/type", **elsewhere)
+    assert (status, out) == (0, "280\n"), err
+    assert err == "with-vcan: User-Mode Linux with a preload: vcan0 vcan1\n"
+    folder = Path(elsewhere["XDG_CACHE_HOME"], "with-vcan")
+    assert folder.stat().st_mode & 0o777 == 0o700
+    (library,) = folder.glob("*.so")
+    made = library.stat()
+    assert run("--way", "uml-preload", "true", **elsewhere)[0] == 0
+    assert library.stat() == made  # it is compiled once
+
+
+@guest
+@pytest.mark.realtime
+def test_what_worked_is_remembered_until_a_program_changes(
+    tmp_path: Path, elsewhere: dict[str, str]
+) -> None:
+    program = kernel(tmp_path, f'echo >>{tmp_path}/starts; exec {shutil.which("linux.uml")} "$@"')
+    elsewhere |= program
+    starts = tmp_path / "starts"
+    assert run("--guest", "--where", **elsewhere)[:2] == (0, "User-Mode Linux: vcan0 vcan1\n")
+    assert run("--guest", "--where", **elsewhere)[:2] == (0, "User-Mode Linux: vcan0 vcan1\n")
+    assert starts.read_text() == "\n"
+    kernel(tmp_path, "exit 1")
+    assert run("--guest", "--where", **elsewhere)[0] == 125
+
+
+@guest
+@pytest.mark.realtime
+def test_a_folder_that_others_can_write_to_is_not_trusted(elsewhere: dict[str, str]) -> None:
+    folder = Path(elsewhere["XDG_CACHE_HOME"], "with-vcan")
+    folder.mkdir(parents=True)
+    folder.chmod(0o777)
+    assert run("--way", "uml-preload", "true", **elsewhere)[0] == 0
+    assert run("--guest", "--where", **elsewhere)[0] == 0
+    assert [*folder.iterdir()] == []
+
+
+@guest
+@pytest.mark.realtime
+def test_a_guest_that_is_only_tried_ends_with_it(tmp_path: Path, elsewhere: dict[str, str]) -> None:
+    fifo = tmp_path / "alive"
+    os.mkfifo(fifo)
+    elsewhere |= kernel(tmp_path, f"exec >{fifo}; echo; exec sleep 1000")
+    words = [str(TOOL), "--guest", "--where"]
+    with subprocess.Popen(words, env=os.environ | elsewhere, stderr=subprocess.DEVNULL) as process:
+        with fifo.open() as alive:
+            assert alive.readline() == "\n"
+            process.send_signal(signal.SIGTERM)
+            assert alive.read() == ""  # nobody has it open any more
+        assert process.wait() == 143
+
+
+INTERRUPTED = """
+import math, signal
+
+signal.signal(signal.SIGALRM, lambda *_: math.sqrt(2) ** 0.5)
+
+def computed():
+    return sum(math.sin(number) * 1.0001 ** (number % 7) for number in range(300_000))
+
+signal.setitimer(signal.ITIMER_REAL, 0)
+before = computed()
+signal.setitimer(signal.ITIMER_REAL, 0.002, 0.002)
+print(before == computed() == computed())
+"""
+
+
+@guest
+@compiler
+@pytest.mark.realtime
+@pytest.mark.parametrize("large", [False, True], ids=["as it is", "amx"])
+def test_numbers_survive_signals_and_other_processes_under_the_preload(
+    large: bool, amx: dict[str, str]
+) -> None:
+    both = f"{sys.executable} -c '{INTERRUPTED}' & {sys.executable} -c '{INTERRUPTED}'; wait"
+    status, out, err = run("--way", "uml-preload", "sh", "-c", both, **(amx if large else {}))
+    assert (status, out.split()) == (0, ["True", "True"]), err
+
+
+COUNTED = hashlib.md5("".join(f"{number}\n" for number in range(1, 50_001)).encode()).hexdigest()
+
+
+@pytest.mark.realtime
+@pytest.mark.timeout(600)
+@pytest.mark.skipif(shutil.which("qemu-system-x86_64") is None, reason="no QEMU here")
+def test_qemu_without_kvm_runs_a_command() -> None:
+    told = "echo $WITH_VCAN_SLOWDOWN; cat /sys/class/net/vcan?/type; seq 50000 | md5sum >&2; exit 3"
+    status, out, err = run("--way", "qemu", "bash", "-c", told)
+    assert (status, out.split()) == (3, ["20", "280", "280"]), err
+    assert err.split()[-2] == COUNTED
 
 
 MULTICAST = """
