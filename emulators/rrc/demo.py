@@ -16,7 +16,7 @@ from tickrig.wire.rrc.replies import RrcEvent
 from tickrig.wire.serial.lines import LineSplitter
 
 Echo = Callable[[str], None]
-Ask = Callable[..., Object]
+Request = Callable[..., Object]
 """Makes a request to the emulator, as `ControlClient.request`."""
 
 PATIENCE_US: Final = 30_000_000
@@ -114,7 +114,7 @@ def run_demo(echo: Echo) -> None:
         play(SerialLink(str(child.link)), hand.request, echo)
 
 
-def play(link: Link[bytes], ask: Ask, echo: Echo) -> None:
+def play(link: Link[bytes], request: Request, echo: Echo) -> None:
     """Run the demonstration on an emulator that is there.
 
     Raises:
@@ -123,27 +123,27 @@ def play(link: Link[bytes], ask: Ask, echo: Echo) -> None:
     echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
     transcript = Transcript(link, echo)
     with RrcClient(transcript, timeout_us=PATIENCE_US, max_refusals=MAX_REFUSALS) as rrc:
-        for title in _chapters(rrc, transcript, ask, echo):
+        for title in _chapters(rrc, transcript, request, echo):
             echo(f"\n{title}")
-    status = ask("status")
+    status = request("status")
     echo(f"\nDone. Late ticks: {status['late_steps']}, lost bytes: {status['lost_bytes']}.")
 
 
-def _chapters(rrc: RrcClient, link: Link[bytes], ask: Ask, echo: Echo) -> Iterator[str]:
+def _chapters(rrc: RrcClient, link: Link[bytes], request: Request, echo: Echo) -> Iterator[str]:
     """Give the title of each chapter, then play it."""
     yield "Begin as the manual advises: a dummy command, a pause, then talk."
     rrc.start()
     yield "The operator presses the power button."
-    _switch_on(rrc, ask)
+    _switch_on(rrc, request)
     yield "The nine sample commands of the manual's test procedure."
     for sample in SAMPLES:
         echo(f"  # {sample.effect}")
         _send(rrc, sample.command, echo)
     yield "The operator switches VR2 off and on again."
-    ask("press", name="power_button")
+    request("press", name="power_button")
     rrc.wait_for(RrcEvent.INITIALIZED, PATIENCE_US)
     rrc.run_for(300_000)
-    _switch_on(rrc, ask)
+    _switch_on(rrc, request)
     yield "Output mode: the slowest speed mode first, then 30 % forward; the status shows it (1E)."
     rrc.status()
     rrc.drive_by_host(30, 0)
@@ -166,6 +166,6 @@ def _send(rrc: RrcClient, command: cmd.Command, echo: Echo) -> None:
         echo("  # refused: this machine was busy for 1 s, and the watchdog stopped VR2 before")
 
 
-def _switch_on(rrc: RrcClient, ask: Ask) -> None:
-    ask("press", name="power_button")
+def _switch_on(rrc: RrcClient, request: Request) -> None:
+    request("press", name="power_button")
     rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, PATIENCE_US)

@@ -22,12 +22,12 @@ def test_the_demo_of_the_rrc_goes_on_after_a_lag(late_us: int, stopped: bool) ->
         emulator = Emulator("rrc", Rrc())
         control = EmulatorControl(emulator)
 
-        def ask(do: str, **fields: object) -> Object:
+        def request(do: str, **fields: object) -> Object:
             return control.answer({"v": VERSION, "do": do, **fields})  # noqa: B023 - called at once
 
         lines = list[str]()
         link = SimLink(emulator.rig, emulator.host_end)
-        play(LateLink(link, from_us, from_us + late_us, stopped=stopped), ask, lines.append)
+        play(LateLink(link, from_us, from_us + late_us, stopped=stopped), request, lines.append)
         assert lines[-1].startswith("\nDone."), from_us
 
 
