@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
+import subprocess
 import sys
 from collections.abc import Generator
 
@@ -27,6 +29,18 @@ settings.load_profile("tickrig")
 def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginManager) -> None:
     if not pluginmanager.has_plugin("tickrig"):  # it is not installed, and runs from src
         pluginmanager.register(pytest_plugin, "tickrig")
+
+
+@pytest.fixture(scope="session")
+def user_mode_linux(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Skip where it cannot run at all: tools/with-vcan has to manage all other cases."""
+    if not all(map(shutil.which, ("linux.uml", "modprobe", "ip"))):
+        pytest.skip("no guest here: it wants the packages user-mode-linux, kmod and iproute2")
+    words = ["linux.uml", "mem=64M", "root=/dev/none", "con=null", "con0=null,fd:1"]
+    words.append(f"uml_dir={tmp_path_factory.mktemp('uml')}")
+    booted = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    if b"Unable to mount root" not in booted.stdout:
+        pytest.skip("no guest here: linux.uml does not come as far as to look for its files")
 
 
 def pytest_configure(config: pytest.Config) -> None:

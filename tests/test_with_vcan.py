@@ -14,10 +14,7 @@ from pathlib import Path
 import pytest
 
 TOOL = Path(__file__).parents[1] / "tools" / "with-vcan"
-guest = pytest.mark.skipif(
-    not all(map(shutil.which, ("linux.uml", "modprobe", "ip"))),
-    reason="no guest here: it wants the packages user-mode-linux, kmod and iproute2",
-)
+guest = pytest.mark.usefixtures("user_mode_linux")
 
 
 compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler here")

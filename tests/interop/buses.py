@@ -10,6 +10,9 @@ from typing import Any
 
 import can
 
+SLOWDOWN = int(os.environ.get("WITH_VCAN_SLOWDOWN", "1"))
+"""How many times slower than a machine this guest of tools/with-vcan is."""
+
 VCAN = "vcan0"
 GROUP = "ff11::7469:636b"  # of interface-local scope: what is sent never leaves this machine
 PORT = 20_000 + os.getpid() % 20_000  # so that two runs beside each other do not meet
@@ -18,6 +21,11 @@ NO_SOCKETCAN = (
     f"no SocketCAN with {VCAN} here; 'tools/with-vcan pytest tests/interop' runs it in a kernel"
     " that has it"
 )
+
+
+def patience(seconds: float) -> float:
+    """Return how long something may take here that takes so long at most on a machine."""
+    return seconds * SLOWDOWN
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tests.interop.buses import Bus
+from tests.interop.buses import Bus, patience
 from tickrig.host.control.client import ControlClient
 
 EDS = Path(__file__).parents[1] / "golden" / "canopen" / "r1.eds"
 PROGRAM = "from tickrig.emulators.canopen.cli import main; main(prog_name='canopen-slave-emu')"
-START_S = 30.0
-PATIENCE_S = 10.0
+START_S = patience(30)
+PATIENCE_S = patience(10)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pathlib import Path
 import can
 import pytest
 
-from tests.interop.buses import Bus
+from tests.interop.buses import Bus, patience
 from tests.interop.slave import EDS, running
 
 pytestmark = [
@@ -23,7 +23,7 @@ pytestmark = [
 ]
 
 OPTIONS = ("--eds", str(EDS), "--node-id", "5")
-PATIENCE_S = 10.0
+PATIENCE_S = patience(10)
 
 
 class Candump:
@@ -68,6 +68,7 @@ def cansend(bus: Bus, frame: str) -> None:
     subprocess.run(["cansend", bus.channel, frame], check=True, timeout=PATIENCE_S)
 
 
+@pytest.mark.essential
 def test_candump_sees_the_boot_up_and_cansend_is_answered(vcan: Bus, tmp_path: Path) -> None:
     with candump(vcan, tmp_path) as dump, running(vcan, *OPTIONS) as slave:
         dump.wait_for("705#00")
@@ -100,6 +101,7 @@ def test_many_nodes_hear_each_other_and_are_heard_once(vcan: Bus, tmp_path: Path
     assert dump.frames.count("58A#4300100091010F00") == 1
 
 
+@pytest.mark.essential
 def test_its_trace_is_read_by_python_can(vcan: Bus, tmp_path: Path) -> None:
     trace = tmp_path / "bus.log"
     with running(vcan, *OPTIONS, "--trace", str(trace)) as slave:

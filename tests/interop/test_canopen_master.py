@@ -9,11 +9,12 @@ from typing import Any
 import canopen
 import pytest
 
+from tests.interop.buses import patience
 from tests.interop.slave import Slave
 
 pytestmark = pytest.mark.realtime
 
-PATIENCE_S = 10.0
+PATIENCE_S = patience(10)
 BLOB = bytes(index * 7 % 251 for index in range(5_000))
 
 
@@ -23,6 +24,7 @@ def operate(master: Any) -> None:
     master.nmt.wait_for_heartbeat(PATIENCE_S)
 
 
+@pytest.mark.essential
 def test_the_master_leads_it_through_the_nmt_states(master: Any, slave: Slave) -> None:
     master.sdo[0x1017].raw = 50
     for state, shown in (
@@ -45,6 +47,7 @@ def test_heartbeats_come_at_the_time_that_was_written(master: Any) -> None:
     assert stamps[-1] - stamps[0] > 0.09
 
 
+@pytest.mark.essential
 def test_numbers_go_by_expedited_transfer(master: Any, slave: Slave) -> None:
     assert master.sdo[0x1018][1].raw == slave.get("0x1018:1")
     for index, value in ((0x2000, 0x12), (0x2001, 0x1234), (0x2002, 0x1234_5678)):
@@ -53,6 +56,7 @@ def test_numbers_go_by_expedited_transfer(master: Any, slave: Slave) -> None:
     slave.wait_for("0x2002", 0x1234_5678)
 
 
+@pytest.mark.essential
 def test_longer_values_go_by_segmented_transfer(master: Any, slave: Slave) -> None:
     text = "a string of some length, in segments"
     master.sdo[0x2007].raw = text
@@ -74,6 +78,7 @@ def test_a_domain_goes_by_block_transfer(master: Any, slave: Slave) -> None:
         assert stream.read() == BLOB
 
 
+@pytest.mark.essential
 def test_a_refusal_carries_its_abort_code(master: Any) -> None:
     with pytest.raises(canopen.SdoAbortedError) as refused:
         master.sdo.upload(0x5FFF, 0)
@@ -83,6 +88,7 @@ def test_a_refusal_carries_its_abort_code(master: Any) -> None:
     assert refused.value.code == 0x0609_0031
 
 
+@pytest.mark.essential
 def test_an_input_that_changes_sends_its_tpdo(master: Any, slave: Slave) -> None:
     master.tpdo.read()
     operate(master)
@@ -94,6 +100,7 @@ def test_an_input_that_changes_sends_its_tpdo(master: Any, slave: Slave) -> None
         master.tpdo[1].wait_for_reception(0.5)
 
 
+@pytest.mark.essential
 def test_an_rpdo_sets_an_output(master: Any, slave: Slave) -> None:
     master.rpdo.read()
     operate(master)
@@ -122,6 +129,7 @@ def test_the_master_maps_a_pdo_anew_and_sync_brings_it(
         pdo.wait_for_reception(0.5)
 
 
+@pytest.mark.essential
 def test_an_error_is_told_by_emcy_and_its_end_too(master: Any, slave: Slave) -> None:
     heard: list[Any] = []
     master.emcy.add_callback(heard.append)

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 import can
 import pytest
 
-from tests.interop.buses import Bus
+from tests.interop.buses import Bus, patience
 from tests.interop.slave import Slave
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.wire.can import CanFrame
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.realtime, pytest.mark.essential]
 
-PATIENCE_S = 10.0
+PATIENCE_S = patience(10)
 
 
 @pytest.fixture
