@@ -167,6 +167,22 @@ def test_what_is_missing_is_said_with_its_packages(elsewhere: dict[str, str]) ->
 
 
 @guest
+@pytest.mark.realtime
+def test_ci_skips_its_interop_step_where_no_way_works(
+    tmp_path: Path, elsewhere: dict[str, str]
+) -> None:
+    elsewhere |= kernel(tmp_path, "exit 1")
+    (tmp_path / "apt-get").symlink_to("/bin/false")  # as without a package index
+    elsewhere["PATH"] = f"{tmp_path}:{os.environ['PATH']}"
+    words = [TOOL.parents[1] / ".ci" / "interop", "--guest"]
+    done = subprocess.run(
+        words, capture_output=True, text=True, check=False, env=os.environ | elsewhere
+    )
+    assert (done.returncode, done.stdout) == (0, "skipped: no way to SocketCAN, see above\n")
+    assert "User-Mode Linux: its guest does not run `true`" in done.stderr
+
+
+@guest
 @compiler
 @pytest.mark.realtime
 def test_a_guest_runs_where_the_processor_has_amx(
