@@ -174,7 +174,7 @@ def test_ci_skips_its_interop_step_where_no_way_works(
     elsewhere |= kernel(tmp_path, "exit 1")
     (tmp_path / "apt-get").symlink_to("/bin/false")  # as without a package index
     elsewhere["PATH"] = f"{tmp_path}:{os.environ['PATH']}"
-    words = [TOOL.parents[1] / ".ci" / "interop", "--guest"]
+    words = [str(TOOL.parents[1] / ".ci" / "interop"), "--guest"]
     done = subprocess.run(
         words, capture_output=True, text=True, check=False, env=os.environ | elsewhere
     )
