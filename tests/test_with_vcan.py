@@ -278,9 +278,12 @@ COUNTED = hashlib.md5("".join(f"{number}\n" for number in range(1, 50_001)).enco
 @pytest.mark.timeout(600)
 @pytest.mark.skipif(shutil.which("qemu-system-x86_64") is None, reason="no QEMU here")
 def test_qemu_without_kvm_runs_a_command() -> None:
-    told = "echo $WITH_VCAN_SLOWDOWN; cat /sys/class/net/vcan?/type; seq 50000 | md5sum >&2; exit 3"
+    told = (
+        "echo $WITH_VCAN_SLOWDOWN $TMPDIR; cat /sys/class/net/vcan?/type;"
+        " seq 50000 | md5sum >&2; exit 3"
+    )
     status, out, err = run("--way", "qemu", "bash", "-c", told)
-    assert (status, out.split()) == (3, ["20", "280", "280"]), err
+    assert (status, out.split()) == (3, ["20", "/dev/shm", "280", "280"]), err
     assert err.split()[-2] == COUNTED
 
 

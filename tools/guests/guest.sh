@@ -74,13 +74,12 @@ forget() {
 }
 
 # --- its files -------------------------------------------------------------------------
-write_guest_files() { # what differs between guests is in $modprobe, $slowdown, $open_lines
-    local modprobe=modprobe slowdown='' open_lines
+write_guest_files() { # what differs between guests is in $modprobe, $variables, $open_lines
+    local modprobe=modprobe variables=() open_lines
     "prepare_${way%-preload}"
     {
         export -p
-        [[ $modprobe == modprobe ]] || printf 'export MODPROBE_OPTIONS="-d %s"\n' "$dir"
-        [[ -z $slowdown ]] || printf 'export WITH_VCAN_SLOWDOWN=%s\n' "$slowdown"
+        printf 'export %s\n' "${variables[@]}"
         printf 'umask %s\ncd %q && exec' "$(umask)" "$PWD"
         printf ' %q' "$@"
         echo

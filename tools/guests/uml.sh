@@ -2,7 +2,7 @@
 # A guest of with-vcan in User-Mode Linux, with the preload where it is wanted.
 
 prepare_uml() { # the preload is compiled before, as its time is not the guest's
-    modprobe=$dir/modprobe
+    modprobe=$dir/modprobe variables=("MODPROBE_OPTIONS='-d $dir'")
     # shellcheck disable=SC2016 # the guest expands
     open_lines='out=/dev/ttyS0 err=/dev/ttyS1
     stty -F $out raw -echo; stty -F $err raw -echo'
