@@ -174,7 +174,9 @@ class _Tree:
     def _check_number(self, node: yaml.Node) -> None:
         """Note a number that the two readers of the file read apart; quotes make it a text."""
         text = str(node.value)
-        if node.style is None and len(text) <= LONGEST and text.strip("-+")[:1] in DIGITS:
+        if not isinstance(node, yaml.ScalarNode) or node.style is not None:
+            return
+        if len(text) <= LONGEST and text.strip("-+")[:1] in DIGITS:
             for form, said in READ_APART:
                 if re.fullmatch(form, text):
                     self._wrong("yaml-number", node, said.format(shorten(text)))
