@@ -103,6 +103,12 @@ class Heat(Part):
             self.temperatures = self._after(seconds, square_a2s / seconds)
             self.since_us = now_us
 
+    def rest(self, now_us: int, current_a: float) -> None:
+        """Let time pass with a constant current; the temperatures are those of `at`, to the bit."""
+        seconds = (now_us - self.since_us) / 1_000_000
+        self.i2t.pass_time(seconds, current_a**2 * seconds)
+        self.temperatures, self.since_us = self.at(now_us, current_a), now_us
+
     def at(self, now_us: int, current_a: float) -> Temperatures:
         """Return the temperatures at an instant, the current constant until then."""
         return self._after((now_us - self.since_us) / 1_000_000, current_a**2)

@@ -226,7 +226,6 @@ class Servo(Readings):
 
     def _wake(self) -> None:
         """Take the time of rest into account."""
-        plant, rested_us = self._plant, self.now_us - self._heat.since_us
-        plant.losses.square_a2s = plant.current_a**2 * rested_us / 1_000_000
+        self._heat.rest(self.now_us, self._plant.current_a)
         self.resting = False
         self._update_limit()

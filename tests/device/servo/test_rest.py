@@ -70,8 +70,13 @@ def test_each_millisecond_and_seldom_are_the_same_to_the_bit(
 
 @pytest.fixture
 def servo() -> Servo:
+    return at_rest(-2.0)
+
+
+def at_rest(load_nm: float) -> Servo:
+    """Return a servo that holds a load and rests."""
     servo = Servo(EPOS_WHEEL)
-    servo.load_nm = -2.0
+    servo.load_nm = load_nm
     servo.drive_position(5_000)
     servo.step_to(5 * SECOND_US)
     assert servo.resting
@@ -115,11 +120,14 @@ def test_a_held_load_warms_the_resting_motor(servo: Servo) -> None:
     assert servo.winding_c > servo.housing_c > before
 
 
-def test_the_heat_of_a_rest_is_there_when_it_ends(servo: Servo) -> None:
-    servo.step_to(3_600 * SECOND_US)
-    at_rest = servo.winding_c, servo.housing_c
+@pytest.mark.parametrize("load_nm", [-2.0, -1.3, 1.9])
+@pytest.mark.parametrize("until_s", [66, 3_600, 3_605])
+def test_the_heat_of_a_rest_is_there_when_it_ends(load_nm: float, until_s: int) -> None:
+    servo = at_rest(load_nm)
+    servo.step_to(until_s * SECOND_US)
+    before = servo.winding_c, servo.housing_c
     servo.drive_position(5_001)
-    assert (servo.winding_c, servo.housing_c) == at_rest
+    assert (servo.winding_c, servo.housing_c) == before
 
 
 def test_the_air_of_a_rest_is_the_air_that_was(servo: Servo) -> None:
