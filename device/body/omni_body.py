@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import reduce
 from math import cos, pi, sin
+from operator import add
 from typing import Final, NamedTuple
 
 from tickrig.device.body.pose import Pose
@@ -65,9 +67,9 @@ class OmniParameters(Immutable):
         """
         rims = [speed * self.wheel_radius_m for speed in speeds]
         pairs = list(zip(rims, BEARINGS, strict=True))
-        vx = -sum(rim * sin(at) for rim, at in pairs) * 2 / 3
-        vy = sum(rim * cos(at) for rim, at in pairs) * 2 / 3
-        return Velocity(vx, vy, sum(rims) / 3 / self.base_radius_m)
+        vx = -reduce(add, [rim * sin(at) for rim, at in pairs], 0.0) * 2 / 3
+        vy = reduce(add, [rim * cos(at) for rim, at in pairs], 0.0) * 2 / 3
+        return Velocity(vx, vy, reduce(add, rims, 0.0) / 3 / self.base_radius_m)
 
 
 @dataclass(slots=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 from typing import Final
 
 from tickrig.device.body.contact import Contact
@@ -118,4 +120,4 @@ class WheeledBody(Copyable):
 
 
 def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
+    return reduce(add, values, 0.0) / len(values)

@@ -13,7 +13,7 @@ inertia and resistance, so no step is too long and none can become unstable.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Final
 
 from tickrig.device.servo.parameters import MotorParameters
@@ -82,7 +82,7 @@ def discretise(
 def exponential(matrix: Matrix) -> Matrix:
     """Return e to the power of a square matrix, by scaling, series and squaring."""
     size = len(matrix)
-    largest = max(sum(abs(x) for x in row) for row in matrix)
+    largest = max(reduce(float.__add__, map(abs, row)) for row in matrix)
     halvings = 0
     while largest > 0.25:
         largest, halvings = largest / 2, halvings + 1
@@ -101,7 +101,10 @@ def exponential(matrix: Matrix) -> Matrix:
 
 def _product(a: Matrix, b: Matrix) -> Matrix:
     columns = list(zip(*b, strict=True))
-    return [[sum(map(float.__mul__, row, column)) for column in columns] for row in a]
+    return [
+        [reduce(float.__add__, map(float.__mul__, row, column), 0.0) for column in columns]
+        for row in a
+    ]
 
 
 def _step(system: Matrix) -> Matrix:

@@ -18,7 +18,7 @@ def refusal(command: Command, *, adjusting: bool) -> str:
         return status.STRING_TOO_LONG
     if not LETTERS.issuperset(command.string[1:]):
         return status.STRING_LETTERS
-    wanted = sum(SIZES[command.symbol])
+    wanted: int = sum(SIZES[command.symbol])
     if len(command.parameters) != wanted:
         return status.TOO_SHORT if len(command.parameters) < wanted else status.TOO_LONG
     if adjusting and command.symbol not in ("TM", "RS"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
-from math import sqrt
+from math import fsum, sqrt
 from typing import Final, NamedTuple
 
 from tickrig.host.motion.control_laws import VelocityLimits
@@ -77,7 +77,7 @@ class MotionRun:
     @property
     def turning_rad_s(self) -> float:
         """The sum of all changes of the commanded angular velocity."""
-        return sum(abs(b.twist.w - a.twist.w) for a, b in pairwise(self.samples))
+        return fsum(abs(b.twist.w - a.twist.w) for a, b in pairwise(self.samples))
 
     @property
     def cross_track(self) -> CrossTrack:
@@ -85,7 +85,7 @@ class MotionRun:
         errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
             0.0
         ]
-        square = sum(error * error for error in errors) / len(errors)
+        square = fsum(error * error for error in errors) / len(errors)
         return CrossTrack(sqrt(square), max(map(abs, errors)))
 
     def violations(self, limits: VelocityLimits) -> int:
@@ -138,7 +138,7 @@ def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> 
     12.06
     """
     limits = limits or MotionLimits()
-    return sum(
+    return fsum(
         way_time_s(here.distance(there), limits.v, limits.acceleration)
         + way_time_s(abs(wrap(there.heading - here.heading)), limits.w, limits.angular_acceleration)
         for here, there in pairwise(relays)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import hypot, pi, sin
+from math import fsum, hypot, pi, sin
 from typing import Final
 
 from tickrig.host.motion.drive import BaseConnection, OnSample, drive
@@ -60,7 +60,7 @@ def centre(errors: Sequence[Error]) -> Error:
     >>> centre([(0.0, 1.0), (2.0, 3.0)])
     (1.0, 2.0)
     """
-    return sum(x for x, _ in errors) / len(errors), sum(y for _, y in errors) / len(errors)
+    return fsum(x for x, _ in errors) / len(errors), fsum(y for _, y in errors) / len(errors)
 
 
 def square(*, clockwise: bool, side_m: float = SIDE_M) -> list[Pose]:

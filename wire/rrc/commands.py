@@ -92,7 +92,8 @@ class Command:
 
     def __init_subclass__(cls) -> None:
         """Count what stands behind the name."""
-        cls.size = len(cls.literal) + sum(p.width for p in cls.parameters)
+        widths: int = sum(p.width for p in cls.parameters)
+        cls.size = len(cls.literal) + widths
 
     def __post_init__(self) -> None:
         """Refuse values that do not fit; BadParameters says which."""

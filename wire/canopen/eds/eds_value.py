@@ -145,7 +145,8 @@ def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
 def _parse_sum(text: str) -> tuple[int, bool]:
     terms = text.replace(" ", "").upper().split("+")
     numbers = [parse_number(term) for term in terms if term not in NODE_IDS]
-    return sum(numbers), len(numbers) < len(terms)
+    total: int = sum(numbers)
+    return total, len(numbers) < len(terms)
 
 
 def _parse_float(layout: str, text: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import fsum
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -81,7 +82,7 @@ def _count(suite: Element) -> None:
     suite.set("tests", str(len(suite)))
     for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(name, str(sum(case.find(tag) is not None for case in suite)))
-    suite.set("time", f"{sum(float(case.get('time', '0')) for case in suite):.6f}")
+    suite.set("time", f"{fsum(float(case.get('time', '0')) for case in suite):.6f}")
 
 
 def _add_properties(root: Element, report: Report) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from math import fsum
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_file import BusFile
@@ -41,8 +42,8 @@ def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
     if master is not None:
         polled = [load for slave in bus.slaves.values() if (load := polling_load(slave, master))]
         rate = master.baudrate / 1_000
-        sdo = sum(polled) / rate
-        pdos = sum(pdo_load(slave, master) for slave in bus.slaves.values()) / rate
+        sdo = fsum(polled) / rate
+        pdos = fsum(pdo_load(slave, master) for slave in bus.slaves.values()) / rate
         if sdo + pdos > MOST:
             text = _said(len(polled), sdo, pdos)
             notes.note("bus-load", master.place, "", f"{master.baudrate} kbit/s: {text}")
@@ -101,7 +102,7 @@ def _bits(slave: BusSlave, request: bytes, response: bytes) -> int:
 def pdo_load(slave: BusSlave, master: BusMaster) -> Load:
     """Return what PDOs take that come in periods."""
     written_us = period_us_of(slave) or master.sync_period_us if is_drive(slave) else 0
-    return sum(_loads((pdo for pdo in slave.pdos if pdo.enabled), master, written_us))
+    return fsum(_loads((pdo for pdo in slave.pdos if pdo.enabled), master, written_us))
 
 
 def _loads(pdos: Iterable[BusPdo], master: BusMaster, written_us: int) -> Iterator[Load]:
