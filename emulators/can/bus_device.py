@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeGuard
 
 from tickrig.wire.can_error import ErrorState
 
@@ -11,7 +11,6 @@ Accepted = frozenset[int] | None
 """CAN-IDs that an end listens to, 29-bit ones with bit 29 set; None for all."""
 
 
-@runtime_checkable
 class Filtering(Protocol):
     """A device that says which CAN-IDs it listens to.
 
@@ -36,9 +35,18 @@ class Filtering(Protocol):
         ...
 
 
-@runtime_checkable
 class ErrorAware(Protocol):
     """A device that is told the error state of its CAN controller."""
 
     def bus_state(self, state: ErrorState, /) -> None:
         """Hear of a change; it is seen to in the next tick."""
+
+
+def is_filtering(device: object) -> TypeGuard[Filtering]:
+    """Say whether a device has the members of `Filtering`, by `__getattr__` too."""
+    return all(hasattr(device, name) for name in ("accepts", "reconfigured_by", "on_accepts"))
+
+
+def is_error_aware(device: object) -> TypeGuard[ErrorAware]:
+    """Say whether a device has `bus_state`, by `__getattr__` too."""
+    return hasattr(device, "bus_state")

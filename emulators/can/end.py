@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.device.core import Device
 from tickrig.device.twin import Copyable
-from tickrig.emulators.can.bus_device import Accepted, ErrorAware, Filtering
+from tickrig.emulators.can.bus_device import (
+    Accepted,
+    ErrorAware,
+    Filtering,
+    is_error_aware,
+    is_filtering,
+)
 from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
@@ -103,11 +109,11 @@ class CanEnd(Copyable):
     def attach(self, device: Device[Any], wake: Callable[[int], None], /) -> None:
         """Take the filter from a device, tell it the error state, say when a frame has arrived."""
         self.wake = wake
-        if isinstance(device, Filtering):
+        if is_filtering(device):
             self._device = device
             device.on_accepts.append(self._refilter)
             self._refilter()
-        if isinstance(device, ErrorAware):
+        if is_error_aware(device):
             self._error_aware = device
 
     def poll(self, now_us: int, /) -> Frames:

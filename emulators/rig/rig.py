@@ -16,7 +16,7 @@ from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
 from tickrig.emulators.rig.station import Station, next_tick_us
 from tickrig.emulators.rig.timetable import Timetable
-from tickrig.emulators.rig.wire_port import WirePort
+from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.emulators.rig.wires import Wires
 from tickrig.wire.instant import NEVER
 
@@ -103,7 +103,7 @@ class Rig(Copyable):
     def _attach(self, station: Station[Any]) -> bool:
         """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
         port, device = station.port, station.device
-        if not isinstance(port, WirePort):
+        if not is_wire_port(port):
             return False
         station.stand_in(None if self._dense else self._timetable)
         self.move_on(port.wire)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Generic
 from tickrig.device.core import Device, W
 from tickrig.device.twin import Part
 from tickrig.emulators.rig.port import Port
-from tickrig.emulators.rig.wire_port import WirePort
+from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Station(Part, Generic[W]):
     def stand_in(self, timetable: Timetable | None) -> None:
         """Enter itself in a timetable when traffic arrives; without one it is looked at anyway."""
         self._timetable = timetable
-        if isinstance(self.port, WirePort):
+        if is_wire_port(self.port):
             self.port.attach(self.device, self._wake)
 
     def _wake(self, at_us: int) -> None:

@@ -286,6 +286,13 @@ def test_no_float_is_added_by_the_built_in_sum() -> None:
     assert found == []
 
 
+def test_no_protocol_is_asked_for_by_isinstance() -> None:
+    """Since Python 3.12 `isinstance` ignores `__getattr__` there: a wrapper is something else."""
+    assert [
+        n for n, path in modules().items() if "runtime_checkable" in path.read_text("utf-8")
+    ] == []
+
+
 if __name__ == "__main__":
     made = hashes()
     print(lines(made))

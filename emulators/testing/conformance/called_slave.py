@@ -6,12 +6,10 @@ from collections.abc import Callable, Iterable
 from inspect import signature
 from typing import Final
 
-from tickrig.emulators.testing.conformance.slave import TICK_US, Slave, SlaveCall
+from tickrig.emulators.testing.conformance.slave import MEMBERS, TICK_US, SlaveCall, is_slave
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import FieldError
 
-MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
-"""What a `Slave` has."""
 STEP: Final = (0, ())
 """A time and frames."""
 EXAMPLE: Final = "what makes the slave at each power-on, as `lambda: Mini(5).step`"
@@ -39,7 +37,7 @@ class CalledSlave:
         if is_step(make):
             raise ValueError(f"{_name(make)} takes a time and frames: give {EXAMPLE}")
         call = make()
-        if isinstance(call, Slave):
+        if is_slave(call):
             raise ValueError(f"{_name(make)} makes a slave: give the slave itself")
         if not _takes(call, *STEP):
             given = f"{_name(make)} makes {_name(call)}"
@@ -58,7 +56,7 @@ class CalledSlave:
 
 def is_step(node: object) -> bool:
     """Say whether it is what is called each millisecond, not what makes it."""
-    return not isinstance(node, Slave) and _takes(node, *STEP) and not _takes(node)
+    return not is_slave(node) and _takes(node, *STEP) and not _takes(node)
 
 
 def checked_frames(sent: object) -> Frames:

@@ -13,7 +13,7 @@ from tickrig.emulators.testing.bench.bench_device import BenchDevice
 from tickrig.emulators.testing.conformance.bench_source import bench_source, eds_of
 from tickrig.emulators.testing.conformance.called_slave import CalledSlave
 from tickrig.emulators.testing.conformance.crash import guarded
-from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
+from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall, is_slave
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.emulators.testing.conformance.slave_stimulus import SlaveStimulus
 from tickrig.host.canmon.conform.chosen import patterns, unknown
@@ -109,7 +109,7 @@ def _source(
     if isinstance(node, BenchDevice):
         source = bench_source(node._mode, node_id, device=node.name)
         return replace(source, stimulus=lambda number: guarded(stimulus)) if stimulus else source
-    if isinstance(node, Slave) and not isinstance(node, type):
+    if is_slave(node) and not isinstance(node, type):
         return SlaveBench(node, bit_rate, stimulus).source
     return SlaveBench(CalledSlave(cast("Called", node)), bit_rate, stimulus).source
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, Protocol, runtime_checkable
+from typing import Final, Protocol, TypeGuard
 
 from tickrig.wire.can import Frames
 
 TICK_US: Final = 1_000
 
 
-@runtime_checkable
 class Slave(Protocol):
     """A CANopen slave as a machine: frames in with the time, frames out.
 
@@ -50,3 +49,11 @@ class Slave(Protocol):
 
 SlaveCall = Callable[[int, Frames], Frames]
 """The `tick` of a slave alone, called each millisecond."""
+
+MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
+"""What a `Slave` has."""
+
+
+def is_slave(node: object) -> TypeGuard[Slave]:
+    """Say whether a node has the members of a `Slave`, by `__getattr__` too."""
+    return all(hasattr(node, name) for name in MEMBERS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -87,6 +88,16 @@ class Node:
             told()
 
 
+class Wrapper:
+    """Around a device or a port; what it has not itself, it asks of that."""
+
+    def __init__(self, inner: object) -> None:
+        self._inner = inner
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._inner, name)
+
+
 class Unfiltered:
     """A device that does not say what it accepts: it hears everything."""
 
@@ -167,6 +178,20 @@ def test_a_node_that_does_not_accept_a_frame_is_not_ticked() -> None:
     rig.run_for(100_000)
     assert (deaf.ticks, keen.ticks) == ([], [1_000, 4_000])
     assert host.poll(100_000) == frames("202#0100")
+
+
+def test_a_wrapper_with_getattr_is_treated_as_what_it_wraps() -> None:
+    """Python 3.12 and later do not call `__getattr__` where a protocol is asked for."""
+    wire = CanWire()
+    node, end, host = Node(1, period_us=10_000), wire.end(), wire.end()
+    wrapped: Any = Wrapper(node), Wrapper(end)
+    rig = Rig(Station(*wrapped))
+    host.send(0, frames("080#"))
+    rig.run_to(5_000)
+    assert node.ticks == []
+    wire.disconnect(end)
+    rig.run_to(50_000)
+    assert node.state is ErrorState.PASSIVE
 
 
 def test_a_frame_that_ends_at_a_tick_is_heard_in_it() -> None:
