@@ -83,7 +83,7 @@ def bit_s(text: str) -> int:
     return int(match[1]) * _FACTORS[match[2]]
 
 
-class BitRate(click.ParamType[int]):
+class BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4 only
     """A bit rate on the command line."""
 
     name = "bit rate"
