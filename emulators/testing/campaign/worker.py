@@ -39,6 +39,9 @@ IDLE_S: Final = 60.0
 MOST: Final = 300
 """Characters of a reason."""
 
+REPORTER: Final = "terminalreporter"
+"""The name of the plug-in that writes to the terminal."""
+
 _ADDRESS: Final = re.compile(r"\b0x[0-9a-f]{8,16}\b")
 
 
@@ -58,8 +61,10 @@ class Worker:
 
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self, config: pytest.Config) -> None:
-        """Show nothing."""
-        config.pluginmanager.unregister(name="terminalreporter")
+        """Show nothing; pytest up to 9.0 needs a reporter to explain what `assert` compared."""
+        config.pluginmanager.unregister(name=REPORTER)
+        self._silent = pytest.TerminalReporter(config, open(os.devnull, "w"))  # noqa: SIM115
+        config.pluginmanager.register(self._silent, REPORTER)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Note the first file that cannot be collected."""
@@ -94,6 +99,7 @@ class Worker:
         settings = item.config.stash[SETTINGS]
         item.config.stash[SETTINGS] = settings._replace(seed=run.seed)
         del item.user_properties[:], item._report_sections[:], self._reports[:]
+        self._silent.stats.clear()  # it keeps each report
         if BENCHED in item.stash:
             del item.stash[BENCHED]
         protocol: Callable[..., object] = item.config.hook.pytest_runtest_protocol
