@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shlex
 import sys
 from collections import Counter
@@ -177,8 +178,7 @@ class CampaignRun:
         failed = Counter(verdict.outcome in WELL for verdict in kept.values())
         bar: ProgressBar[int] = click.progressbar(
             length=plan.size(),
-            file=sys.stderr,
-            hidden=not sys.stderr.isatty(),
+            file=sys.stderr if sys.stderr.isatty() else io.StringIO(),
             item_show_func=lambda _: f"{failed[False]} not passed",
         )
         with bar:
