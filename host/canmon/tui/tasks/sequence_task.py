@@ -64,6 +64,8 @@ def texts_settings(texts: list[str]) -> list[dict[str, Any]]:
 
     def written(text: str) -> Any:
         text = text.lstrip("\n")  # TOML drops the first one
+        if "\r" in text:  # tomlkit up to 0.15.0 writes it as it is, and cannot read it
+            return text
         try:
             return tomlkit.string(text, literal=True, multiline=True)
         except InvalidStringError:

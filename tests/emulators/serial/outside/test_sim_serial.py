@@ -113,6 +113,7 @@ def test_text_and_buffers_may_be_put_around_it() -> None:
     text.flush()
     bench.port.flush()
     assert bench.heard() == b"danke\n"
+    text.close()  # before the port: since Python 3.13 what a finalizer cannot flush is told
 
 
 def test_what_is_written_is_at_the_device_when_flush_returns() -> None:

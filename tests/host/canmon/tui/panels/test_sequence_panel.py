@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from textual.widgets import TextArea
 
@@ -91,6 +91,8 @@ def test_files_are_read_and_written(tmp_path: Path) -> None:
     assert (tmp_path / "copy.toml").read_text() == START
 
 
+@example("\r\n")
+@example("a\r")
 @given(st.text(st.sampled_from("a'\n\t\"\\#=\r\x00é"), max_size=30))
 def test_any_text_comes_back_from_a_workspace(text: str) -> None:
     workspace = Workspace()
