@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -29,6 +30,17 @@ QUICK = (
     "tests/test_docs.py::test_every_link_and_named_test_is_there",
 )
 """Some of each floor, what reads golden files and pages, and what looks at the tree itself."""
+
+
+def test_the_pages_name_the_pythons_of_the_classifiers() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    pattern = r"Programming Language :: Python :: (3\.\d+)$"
+    first, *others, last = re.findall(pattern, "\n".join(project["classifiers"]), re.MULTILINE)
+    assert project["requires-python"] == f">={first}"
+    readme, page = ((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/install.md"))
+    assert f"Linux with Python {first} to {last}:" in readme
+    assert f"Linux and Python {first} to {last} " in page
+    assert f"Python {first}, {', '.join(others)} and {last} are tested" in page
 
 
 def test_import_package_links_to_the_top_level_folders() -> None:
