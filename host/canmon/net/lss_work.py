@@ -123,11 +123,22 @@ class LssWork:
         found = 0
         for address, old_id in self._slaves():
             found += 1
-            click.echo(f"{_text(address)}  {_id_text(old_id)}")
+            self._tell(address, old_id)
             node_id = next(ids, None)
             if self._settings.configures:
                 self._configure(node_id, old_id)
         return found
+
+    def _tell(self, address: LssAddress, old_id: int) -> None:
+        """Show who was found; NodeFailed if several were, and are to be configured."""
+        count = self._master.count()
+        shared = f", {count} nodes with this identity" if count > 1 else ""
+        click.echo(f"{_text(address)}  {_id_text(old_id)}{shared}")
+        if shared and self._settings.configures:
+            raise NodeFailed(
+                f"{count} nodes have the identity {_text(address)}: LSS cannot tell them apart,"
+                " so they were not configured; connect one after the other"
+            )
 
     def _slaves(self) -> Iterator[tuple[LssAddress, int]]:
         """Yield each slave that is meant, in configuration, with its node-ID."""

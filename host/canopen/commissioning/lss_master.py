@@ -156,6 +156,14 @@ class LssMaster:
         """Return the active node-ID of the slave in configuration, 255 for none."""
         return self._command(message(LssCommand.INQUIRE_NODE_ID))[1]
 
+    def count(self) -> int:
+        """Return how many slaves in configuration answer; 0 if none knows the question.
+
+        Slaves with the same address are found as one by a fastscan. Their answers are one
+        frame if they are sent at the same moment, and count as one then.
+        """
+        return len(self._answers_to(message(LssCommand.INQUIRE_NODE_ID)))
+
     def configure_node_id(self, node_id: int) -> None:
         """Give the slave in configuration a node-ID.
 
@@ -197,15 +205,18 @@ class LssMaster:
 
     def _command(self, request: bytes) -> bytes:
         """Return the answer to a command."""
-        command = LssCommand(request[0])
-        found = [answer for answer in self._request(request) if answer[0] == request[0]]
-        found += [answer for answer in self._gather(SETTLE_US) if answer[0] == request[0]]
+        command, found = LssCommand(request[0]), self._answers_to(request)
         if not found:
             within = f"{self._answer_us // 1_000} ms"
             raise LssFailed(f"LSS {_name(command)}: no answer within {within}", command)
         if len(found) > 1:
             raise LssFailed(f"LSS {_name(command)}: {len(found)} slaves answered, where one may")
         return found[0]
+
+    def _answers_to(self, request: bytes) -> list[bytes]:
+        """Return all answers to a command."""
+        answers = [*self._request(request), *self._gather(SETTLE_US)]
+        return [answer for answer in answers if answer[0] == request[0]]
 
     def _request(self, request: bytes) -> list[bytes]:
         """Send; return the first answers that come together."""

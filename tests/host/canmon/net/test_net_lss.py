@@ -7,6 +7,11 @@ from pathlib import Path
 import pytest
 
 from tests.host.canmon.net.test_net_verbs import net
+from tests.host.canopen.commissioning.net_bench import NetBench
+from tests.host.canopen.commissioning.test_lss_master import Late
+from tickrig.device import make_epos
+from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.host.canmon.net import session
 from tickrig.host.canopen.commissioning.lss_master import LssMaster
 
 RIG = """\
@@ -88,6 +93,32 @@ def test_a_node_that_dies_in_the_middle_is_told(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert "is not confirmed; a slave is gone, or needs longer than 20 ms" in result.stderr
     assert result.stderr.endswith("; all nodes were sent back to LSS waiting\n")
+
+
+@pytest.fixture
+def twins(monkeypatch: pytest.MonkeyPatch) -> NetBench:
+    """Two nodes with the same identity, and without a node-ID."""
+    bench = NetBench(make_epos(255), Late(make_epos(255), 2_000))
+    source = ConformSource(bench.host, "a-bus", "a bus in virtual time", virtual=True)
+    monkeypatch.setattr(session, "open_conform_source", lambda *words: source)
+    return bench
+
+
+def test_nodes_with_one_identity_get_no_node_id(twins: NetBench) -> None:
+    result = net("a-bus", "lss", "--fastscan", "--node-id", "5", "--store")
+    assert result.exit_code == 1
+    assert result.stderr == (
+        f"Error: 2 nodes have the identity {DRIVE}: LSS cannot tell them apart, so they were"
+        " not configured; connect one after the other; all nodes were sent back to LSS waiting\n"
+    )
+    twins.rig.run_for(1_000_000)
+    assert "705#00" not in twins.frames
+
+
+def test_nodes_with_one_identity_are_listed_as_such(twins: NetBench) -> None:
+    result = net("a-bus", "lss")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == f"{DRIVE}  no node-ID, 2 nodes with this identity\n"
 
 
 @pytest.mark.parametrize(

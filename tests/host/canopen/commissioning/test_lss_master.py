@@ -168,15 +168,26 @@ def test_a_slave_that_answers_late_gets_more_time() -> None:
     assert LssMaster(bench.bus, scan_us=10_000).fastscan() == EPOS
 
 
+def test_slaves_with_the_same_address_are_counted() -> None:
+    bench = NetBench(ours(), Late(ours(), 2_000))
+    master = LssMaster(bench.bus)
+    with master.at_work():
+        assert master.count() == 0
+        assert master.fastscan() == EPOS
+        assert master.count() == 2
+
+
 class Late:
-    """A slave that says what it has to say 15 ms later.
+    """A slave that says what it has to say some time later.
 
     Args:
         slave: the slave.
+        late_us: by how much.
     """
 
-    def __init__(self, slave: CanopenSlave) -> None:
-        self._slave, self._waiting = slave, deque[tuple[int, Frames]]()
+    def __init__(self, slave: CanopenSlave, late_us: int = 15_000) -> None:
+        self._slave, self._late_us = slave, late_us
+        self._waiting = deque[tuple[int, Frames]]()
 
     tick_us = 1_000
 
@@ -189,7 +200,7 @@ class Late:
 
     def tick(self, now_us: int, rx: Frames, /) -> Frames:
         if out := self._slave.tick(now_us, rx):
-            self._waiting.append((now_us + 15_000, out))
+            self._waiting.append((now_us + self._late_us, out))
         if self._waiting and self._waiting[0][0] <= now_us:
             return self._waiting.popleft()[1]
         return ()
