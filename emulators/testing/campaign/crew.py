@@ -79,8 +79,8 @@ class Crew:
         self._busy.add(worker)
         try:
             worker.request(runs)
-            for _ in range(len(runs)):
-                yield worker.verdict(self.order.timeout_s)
+            for run in tuple(runs):
+                yield worker.verdict(run, self.order.timeout_s)
         except BaseException:
             worker.end()
             raise

@@ -14,8 +14,9 @@ from uuid import uuid4
 from distributed import Client, KilledWorker, Worker, WorkerPlugin, get_worker
 
 from tickrig.emulators.testing.campaign.crew import Crew
-from tickrig.emulators.testing.campaign.order import Order, Refusal, Run, Verdict
+from tickrig.emulators.testing.campaign.order import Order, Refusal, Run, Verdict, verdicts_of
 from tickrig.emulators.testing.campaign.plan import Plan
+from tickrig.host.text.page_text import one_line
 
 CONNECT: Final = "10s"
 WAIT_S: Final = 60.0
@@ -109,9 +110,12 @@ class DaskWorkers:
             text = f"{type(error).__name__}: {error}".partition("\n")[0]
             wanted.set_exception(Refusal(f"--scheduler {self._url}: {text}"))
         elif isinstance(answer := future.result(), str):
-            wanted.set_exception(Refusal(answer))
+            wanted.set_exception(Refusal(one_line(answer)))
         else:
-            wanted.set_result([Verdict(*verdict) for verdict in answer])
+            try:
+                wanted.set_result(verdicts_of(answer, runs))
+            except ValueError as mistake:
+                wanted.set_exception(Refusal(f"--scheduler {self._url}: a worker sent {mistake}"))
 
     def _gone(self) -> Refusal:
         return Refusal(f"--scheduler {self._url} is gone; what was done is kept")

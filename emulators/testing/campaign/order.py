@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
+
+from tickrig.emulators.testing.report.bench_report import Outcome
+from tickrig.host.text.values import counted
 
 OPTIONS: Final = (
     *("-p", "no:cacheprovider", "--capture=no", "--tb=short", "--bench-mode", "virtual"),
@@ -113,3 +116,29 @@ class Verdict(NamedTuple):
 
 HUNG: Final = "hung"
 DIED: Final = "died"
+OUTCOMES: Final = frozenset({*(outcome.value for outcome in Outcome), HUNG, DIED})
+
+
+def verdicts_of(answer: object, runs: Sequence[Run]) -> list[Verdict]:
+    """Return the verdicts that a worker has sent.
+
+    Args:
+        answer: what came from the worker.
+        runs: what it was asked for.
+
+    Raises:
+        ValueError: the answer is not one verdict for each run, in their order.
+    """
+    if not isinstance(answer, list) or len(answer) != len(runs):
+        came = counted(len(answer), "item") if isinstance(answer, list) else type(answer).__name__
+        raise ValueError(f"{came} in place of {counted(len(runs), 'verdict')}")
+    return [_verdict_of(each, run) for each, run in zip(answer, runs, strict=True)]
+
+
+def _verdict_of(answer: object, run: Run) -> Verdict:
+    match answer:
+        case (run.number, str(outcome), int(virtual_us), str(where), str(reason)) if (
+            outcome in OUTCOMES and virtual_us >= 0
+        ):
+            return Verdict(run.number, outcome, int(virtual_us), where, reason)
+    raise ValueError(f"{repr(answer)[:60]} in place of a verdict of run {run.number}")

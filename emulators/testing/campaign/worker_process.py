@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -12,12 +13,22 @@ from multiprocessing import Pipe
 from threading import Lock
 from typing import Final
 
-from tickrig.emulators.testing.campaign.order import Collected, Order, Refusal, Run, Verdict
+from tickrig.emulators.testing.campaign.order import (
+    Collected,
+    Order,
+    Refusal,
+    Run,
+    Verdict,
+    verdicts_of,
+)
 
 START_S: Final = 300.0
 """So long collecting may take."""
 
 LOOK_S: Final = 1.0
+
+MOST_BYTES: Final = 64 << 20
+"""Of an answer."""
 
 
 class WorkerDied(Exception):  # noqa: N818 - nobody's fault
@@ -78,16 +89,18 @@ class WorkerProcess:
         except OSError:
             raise self._died() from None
 
-    def verdict(self, timeout_s: float) -> Verdict:
-        """Wait for the next verdict.
+    def verdict(self, run: Run, timeout_s: float) -> Verdict:
+        """Wait for the verdict of a run.
 
         Raises:
             RunHung: it did not come in time.
-            WorkerDied: it never will.
+            WorkerDied: it never will, or something else came.
         """
-        verdict = self._receive(timeout_s)
-        assert isinstance(verdict, Verdict)
-        return verdict
+        answer = self._receive(timeout_s)
+        try:
+            return verdicts_of([answer], [run])[0]
+        except ValueError as mistake:
+            raise WorkerDied(f"when it sent {mistake}") from None
 
     def _receive(self, timeout_s: float) -> object:
         """Wait for an answer; time in which this process is stopped does not count."""
@@ -97,9 +110,13 @@ class WorkerProcess:
                 waited_s += LOOK_S
                 if waited_s >= timeout_s:
                     raise RunHung
-            return self._conn.recv()
+            data = self._conn.recv_bytes(MOST_BYTES)
         except (EOFError, OSError):
             raise self._died() from None
+        try:
+            return pickle.loads(data)
+        except Exception as error:  # pickle raises anything
+            raise WorkerDied(f"when it sent what cannot be read: {error!r}") from None
 
     def _died(self) -> WorkerDied:
         with suppress(subprocess.TimeoutExpired):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import shlex
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.emulators.testing.campaign.conftest import ANSWERS, HEAD, TICKRIG, Campaign
+from tickrig.emulators.testing.campaign.order import Run, Verdict, verdicts_of
 
 WHOLE = ("test_rrc.py", "--seeds", "0-29", "--param", "flip=0.0001,0.001")
 
@@ -26,6 +28,49 @@ def add_test(folder: Path, body: str) -> None:
     head = "\n\ndef test_more(bench, request):\n    seed = seed_of(request)\n"
     text = HEAD + head + "".join(f"    {line}\n" for line in body.splitlines())
     (folder / "test_rrc.py").write_text(f"{text}    bench.run_for('100ms')\n", "utf-8")
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        ([Verdict(1, "passed")], ""),
+        ([(1, "failed", 5, "a.py:3", "why")], ""),
+        ([], "0 items in place of 1 verdict"),
+        ([Verdict(1, "passed")] * 2, "2 items in place of 1 verdict"),
+        (5, "int in place of 1 verdict"),
+        (None, "NoneType in place of 1 verdict"),
+        ([7], "7 in place of a verdict of run 1"),
+        ([(1, 2)], "(1, 2) in place of a verdict of run 1"),
+        ([Verdict(2, "passed")], "Verdict(number=2, outcome='passed'"),
+        ([Verdict(1, "splendid")], "Verdict(number=1, outcome='splendid'"),
+        ([Verdict(1, "passed", -1)], "Verdict(number=1, outcome='passed', virtual_us=-1"),
+        ([(1, "failed", 5, None, "why")], "(1, 'failed', 5, None, 'why') in place of"),
+    ],
+)
+def test_only_verdicts_of_the_runs_are_taken(answer: object, said: str) -> None:
+    runs = [Run(1, "test_rrc.py::test_it_answers", 0)]
+    if said:
+        with pytest.raises(ValueError, match=re.escape(said)):
+            verdicts_of(answer, runs)
+    else:
+        assert verdicts_of(answer, runs) == answer
+
+
+def test_a_worker_that_sends_something_else_is_replaced(folder: Path, tickrig: Campaign) -> None:
+    send = "os.write(int(sys.argv[1]), {})"
+    whole = send.format("b'\\0\\0\\0\\4junk'")
+    endless = send.format("b'junk'")
+    add_test(
+        folder,
+        "import sys\n"
+        f"if seed == 2 and once('a'): {whole}\n"
+        f"if seed == 3 and once('b'): {endless}\n"
+        f"if seed == 4: {whole}",
+    )
+    tickrig("test_rrc.py", "--seeds", "0-5", "-j", "1", status=1)
+    outcomes = [row["outcome"] for row in rows(folder / "campaign.csv")]
+    assert outcomes == ["passed"] * 4 + ["died", "passed"]
+    assert "when it sent what cannot be read" in rows(folder / "campaign.csv")[4]["reason"]
 
 
 def test_the_table_is_the_same_in_shards_and_by_any_number_of_processes(

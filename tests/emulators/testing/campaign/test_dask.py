@@ -42,6 +42,23 @@ def end(process: subprocess.Popen[str]) -> None:
     process.communicate()
 
 
+LIAR = """
+from tickrig.emulators.testing.campaign import dask_workers
+
+
+def dask_setup(worker):
+    do = dask_workers._do
+    dask_workers._do = lambda *words: do(*words)[1:]
+"""
+
+
+@pytest.fixture
+def liar(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let workers leave out the first verdict of each answer."""
+    (folder / "liar.py").write_text(LIAR, "utf-8")
+    monkeypatch.setenv("DASK_DISTRIBUTED__WORKER__PRELOAD", str(folder / "liar.py"))
+
+
 @pytest.fixture
 def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
     """Give the address of a scheduler with two workers, and their processes."""
@@ -98,6 +115,14 @@ def test_a_cluster_that_is_gone_is_told_and_the_campaign_goes_on_here(
     assert done.stderr == f"Error: --scheduler {cluster[0]} is gone; what was done is kept\n"
     again = tickrig(*words)
     assert re.fullmatch(r"campaign\.csv\.journal: \d+ of 30 runs are done\n", again.stderr)
+
+
+def test_a_worker_that_leaves_out_a_verdict_is_told(
+    folder: Path, tickrig: Campaign, liar: None, cluster: Cluster
+) -> None:
+    done = tickrig("test_rrc.py", "--seeds", "0-29", "--scheduler", cluster[0], status=2)
+    said = "a worker sent 0 items in place of 1 verdict"
+    assert done.stderr == f"Error: --scheduler {cluster[0]}: {said}\n"
 
 
 def test_a_traceback_of_tornado_is_not_shown(capfd: pytest.CaptureFixture[str]) -> None:
