@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import re
 from collections.abc import Sequence
 from concurrent.futures import CancelledError, Future
 from contextlib import suppress
 from functools import partial
+from threading import Thread
 from typing import Any, Final
 from uuid import uuid4
 
 from distributed import Client, KilledWorker, Worker, WorkerPlugin, get_worker
+from distributed.core import rpc
 
 from tickrig.emulators.testing.campaign.crew import Crew
 from tickrig.emulators.testing.campaign.order import Order, Refusal, Run, Verdict, verdicts_of
 from tickrig.emulators.testing.campaign.plan import Plan
 from tickrig.host.text.page_text import one_line
 
-CONNECT: Final = "10s"
+CONNECT_S: Final = 10.0
+SCHEDULER: Final = "Scheduler"
+"""How a scheduler calls itself, where a worker says `Worker`."""
+
 WAIT_S: Final = 60.0
 """So long a scheduler may be without any worker."""
+
+CLOSE_S: Final = 5.0
+"""So long the cluster has to forget a campaign."""
+
+GONE: Final = (OSError, RuntimeError, TimeoutError, CancelledError)
 
 LOSSES: Final = 3
 """So often a batch is begun again that Dask gives up for lost."""
@@ -65,10 +76,13 @@ class DaskWorkers:
         if re.fullmatch(r"\w+://.+:[0-9]+", url) is None:
             raise Refusal(f"--scheduler {url}: write tcp://HOST:PORT")
         try:
-            self._client = Client(url, timeout=CONNECT, set_as_default=False)
-        except (OSError, ValueError, TimeoutError) as error:
-            text = str(error).partition("\n")[0] or "no answer"
-            raise Refusal(f"--scheduler {url}: {text}") from None
+            asyncio.run(asyncio.wait_for(_ask_for_scheduler(url), CONNECT_S))
+            self._client = Client(url, timeout=CONNECT_S, set_as_default=False)
+        except TimeoutError:
+            raise Refusal(f"--scheduler {url}: no answer within {CONNECT_S:g} s") from None
+        except Exception as error:  # Dask raises anything when something else listens there
+            text = one_line(str(error).partition("\n")[0]) or type(error).__name__
+            raise Refusal(f"--scheduler {url}: no Dask scheduler: {text}") from None
         try:
             self._client.wait_for_workers(1, WAIT_S)
             self._client.register_plugin(self._plugin)
@@ -121,12 +135,27 @@ class DaskWorkers:
         return Refusal(f"--scheduler {self._url} is gone; what was done is kept")
 
     def close(self) -> None:
-        """Let the cluster forget the campaign."""
-        with suppress(OSError, RuntimeError, TimeoutError, CancelledError):
+        """Let the cluster forget the campaign, if it still answers."""
+        with suppress(*GONE):
             self._executor.shutdown(wait=False)
-            self._client.unregister_worker_plugin(self._plugin.name)
-        with suppress(OSError, RuntimeError, TimeoutError, CancelledError):
+        forgetting = Thread(target=self._forget, daemon=True)
+        forgetting.start()
+        forgetting.join(CLOSE_S)
+        with suppress(*GONE):
             self._client.close(timeout=1)
+
+    def _forget(self) -> None:
+        """Remove the plug-in; Dask waits without a limit for a scheduler or worker that stands."""
+        with suppress(*GONE):
+            self._client.unregister_worker_plugin(self._plugin.name)
+
+
+async def _ask_for_scheduler(url: str) -> None:
+    """Raise unless a scheduler answers; a `Client` waits for the answer without a limit."""
+    async with rpc(url, timeout=CONNECT_S) as scheduler:
+        answer = await scheduler.identity()
+    if not isinstance(answer, dict) or answer.get("type") != SCHEDULER:
+        raise ValueError(f"{one_line(repr(answer))[:60]} answers there")
 
 
 def be_quiet() -> None:

@@ -5,16 +5,22 @@ from __future__ import annotations
 import logging
 import os
 import re
+import shlex
 import signal
+import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.emulators.testing.campaign.conftest import Campaign
+from tests.emulators.testing.campaign.conftest import TICKRIG, Campaign
 from tests.emulators.testing.campaign.test_campaign import add_test
+from tickrig.emulators.testing.campaign.order import Collected, Order, Refusal
+from tickrig.emulators.testing.campaign.plan import Plan, Shard
+from tickrig.emulators.testing.campaign.seeds import Seeds
 
 if "CI" not in os.environ:  # there it fails without them
     pytest.importorskip("distributed", reason="no Dask here: pip install 'tickrig[campaign]'")
@@ -123,6 +129,48 @@ def test_a_worker_that_leaves_out_a_verdict_is_told(
     done = tickrig("test_rrc.py", "--seeds", "0-29", "--scheduler", cluster[0], status=2)
     said = "a worker sent 0 items in place of 1 verdict"
     assert done.stderr == f"Error: --scheduler {cluster[0]}: {said}\n"
+
+
+def test_ctrl_c_ends_a_campaign_whose_scheduler_stands(folder: Path, cluster: Cluster) -> None:
+    stop = f"os.kill({cluster[1][0].pid}, signal.SIGSTOP)"
+    interrupt = "os.kill(int(Path('pid').read_text()), signal.SIGINT)"
+    add_test(folder, f"if seed == 20:\n    {stop}\n    {interrupt}")
+    words = ("campaign", "test_rrc.py", "--seeds", "0-99", "--scheduler", cluster[0])
+    command = shlex.join([sys.executable, "-c", TICKRIG, *words])
+    script = ["sh", "-c", f"echo $$ > pid; exec {command}"]
+    done = subprocess.run(script, capture_output=True, text=True, check=False)
+    assert done.returncode == 130
+    assert re.match(r"interrupted: \d+ of 100 runs are kept; go on with tickrig ", done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("greeting", "said"),
+    [
+        (b"HTTP/1.0 400 Bad Request\r\n\r\n", "no Dask scheduler: "),
+        (b"", "no answer within 0.5 s"),
+    ],
+)
+def test_what_is_no_scheduler_is_told(
+    greeting: bytes, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tickrig.emulators.testing.campaign import dask_workers  # noqa: PLC0415 - an extra
+
+    monkeypatch.setattr(dask_workers, "CONNECT_S", 0.5)
+    plan = Plan(Order(tests=()), Collected((), (), ""), Seeds.parse("0"), Shard.parse("1/1"))
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        threading.Thread(target=greet, args=(listener, greeting), daemon=True).start()
+        with pytest.raises(Refusal, match=f"--scheduler tcp://127.0.0.1:{port}: {said}"):
+            dask_workers.DaskWorkers(f"tcp://127.0.0.1:{port}", plan)
+
+
+def greet(listener: socket.socket, greeting: bytes) -> None:
+    """Send something to whoever comes, and wait until it has gone."""
+    connection, _ = listener.accept()
+    with connection:
+        connection.sendall(greeting)
+        while connection.recv(4_096):
+            pass
 
 
 def test_a_traceback_of_tornado_is_not_shown(capfd: pytest.CaptureFixture[str]) -> None:
