@@ -77,6 +77,30 @@ RECEIVE_BYTES: Final = 4 << 20
 """Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
 
 
+def receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> can.Message | None:
+    """Return the next message of a bus; None if none comes in time.
+
+    python-can measures a wait by the wall clock: where that is set back by an hour meanwhile, the
+    wait is an hour longer. Here it is measured by the monotonic clock.
+
+    Args:
+        recv: of the bus. One that is not python-can's own is called as it is.
+        timeout_s: how long to wait, in seconds; 0 only looks.
+    """
+    if getattr(recv, "__func__", None) is not can.BusABC.recv:
+        return recv(timeout_s)
+    bus: can.BusABC = recv.__self__  # type: ignore[attr-defined] # a bound method has it
+    until_s = time.monotonic() + timeout_s
+    left_s = timeout_s
+    while True:
+        message, filtered = bus._recv_internal(left_s)
+        if message and (filtered or bus._matches_filters(message)):
+            return message
+        left_s = until_s - time.monotonic()
+        if left_s <= 0:
+            return None
+
+
 def _enlarge_queue(sock: socket.socket) -> None:
     """Let the kernel keep what comes while this process is held up: 300 frames are 40 ms."""
     try:
@@ -239,7 +263,7 @@ class CanLink:
 
     def _read(self, wait_us: int) -> can.Message | None:
         try:
-            return self._bus.recv(wait_us / 1e6)
+            return receive(self._bus.recv, wait_us / 1e6)
         except Exception as error:  # drivers raise what they like
             text = str(error) or type(error).__name__
             raise LinkClosed(f"cannot read from {self._name}: {text}") from error

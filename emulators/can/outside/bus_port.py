@@ -11,6 +11,7 @@ import can
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.can.outside.bridge import CountingPort, WithoutEcho
 from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.links.can_link import receive
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.echo import ECHOING
 from tickrig.host.text.log import log_of
@@ -80,7 +81,7 @@ class CanBusPort(NonCopyable):
 
     def _read(self) -> can.Message | None:
         try:
-            return self._bus.recv(0)
+            return receive(self._bus.recv, 0)
         except (can.CanError, OSError) as error:
             self._note(str(error))
             return None

@@ -15,6 +15,7 @@ from tickrig.host.canmon.sources.socket_reader import SocketReader, let_fd
 from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
 from tickrig.host.cli.refused import BusUnavailable
+from tickrig.host.links.can_link import receive
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_log import channel_name
@@ -82,11 +83,11 @@ class BusReader:
         """Wait for a first frame; LinkClosed if the bus is gone."""
         records: list[Record] = []
         try:
-            message = self._bus.recv(timeout_us / 1e6)
+            message = receive(self._bus.recv, timeout_us / 1e6)
             while message is not None:
                 one = to_record(message, self.name, self.tally)
                 records += (one,) if one else ()
-                message = self._bus.recv(0) if len(records) < BATCH else None
+                message = receive(self._bus.recv, 0) if len(records) < BATCH else None
         except Exception as error:  # drivers raise what they like
             if not records:
                 text = " ".join(str(error).split()) or type(error).__name__

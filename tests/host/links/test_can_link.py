@@ -6,12 +6,13 @@ import errno
 import os
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import can
 import pytest
 
 from tests.emulators.can.can_bench import frames
+from tickrig.emulators.can.outside.bus_port import CanBusPort
 from tickrig.host.canmon.sources.bus_source import BusReader
 from tickrig.host.links.can_link import CanLink, prepare_bus
 from tickrig.host.links.can_message import to_frame, to_message
@@ -83,6 +84,46 @@ def test_a_fault_of_a_driver_is_told_as_one_of_the_bus() -> None:
     reader = BusReader(BadDriver("bad"), "bad", "bad:0")
     with pytest.raises(LinkClosed, match="bad:0: AttributeError"):
         reader.read(0)
+
+
+class Silent(can.BusABC):
+    """A driver that has nothing.
+
+    Attributes:
+        waits: how often it was to wait.
+    """
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(channel)
+        self.waits = 0
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        assert timeout is not None
+        assert timeout <= MOST_S
+        self.waits += 1
+        return None, False
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        raise AssertionError
+
+
+MOST_S = 0.002
+READS: list[tuple[str, Callable[[can.BusABC], object]]] = [
+    ("a link", lambda bus: CanLink(bus, "silent:0").receive(2_000)),
+    ("canmon", lambda bus: BusReader(bus, "silent", "silent:0").read(2_000)),
+    ("an emulator", lambda bus: CanBusPort(bus).poll(0)),
+]
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("read", [read for _, read in READS], ids=[name for name, _ in READS])
+def test_a_wall_clock_that_is_set_back_prolongs_no_wait(
+    read: Callable[[can.BusABC], object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = Silent("silent")
+    monkeypatch.setattr("can.bus.time", lambda: -3_600 * bus.waits)
+    read(bus)
+    assert bus.waits
 
 
 def test_a_bus_that_cannot_be_opened_is_told() -> None:

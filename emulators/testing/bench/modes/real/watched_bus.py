@@ -14,7 +14,7 @@ from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.cli.can_options import bus_reason
-from tickrig.host.links.can_link import prepare_bus
+from tickrig.host.links.can_link import prepare_bus, receive
 from tickrig.host.links.can_message import to_error_frame, to_frame
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
@@ -36,7 +36,7 @@ class _Watched(can.BusABC):
         self._watch.used()
         begun_ns = monotonic_ns()
         with self._told_if_gone():
-            message = super().recv(timeout)
+            message = super().recv() if timeout is None else receive(super().recv, timeout)
         if message is not None:
             error = to_error_frame(message)
             self._pass_on(Mark.FROM_DEVICE, _frames_of(message) if error is None else (error,))
