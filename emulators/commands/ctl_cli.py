@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from functools import wraps
 from typing import Any, Final
@@ -13,6 +12,7 @@ from tickrig.host.cli.control import request
 from tickrig.host.cli.refused import time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
+from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import format_time, parse_setting
 
 PATIENCE_S: Final = 1.0
@@ -139,7 +139,7 @@ def verb(
         @wraps(fields)
         def run(socket: str, as_json: bool, **arguments: Any) -> None:
             answer = request(socket, whom, do, **fields(**arguments))
-            for line in [json.dumps(answer)] if as_json else show(answer):
+            for line in [json_text(answer)] if as_json else show(answer):
                 click.echo(line)
 
         command = ctl.command(do, **settings)(click.pass_obj(run))

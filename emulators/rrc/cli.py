@@ -7,9 +7,10 @@ from typing import Any
 import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
+from tickrig.host.cli.options import Program
 
 
-@click.command()
+@click.command(cls=Program)
 @click.option(
     "--power-on-event",
     type=click.Choice(["PowerOnTrigger", "PowerOn"]),

@@ -1,4 +1,4 @@
-"""Options of which command lines are made."""
+"""What console commands are, and options of which command lines are made."""
 
 from __future__ import annotations
 
@@ -10,9 +10,19 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig import __version__
+from tickrig.host.cli.start import standard_streams
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+
+class Program(click.Command):
+    """A console command: nothing that it prints is obeyed by a terminal."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run it."""
+        with standard_streams():
+            return super().main(*args, **extra)
 
 
 class PathType(click.Path):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final, TextIO
+from collections.abc import Callable, Sequence
+from typing import Final
 
 from tickrig.host.monitor.graph.plot import DOTS_X, DOTS_Y, Canvas
 from tickrig.host.motion.geometry import Pose
@@ -71,11 +71,11 @@ class LiveMap:
 
     Args:
         track: what is drawn.
-        out: a terminal.
+        paint: writes what moves the cursor of a terminal, too.
     """
 
-    def __init__(self, track: TrackMap, out: TextIO) -> None:
-        self._track, self._out = track, out
+    def __init__(self, track: TrackMap, paint: Callable[[str], None]) -> None:
+        self._track, self._paint = track, paint
         self._count = self._height = 0
 
     def watch(self, sample: Sample) -> None:
@@ -90,6 +90,5 @@ class LiveMap:
         numbers = f"{sample.time_s:7.2f} s  {x:+.3f} {y:+.3f} m  {heading:+.3f} rad"
         lines = [*self._track.rows(), f"{numbers}  {v:+.2f} m/s  {w:+.2f} rad/s"]
         up = f"\x1b[{self._height}A" if self._height else ""
-        self._out.write(up + "".join(f"{line}\x1b[K\n" for line in lines))
-        self._out.flush()
+        self._paint(up + "".join(f"{line}\x1b[K\n" for line in lines))
         self._height = len(lines)

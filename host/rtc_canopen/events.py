@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
+
+from tickrig.host.text.page_text import json_text
 
 KEPT: Final = 10_000
 """Events that a log keeps; older ones are dropped."""
@@ -70,7 +71,7 @@ class ServerEvent:
 
     def to_json(self) -> str:
         """Write it as one line of JSON."""
-        return json.dumps(
+        return json_text(
             {"at_us": self.at_us, "event": self.kind, "node": self.node, "text": self.text}
         )
 

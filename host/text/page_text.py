@@ -1,4 +1,4 @@
-r"""Times, sizes and foreign texts as a page writes them.
+r"""Times, sizes and foreign texts as a page, a terminal and JSON for programs write them.
 
 >>> duration(3_100), duration(2_000_000), duration(200_000_000)
 ('3.1 ms', '2.00 s', '3 min 20 s')
@@ -8,6 +8,7 @@ r"""Times, sizes and foreign texts as a page writes them.
 
 from __future__ import annotations
 
+import json
 import re
 from typing import Any, Final
 
@@ -16,10 +17,12 @@ from tickrig.host.text.values import format_time
 DASH: Final = "\N{EN DASH}"
 """Where there is nothing to be told."""
 
-_UNSEEN: Final = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufff9-\ufffb"
-    "\ufffe\uffff\ud800-\udfff]"
+_MARKS: Final = (
+    "\x80-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufff9-\ufffb"
+    "\ufffe\uffff\ud800-\udfff"
 )
+_UNSEEN: Final = re.compile(f"[\x00-\x08\x0b-\x1f\x7f{_MARKS}]")
+_NO_CELL: Final = re.compile(f"[\x00-\x1f\x7f{_MARKS}]")
 
 
 def harmless(value: Any) -> Any:  # a template prints values of any type
@@ -38,6 +41,33 @@ def one_line(value: str) -> str:
     if value.isascii() and value.isprintable():
         return value
     return str(harmless(value)).replace("\n", "␊").replace("\t", "␉")
+
+
+def in_cells(text: str) -> str:
+    r"""Return a text of as many characters in one line, each of which takes room on a screen.
+
+    >>> in_cells("a\x1b[31m\u202eb\n")
+    'a␛[31m\ufffdb␊'
+    """
+    if text.isprintable():
+        return text
+    return _NO_CELL.sub(lambda match: shown if len(shown := _shown(match)) == 1 else "�", text)
+
+
+def json_text(value: object, *, compact: bool = False, letters: bool = False) -> str:
+    r"""Return a value as JSON in one line, in which what a terminal obeys is escaped.
+
+    Args:
+        value: what `json.dumps` takes.
+        compact: without blanks.
+        letters: those beyond ASCII are written as they are.
+
+    >>> json_text("µ\x1b\x7f\x9b\u202e", letters=True), json_text("µ\x7f")
+    ('"µ\\u001b\\u007f\\u009b\\u202e"', '"\\u00b5\\u007f"')
+    """
+    separators = (",", ":") if compact else None
+    text = json.dumps(value, ensure_ascii=not letters, separators=separators)
+    return text if text.isprintable() else _UNSEEN.sub(lambda one: f"\\u{ord(one[0]):04x}", text)
 
 
 def _shown(match: re.Match[str]) -> str:

@@ -5,12 +5,33 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final
 
+from rich.segment import Segment
 from textual.app import App
 from textual.binding import Binding, BindingType
+from textual.color import Color
+from textual.filter import LineFilter
 
 from tickrig.host.cli.start import TERMINATING
+from tickrig.host.text.page_text import in_cells
+
+
+class _Harmless(LineFilter):
+    """Lets no text command the terminal: the codes of Textual are not among what it sees."""
+
+    def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
+        """Return pieces of as many characters, all of which are seen."""
+        return [
+            piece
+            if piece.control or piece.text.isprintable()
+            else Segment(in_cells(piece.text), piece.style)
+            for piece in segments
+        ]
+
+
+HARMLESS: Final = _Harmless()
 
 
 class FramedApp(App[None]):
@@ -32,6 +53,14 @@ class FramedApp(App[None]):
             loop = asyncio.get_running_loop()
             for number in (signal.SIGINT, *TERMINATING):
                 loop.add_signal_handler(number, self.exit)
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Return what all that is painted passes."""
+        return [*super().get_line_filters(), HARMLESS]
+
+    def notify(self, message: str, **how: Any) -> None:
+        """Show a message; brackets in what files and devices say are no markup."""
+        super().notify(message, **{**how, "markup": False})
 
     @property
     def helps(self) -> bool:

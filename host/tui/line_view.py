@@ -19,6 +19,8 @@ from textual.message import Message
 from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
+from tickrig.host.text.page_text import in_cells
+
 Line = tuple[tuple[str, str], ...]
 """Pieces of text, each with a style as `bold red`; empty for none."""
 
@@ -174,7 +176,7 @@ def line_strip(line: Line, base: Style, left: int, width: int) -> Strip:
         begin, column = column, column + len(text)
         if column > 0 and begin < width:
             text = text[max(0, -begin) : width - begin]  # noqa: PLW2901 - what is in view
-            segments.append(Segment(text, style_on(base, style)))
+            segments.append(Segment(in_cells(text), style_on(base, style)))
     missing = width - max(0, column)
     if missing > 0:
         segments.append(Segment(" " * missing, base))

@@ -9,6 +9,7 @@ import click
 
 from tickrig.emulators.rh3.base_options import base_options
 from tickrig.host.cli.engine_options import openrtm_options, ros2_options
+from tickrig.host.cli.lazy_group import LazyGroup
 from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options, version_option
 from tickrig.host.cli.start import loading
 
@@ -55,7 +56,7 @@ _PLOT: Final[Decorator] = click.option(
 )
 
 
-@click.group()
+@click.group(cls=LazyGroup, commands={})
 @version_option()
 def main() -> None:
     """Let a cart of Reference Hardware 3 drive: six components over a base.

@@ -19,7 +19,7 @@ from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop, MountedUrg
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.serving import stopped_by_signals
-from tickrig.host.cli.start import INTERRUPTED
+from tickrig.host.cli.start import INTERRUPTED, paint
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.motion.chain import RATE_HZ, MotionChain
@@ -147,7 +147,8 @@ class RunWatcher:
     def __init__(self, options: MotionOptions, points: Sequence[Pose]) -> None:
         self._ended = self._asking = False
         width = min(WIDTH, get_terminal_size().columns - 1)
-        self._map = LiveMap(TrackMap(points, width), sys.stdout) if options.show_map else None
+        drawn = partial(paint, sys.stdout)
+        self._map = LiveMap(TrackMap(points, width), drawn) if options.show_map else None
 
     def end(self) -> None:
         """Let the next sample be the last; a question is left at once."""

@@ -24,7 +24,7 @@ from tickrig.emulators.testing.campaign.plan import Plan, Shard
 from tickrig.emulators.testing.campaign.seeds import Seeds
 from tickrig.emulators.testing.campaign.table import PARQUET, WELL, Table, table_of, write_table
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.start import INTERRUPTED, UNWRITTEN
+from tickrig.host.cli.start import INTERRUPTED, UNWRITTEN, as_is
 from tickrig.host.text.names import known
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file
@@ -178,7 +178,7 @@ class CampaignRun:
         failed = Counter(verdict.outcome in WELL for verdict in kept.values())
         bar: ProgressBar[int] = click.progressbar(
             length=plan.size(),
-            file=sys.stderr if sys.stderr.isatty() else io.StringIO(),
+            file=as_is(sys.stderr) if sys.stderr.isatty() else io.StringIO(),
             item_show_func=lambda _: f"{failed[False]} not passed",
         )
         with bar:

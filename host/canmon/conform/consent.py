@@ -13,6 +13,7 @@ from tickrig.host.canopen.conform.notation.bound_check import LSS_TO_ALL
 from tickrig.host.canopen.conform.verdict import Result, Verdict
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import paint
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
 
@@ -92,7 +93,7 @@ class Progress:
     def begin(self, node_id: int) -> None:
         """Say what lasts before the first result."""
         if self._shown:
-            click.echo(f"\r\x1b[Knode {node_id} is read", nl=False, err=True)
+            paint(sys.stderr, f"\r\x1b[Knode {node_id} is read")
 
     def take(self, result: Result) -> None:
         """Count a result."""
@@ -101,9 +102,9 @@ class Progress:
         if self._shown:
             failed = counted(self._failed, "failure")
             text = f"{counted(self._judged, 'check')}, {failed}: {result.check.id}"
-            click.echo(f"\r\x1b[K{one_line(text)}", nl=False, err=True)
+            paint(sys.stderr, f"\r\x1b[K{one_line(text)}")
 
     def end(self) -> None:
         """Clear the line."""
         if self._shown:
-            click.echo("\r\x1b[K", nl=False, err=True)
+            paint(sys.stderr, "\r\x1b[K")

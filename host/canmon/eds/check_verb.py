@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -17,6 +16,7 @@ from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.check.junit import junit
+from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 
@@ -105,7 +105,7 @@ def finding_json(one: RuleFinding) -> str:
         "clause": one.rule.clause,
         "mended_by_fix": bool(one.edits),
     }
-    return json.dumps(said, ensure_ascii=False)
+    return json_text(said, letters=True)
 
 
 def _check_report(report: Path | None, files: Sequence[Path]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +10,7 @@ import click
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.options import PATH
+from tickrig.host.text.page_text import json_text
 
 DIFFERENT: Final = 1
 
@@ -35,6 +35,6 @@ def command(old: Path, new: Path, as_json: bool) -> None:
     with until_unread():
         for change in changes:
             said = {"v": 1, **change._asdict()}
-            click.echo(json.dumps(said, ensure_ascii=False) if as_json else str(change))
+            click.echo(json_text(said, letters=True) if as_json else str(change))
     if changes:
         click.get_current_context().exit(DIFFERENT)

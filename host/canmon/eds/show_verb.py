@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +13,7 @@ from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused
+from tickrig.host.text.page_text import json_text
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
@@ -43,7 +43,7 @@ def command(file: Path, place: str | None, node: int, as_json: bool) -> None:
     if index is not None and not said["entries"]:
         raise Refused(f"{file}: no {place} is there")
     with until_unread():
-        for line in [json.dumps(said, ensure_ascii=False)] if as_json else _lines(said, node):
+        for line in [json_text(said, letters=True)] if as_json else _lines(said, node):
             click.echo(line)
 
 

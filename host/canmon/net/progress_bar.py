@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-import click
+from tickrig.host.cli.start import paint
 
 WIDTH = 30
 LEAST_S = 1
@@ -32,12 +32,12 @@ class ProgressBar:
         text = self._line(done)
         if self._shown and text != self._text:
             self._text = text
-            click.echo(f"\r\x1b[K{text}", nl=False, err=True)
+            paint(sys.stderr, f"\r\x1b[K{text}")
 
     def end(self) -> None:
         """Clear the line."""
         if self._shown:
-            click.echo("\r\x1b[K", nl=False, err=True)
+            paint(sys.stderr, "\r\x1b[K")
 
     def _line(self, done: int) -> str:
         share = done / self._total if self._total else 1.0

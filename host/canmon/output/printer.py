@@ -9,11 +9,13 @@ from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
+from tickrig.host.cli.start import as_is
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_writer import comment, log_line
 from tickrig.host.monitor.logs.mark import Mark, dropped
 from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
+from tickrig.host.text.page_text import json_text, one_line
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
@@ -82,7 +84,7 @@ def text_printer(lines: DumpLines) -> Printer:
     """Return what writes lines as candump shows them."""
 
     def printed(record: AnyRecord, decoded: Decoded | None) -> str:
-        text = decoded_text(decoded)
+        text = one_line(decoded_text(decoded))
         if isinstance(record, Record):
             return lines.line(record, text)
         from tickrig.host.monitor.frames.dump_line import line_text  # noqa: PLC0415 - seldom wanted
@@ -107,12 +109,11 @@ def json_printer(record: AnyRecord, decoded: Decoded | None) -> str:
 
 
 def _meaning_json(decoded: Decoded) -> str:
-    import json  # noqa: PLC0415 - seldom wanted
 
     node = "" if decoded.node is None else f',"node":{decoded.node}'
-    text = f',"text":{json.dumps(decoded.text)}' if decoded.text else ""
+    text = f',"text":{json_text(decoded.text)}' if decoded.text else ""
     values = {signal.name: _plain(signal.value) for signal in decoded.signals}
-    signals = f',"sig":{json.dumps(values, separators=(",", ":"))}' if values else ""
+    signals = f',"sig":{json_text(values, compact=True)}' if values else ""
     source = f',"src":"{decoded.source}"' if decoded.source else ""
     return f',"kind":"{decoded.kind}"{node}{text}{signals}{source}'
 
@@ -153,11 +154,17 @@ _MARKS: Final = {Output.LOG: comment, Output.JSONL: Mark.json}
 
 
 class StdoutWriter:
-    """Lines on standard output; in JSON and in a log, what is between frames among them."""
+    """Lines on standard output; in JSON and in a log, what is between frames among them.
+
+    A log and CSV keep their characters, so that they are read again as they were written, but
+    on a terminal.
+    """
 
     def __init__(self, printer: Printer, output: Output) -> None:
         self._printer, self._output, self._lost = printer, output, 0
         self._header = output is Output.CSV
+        machine = output in (Output.LOG, Output.CSV)  # JSON has nothing that a terminal obeys
+        self._shown = not machine or sys.stdout.isatty()
 
     def take(
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
@@ -171,6 +178,7 @@ class StdoutWriter:
             lines += map(write, marks)
         self._header, self._lost = False, lost
         if lines:
-            sys.stdout.write("\n".join(lines) + "\n")
-            sys.stdout.flush()
+            stream = sys.stdout if self._shown else as_is(sys.stdout)
+            stream.write("\n".join(lines) + "\n")
+            stream.flush()
         return False

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Final, Self
 
 from tickrig.host.links.terminal import take_keys
+from tickrig.host.text.page_text import in_cells
 
 ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
 """Alternate screen, no cursor, no wrapping, all clear."""
@@ -22,6 +23,7 @@ ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
 """Keys that are more than a character, and what is pressed instead."""
 
 _KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
+_COLOUR: Final = re.compile(r"(\x1b\[(?:[07]|3[1-6])m)")
 TERMINAL: Final = "/dev/tty"
 
 
@@ -69,17 +71,27 @@ class Screen:
         return [ARROWS.get(key, key) for key in _KEY.findall(text)]
 
     def paint(self, lines: Sequence[str]) -> None:
-        """Show lines."""
-        size = self.size()
+        """Show lines; the only codes in them that the terminal obeys are those of colours."""
+        lines, size = list(map(_painted, lines)), self.size()
         before = self._painted if size == self._size else []
         text = difference(before, lines)
         self._write(text if size == self._size else CLEAR + text)
-        self._painted, self._size = list(lines), size
+        self._painted, self._size = lines, size
 
     def _write(self, text: str) -> None:
         data = text.encode()
         while data:
             data = data[os.write(self._terminal, data) :]
+
+
+def _painted(line: str) -> str:
+    r"""Return a line with nothing for the terminal but our colours.
+
+    >>> _painted("\x1b[7m01\x1b[0m \x1b]52;c;\a")
+    '\x1b[7m01\x1b[0m ␛]52;c;␇'
+    """
+    pieces = _COLOUR.split(line)
+    return "".join(one if place % 2 else in_cells(one) for place, one in enumerate(pieces))
 
 
 def difference(before: Sequence[str], lines: Sequence[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
@@ -13,6 +12,7 @@ from tickrig.host.canmon.errors import until_unread
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
 
 
@@ -89,7 +89,7 @@ def finding_json(finding: Finding) -> str:
             {"t": record.at_us / 1e6, **_frame(record), "text": decoded_text(decoded)}
             for record, decoded in finding.around
         ]
-    return json.dumps(said, ensure_ascii=False)
+    return json_text(said, letters=True)
 
 
 def _frame(record: Record) -> dict[str, str]:

@@ -23,6 +23,7 @@ from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.options import PATH, time_option
 from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.start import paint
 from tickrig.host.monitor.graph.collector import Collector
 from tickrig.host.monitor.graph.plot import render
 from tickrig.host.monitor.graph.series import Series, View
@@ -199,7 +200,8 @@ def _show(series: Sequence[Series], request: GraphRequest) -> None:
         width, height = shutil.get_terminal_size(SIZE)
         colour = sys.stdout.isatty() and "NO_COLOR" not in os.environ
         lines = render(series, view, width, min(height - 1, SIZE[1]), colour=colour)
-        click.echo("\n".join(line.rstrip() for line in lines))
+        show = partial(paint, sys.stdout) if colour else click.echo
+        show("\n".join(line.rstrip() for line in lines) + "\n" * colour)
 
 
 explained(command)

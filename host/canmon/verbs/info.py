@@ -25,6 +25,7 @@ from tickrig.host.monitor.logs.log_file import (
 )
 from tickrig.host.monitor.logs.log_reader import LogLines, read_log
 from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.text.page_text import json_text
 
 HEAD_FRAMES: Final = 1_000
 TAIL_BYTES: Final = 1 << 14
@@ -164,7 +165,6 @@ def _time(at_us: int | None) -> str:
 
 
 def _json(path: Path, head: LogHead) -> str:
-    import json  # noqa: PLC0415 - seldom wanted
 
     said = {
         "v": 1,
@@ -178,4 +178,4 @@ def _json(path: Path, head: LogHead) -> str:
         "last": None if head.last_us is None else head.last_us / 1e6,
         "bad_lines": head.tally.bad_lines.count,
     }
-    return json.dumps(said, separators=(",", ":"))
+    return json_text(said, compact=True)

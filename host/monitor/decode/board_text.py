@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Final
 
 from tickrig.host.monitor.decode.node_board import NodeBoard, NodeStatus
+from tickrig.host.text.page_text import json_text
 from tickrig.wire.canopen.emcy import describe
 
 VERSION: Final = 1
@@ -38,7 +38,7 @@ def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list
 
 def board_json(board: NodeBoard, now_us: int) -> list[str]:
     """Return one JSON object a node."""
-    return [json.dumps(_fields(row, now_us)) for row in board.rows()]
+    return [json_text(_fields(row, now_us)) for row in board.rows()]
 
 
 def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:

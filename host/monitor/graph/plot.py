@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 
 from tickrig.host.monitor.graph.chart import Chart, Curve, chart, ticks
 from tickrig.host.monitor.graph.series import Series, View
+from tickrig.host.text.page_text import one_line
 
 DOTS_X: Final = 2
 DOTS_Y: Final = 4
@@ -160,7 +161,7 @@ def _names(series: Sequence[Series], cursor_us: int | None, width: int, colour: 
     lines = []
     for number, (one, reading) in enumerate(zip(series, readings, strict=True)):
         axis = f"  (axis {one.axis})" if one.axis > 1 else ""
-        text = f"━ {reading}{axis}"[:width]
+        text = one_line(f"━ {reading}{axis}")[:width]
         lines.append(_coloured(text, number) if colour else text)
     return lines
 

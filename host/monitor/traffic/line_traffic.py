@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from tickrig.host.monitor.frames.quantity import ms_text, rate_text, s_text
 from tickrig.host.monitor.frames.record import ARROWS
+from tickrig.host.text.page_text import in_cells
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -99,4 +100,4 @@ def line_table(rows: tuple[LineRow, ...], now_us: int, width: int) -> list[str]:
         f" {s_text(now_us - row.last_us):>7} {row.text}"
         for name, row in zip(names, rows, strict=True)
     ]
-    return [line[:width] for line in ("", head, *lines)]
+    return [in_cells(line)[:width] for line in ("", head, *lines)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
@@ -10,6 +9,7 @@ from tickrig.host.monitor.frames.ident import EXTENDED, FD, REMOTE, ident_text, 
 from tickrig.host.monitor.frames.quantity import count_text, load_text, ms_text, rate_text
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot
+from tickrig.host.text.page_text import json_text
 from tickrig.wire.can import EXTENDED_MAX
 
 ID_HEAD: Final = (
@@ -179,4 +179,4 @@ def _ident(ident: int) -> dict[str, object]:
 
 
 def _line(what: str, **members: object) -> str:
-    return json.dumps({"v": 1, "what": what, **members}, separators=(",", ":"), ensure_ascii=False)
+    return json_text({"v": 1, "what": what, **members}, compact=True, letters=True)

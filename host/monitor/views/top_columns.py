@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 from tickrig.host.monitor.frames.ident import ident_text
 from tickrig.host.monitor.frames.quantity import count_text, ms_text, rate_text, s_text
 from tickrig.host.monitor.traffic.tally import BitRow, IdRow
+from tickrig.host.text.page_text import in_cells
 
 REVERSE: Final = "\x1b[7m"
 PLAIN: Final = "\x1b[0m"
@@ -124,6 +125,7 @@ class IdText(NamedTuple):
         return self._joined("bus", "CAN-ID")
 
     def _joined(self, channel: str, ident: str) -> str:
+        channel = in_cells(channel)
         return (
             f"{channel:<{self.channel_width}.{self.channel_width}} " * bool(self.channel_width)
             + f"{ident:<9}"

@@ -15,6 +15,7 @@ from tickrig.host.monitor.traffic.line_traffic import LineRow, LineTraffic, line
 from tickrig.host.monitor.traffic.tally import IdRow
 from tickrig.host.monitor.traffic.traffic import BusRow, Snapshot, Traffic
 from tickrig.host.monitor.views.top_columns import Column, IdText, data_text, fitting, heat_text
+from tickrig.host.text.page_text import in_cells
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def bus_line(bus: BusRow, bit_rate: int | None) -> str:
     """Write what a bus did in one line."""
     load, errors = bus.load, bus.errors
     words = [
-        f"{bus.channel}: {bus.frames} frames",
+        f"{in_cells(bus.channel)}: {bus.frames} frames",
         f"load {load_text(load.latest.bits, bit_rate)}",
         f"error frames {errors.frames}",
     ]
@@ -283,7 +284,7 @@ def meaning_text(decoded: Decoded) -> str:
     """Write what a frame means, with the node and where the names are from."""
     node = "" if decoded.node is None else f"{decoded.node} "
     source = f" ({decoded.source})" if decoded.source else ""
-    return f"{node}{decoded.kind} {decoded.text}".rstrip() + source
+    return in_cells(f"{node}{decoded.kind} {decoded.text}".rstrip() + source)
 
 
 def _next(order: Order) -> Order:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +11,7 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading
 from tickrig.host.rtc.commands.request import at, components, request_system
 from tickrig.host.rtc.commands.verbs import as_json
+from tickrig.host.text.page_text import json_text
 
 
 @click.command()
@@ -36,7 +36,7 @@ def status(at: Path, as_json: bool) -> None:
     """Show how the run is going: time, late ticks."""
     answer = {key: value for key, value in request_system(at, "status").items() if key != "ok"}
     if as_json:
-        click.echo(json.dumps(answer))
+        click.echo(json_text(answer))
         return
     for key in ("components", "now_us", "late_ticks", "late_us"):
         click.echo(f"{key} {answer[key]}")

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any
 
+from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import format_time
 
 
@@ -83,8 +83,8 @@ def value_line(value: Any) -> str:
     """
     if set(value) == {"tm", "data"}:
         time_us = value["tm"]["sec"] * 1_000_000 + value["tm"]["nsec"] // 1_000
-        return f"{format_time(time_us)} {json.dumps(value['data'])}"
-    return json.dumps(value)
+        return f"{format_time(time_us)} {json_text(value['data'])}"
+    return json_text(value)
 
 
 def _short_type(idl_id: str) -> str:

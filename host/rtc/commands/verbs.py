@@ -25,6 +25,7 @@ from tickrig.host.rtc.commands.request import (
     settle,
 )
 from tickrig.host.rtc.commands.texts import component_lines, component_row, port_line, value_line
+from tickrig.host.text.page_text import json_text
 
 DATAPORT: Final = "dataport."
 POLL_S: Final = 0.02
@@ -47,7 +48,7 @@ def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: b
     """
     described = components(at, *names)
     if as_json:
-        click.echo(json.dumps(described))
+        click.echo(json_text(described))
         return
     for component in described:
         click.echo(component_row(component) if long else component["name"])
@@ -64,7 +65,7 @@ def cat(at: Path, names: tuple[str, ...], long: bool, as_json: bool) -> None:
     """Show the components NAMES: type, state, ports, connectors, configuration."""
     described = components(at, *names)
     if as_json:
-        click.echo(json.dumps(described))
+        click.echo(json_text(described))
         return
     for component in described:
         for line in component_lines(component, long=long):
@@ -159,7 +160,7 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
     until_s = time.monotonic() + time_us("--for", duration) / 1e6 if duration else None
     try:
         for value in _values(at, port, count, until_s):
-            click.echo(json.dumps(value) if as_json else value_line(value))
+            click.echo(json_text(value) if as_json else value_line(value))
     except KeyboardInterrupt:
         return
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -18,7 +17,7 @@ from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused
-from tickrig.host.text.page_text import one_line
+from tickrig.host.text.page_text import json_text, one_line
 
 REFUSED: Final = 1
 
@@ -78,4 +77,4 @@ def _read(session: NetSession, objects: NodeObjects, entry: Entry, as_json: bool
     value = objects.text(entry).read(data)[0]
     said = {"v": 1, "node": node_id, "index": entry[0], "sub": entry[1]}
     more = {"name": objects.text(entry).name, "data": data.hex(), "unit": objects.text(entry).unit}
-    return json.dumps({**said, **more, "value": value if not isinstance(value, bytes) else None})
+    return json_text({**said, **more, "value": value if not isinstance(value, bytes) else None})

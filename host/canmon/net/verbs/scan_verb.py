@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Final
 
 import click
@@ -15,7 +14,7 @@ from tickrig.host.canopen.master.boot_talk import state_text
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import time_option
 from tickrig.host.monitor.views.node_card import profile_text
-from tickrig.host.text.page_text import one_line
+from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted
 
 NOBODY: Final = 1
@@ -70,7 +69,7 @@ def _identity(node: NodeFound) -> str:
 
 
 def _json(node: NodeFound) -> str:
-    return json.dumps(
+    return json_text(
         {
             "v": 1,
             "node": node.node_id,

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import IO, Final
 
 from tickrig.emulators.testing.bench.errors import NotOnThisBench, OperatorRefused
+from tickrig.host.text.page_text import harmless
 
 TERMINAL: Final = "/dev/tty"
 POLL_US: Final = 10_000
@@ -37,7 +38,7 @@ class Terminal:
         """
         try:
             with open(self._path, "r+b", buffering=0) as terminal:
-                terminal.write(f"\n{text} ".encode())
+                terminal.write(f"\n{harmless(text)} ".encode())
                 while not self._is_typed(terminal):
                     for host in self.hosts:
                         host(POLL_US)
