@@ -89,12 +89,13 @@ def parse_address(text: str) -> tuple[str, int]:
 
 def _answer_input(gateway: Gateway) -> None:
     """Answer standard input; exit status 1 if a command was not carried out."""
-    failed = False
+    failed, shown = False, sys.stdout.isatty()
     for line in sys.stdin.buffer:
         answer = gateway.answer(line.decode("latin-1").rstrip("\r\n"))
         if answer:
             failed |= ERROR in answer
-            click.echo(answer.encode("latin-1", "replace"))
+            # a program reads the bytes of the node; at a terminal nothing obeys them
+            click.echo(answer if shown else answer.encode("latin-1", "replace"))
     if failed:
         raise click.exceptions.Exit(1)
 
