@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from tickrig.emulators.canopen.choices import MODELS, PROFILES
 from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.text.user_file import SUFFIX
 
 NODE_KEYS: Final = ("id", "eds", "model", "rtc", "profile")
@@ -43,7 +43,7 @@ def read_rig(path: Path) -> RigFile:
         text = path.read_text("utf-8")
         if is_bus_file(text.encode()):
             raise Refused(f"rig {path}: it is a bus.yml: --bus {path}")
-        content = tomllib.loads(text)
+        content = load_toml(text)
     except OSError as error:
         refuse_path("rig", error)
     except ValueError as error:

@@ -50,7 +50,10 @@ class ControlClient:
         """
         request = json.dumps({"v": VERSION, "do": do, **fields})
         self._socket.sendall(request.encode() + b"\n")
-        answer = json.loads(self._receive_line())
+        try:
+            answer = json.loads(self._receive_line())
+        except RecursionError:
+            answer = None
         if not isinstance(answer, dict):
             raise ValueError("the answer is not a JSON object")
         if not answer.get("ok"):
@@ -75,10 +78,10 @@ class ControlClient:
         self.close()
 
     def _receive_line(self) -> bytes:
-        while b"\n" not in self._received:
-            data = self._socket.recv(65_536)
-            if not data:
+        pieces = [self._received]
+        while b"\n" not in pieces[-1]:
+            pieces.append(self._socket.recv(65_536))
+            if not pieces[-1]:
                 raise ConnectionResetError("the emulator hung up")
-            self._received += data
-        line, _, self._received = self._received.partition(b"\n")
+        line, _, self._received = b"".join(pieces).partition(b"\n")
         return line

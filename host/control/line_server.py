@@ -140,7 +140,8 @@ class _Client:
     ) -> None:
         self.connection, self.active_s = connection, 0.0
         self._answer, self._max_line, self._too_long = answer, max_line, too_long
-        self._received, self._unsent = b"", b""
+        self._received, self._unsent = bytearray(), bytearray()
+        self._end = -1  # where the first line in it ends; found once, whatever its length
         self._closing = self._broken = self._skipping = False
 
     @property
@@ -149,11 +150,11 @@ class _Client:
 
     @property
     def has_line(self) -> bool:
-        return b"\n" in self._received and len(self._unsent) < MAX_UNSENT
+        return self._end >= 0 and len(self._unsent) < MAX_UNSENT
 
     @property
     def wants_more(self) -> bool:
-        return not self._closing and b"\n" not in self._received
+        return not self._closing and self._end < 0
 
     @property
     def gone(self) -> bool:
@@ -173,7 +174,9 @@ class _Client:
 
     def answer(self) -> None:
         """Answer the next whole line."""
-        line, _, self._received = self._received.partition(b"\n")
+        line = bytes(self._received[: self._end])
+        del self._received[: self._end + 1]
+        self._end = self._received.find(b"\n")
         self.send(self._too_long if len(line) > self._max_line else self._answer(line))
 
     def send(self, data: bytes) -> None:
@@ -184,7 +187,7 @@ class _Client:
     def flush(self) -> None:
         """Send what goes at once."""
         try:
-            self._unsent = self._unsent[self.connection.send(self._unsent) :]
+            del self._unsent[: self.connection.send(self._unsent)]
         except BlockingIOError:
             return
         except OSError:
@@ -194,7 +197,11 @@ class _Client:
         if self._skipping:
             _, end, data = data.partition(b"\n")
             self._skipping = not end
+        begin = len(self._received)
         self._received += data
-        if b"\n" not in self._received and len(self._received) > self._max_line:
-            self._received, self._skipping = b"", True
+        if self._end < 0:
+            self._end = self._received.find(b"\n", begin)
+        if self._end < 0 and len(self._received) > self._max_line:
+            self._received.clear()
+            self._skipping = True
             self.send(self._too_long)

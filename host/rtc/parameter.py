@@ -18,7 +18,7 @@ _BOOLS: Final[Mapping[str, bool]] = {
 }
 Check = Callable[[object], bool]
 
-_NUMBER: Final = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)"
+_NUMBER: Final = r"([-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d++)?)"
 _SIGN: Final = r"(<=|>=|<|>|==?)"
 _RANGE: Final = re.compile(rf"(?:{_NUMBER}{_SIGN})?x(?:{_SIGN}{_NUMBER})?", re.IGNORECASE)
 _WORDS: Final = re.compile(r"\(([^()]*)\)")

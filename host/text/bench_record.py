@@ -151,6 +151,9 @@ def _check_change(text: str) -> None:
     match = _CHANGE.fullmatch(text)
     if match is None:
         raise ValueError(f"{text!r:.60} is not NAME=VALUE")
-    value = json.loads(match[2])
+    try:
+        value = json.loads(match[2])
+    except RecursionError:
+        value = None
     if type(value) not in (int, float, str) or (type(value) is float and not isfinite(value)):
         raise ValueError(f"{text!r:.60} is no number and no string")

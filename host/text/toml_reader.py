@@ -32,6 +32,9 @@ from tickrig.host.text.toml_document import (
 MOST_DEEP: Final = 50
 """How deep arrays and inline tables may nest, and how many parts a key may have."""
 
+MOST_MISTAKES: Final = 1_000
+"""Behind so many the text is not read any further."""
+
 ONE_LINE: Final = "an inline table stands on one line; [a.table] has lines of its own"
 
 _BLANK: Final = re.compile(r"[ \t]*")
@@ -45,12 +48,39 @@ _LONG: Final = {
     "'''": re.compile(r"'''.*?''''{0,2}", re.DOTALL),
 }
 _PLAIN: Final = re.compile(r"[^\s,\[\]{}#\"']+(?: [0-9][^\s,\[\]{}#\"']*)?")
+_PARTS: Final = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_DEEP}}}[\w\"'-]")
+"""A key whose reading by the standard library takes the square of its length."""
 _WHOLE: Final = re.compile(r"0|[1-9][0-9]{0,17}")
+_SIMPLE: Final = re.compile(r"\"[^\"\\]*\"|'[^']*'")
 _STATEMENT: Final = re.compile(
-    r"[ \t]*(?:\[\[?[ \t]*(?!(?:true|false|inf|nan)\b)[A-Za-z_][^\]\n]*\]\]?[ \t]*(?:#|\n|$)"
+    r"[ \t]*+(?:\[\[?[ \t]*(?!(?:true|false|inf|nan)\b)[A-Za-z_][^\]\n]*\]\]?[ \t]*(?:#|\n|$)"
     r"|[\w.\"' \t-]+=)"
 )
 """What most likely begins a statement, where an array has not ended."""
+
+
+def load_toml(text: str) -> dict[str, Any]:
+    """Return the values of a text as the parser of the standard library reads it.
+
+    Args:
+        text: the whole.
+
+    Raises:
+        TOMLDecodeError: it is no TOML, or nested deeper than anybody writes.
+    """
+    if found := _PARTS.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        reason = f"a key of more than {MOST_DEEP} parts (at line {line}, column 1)"
+        raise tomllib.TOMLDecodeError(reason)
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except RecursionError:
+        reason = "lists or tables nest too deep"
+        raise tomllib.TOMLDecodeError(reason) from None
+    except ValueError as error:  # a number of thousands of digits
+        raise tomllib.TOMLDecodeError(str(error)) from None
 
 
 def read_toml(text: str) -> TomlDocument:
@@ -70,6 +100,10 @@ class _WrongError(Exception):
         self.at, self.place = at, at if place is None else place
 
 
+class _EnoughError(Exception):
+    """There are as many mistakes as anybody reads."""
+
+
 class _Reader:
     """Reads one text."""
 
@@ -81,17 +115,24 @@ class _Reader:
         self._mistakes: list[Mistake] = []
 
     def read(self) -> TomlDocument:
-        while self._skip(_BETWEEN) < len(self._text):
-            start = self._at
-            try:
-                self._statement()
-            except _WrongError as error:
-                self._report(error.place, str(error))
-                self._go_on_behind(start, error.at)
+        try:
+            while self._skip(_BETWEEN) < len(self._text):
+                start = self._at
+                try:
+                    self._statement()
+                except _WrongError as error:
+                    self._report(error.place, str(error))
+                    self._go_on_behind(start, error.at)
+        except _EnoughError:
+            self._whole = False
         return document_of(self._top, self._mistakes, whole=self._whole)
 
     def _report(self, at: int, reason: str) -> None:
-        self._mistakes.append(Mistake(self._line(at), reason))
+        line = self._line(at)
+        self._mistakes.append(Mistake(line, reason))
+        if len(self._mistakes) == MOST_MISTAKES:
+            self._mistakes.append(Mistake(line, f"{MOST_MISTAKES} mistakes; nothing more is read"))
+            raise _EnoughError
 
     def _line(self, at: int) -> int:
         return bisect_right(self._starts, min(at, len(self._text)))
@@ -232,6 +273,8 @@ class _Reader:
         """Return the value of a token; tell what is wrong with it, and return BROKEN."""
         if _WHOLE.fullmatch(token):
             return int(token)
+        if token.isprintable() and _SIMPLE.fullmatch(token):  # a parser for each takes long
+            return token[1:-1]
         try:
             return tomllib.loads(f"v={token}")["v"]
         except (ValueError, RecursionError) as error:
@@ -262,7 +305,8 @@ class _Reader:
         """Stop where a statement most likely begins, on a line after that of the array."""
         line = self._line(self._at)
         first = self._starts[line - 1]
-        is_first = not self._text[first : self._at].strip(" \t")
+        blank = _BLANK.match(self._text, first)
+        is_first = blank is not None and blank.end() == self._at
         if is_first and line > self._line(start) and _STATEMENT.match(self._text, first):
             self._close(start, "]", "array")
 

@@ -77,7 +77,7 @@ def _read(path: Path) -> dict[str, Nonvolatile]:
         content = json.loads(path.read_bytes())
     except FileNotFoundError:
         return {}
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise StoreError(f"{path}: not a store file: {error}") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise StoreError(f"{path}: not a store file: its format is not {FORMAT!r}")

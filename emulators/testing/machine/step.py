@@ -19,6 +19,12 @@ CALL: Final = "call"
 SEED: Final = "seed"
 VERBS: Final = (CALL, "set", "press", "fault", "send", "wait", SEED)
 
+LONGEST: Final = 10_000
+"""Characters of a call."""
+
+DIGITS: Final = 20
+"""Of a seed."""
+
 _LINE: Final = re.compile(r"\+(\S+)\s+(\w+)(?:\s+(.*))?")
 
 
@@ -113,15 +119,15 @@ def parse_steps(text: str, file: str) -> tuple[HostStep, ...]:
 def _parse(content: str) -> HostStep:
     match = _LINE.fullmatch(content)
     if match is None:
-        raise ValueError(f"{content!r} is not '+TIME ACTION ...', as '+5ms call heat()'")
+        raise ValueError(f"{content!r:.60} is not '+TIME ACTION ...', as '+5ms call heat()'")
     wait_us, verb, rest = parse_time_us(match[1]), match[2], (match[3] or "").strip()
     if verb not in VERBS:
         raise ValueError(f"no action {verb!r}; {near(verb, VERBS)}")
     if verb == CALL:
         name, arguments = _parse_call(rest)
         return HostStep(wait_us, verb, name, arguments=arguments)
-    if verb == SEED and not rest.isdecimal():
-        raise ValueError(f"a seed is a whole number from 0, not {rest!r}")
+    if verb == SEED and not (rest.isdecimal() and len(rest) <= DIGITS):
+        raise ValueError(f"a seed is a whole number from 0, not {rest!r:.60}")
     what, lasting, time = rest.partition(" for ")
     return HostStep(wait_us, verb, what, parse_time_us(time) if lasting else 0)
 
@@ -129,15 +135,15 @@ def _parse(content: str) -> HostStep:
 def _parse_call(text: str) -> tuple[str, dict[str, Any]]:
     """Read `name(argument=literal, ...)`; nothing is evaluated but literals."""
     try:
-        call = ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError):
+        call = ast.parse(text, mode="eval").body if len(text) <= LONGEST else None
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
         call = None
     if not isinstance(call, ast.Call) or not isinstance(call.func, ast.Name) or call.args:
-        raise ValueError(f"{text!r} is not a call, as 'write(data=b\"a\", to=3)'")
+        raise ValueError(f"{text!r:.60} is not a call, as 'write(data=b\"a\", to=3)'")
     try:
         arguments = {str(each.arg): ast.literal_eval(each.value) for each in call.keywords}
-    except ValueError:
-        raise ValueError(f"{text!r}: an argument is no plain value") from None
+    except (ValueError, MemoryError, RecursionError):
+        raise ValueError(f"{text!r:.60}: an argument is no plain value") from None
     return call.func.id, arguments
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
 from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
 from tickrig.host.text.names import near
+from tickrig.host.text.toml_reader import load_toml
 from tickrig.wire.sensors.ucode import parse_ucode
 
 EXAMPLE: Final = """\
@@ -52,7 +52,7 @@ def parse_table(text: str) -> Table:
     >>> sorted(parse_table(EXAMPLE).contents)
     ['door', 'lift']
     """
-    found = tomllib.loads(text)
+    found = load_toml(text)
     if unknown := [name for name in found if name not in ("ucodes", "contents")]:
         raise ValueError(f"no section {unknown[0]!r}; {near(unknown[0], ['ucodes', 'contents'])}")
     contents = {name: _contents(name, each) for name, each in _tables(found, "contents").items()}

@@ -30,7 +30,7 @@ from tickrig.host.monitor.graph.series import Series, View
 from tickrig.host.monitor.graph.signal_spec import ObjectName, parse_signal
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")
-_RANGE: Final = re.compile(r"([1-9])=(-?[0-9.eE+-]+?)\.\.(-?[0-9.eE+-]+)")
+_RANGE: Final = re.compile(r"([1-9])=((?:(?!\.\.)[0-9.eE+-])++)\.\.([0-9.eE+-]+)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

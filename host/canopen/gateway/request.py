@@ -56,11 +56,11 @@ def parse_request(line: str) -> Request | None:
         raise GatewayError(ErrorCode.SYNTAX, "a command begins with its number, as [1]")
     words, numbers = _words(line[head.end() :]), list[int]()
     while words and words[0][:1].isdecimal():
+        if len(numbers) == MOST_NUMBERS:
+            raise GatewayError(ErrorCode.SYNTAX, "before a command stand net and node, no more")
         numbers.append(number(words.pop(0), MAX_NUMBER, "number"))
     if not words:
         raise GatewayError(ErrorCode.SYNTAX, "there is no command")
-    if len(numbers) > MOST_NUMBERS:
-        raise GatewayError(ErrorCode.SYNTAX, "before a command stand net and node, no more")
     return Request(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
 
 

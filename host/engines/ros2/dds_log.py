@@ -21,7 +21,7 @@ MOST: Final = 100
 
 _DESCRIPTORS: Final = "/dev/fd"
 _LOG: Final = log_of(__name__)
-_NUMBER: Final = re.compile(r"[0-9a-f]*\d[0-9a-f]*")
+_NUMBER: Final = re.compile(r"(?<![0-9a-f])(?=[a-f]*+[0-9])[0-9a-f]++")
 _HEAD: Final = re.compile(r"^[\d.]+ \[[^]]*\] +\S* *")
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 
 from tickrig.host.monitor.check.rules import LISTS, LoadRule, RuleValues, parse_rules
+from tickrig.host.text.toml_reader import load_toml, read_toml
 from tickrig.host.text.values import counted
 
 
@@ -20,7 +20,7 @@ def parse_rule_file(text: str, load_rule: LoadRule) -> RuleValues:
         ValueError: what is wrong, each mistake with its line.
     """
     try:
-        words = tomllib.loads(text)
+        words = load_toml(text)
         parse_rules(words, load_rule)
     except ValueError as error:
         mistakes = _mistakes(text, load_rule) or [str(error)]
@@ -33,8 +33,6 @@ def parse_rule_file(text: str, load_rule: LoadRule) -> RuleValues:
 
 def _mistakes(text: str, load_rule: LoadRule) -> list[str]:
     """Try each rule alone; of text that is no TOML nothing else is said."""
-    from tickrig.host.text.toml_reader import read_toml  # noqa: PLC0415 - only for mistakes
-
     document = read_toml(text)
     found = [(line, reason) for line, reason in document.mistakes]
     for path, words in () if found else _alone(document.values):

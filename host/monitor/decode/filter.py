@@ -57,6 +57,15 @@ from tickrig.host.monitor.frames.tokens import Token, tokens_of
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
 
 
+LONGEST: Final = 10_000
+"""Characters of a filter or a rule."""
+
+DEEPEST: Final = 50
+"""So many brackets and `not` may stand in each other."""
+
+SHOWN: Final = 200
+
+
 class FilterError(ValueError):
     """Text that is no filter.
 
@@ -68,7 +77,8 @@ class FilterError(ValueError):
     what = "filter"
 
     def __init__(self, text: str, column: int, reason: str) -> None:
-        super().__init__(f"{self.what} {text!r}, column {column}: {reason}")
+        shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+        super().__init__(f"{self.what} {shown!r}, column {column}: {reason}")
         self.column = column
 
 
@@ -96,7 +106,9 @@ class FilterParser:
         self._text = text
         self._signals: set[str] = set()
         self._nodes: set[range] = set()
-        self._tokens = tokens_of(text)
+        if len(text) > LONGEST:
+            raise self.wrong(text, LONGEST, f"it has {len(text)} characters, at most {LONGEST}")
+        self._tokens, self._depth = tokens_of(text), 0
 
     def parse(self) -> tuple[Test, frozenset[str]]:
         """Return the test and the signals it asks for; FilterError if it is no filter."""
@@ -136,14 +148,20 @@ class FilterParser:
         return lambda record, decoded: all(test(record, decoded) for test in tests)
 
     def _not(self) -> Test:
+        if self._next.text not in ("not", "!", "("):
+            return self._term()
+        if self._depth == DEEPEST:
+            raise self._error(f"nested deeper than {DEEPEST}")
+        self._depth += 1
         if self._take("not", "!"):
-            test = self._not()
-            return lambda record, decoded: not test(record, decoded)
-        if self._take("("):
+            inner = self._not()
+            test: Test = lambda record, decoded: not inner(record, decoded)  # noqa: E731
+        else:
+            self._take("(")
             test = self._or()
             self._expect(")")
-            return test
-        return self._term()
+        self._depth -= 1
+        return test
 
     def _expect(self, word: str) -> None:
         if not self._take(word):

@@ -33,7 +33,7 @@ FORM: Final = (
     "ID[BYTES]TYPE*FACTOR+OFFSET, as 181[2:6]s*0.001: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5;"
     " TYPE is u, s or f, and b behind it for big-endian"
 )
-_NUMBER: Final = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_NUMBER: Final = r"(?:[0-9]++\.?[0-9]*+|\.[0-9]++)(?:[eE][+-]?[0-9]++)?"
 _NOTATION: Final = re.compile(
     r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
     r"\[([0-9]{1,2})(?::([0-9]{1,2})|\.([0-7])(?:\+([0-9]{1,2}))?)?\]"

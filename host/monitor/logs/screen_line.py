@@ -38,7 +38,7 @@ _SERIAL: Final = re.compile(rf"(?:{_STAMP})?\S+  [<>]  .*", re.ASCII)
 _WORDS: Final = re.compile(r"\t+[a-z]+-[a-z-]+(?:\{.*\})?\s*", re.ASCII)
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 _SPANS: Final = re.compile(
-    r"^\s*\((-?)([0-9]{3,9})\.([0-9]{6})\)\s+\S+\s.*\[[0-9]", re.ASCII | re.MULTILINE
+    r"^[ \t]*+\((-?)([0-9]{3,9})\.([0-9]{6})\)[ \t]++\S++\s.*\[[0-9]", re.ASCII | re.MULTILINE
 )
 _DIGITS: Final = re.compile(r"[0-9A-Fa-f]{2}")
 _ABSOLUTE: Final = 10

@@ -16,7 +16,7 @@ from tickrig.host.monitor.sequence.sequence_run import (
 )
 from tickrig.host.monitor.sequence.variables import fill_in
 from tickrig.host.text.steps import FOREVER, Place, StepError, content_lines
-from tickrig.host.text.toml_reader import read_toml
+from tickrig.host.text.toml_reader import load_toml, read_toml
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
@@ -128,11 +128,9 @@ class TomlSequence:
             StepError: `FILE:LINE: what came, what is allowed`.
         """
         try:
-            top = tomllib.loads(self._text)
+            top = load_toml(self._text)
         except tomllib.TOMLDecodeError as error:
             raise StepError(self._syntax(str(error))) from None
-        except RecursionError:
-            raise StepError(self._syntax("lists in lists in lists (at end)")) from None
         try:
             self._variables = {**self._vars(top.get("vars", {})), **self._given}
             _check_keys(top, _TOP, ())
@@ -150,7 +148,7 @@ class TomlSequence:
         reason, _, place = text.rpartition(" (at ")
         found = _LINE.search(place)
         number = found[1] if found else max(1, len(self._text.splitlines()))
-        return f"{self._file}:{number}: {reason}"
+        return f"{self._file}:{number}: {reason or place}"
 
     def _vars(self, table: Any) -> dict[str, int]:
         if not isinstance(table, dict):

@@ -29,6 +29,8 @@ _BINARY: Final[dict[type[ast.operator], Callable[[int, int], int]]] = {
     ast.RShift: operator.rshift,
 }
 MOST_BITS: Final = 64
+LONGEST: Final = 1_000
+"""Characters of an expression."""
 
 
 def fill_in(text: str, variables: Mapping[str, int]) -> str:
@@ -62,9 +64,11 @@ def evaluate(text: str, variables: Mapping[str, int]) -> int:
         ValueError: something else, or more than 64 bits.
     """
     try:
+        if len(text) > LONGEST:
+            raise SyntaxError
         number = _number(ast.parse(text.strip(), mode="eval").body, variables)
     except (SyntaxError, ZeroDivisionError, RecursionError, MemoryError):
-        raise ValueError(f"{text!r} is no whole number: write 3, 0x600+id or 2*n") from None
+        raise ValueError(f"{text!r:.60} is no whole number: write 3, 0x600+id or 2*n") from None
     return number
 
 
@@ -82,7 +86,7 @@ def _number(node: ast.expr, variables: Mapping[str, int]) -> int:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             number = _BINARY[type(op)](_number(left, variables), _count(right, op, variables))
         case _:
-            raise ValueError(f"{ast.unparse(node)!r} is no whole number: write 3, 0x600+id or 2*n")
+            raise ValueError(f"{ast.unparse(node)!r:.60} is no whole number: write 3, 0x600+id or 2*n")
     if abs(number) >> MOST_BITS:
         raise ValueError(f"{ast.unparse(node)!r} has more than {MOST_BITS} bits")
     return number
@@ -99,7 +103,7 @@ def _written(text: str, form: str, variables: Mapping[str, int]) -> str:
     number = evaluate(text, variables)
     match = _FORM.fullmatch(form)
     if match is None:
-        raise ValueError(f"{{{text}:{form}}}: 1 to 8 hex digits, u8 to u64, i8 to i64, or d")
+        raise ValueError(f"{{{text}:{form:.20}}}: 1 to 8 hex digits, u8 to u64, i8 to i64, or d")
     digits, sign, bits = match.groups()
     if form == "d":
         return str(number)

@@ -137,8 +137,8 @@ def inject(at: Path, port: str, value: str) -> None:
     """  # noqa: D301 - click wants the backspace
     try:
         given = json.loads(value)
-    except ValueError:
-        raise Refused(f"{value!r} is not JSON, as 5, [1, 2], true or '\"text\"'") from None
+    except (ValueError, RecursionError):
+        raise Refused(f"{value!r:.60} is not JSON, as 5, [1, 2], true or '\"text\"'") from None
     request_system(at, "inject", port=port, value=given)
 
 

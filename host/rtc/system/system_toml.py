@@ -33,6 +33,7 @@ from typing import Any, Final
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.remotes import RemoteEntry
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
+from tickrig.host.text.toml_reader import load_toml
 
 _COMPONENT: Final[Mapping[str, type]] = {
     "name": str,
@@ -60,11 +61,9 @@ def parse_toml(text: str) -> System:
         RtcRefused: no TOML, or a key or value that is not in the table above.
     """
     try:
-        tables = tomllib.loads(text)
+        tables = load_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise RtcRefused(f"not TOML: {error}") from error
-    except RecursionError:
-        raise RtcRefused("not TOML that can be read: lists or tables nest too deep") from None
     if unknown := set(tables) - {"component", "connection", "remote"}:
         raise RtcRefused(f"{min(unknown)!r} is none of: component, connection, remote")
     components = _read(tables, "component", _COMPONENT, ("name", "type"))

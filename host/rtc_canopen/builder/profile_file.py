@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
@@ -74,8 +73,10 @@ def parse_project(text: str) -> Project:
         ProfileError: no TOML, an unknown key, a value of another kind, or what no
             DeviceRTC can be.
     """
+    from tickrig.host.text.toml_reader import load_toml  # noqa: PLC0415 - a TAB needs none
+
     try:
-        content = tomllib.loads(text)
+        content = load_toml(text)
         _check_keys(content, KEYS)
         ports = _tables(content)
         word_bits = _take(content, "word_bits", int, DEFAULT_WORD_BITS)
@@ -89,8 +90,6 @@ def parse_project(text: str) -> Project:
         if not 1 <= node_id <= 127:
             raise ProfileError(f"node_id {node_id} is not in 1..127")
         return Project(profile, node_id, _take(content, "strict_cia301", bool, False))
-    except RecursionError:
-        raise ProfileError("lists or tables nest too deep") from None
     except ValueError as error:
         raise ProfileError(str(error)) from None
 

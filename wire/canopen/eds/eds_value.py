@@ -27,7 +27,7 @@ _SPLIT_HEX: Final = re.compile(r"0x((?: *[0-9a-f])+)", re.IGNORECASE | re.ASCII)
 _ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f]*)h", re.IGNORECASE | re.ASCII)
 _UNDERSCORE: Final = re.compile(r"(?<=[0-9a-f])_(?=[0-9a-f])", re.IGNORECASE)
 _OCTAL: Final = re.compile(r"0[0-7]+")
-_NO_OCTAL: Final = re.compile(r"\b0+([0-9]*[89][0-9]*)\b", re.ASCII)
+_NO_OCTAL: Final = re.compile(r"\b0++(?=[0-7]*+[89])([0-9]++)\b", re.ASCII)
 _TRUTH: Final = {"true": True, "false": False}
 
 

@@ -128,6 +128,7 @@ class _Reader:
         self.parser: expat.XMLParserType | None = None
         self.found: list[Element] = []
         self._open: list[Element] = []
+        self._texts: list[list[str]] = []  # of what is open: pieces, which are joined at its end
 
     @property
     def _line(self) -> int:
@@ -141,13 +142,14 @@ class _Reader:
         if self._open:
             self._open[-1].children.append(element)
         self._open.append(element)
+        self._texts.append([])
         self.found.append(element)
 
     def end(self, name: str) -> None:
-        self._open.pop()
+        self._open.pop().text = "".join(self._texts.pop())
 
     def take(self, data: str) -> None:
-        self._open[-1].text += data
+        self._texts[-1].append(data)
 
     def refuse(self, *words: object) -> None:
         raise XddError("has a document type, which is refused", self._line)

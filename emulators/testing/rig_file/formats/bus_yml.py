@@ -18,7 +18,7 @@ BUS: Final = "bus"
 """The key of a rig file that names a bus.yml."""
 
 MISNAMED: Final = "it is a bus.yml: its name has to end in .yml or .yaml"
-_TOML: Final = re.compile(rb"^\s*\[", re.MULTILINE)
+_TOML: Final = re.compile(rb"^[ \t]*+\[", re.MULTILINE)
 
 
 def is_bus_yml(path: Path, data: bytes) -> bool:

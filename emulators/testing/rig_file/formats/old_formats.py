@@ -33,7 +33,9 @@ URDF: Final = (
 _EDS: Final = re.compile(r"\s*\[(FileInfo|DeviceInfo|DeviceComissioning)\]", re.IGNORECASE)
 _HEAD: Final = 2_000
 """Characters at its beginning by which a URDF is known."""
-_SCENARIO: Final = re.compile(r"(\s*(#.*)?\n)*\s*\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)")
+_SCENARIO: Final = re.compile(
+    r"(?:[^\S\n]*+(?:#.*+)?\n)*+[^\S\n]*+\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)"
+)
 HIL: Final = {
     ("dut", "rrc", "port"): ("hardware", "rrc", "port"),
     ("tolerance", "stick_pct"): ("hardware", "tolerance", "stick_pct"),

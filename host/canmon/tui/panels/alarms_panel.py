@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
 from typing import Any, ClassVar, Final
@@ -19,6 +18,7 @@ from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, 
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.monitor.check.alarms import RULE, Alarms, State, render_alarms
 from tickrig.host.monitor.check.rules import SWITCHES, VALUES, Rules, parse_rules
+from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.tui.line_view import Line, LineView, plain
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
@@ -188,7 +188,7 @@ class AlarmsPanel(Panel):
         if not self._own:
             return {}
         rules = dict.fromkeys((*SWITCHES, *VALUES))
-        return {"rules": {**rules, **tomllib.loads(self.rules_text)}}
+        return {"rules": {**rules, **load_toml(self.rules_text)}}
 
     def action_acknowledge(self) -> None:
         """Take note of all that was broken."""
@@ -210,7 +210,7 @@ class AlarmsPanel(Panel):
         if not area.display:
             return
         try:
-            rules = parse_rules(tomllib.loads(area.text), load_rule)
+            rules = parse_rules(load_toml(area.text), load_rule)
             with self.session.lock:
                 self.held.hold(rules)
         except ValueError as error:

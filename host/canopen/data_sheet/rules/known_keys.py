@@ -46,7 +46,7 @@ KEYS: Final = {
 
 SECTION: Final = re.compile(
     r"[0-9A-F]{4}(sub[0-9A-F]{1,2}|Name|Value|Denotation|ObjectLinks)?"
-    r"|[0-9A-F]{1,3}(sub[01])?|M[0-9]+.*|Tool[0-9]+",
+    r"|[0-9A-F]{1,3}(sub[01])?|M[0-9].*|Tool[0-9]+",
     re.IGNORECASE,
 )
 """Sections beside those with names of their own: objects, data types, modules, tools."""

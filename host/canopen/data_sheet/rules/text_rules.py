@@ -17,7 +17,7 @@ _PLAIN: Final = re.compile(
     r"\[[0-9A-Fa-f]{1,4}(sub(0|[1-9A-Fa-f][0-9A-Fa-f]?)|Name|Value|Denotation|ObjectLinks)?\]"
     r"|\[(M[0-9]|Tool).*\]"
 )
-_INLINE: Final = re.compile(r"\s+;.*$")
+_INLINE: Final = re.compile(r"(?<!\s)\s++;.*$")
 
 
 def encoding(document: Document) -> Iterator[RuleFinding]:

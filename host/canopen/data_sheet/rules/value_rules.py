@@ -223,7 +223,9 @@ def _doubled_section(document: Document, finding: Finding, line: EdsLine) -> tup
 
 def _again(document: Document, title: EdsLine) -> Iterator[tuple[EdsLine, EdsLine | None]]:
     """Give the keywords behind a title, each with the line that counts."""
-    for line in takewhile(lambda other: not other.title, document.file.lines[title.number :]):
+    lines = document.file.lines  # a slice would be all of the rest, for each title
+    behind = (lines[at] for at in range(title.number, len(lines)))
+    for line in takewhile(lambda other: not other.title, behind):
         if line.is_keyword and line.key:
             yield line, document.keyword(title.section, line.key)
 

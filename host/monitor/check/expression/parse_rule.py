@@ -78,7 +78,7 @@ EACH_NODE: Final = (Every, FirstWithin, Latency, Count, Rate)
 """Demands that are made of each node where several are named; the others tell them apart."""
 
 _NODES: Final = re.compile(r"\b(of|node)(\s+)([0-9]{1,3}-[0-9]{1,3})(?![\w.])")
-_OF: Final = re.compile(r"\s+of\s")
+_OF: Final = re.compile(r"(?<!\s)\s++of\s")
 _OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
 
 

@@ -118,7 +118,7 @@ def test_what_is_left_out_has_its_default() -> None:
     ("text", "said"),
     [
         ("a = ", "not TOML"),
-        ("a = " + "[" * 20_000, "not TOML that can be read: lists or tables nest too deep"),
+        ("a = " + "[" * 20_000, "not TOML: lists or tables nest too deep"),
         ("[[components]]", "'components' is none of: component, connection, remote"),
         ("[component]\nname = 'A'", "component is written [[component]]"),
         ("[[component]]\nname = 'A'", "[[component]] 1 has no type"),
