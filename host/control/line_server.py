@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import select
 import socket
 import time
 from collections.abc import Callable
 from typing import Final, Protocol
+
+from tickrig.host.links.ready import ready
 
 MAX_LINE: Final = 4_096
 MAX_CLIENTS: Final = 32
@@ -72,19 +73,19 @@ class LineServer:
         wait_us = 0 if any(client.has_line for client in clients) else max(0, wait_us)
         attached = [source for source in self._attached if source.fileno() >= 0]
         sources = [self._listener, *readers, *attached]
-        ready = select.select(sources, writers, [], wait_us / 1e6)
-        for connection in ready[1]:
+        can_be_read, can_be_written = ready(sources, writers, wait_us / 1e6)
+        for connection in can_be_written:
             self._clients[connection].flush()
             self._clients[connection].active_s = self._clock()
         for connection in readers:
-            if connection in ready[0]:
+            if connection in can_be_read:
                 self._clients[connection].read()
                 self._clients[connection].active_s = self._clock()
         for source in attached:
-            if source in ready[0]:
+            if source in can_be_read:
                 self._attached[source]()
         self._answer()
-        if self._listener in ready[0]:
+        if self._listener in can_be_read:
             self._accept()
 
     def close(self) -> None:

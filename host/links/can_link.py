@@ -16,6 +16,7 @@ import can
 from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedFrames
+from tickrig.host.links.ready import let_wait
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import (
     CONTROLLER_BYTE,
@@ -116,6 +117,7 @@ def prepare_bus(bus: can.BusABC, interface: str) -> None:
     comes on that port for any group that any program of this machine has joined (ip(7),
     IP_MULTICAST_ALL). Elsewhere there is no such option, and no need.
     """
+    let_wait(bus)
     if sys.platform == "linux" and interface in (INTERFACE, "socketcan"):
         with socket.socket(fileno=os.dup(bus.fileno())) as sock:
             _enlarge_queue(sock)

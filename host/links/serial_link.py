@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import serial
 
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.ready import let_wait
 from tickrig.host.links.tcp import give_up_unanswered, tune
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ class SerialLink:
             self._port = _open_port(url, baud, exclusive=exclusive)
         except (serial.SerialException, ValueError, OSError) as error:
             raise LinkClosed(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
+        let_wait(self._port)
         found = getattr(self._port, "_socket", None)
         self._connection = found if isinstance(found, socket.socket) else None
         if self._connection is not None:

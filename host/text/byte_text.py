@@ -17,7 +17,7 @@ _TEXT: Final = tuple(
     for code in range(256)
 )
 _CODES: Final = {text: bytes([code]) for code, text in _SHORT.items()}
-_TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]")
+_TOKEN: Final = re.compile(r"\\x[0-9a-fA-F]{2}|\\[nrt\\]|[ -\[\]-~]+")
 
 
 def escape(data: bytes) -> str:
@@ -39,12 +39,12 @@ def unescape(text: str) -> bytes:
         token = _TOKEN.match(text, at)
         if token is None:
             raise ValueError(rf"{text[at : at + 4]!r} is not ASCII, \n, \r, \t, \\ or \xHH")
-        out.append(_byte(token[0]))
+        out.append(_bytes(token[0]))
         at = token.end()
     return b"".join(out)
 
 
-def _byte(token: str) -> bytes:
+def _bytes(token: str) -> bytes:
     if token.startswith(r"\x"):
         return bytes.fromhex(token[2:])
     return _CODES.get(token) or token.encode("ascii")

@@ -8,6 +8,8 @@ from typing import Final
 
 MOST: Final = 40
 SHOWN: Final = 8
+LONGEST: Final = 200
+"""Characters of a name that could be a slip."""
 _NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
 
@@ -54,6 +56,8 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
     """
     from difflib import get_close_matches  # noqa: PLC0415 - only for mistakes
 
+    if len(name) > LONGEST:
+        return []
     names, (device, slash, signal) = list(names), name.rpartition("/")
     own = [each.removeprefix(device + slash) for each in names if each.startswith(device + slash)]
     if slash and own:  # a device that there is

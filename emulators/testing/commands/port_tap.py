@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import select
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from typing import Final
 
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.ready import ready
 from tickrig.host.links.recording_link import RecordingLink
 
 LOOK_S: Final = 0.05
@@ -64,9 +64,13 @@ class PortTap:
         watched = [self._pty.fileno(), *([] if terminal is None else [terminal])]
         while not self._stopped and not self.gone:
             began_s = time.monotonic()
-            ready, _, _ = select.select(watched, [], [], LOOK_S)
+            can_be_read, _ = ready(watched, wait_s=LOOK_S)
             self._read_pty()
-            if terminal is not None and terminal in ready and not self._read_terminal(terminal):
+            if (
+                terminal is not None
+                and terminal in can_be_read
+                and not self._read_terminal(terminal)
+            ):
                 watched.remove(terminal)
             if (late_s := time.monotonic() - began_s - LOOK_S) > STOPPED_S:
                 self._late(late_s)

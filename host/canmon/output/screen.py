@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import select
 from collections.abc import Sequence
 from contextlib import suppress
 from types import TracebackType
 from typing import Final, Self
 
+from tickrig.host.links.ready import ready
 from tickrig.host.links.terminal import take_keys
 from tickrig.host.text.page_text import in_cells
 
@@ -65,7 +65,7 @@ class Screen:
 
     def keys(self) -> list[str]:
         """Return the keys that were pressed."""
-        if not select.select([self._terminal], [], [], 0)[0]:
+        if not ready([self._terminal], wait_s=0)[0]:
             return []
         text = os.read(self._terminal, 1_024).decode("utf-8", "replace")
         return [ARROWS.get(key, key) for key in _KEY.findall(text)]

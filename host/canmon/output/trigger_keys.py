@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-import select
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Final
+
+from tickrig.host.links.ready import ready
 
 KEY: Final = "key"
 STDIN: Final = 0
@@ -46,7 +47,7 @@ class TriggerKeys:
         if self._signals:
             self._signals = 0
             return "SIGUSR1"
-        if not self._typed or not select.select([STDIN], [], [], 0)[0]:
+        if not self._typed or not ready([STDIN], wait_s=0)[0]:
             return ""
         try:
             typed = os.read(STDIN, 1_024)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 import os
-import select
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice, takewhile
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Final, cast
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import FileSpec
+from tickrig.host.links.ready import ready
 from tickrig.host.monitor.frames.ident import flagged_id
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
@@ -145,7 +145,7 @@ class StdinSource(LoggedSource):
 
     def _read(self, timeout_us: int) -> Sequence[Item]:
         """Wait for bytes; return what the lines hold that are whole."""
-        if not select.select([self._descriptor], [], [], timeout_us / 1e6)[0]:
+        if not ready([self._descriptor], wait_s=timeout_us / 1e6)[0]:
             return []
         try:
             data = os.read(self._descriptor, READ_BYTES)

@@ -11,10 +11,10 @@ from __future__ import annotations
 import socket
 import struct
 from contextlib import suppress
-from select import select
 from typing import Any, Final
 
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.ready import ready
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
@@ -73,7 +73,7 @@ class SocketReader:
     def read(self, timeout_us: int, /) -> list[Record]:
         """Wait for a first frame; LinkClosed if the bus is gone."""
         records: list[Record] = []
-        select([self._socket], [], [], timeout_us / 1e6)
+        ready([self._socket], wait_s=timeout_us / 1e6)
         try:
             while len(records) < BATCH:
                 records += self._records(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))

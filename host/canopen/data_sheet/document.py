@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
@@ -57,6 +58,7 @@ class Document:
             if line.is_keyword:
                 self._keywords.setdefault((line.section, line.key.lower()), line)
         self._blocks = self._read_blocks()
+        self._first = {line.number for block in self._blocks.values() for line in block}
         self._subs: dict[int, list[int]] = {}
         for _, index, sub in self.file.objects():
             if sub is not None:
@@ -136,9 +138,9 @@ class Document:
 
     def is_again(self, line: EdsLine) -> bool:
         """Return whether a line stands in a section whose title was there before."""
-        return line not in self._blocks.get(line.section, ())
+        return line.number not in self._first
 
-    @property
+    @cached_property
     def head_is_lost(self) -> bool:
         """Whether what stands before the first title seems to have lost its own."""
         return any("[" in line.content for line in self._blocks[""] if not line.title)

@@ -56,7 +56,6 @@ from tickrig.host.monitor.frames.ident import CandumpFilter
 from tickrig.host.monitor.frames.tokens import Token, tokens_of
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
 
-
 LONGEST: Final = 10_000
 """Characters of a filter or a rule."""
 

@@ -86,7 +86,8 @@ def _number(node: ast.expr, variables: Mapping[str, int]) -> int:
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
             number = _BINARY[type(op)](_number(left, variables), _count(right, op, variables))
         case _:
-            raise ValueError(f"{ast.unparse(node)!r:.60} is no whole number: write 3, 0x600+id or 2*n")
+            text = ast.unparse(node)
+            raise ValueError(f"{text!r:.60} is no whole number: write 3, 0x600+id or 2*n")
     if abs(number) >> MOST_BITS:
         raise ValueError(f"{ast.unparse(node)!r} has more than {MOST_BITS} bits")
     return number

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import select
 from collections.abc import Callable
 from functools import partial
 from typing import Final
 
+from tickrig.host.links.ready import ready
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.rtc_types.basic import TimedLong
@@ -38,7 +38,7 @@ class Console:
 
     def read(self, descriptor: int) -> None:
         """Take numbers that were typed, one a line, to each ConsoleIn; never wait."""
-        if self._open and select.select([descriptor], [], [], 0)[0]:
+        if self._open and ready([descriptor], wait_s=0)[0]:
             data = os.read(descriptor, READ_BYTES)
             self._open = bool(data)
             for line in self._typed.push(data):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import select
 import socket
 import threading
 import time
@@ -10,6 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Final, TypeVar
 
+from tickrig.host.links.ready import ready
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.text.log import log_of
 
@@ -93,7 +93,7 @@ class CallQueue:
         wait_s = max(0, wait_us) / 1e6
         if self._closed:
             time.sleep(wait_s)
-        elif select.select([self], [], [], wait_s)[0]:
+        elif ready([self], wait_s=wait_s)[0]:
             self.make()
 
     def close(self) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import select
 from collections.abc import Callable
 from typing import IO, Final
 
 from tickrig.emulators.testing.bench.errors import NotOnThisBench, OperatorRefused
+from tickrig.host.links.ready import ready
 from tickrig.host.text.page_text import harmless
 
 TERMINAL: Final = "/dev/tty"
@@ -73,4 +73,4 @@ class Terminal:
 
     def _is_typed(self, terminal: IO[bytes]) -> bool:
         wait_s = 0 if self.hosts else POLL_US / 1e6
-        return bool(select.select([terminal], [], [], wait_s)[0])
+        return bool(ready([terminal], wait_s=wait_s)[0])

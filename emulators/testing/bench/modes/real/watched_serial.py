@@ -9,6 +9,7 @@ import serial
 
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch
+from tickrig.host.links.ready import let_wait
 from tickrig.host.links.serial_link import explain_open_error
 from tickrig.host.text.trace import Mark
 
@@ -69,6 +70,7 @@ def open_watched(url: str, watch: DoorWatch, options: dict[str, Any]) -> serial.
         kind = type(port)
         port.__class__ = type(kind.__name__, (WatchedPort, kind), {"_watch": watch})
         port.open()
+        let_wait(port)
     except (serial.SerialException, OSError) as error:
         raise SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
     return port

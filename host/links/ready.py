@@ -1,0 +1,116 @@
+"""Waits for descriptors, however many are open: `select` takes those below 1024 alone.
+
+>>> import os
+>>> reader, writer = os.pipe()
+>>> ready([reader], [writer], 0.0) == ([], [writer])
+True
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import select
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from types import SimpleNamespace
+from typing import Any, Final, Protocol, TypeVar
+
+SELECTABLE: Final = 1_024
+"""FD_SETSIZE: `select` knows no descriptor from here on."""
+
+SPARE: Final = 8
+"""A port opens some more beside its own."""
+
+FOREIGN: Final = (
+    *("serial.serialposix", "serial.urlhandler.protocol_socket"),
+    *("can.interfaces.socketcan.socketcan", "can.interfaces.udp_multicast.bus"),
+)
+"""Modules of others that wait with `select`."""
+
+
+class HasDescriptor(Protocol):
+    """Anything with a descriptor, as a socket."""
+
+    def fileno(self) -> int:
+        """Return it."""
+        ...
+
+
+Read = TypeVar("Read", bound="int | HasDescriptor")
+Written = TypeVar("Written", bound="int | HasDescriptor")
+
+
+def ready(
+    readers: Iterable[Read], writers: Iterable[Written] = (), wait_s: float | None = None
+) -> tuple[list[Read], list[Written]]:
+    """Wait until something can be read or written.
+
+    Args:
+        readers: descriptors, or what has one.
+        writers: the same.
+        wait_s: how long to wait at most, in s; None for as long as it takes.
+
+    Returns:
+        Those that can be read, and those that can be written; what is broken is among them.
+
+    Raises:
+        OSError: a descriptor is closed.
+    """
+    readers, writers = list(readers), list(writers)
+    if max(map(_number, (*readers, *writers)), default=0) < SELECTABLE or sys.platform == "win32":
+        can_be_read, can_be_written, _ = select.select(readers, writers, [], wait_s)
+        return can_be_read, can_be_written
+    return _polled(readers, writers, wait_s)
+
+
+def _polled(
+    readers: Sequence[Read], writers: Sequence[Written], wait_s: float | None
+) -> tuple[list[Read], list[Written]]:
+    """Do the same with `poll`, which counts in whole milliseconds."""
+    wanted: dict[int, int] = {}
+    for sources, event in ((readers, select.POLLIN), (writers, select.POLLOUT)):
+        for source in sources:
+            wanted[_number(source)] = wanted.get(_number(source), 0) | event
+    poll = select.poll()
+    for number, events in wanted.items():
+        poll.register(number, events)
+    whole_ms = None if wait_s is None else math.floor(max(0.0, wait_s) * 1e3)
+    came = dict(poll.poll(whole_ms))
+    if not came and wait_s is not None and (rest_s := wait_s - (whole_ms or 0) / 1e3) > 0:
+        time.sleep(rest_s)
+        came = dict(poll.poll(0))
+    if any(events & select.POLLNVAL for events in came.values()):
+        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+    broken = select.POLLERR | select.POLLHUP
+    return (
+        [one for one in readers if came.get(_number(one), 0) & (select.POLLIN | broken)],
+        [one for one in writers if came.get(_number(one), 0) & (select.POLLOUT | broken)],
+    )
+
+
+def _number(source: int | HasDescriptor) -> int:
+    return source if isinstance(source, int) else source.fileno()
+
+
+def let_wait(opened: HasDescriptor) -> None:
+    """Let pyserial and python-can wait for what they opened, where its number is a high one."""
+    try:
+        number = opened.fileno()
+    except (OSError, AttributeError, NotImplementedError):  # it has none
+        return
+    if number < SELECTABLE - SPARE or sys.platform == "win32":
+        return
+    for name in FOREIGN:
+        module: Any = sys.modules.get(name)
+        if getattr(module, "select", None) is select:
+            module.select = SimpleNamespace(**{**vars(select), "select": _select})
+
+
+def _select(
+    readers: Sequence[Any], writers: Sequence[Any], broken: Sequence[Any], wait_s: Any = None
+) -> tuple[list[Any], list[Any], list[Any]]:
+    """Wait as `select.select` does, but for what is broken, which the others find."""
+    return *ready(readers, writers, wait_s), []
