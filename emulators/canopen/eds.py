@@ -13,7 +13,8 @@ from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
 from tickrig.host.canopen.eds import open_eds
 from tickrig.host.text.values import Setting
-from tickrig.wire.canopen.eds.eds_device import COUNTS, read_device
+from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription
 

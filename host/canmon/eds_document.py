@@ -11,16 +11,18 @@ if TYPE_CHECKING:
 
     from tickrig.host.canopen.data_sheet.document import Document
 
+YAML_ENDINGS = (".yml", ".yaml")
 LOOKED_AT = 4096
 """Characters at its beginning by which a binary file is known."""
 
 
-def read_document(path: Path, what: str = "FILE") -> Document:
-    """Read a file; Refused if it cannot be read, is too large or binary.
+def read_document(path: Path, what: str = "FILE", encoding: str = "") -> Document:
+    """Read a file; Refused if it cannot be read, is too large or binary, or is a bus.yml.
 
     Args:
         path: of the file.
         what: the argument or option that names it.
+        encoding: of the file, by its name in Python; empty for that which its bytes show.
     """
     from tickrig.host.canopen.data_sheet.document import Document  # noqa: PLC0415 - slow
     from tickrig.host.canopen.eds import read_eds_bytes  # noqa: PLC0415 - slow
@@ -36,7 +38,12 @@ def read_document(path: Path, what: str = "FILE") -> Document:
         raise Refused(f"{what} {path}: {error}") from None
     if _is_binary(data):
         raise Refused(f"{what} {path}: a binary file: no EDS")
-    return Document(str(path), data)
+    if b"[" not in data[:LOOKED_AT] or path.suffix.lower() in YAML_ENDINGS:
+        from tickrig.host.canopen.bus_file.bus_file import is_bus_file  # noqa: PLC0415 - slow
+
+        if is_bus_file(data):
+            raise Refused(f"{what} {path}: a bus.yml, not an EDS; use: tickrig check {path}")
+    return Document(str(path), data, encoding)
 
 
 def _is_binary(data: bytes) -> bool:

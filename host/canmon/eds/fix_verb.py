@@ -30,23 +30,39 @@ LEFT: Final = 1
 @click.argument("file", type=PATH)
 @click.option("-o", "--output", type=PATH, metavar="OUT", help="Where it is written; may be FILE.")
 @click.option("--dry-run", is_flag=True, help="Show the lines that would change; write nothing.")
-def command(file: Path, output: Path | None, dry_run: bool) -> None:
+@click.option(
+    "--encoding",
+    type=click.Choice(("utf-8", "ascii")),
+    default="utf-8",
+    help="Of OUT, where letters beyond ASCII are in FILE; ascii writes ö as oe.  [utf-8]",
+)
+@click.option(
+    "--from-encoding",
+    metavar="NAME",
+    default="",
+    help="Of FILE, where its bytes are no Unicode, as cp1252 or cp850.  [guessed]",
+)
+def command(
+    file: Path, output: Path | None, dry_run: bool, encoding: str, from_encoding: str
+) -> None:
     """Mend an EDS; exit status 1 if errors or warnings are left.
 
-    Lines that no finding names stay to the byte. What is mended, with the lines of
-    FILE, and what is left as it needs knowledge of the device, with those of OUT, is
+    Lines that no finding names stay to the byte, unless the file is not Unicode: then
+    it becomes UTF-8, and what a byte is taken for is told. What is mended, with the lines
+    of FILE, and what is left as it needs knowledge of the device, with those of OUT, is
     told. XDD files are not mended.
 
     \b
     canmon eds fix drive.eds -o mended.eds
     canmon eds fix drive.eds --dry-run
+    canmon eds fix drive.eds -o mended.eds --from-encoding cp850
     """  # noqa: D301 - click wants the backspace
     from tickrig.host.canopen.data_sheet.fix import fix  # noqa: PLC0415 - slow
 
     if (output is None) is not dry_run:
         raise Refused("give -o OUT, or --dry-run")
-    document = _mendable(file)
-    fixed = fix(document)
+    document = _mendable(file, _known(from_encoding))
+    fixed = fix(document, ascii_only=encoding == "ascii")
     with until_unread():
         if dry_run:
             for line in _differences(document, fixed.document):
@@ -62,9 +78,19 @@ def command(file: Path, output: Path | None, dry_run: bool) -> None:
         click.get_current_context().exit(LEFT)
 
 
-def _mendable(file: Path) -> Document:
+def _known(encoding: str) -> str:
+    """Return the name of an encoding of texts, or empty; Refused if there is none of that name."""
+    try:
+        b"".decode(encoding or "ascii")
+    except LookupError:
+        text = f"--from-encoding {encoding!r} is no encoding, as cp1252, cp850 or latin-1"
+        raise Refused(text) from None
+    return encoding
+
+
+def _mendable(file: Path, encoding: str) -> Document:
     """Read a file that can be mended; Refused if it is XML, or describes no object."""
-    document = read_document(file)
+    document = read_document(file, encoding=encoding)
     if document.file.is_xml:
         raise Refused(f"FILE {file}: XDD files are not mended")
     if not document.rows:

@@ -39,7 +39,15 @@ STOPS: Final = frozenset(
     (
         *("access-form", "access-missing", "bom", "data-type-missing", "doubled-key"),
         *("doubled-section", "list-entry", "list-extra", "list-gap", "name-missing", "no-keyword"),
-        *("no-number", "no-objects", "number-form", "number-word", "object-index", "pdo-half"),
+        *(
+            "leading-zero",
+            "no-number",
+            "no-objects",
+            "number-form",
+            "number-word",
+            "object-index",
+            "pdo-half",
+        ),
         *("truncated", "utf-16", "xml"),
     )
 )
@@ -205,7 +213,7 @@ def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
         found = check(document)
         stops = [one for one in found if one.rule.name in STOPS]
         names = [one.rule.name for one in stops]
-        if document.encoding == "cp1252":
+        if not document.is_unicode:
             names.insert(0, "its encoding, which is not UTF-8")
         counted = [*stops, *failing(found)]
         if names or counted:

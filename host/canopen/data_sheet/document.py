@@ -10,13 +10,19 @@ from typing import Final
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
 from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK, EdsFile, decode_text, encoding_of, shorten
+from tickrig.wire.canopen.eds.eds_file import (
+    CODE_PAGES,
+    UTF_8_MARK,
+    EdsFile,
+    decode_text,
+    encoding_of,
+    shorten,
+)
 from tickrig.wire.canopen.eds.eds_lines import EdsLine
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 BOM: Final = "\ufeff"
 _END: Final = re.compile(r"(\r\n|\r|\n)")
-DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
 class Document:
@@ -25,6 +31,7 @@ class Document:
     Args:
         name: what findings call it.
         data: the whole file.
+        encoding: of the file, by its name in Python; empty for that which its bytes show.
 
     Attributes:
         name: likewise.
@@ -39,14 +46,15 @@ class Document:
         findings: of `check`, None until it is asked.
     """
 
-    def __init__(self, name: str, data: bytes) -> None:
+    def __init__(self, name: str, data: bytes, encoding: str = "") -> None:
         coded = data.removeprefix(UTF_8_MARK)
-        self.name, self.data, self.encoding = name, data, encoding_of(coded)
+        self.name, self.data = name, data
+        self.encoding = encoding or encoding_of(coded)
         text = coded.decode(self.encoding, self._lossless)
         self.has_bom = coded != data or text.startswith(BOM)
         parts = _END.split(text.removeprefix(BOM))
         self.texts, self.ends = parts[::2], [*parts[1::2], ""]
-        self.file = EdsFile(name, decode_text(data))
+        self.file = EdsFile(name, decode_text(data, self.encoding))
         self.device = read_device(self.file)
         self.rows = {(row.index, row.sub): row for row in self.device.entries}
         self._entries: dict[int, list[EntryDescription]] = {}
@@ -69,10 +77,17 @@ class Document:
         return "replace" if self.encoding.startswith("utf-16") else "surrogateescape"
 
     @property
-    def is_dcf(self) -> bool:
-        """Whether it is of one node: its name says so, or that it has a node-ID."""
-        ending = self.name.lower().endswith(DCF_ENDINGS)
-        return ending or "DeviceComissioning" in self.file.sections
+    def is_unicode(self) -> bool:
+        """Whether it is UTF-8, of which ASCII is a part, or UTF-16."""
+        return encoding_of(self.data) not in CODE_PAGES
+
+    def letters(self, line: int) -> str:
+        """Say what the first byte beyond ASCII of a line is in the encodings that it may have."""
+        byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
+        coded = byte.encode(self.encoding, "surrogateescape")
+        pages = dict.fromkeys((self.encoding, *CODE_PAGES))
+        said = (f"{coded.decode(page, 'replace')!r} in {page}" for page in pages)
+        return f"byte {coded.hex().upper()}h is {', '.join(said)}"
 
     def keyword(self, section: str, key: str) -> EdsLine | None:
         """Return the line that gives a keyword its value, None without one."""

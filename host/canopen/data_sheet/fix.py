@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+import unicodedata
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.check import check, failing
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
-from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK
+from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK, shorten
 
 MOST_PASSES: Final = 50
+WRITTEN_AS: Final = {
+    **{"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"},
+    **{"°": "deg", "µ": "u", "μ": "u", "Ω": "Ohm", "\N{OHM SIGN}": "Ohm", "±": "+-", "€": "EUR"},
+    **{"©": "(c)", "®": "(R)", "•": "*", "·": "*", "„": '"', "“": '"', "”": '"'},
+    **dict.fromkeys("\u2013\u2014", "-"),
+    **dict.fromkeys("\u2018\u2019", "'"),
+}
+"""Letters in ASCII that taking their accents away does not give."""
 CUT: Final = "truncated"
+_NO_LETTER: Final = re.compile("[\udc80-\udcff]")
+"""Bytes that their encoding has no letter for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +48,15 @@ class Fixed:
         return replace(one, line=_origin(self.origins, one.line))
 
 
-def fix(document: Document) -> Fixed:
+def fix(document: Document, *, ascii_only: bool = False) -> Fixed:
     """Mend a file until nothing changes; lines that no finding names stay to the byte.
 
-    A file that looks truncated stays as it is: mended, it would look whole.
+    A file that looks truncated stays as it is: mended, it would look whole. What is not Unicode
+    becomes UTF-8.
+
+    Args:
+        document: the file.
+        ascii_only: whether letters beyond ASCII are written with those of ASCII.
     """
     mended: list[RuleFinding] = []
     origins = list(range(1, len(document.texts) + 1))
@@ -48,13 +65,41 @@ def fix(document: Document) -> Fixed:
         return Fixed(document, (), tuple(left), tuple(origins))
     for _ in range(MOST_PASSES):
         plan = _Plan()
-        taken = [one for one in left if document.changes(one.edits) and plan.take(one.edits)]
+        wanted = [*left, *_beyond_ascii(document)] if ascii_only else left
+        taken = [one for one in wanted if document.changes(one.edits) and plan.take(one.edits)]
         if not taken:
             break
         mended += (replace(one, line=_origin(origins, one.line)) for one in taken)
         document, origins = plan.carry_out(document, origins)
         left = failing(check(document), strict=True)
     return Fixed(document, tuple(dict.fromkeys(mended)), tuple(left), tuple(origins))
+
+
+def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:
+    """Find lines with letters beyond ASCII, with the edits that write them in ASCII."""
+    for number, text in enumerate(document.texts, 1):
+        if text.isascii():
+            continue
+        letters = dict.fromkeys(letter for letter in text if not letter.isascii())
+        said = ", ".join(f"{shorten(letter)!r} as {in_ascii(letter)!r}" for letter in letters)
+        edit = Edit(number, lines=("".join(map(in_ascii, text)),))
+        yield document.found(
+            "non-ascii", f"letters beyond ASCII are written: {said}", "", number, edit
+        )
+
+
+def in_ascii(letter: str) -> str:
+    """Return a letter in ASCII, `?` if there is nothing like it.
+
+    >>> [in_ascii(letter) for letter in "öéß°Ω²✓"]
+    ['oe', 'e', 'ss', 'deg', 'Ohm', '2', '?']
+    """
+    if letter.isascii():
+        return letter
+    if letter in WRITTEN_AS:
+        return WRITTEN_AS[letter]
+    plain = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
+    return plain if plain.isprintable() and plain else "?"
 
 
 def _origin(origins: Sequence[int], line: int) -> int:
@@ -110,6 +155,9 @@ class _Plan:
             lines += ((text, end, origin) for text in texts)
 
     def _encoded(self, document: Document, text: str) -> bytes:
+        if not document.is_unicode and Place.ENCODING in self._places:
+            plain = _NO_LETTER.sub("\ufffd", text)
+            return plain.encode("utf-8")
         if document.encoding.startswith("utf-16"):
             return text.encode("utf-8", "replace")
         keeps = document.has_bom and Place.ENCODING not in self._places

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Final
 
-from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.compact_pdo import implied_pdos
-from tickrig.wire.canopen.eds.eds_entry import KIND_WORDS, read_entry, required
+from tickrig.wire.canopen.eds.eds_entry import object_kind, read_object
 from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_writer import VARIABLES
+from tickrig.wire.canopen.eds.modules import module_objects
 from tickrig.wire.canopen.eds.object_table import (
+    BIT_RATES,
     BIT_RATES_KBIT,
-    RO,
-    RW,
-    Access,
     DeviceInfo,
     EntryDescription,
     ObjectCode,
@@ -26,13 +22,6 @@ from tickrig.wire.canopen.eds.object_table import (
 COMMISSIONING: Final = "DeviceComissioning"
 UNSET_NODE_IDS: Final = (0, 0xFF)
 HIGHEST_NODE_ID: Final = 127
-HIGHEST_SUB: Final = 254
-NO_DATA: Final = (0, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT)
-"""Kinds of objects that hold nothing: NULL, and definitions of data types."""
-DESCRIBED: Final = (*VARIABLES, ObjectCode.ARRAY, ObjectCode.RECORD)
-ERROR_FIELD: Final = 0x1003
-COUNTS: Final = (ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
-"""Objects whose sub-index 0 counts what is in use, not what is there."""
 
 Kinds = dict[int, ObjectCode]
 
@@ -63,7 +52,8 @@ def read_device(file: EdsFile) -> EdsDevice:
     warning that says what is taken: C suffixes, empty and missing keywords,
     CompactSubObj in a RECORD, texts beyond ASCII. A ParameterValue (DCF) counts
     as power-on value. ObjFlags concern configuration tools, not the device, and
-    are not kept. What CompactPDO implies is there as if it were described.
+    are not kept. What CompactPDO implies is there as if it were described, and so are the
+    objects of connected modules.
     """
     kinds = _kinds(file)
     entries = list(_entries(file, kinds))
@@ -76,12 +66,16 @@ def read_device(file: EdsFile) -> EdsDevice:
     for described, rows in implied_pdos(file) if entries else ():
         objects[rows[0].index] = described
         entries += rows
+    for described, rows in module_objects(file, entries, objects):
+        objects[rows[0].index] = described
+        added = {row.key for row in rows}
+        entries = [row for row in entries if row.key not in added] + rows
     return EdsDevice(
         _device_info(file),
         tuple(entries),
         objects,
         _node_id(file),
-        1_000 * file.number(COMMISSIONING, "Baudrate") or None,
+        _bit_rate(file),
     )
 
 
@@ -108,30 +102,26 @@ def _node_id(file: EdsFile) -> int | None:
     return node_id
 
 
+def _bit_rate(file: EdsFile) -> int | None:
+    """Return the bit rate of a DCF in bit/s, which CiA 306 gives in kbit/s; None if it is none."""
+    said = file.number(COMMISSIONING, "Baudrate")
+    if said <= max(BIT_RATES_KBIT):
+        return 1_000 * said or None
+    known = said if said in BIT_RATES else None
+    taken = f"{said // 1_000} kbit/s is" if known else "none is"
+    reason = f"Baudrate={said} is more than {max(BIT_RATES_KBIT)} kbit/s: {taken} taken"
+    file.warn(COMMISSIONING, reason, "bit-rate-unit", "Baudrate")
+    return known
+
+
 def _kinds(file: EdsFile) -> Kinds:
     """Return the kind of each object; those that only define a data type are left out."""
     kinds = {}
     with_subs = {index for _, index, sub in file.objects() if sub is not None}
     for section, index, sub in file.objects():
-        if sub is None and (kind := _kind(file, section, index in with_subs)):
+        if sub is None and (kind := object_kind(file, section, index in with_subs)):
             kinds[index] = kind
     return kinds
-
-
-def _kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | None:
-    """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
-    usual = ObjectCode.RECORD if with_subs else ObjectCode.VAR
-    number = file.number(section, "ObjectType", usual, words=KIND_WORDS)
-    if number in NO_DATA:
-        return None
-    if number not in DESCRIBED:
-        reason = f"ObjectType={number} is no kind of object: {usual.name} is taken"
-    elif with_subs and number in VARIABLES:
-        reason = f"ObjectType={number} has no sub-indices, and there are: RECORD is taken"
-    else:
-        return ObjectCode(number)
-    file.warn(section, reason, "object-type", "ObjectType")
-    return usual
 
 
 def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EntryDescription]:
@@ -145,49 +135,4 @@ def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EntryDescription]:
             file.warn(subs[index][0][0], reason, "sub-orphan")
             kinds[index] = ObjectCode.RECORD
     for index, kind in kinds.items():
-        yield from _object(file, index, kind, subs.get(index, []))
-
-
-def _object(
-    file: EdsFile, index: int, kind: ObjectCode, subs: list[tuple[str, int]]
-) -> Iterator[EntryDescription]:
-    """Read the entries of one object; those that are described beside a compact one replace its."""
-    head = f"{index:04X}"
-    if kind in VARIABLES:
-        yield read_entry(file, head, index, 0)
-        return
-    if head in file.sections:
-        required(file, head, "ParameterName", "")
-    described = [read_entry(file, section, index, sub) for section, sub in subs]
-    count = min(file.number(head, "CompactSubObj"), HIGHEST_SUB)
-    if count:
-        if kind is ObjectCode.RECORD:
-            reason = "CompactSubObj in a RECORD: its entries are taken to be alike"
-            file.warn(head, reason, "compact-record", "CompactSubObj")
-        known = {row.sub for row in described}
-        described += [row for row in _compact(file, index, count) if row.sub not in known]
-    yield from sorted(described, key=attrgetter("sub"))
-
-
-def _compact(file: EdsFile, index: int, count: int) -> Iterator[EntryDescription]:
-    """Read an object that is described by one of its elements."""
-    head = f"{index:04X}"
-    title = file.value(head, "ParameterName")
-    elements = []
-    for sub in range(1, count + 1):
-        name = file.value(f"{head}Name", str(sub)) or f"{title}{sub}"
-        elements.append(read_entry(file, head, index, sub, name))
-    yield _count(index, elements)
-    yield from elements
-
-
-def _count(index: int, elements: list[EntryDescription]) -> EntryDescription:
-    """Make the sub-index 0 of a compact object."""
-    u8 = DataType.UNSIGNED8
-    if index == ERROR_FIELD:
-        return EntryDescription(index, 0, "Number of errors", u8, RW, default=0)
-    used, access = len(elements), RO
-    if index in COUNTS:
-        used = sum(any(element.default) for element in elements)
-        access = RW if any(Access.WRITE in element.access for element in elements) else RO
-    return EntryDescription(index, 0, "Number of entries", u8, access, default=used)
+        yield from read_object(file, f"{index:04X}", index, kind, subs.get(index, []))

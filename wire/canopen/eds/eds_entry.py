@@ -1,26 +1,49 @@
-"""One entry of an EDS or DCF: a variable, or an element of an array or record."""
+"""The entries of an object of an EDS or DCF: a variable, or the elements of an array or record."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from collections.abc import Iterator
+from operator import attrgetter
+from typing import Final, NamedTuple
 
-from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.eds_file import EdsFile, shorten
-from tickrig.wire.canopen.eds.eds_value import parse_limit, parse_value
+from tickrig.wire.canopen.eds.eds_value import (
+    BYTES,
+    FLOATS,
+    TIMES,
+    is_hex_bytes,
+    parse_limit,
+    parse_sum,
+    parse_value,
+)
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import (
     MAX_VARIABLE_BYTES,
+    RO,
+    RW,
     Access,
     EntryDescription,
     ObjectCode,
 )
+from tickrig.wire.canopen.eds.standard_objects import standard_type
 
 SIMPLE_TYPES: Final = range(0x1C)
+NUMBERS: Final = (*FLOATS, *TIMES)
+"""Data types of numbers that are no integers."""
 ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
 TRUTH: Final = (0, 1)
 TRUTH_WORDS: Final = {"yes": 1, "true": 1, "no": 0, "false": 0}
 TYPE_WORDS: Final = {kind.name.lower(): int(kind) for kind in DataType}
 KIND_WORDS: Final = {code.name.lower(): int(code) for code in ObjectCode}
+HIGHEST_SUB: Final = 254
+NO_DATA: Final = (0, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT)
+"""Kinds of objects that hold nothing: NULL, and definitions of data types."""
+DESCRIBED: Final = (*VARIABLES, ObjectCode.ARRAY, ObjectCode.RECORD)
+ERROR_FIELD: Final = 0x1003
+COUNTS: Final = (ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
+"""Objects whose sub-index 0 counts what is in use, not what is there."""
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
 MISSING: Final = {
     "ParameterName": "name-missing",
@@ -44,16 +67,17 @@ def read_entry(
     """
     if name is None:
         name = required(file, section, "ParameterName", "")
-    kind, access = _data_type(file, section), _access(file, section)
-    default, relative = _default(file, section, index, sub, kind)
+    derived = _data_type(file, section, index, sub)
+    kind, access = derived.kind, _access(file, section)
+    default, relative = _default(file, section, index, sub, derived)
     low, high = _limits(file, section, kind)
     return EntryDescription(
         *(index, sub, name, kind, access),
         default=default,
-        low=low,
-        high=high,
+        low=derived.low if low is None else low,
+        high=derived.high if high is None else high,
         relative=relative,
-        max_bytes=file.number(section, "MaxBytes", MAX_VARIABLE_BYTES),
+        max_bytes=file.number(section, "MaxBytes", derived.max_bytes),
         unit=file.value(section, "Unit"),
         factor=_factor(file, section),
     )
@@ -68,41 +92,80 @@ def required(file: EdsFile, section: str, key: str, instead: str) -> str:
     return instead
 
 
-def is_visible_char(file: EdsFile, number: int) -> bool:
-    """Return whether 00A0h is the data type of RTC-CANopen here, not one that the file derives."""
-    return number == DataType.VISIBLE_CHAR and f"{number:X}sub1" not in file.sections
+class _Type(NamedTuple):
+    """A data type, whether the file says it, and what one that it derives leaves of its values."""
+
+    kind: DataType
+    is_said: bool = True
+    low: int | float | None = None
+    high: int | float | None = None
+    max_bytes: int = MAX_VARIABLE_BYTES
 
 
-def _data_type(file: EdsFile, section: str) -> DataType:
+def _data_type(file: EdsFile, section: str, index: int, sub: int) -> _Type:
     if file.number(section, "ObjectType", ObjectCode.VAR, words=KIND_WORDS) == ObjectCode.DOMAIN:
-        return DataType.DOMAIN
-    usual = DataType.UNSIGNED8 if section.endswith("sub0") else DataType.DOMAIN
+        return _Type(DataType.DOMAIN)
+    usual = _usual_type(section, index, sub)
     required(file, section, "DataType", usual.name)
     number = file.number(section, "DataType", usual, words=TYPE_WORDS)
-    if number not in SIMPLE_TYPES and not is_visible_char(file, number):
-        number = _derived(file, section, number)
+    if number not in SIMPLE_TYPES and (own := _own_type(file, number)) is not None:
+        return _derived(file, section, number, own)
+    kind = _known_type(file, section, number, usual)
+    return _Type(kind, number == kind and bool(file.word(section, "DataType")))
+
+
+def _usual_type(section: str, index: int, sub: int) -> DataType:
+    """Return the data type that CiA 301 gives an object, DOMAIN where it gives none."""
+    if section.endswith("sub0"):
+        return DataType.UNSIGNED8
+    composed = bool(sub) or not section.endswith(f"{index:04X}")
+    return standard_type(index, sub, composed=composed) or DataType.DOMAIN
+
+
+def _derived(file: EdsFile, section: str, number: int, own: tuple[str, str, str]) -> _Type:
+    """Return the type behind one of the file's own, as CanFestival writes them.
+
+    Sub-index 1 is the type, 2 and 3 are the smallest and the largest number; of a string, 2 is its
+    length.
+    """
+    said = file.number(own[0], "DefaultValue", DataType.DOMAIN)
+    kind = _known_type(file, section if said == number else own[0], said)
+    low, high, length = None, None, MAX_VARIABLE_BYTES
+    if kind.size:
+        low, high = (_limit(file, bound, "DefaultValue", kind) for bound in own[1:])
+    else:
+        length = file.number(own[1], "DefaultValue", length)
+    bounds = "" if low is None and high is None else f" of {low} to {high}"
+    most = "" if length == MAX_VARIABLE_BYTES else f" of at most {length} bytes"
+    if kind is not DataType.DOMAIN:
+        taken = f"{kind.name}{bounds}{most}"
+        reason = f"DataType=0x{number:04X} is derived in [{own[0]}]: {taken} is taken"
+        file.warn(section, reason, "data-type-derived", "DataType")
+    return _Type(kind, True, low, high, length)
+
+
+def _own_type(file: EdsFile, number: int) -> tuple[str, str, str] | None:
+    """Return the sections that derive a data type, None if the file does not derive it."""
+    for form in (f"{number:X}", f"{number:04X}"):
+        if file.value(f"{form}sub1", "DefaultValue"):
+            return f"{form}sub1", f"{form}sub2", f"{form}sub3"
+    return None
+
+
+def _known_type(
+    file: EdsFile, section: str, number: int, usual: DataType = DataType.DOMAIN
+) -> DataType:
     try:
         return DataType(number)
     except ValueError:
-        return DataType(_unknown(file, section, number))
-
-
-def _derived(file: EdsFile, section: str, number: int) -> int:
-    """Return the type behind one of the file's own, as CanFestival writes them."""
-    own = f"{number:X}sub1"
-    if own in file.sections:
-        return file.number(own, "DefaultValue", DataType.DOMAIN)
-    return _unknown(file, section, number)
-
-
-def _unknown(file: EdsFile, section: str, number: int) -> int:
-    reason = f"DataType=0x{number:04X} is unknown: DOMAIN is taken"
-    file.warn(section, reason, "data-type-unknown", "DataType")
-    return DataType.DOMAIN
+        reason = f"DataType=0x{number:04X} is unknown: {usual.name} is taken"
+        file.warn(section, reason, "data-type-unknown", "DataType")
+        return usual
 
 
 def _access(file: EdsFile, section: str) -> Access:
-    text = required(file, section, "AccessType", "rw")
+    required(file, section, "AccessType", "rw")
+    text = file.word(section, "AccessType") if file.has(section, "AccessType") else "rw"
     known = LONE_LETTERS.get(text.lower(), text or "rw")
     mappable = bool(file.number(section, "PDOMapping", words=TRUTH_WORDS))
     try:
@@ -116,9 +179,10 @@ def _access(file: EdsFile, section: str) -> Access:
 
 
 def _default(
-    file: EdsFile, section: str, index: int, sub: int, kind: DataType
+    file: EdsFile, section: str, index: int, sub: int, said: _Type
 ) -> tuple[bytes | None, bool]:
     """Return the power-on value of the file, and whether it is relative to the node-ID."""
+    kind = said.kind
     if file.value(section, "DefaultBytes"):
         return _exact(file, section, kind), False
     for place, key in (
@@ -126,9 +190,19 @@ def _default(
         (f"{index:04X}Value", str(sub)),
         (section, "DefaultValue"),
     ):
-        if file.value(place, key):
-            return _value(file, place, key, kind)
+        if _text(file, place, key, kind):
+            if key == "ParameterValue" and not file.is_dcf:
+                reason = f"{key} stands in an EDS: it is taken, not DefaultValue"
+                file.warn(section, reason, "dcf-key", key)
+            return _value(file, place, key, kind, is_said=said.is_said)
     return None, False
+
+
+def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
+    """Return the text of a value: of a number without a comment, and as CiA 306 writes it."""
+    if kind.is_integer:
+        return file.numeric(section, key)
+    return file.word(section, key) if kind in NUMBERS else file.value(section, key)
 
 
 def read_value_beside(
@@ -146,7 +220,8 @@ def read_value_beside(
         The bytes, and whether the node-ID is added to them.
     """
     place = f"{index:04X}Value"
-    return _value(file, place, str(sub), kind) if file.value(place, str(sub)) else (None, False)
+    said = _text(file, place, str(sub), kind)
+    return _value(file, place, str(sub), kind) if said else (None, False)
 
 
 def _exact(file: EdsFile, section: str, kind: DataType) -> bytes | None:
@@ -162,8 +237,10 @@ def _exact(file: EdsFile, section: str, kind: DataType) -> bytes | None:
     return data
 
 
-def _value(file: EdsFile, section: str, key: str, kind: DataType) -> tuple[bytes | None, bool]:
-    text = file.numeric(section, key) if kind.is_integer else file.value(section, key)
+def _value(
+    file: EdsFile, section: str, key: str, kind: DataType, *, is_said: bool = True
+) -> tuple[bytes | None, bool]:
+    text = _text(file, section, key, kind)
     try:
         if kind in ASCII_TEXTS and not text.isascii():
             return _foreign_text(file, section, key, kind), False
@@ -171,10 +248,28 @@ def _value(file: EdsFile, section: str, key: str, kind: DataType) -> tuple[bytes
         if kind is DataType.BOOLEAN and value not in TRUTH:
             reason = f"{key}={shorten(text)} is no BOOLEAN: 1 is taken"
             file.warn(section, reason, "boolean-value", key)
+        if is_said:
+            _check_form(file, section, key, kind, text, value)
         return kind.encode(value), relative
     except (ValueError, OverflowError):
         file.refuse(section, f"{key}={shorten(text)} is no {kind.name}", "default-value", key)
         return None, False
+
+
+def _check_form(  # noqa: PLR0913, PLR0917 - a place, its text and what it is
+    file: EdsFile, section: str, key: str, kind: DataType, text: str, value: Value
+) -> None:
+    """Warn of a value that has one meaning, and is not written as CiA 306 has it."""
+    if kind in BYTES and isinstance(value, bytes) and not is_hex_bytes(text):
+        what = "its text" if value == text.encode() else value.hex(" ").upper()
+        reason = f"{key}={shorten(text)} is no hexadecimal bytes: {what} is taken"
+        file.warn(section, reason, "byte-form", key)
+    elif kind.is_integer and kind is not DataType.BOOLEAN and isinstance(value, int):
+        number = parse_sum(text)[0]
+        if number != value and number >> kind.bits:
+            taken = str(value) if kind.signed else f"0x{value:0{2 * kind.size}X}"
+            reason = f"{key}={shorten(text)} is no {kind.name}: {taken} is taken"
+            file.warn(section, reason, "value-sign", key)
 
 
 def _foreign_text(file: EdsFile, section: str, key: str, kind: DataType) -> bytes:
@@ -202,18 +297,21 @@ def _limits(
 
 
 def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float | None:
-    text = file.numeric(section, key) if kind.is_integer else file.value(section, key)
+    text = _text(file, section, key, kind)
     try:
-        return parse_limit(kind, text) if text else None
+        limit = parse_limit(kind, text, upper=key != "LowLimit") if text else None
     except (ValueError, OverflowError):
         reason = f"{key}={shorten(text)} is no {kind.name}: no limit is taken"
         file.warn(section, reason, "limit-value", key)
         return None
+    if isinstance(limit, int) and kind is not DataType.BOOLEAN:
+        _check_form(file, section, key, kind, text, limit)
+    return limit
 
 
 def _factor(file: EdsFile, section: str) -> float:
     """Return the factor, which the canopen library reads too; it is of no standard."""
-    text = file.value(section, "Factor")
+    text = file.word(section, "Factor")
     try:
         factor = float(text or 1)
     except ValueError:
@@ -223,3 +321,73 @@ def _factor(file: EdsFile, section: str) -> float:
     reason = f"Factor={shorten(text)} is no factor: 1 is taken"
     file.warn(section, reason, "factor", "Factor")
     return 1
+
+
+def object_kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | None:
+    """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
+    usual = ObjectCode.RECORD if with_subs else ObjectCode.VAR
+    number = file.number(section, "ObjectType", usual, words=KIND_WORDS)
+    if number in NO_DATA:
+        return None
+    if number not in DESCRIBED:
+        reason = f"ObjectType={number} is no kind of object: {usual.name} is taken"
+    elif with_subs and number in VARIABLES:
+        reason = f"ObjectType={number} has no sub-indices, and there are: RECORD is taken"
+    else:
+        return ObjectCode(number)
+    file.warn(section, reason, "object-type", "ObjectType")
+    return usual
+
+
+def read_object(
+    file: EdsFile, head: str, index: int, kind: ObjectCode, subs: list[tuple[str, int]]
+) -> Iterator[EntryDescription]:
+    """Read the entries of one object; those that are described beside a compact one replace its.
+
+    Args:
+        file: takes what is wrong.
+        head: its section.
+        index: of the object.
+        kind: of the object.
+        subs: the sections of its sub-indices.
+    """
+    if kind in VARIABLES:
+        yield read_entry(file, head, index, 0)
+        return
+    if head in file.sections:
+        required(file, head, "ParameterName", "")
+    described = [read_entry(file, section, index, sub) for section, sub in subs]
+    count = min(file.number(head, "CompactSubObj"), HIGHEST_SUB)
+    if file.value(head, "ParameterValue") and not count:
+        reason = f"ParameterValue belongs to a sub-index of the {kind.name}: it is skipped"
+        file.warn(head, reason, "value-place", "ParameterValue")
+    if count:
+        if kind is ObjectCode.RECORD:
+            reason = "CompactSubObj in a RECORD: its entries are taken to be alike"
+            file.warn(head, reason, "compact-record", "CompactSubObj")
+        known = {row.sub for row in described}
+        described += [row for row in _compact(file, head, index, count) if row.sub not in known]
+    yield from sorted(described, key=attrgetter("sub"))
+
+
+def _compact(file: EdsFile, head: str, index: int, count: int) -> Iterator[EntryDescription]:
+    """Read an object that is described by one of its elements."""
+    title = file.value(head, "ParameterName")
+    elements = []
+    for sub in range(1, count + 1):
+        name = file.value(f"{head}Name", str(sub)) or f"{title}{sub}"
+        elements.append(read_entry(file, head, index, sub, name))
+    yield count_of(index, elements)
+    yield from elements
+
+
+def count_of(index: int, elements: list[EntryDescription]) -> EntryDescription:
+    """Make the sub-index 0 of a compact object."""
+    u8 = DataType.UNSIGNED8
+    if index == ERROR_FIELD:
+        return EntryDescription(index, 0, "Number of errors", u8, RW, default=0)
+    used, access = len(elements), RO
+    if index in COUNTS:
+        used = sum(any(element.default) for element in elements)
+        access = RW if any(Access.WRITE in element.access for element in elements) else RO
+    return EntryDescription(index, 0, "Number of entries", u8, access, default=used)

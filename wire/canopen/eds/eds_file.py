@@ -14,10 +14,13 @@ from tickrig.wire.canopen.eds.eds_lines import (
     object_section,
     read_lines,
 )
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers, without_comment
 from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
 LONGEST: Final = 40
+LONGEST_TITLE: Final = len("1018sub01")
+"""Of a sub-index by CiA 311."""
+DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
 class Finding(NamedTuple):
@@ -114,6 +117,11 @@ class EdsFile:
         """All of them, likewise."""
         return tuple(self._warnings)
 
+    @property
+    def is_dcf(self) -> bool:
+        """Whether it is of one node: its name says so, or that it has a node-ID."""
+        return self.name.lower().endswith(DCF_ENDINGS) or "DeviceComissioning" in self.sections
+
     def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
         """Note an error, at the line of a keyword or a section."""
         line = self.line(section, key)
@@ -130,7 +138,7 @@ class EdsFile:
         return place or self._places.get((section, ""), 0)
 
     def value(self, section: str, key: str) -> str:
-        """Return the text of a keyword, empty if it is not there."""
+        """Return the text of a keyword, empty if it is not there; see `word`."""
         found = self.sections.get(section)
         return "" if found is None else found.get(key.lower(), "")
 
@@ -138,9 +146,23 @@ class EdsFile:
         """Return whether a keyword is there, with a text or without."""
         return key.lower() in self.sections.get(section, {})
 
+    def word(self, section: str, key: str) -> str:
+        """Return what a keyword says that takes no free text, without a comment behind it.
+
+        CiA 306 has comments in lines of their own, and readers take ` ;` for one behind any value.
+        Behind a number or an access type `;`, `#` and `//` begin one, too, with a warning: they
+        cannot mean anything else there, as they can in a text.
+        """
+        text = self.value(section, key)
+        said = without_comment(text)
+        if said != text:
+            what = "the comment behind a number or an access type is skipped"
+            self.warn(section, what, "inline-comment", key)
+        return said
+
     def numeric(self, section: str, key: str) -> str:
         """Return the text of a number as CiA 306 writes it; a warning if the file does not."""
-        text = self.value(section, key)
+        text = self.word(section, key)
         plain = plain_numbers(text)
         if plain != text:
             what = f"{key}={shorten(text)} is no number of CiA 306: {shorten(plain)} is taken"
@@ -213,6 +235,9 @@ class EdsFile:
         if self.is_xml and title not in KNOWN_SECTIONS.values() and object_section(title) is None:
             reason = "is no index of four, or sub-index of two hexadecimal digits: it is lost"
             self._errors[Finding(self.name, title, reason, line.number, "object-index")] = None
+        if self.is_xml and len(line.title) > LONGEST_TITLE and object_section(title) is not None:
+            reason = "subIndex has more than two digits: they are taken for one number"
+            self._warn_at(line, reason, "section-form")
         if title in self.sections and describes_device(title):
             reason = "is there twice: of each keyword the first is taken"
             self._warn_at(line, reason, "doubled-section")
@@ -221,6 +246,8 @@ class EdsFile:
 
     def _add(self, section: Section, line: EdsLine) -> None:
         key = line.key.lower()
+        if key[:1] == "0" and key.isascii() and key.isdigit():
+            key = key.lstrip("0") or "0"  # a number of a list
         if not key:
             if describes_device(line.section):
                 self._skip(line)
@@ -246,14 +273,28 @@ UTF_8_MARK: Final = b"\xef\xbb\xbf"
 _UTF_16: Final = (b"\xff\xfe", b"\xfe\xff")
 
 
+CODE_PAGES: Final = ("cp1252", "cp850")
+"""Encodings of one byte a letter in which older editors write: of Windows, and of DOS."""
+_WITHIN_WORD: Final = re.compile(
+    rb"(?<=[A-Za-z\x80-\xff])[\x80-\x91\x93-\xff](?=[A-Za-z\x80-\xff])"
+)
+_LETTERS_1252: Final = frozenset(range(0xC0, 0x100)) - {0xE1}
+"""Bytes that are letters in Windows-1252; E1h is a letter of either (á, ß)."""
+_LETTERS_850: Final = frozenset((*range(0x80, 0x9B), *range(0xA0, 0xA6)))
+"""Bytes that are letters in CP850, and no letters in Windows-1252."""
+
+
 def encoding_of(data: bytes) -> str:
     r"""Return the encoding of a file, by its name in Python.
 
     UTF-16 where its mark is there or every other byte of its beginning is zero; UTF-8 where it is
-    that; Windows-1252 otherwise, as older editors write it.
+    that. Else it is of one byte a letter: CP850 where that has letters within words and
+    Windows-1252 has none, otherwise Windows-1252.
 
     >>> encoding_of(b"[\0F\0"), encoding_of("µ".encode()), encoding_of(b"\xb5")
     ('utf-16-le', 'utf-8', 'cp1252')
+    >>> encoding_of("Schönaich".encode("cp850")), encoding_of("Schönaich".encode("cp1252"))
+    ('cp850', 'cp1252')
     """
     if data[:2] in _UTF_16:
         return "utf-16-le" if data[:1] == b"\xff" else "utf-16-be"
@@ -264,12 +305,18 @@ def encoding_of(data: bytes) -> str:
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:
-        return "cp1252"
+        within = [match[0][0] for match in _WITHIN_WORD.finditer(data)]
+        of_dos = sum(byte in _LETTERS_850 for byte in within)
+        return "cp850" if of_dos > sum(byte in _LETTERS_1252 for byte in within) else "cp1252"
     return "utf-8"
 
 
-def decode_text(data: bytes) -> str:
+def decode_text(data: bytes, encoding: str = "") -> str:
     r"""Return the text of a file, in whatever encoding, without a byte order mark.
+
+    Args:
+        data: the whole file.
+        encoding: its encoding by its name in Python, empty for that which its bytes show.
 
     >>> decode_text("\ufeffµ".encode()), decode_text("µ".encode("cp1252"))
     ('µ', 'µ')
@@ -277,4 +324,4 @@ def decode_text(data: bytes) -> str:
     '[FileInfo]µ'
     """
     coded = data.removeprefix(UTF_8_MARK)
-    return coded.decode(encoding_of(coded), "replace").removeprefix("\ufeff")
+    return coded.decode(encoding or encoding_of(coded), "replace").removeprefix("\ufeff")

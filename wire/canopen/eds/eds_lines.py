@@ -12,7 +12,8 @@ SECTIONS: Final = ("DeviceInfo", "DeviceComissioning")
 _NAMED: Final = (
     *SECTIONS,
     *("FileInfo", "DummyUsage", "Comments", "DynamicChannels", "Tools"),
-    *("MandatoryObjects", "OptionalObjects", "ManufacturerObjects", "SupportedModules"),
+    *("MandatoryObjects", "OptionalObjects", "ManufacturerObjects"),
+    *("SupportedModules", "ConnectedModules"),
 )
 KNOWN_SECTIONS: Final = {
     **{name.lower(): name for name in _NAMED},
@@ -22,10 +23,20 @@ KNOWN_SECTIONS: Final = {
 
 _OBJECT: Final = re.compile(r"([0-9A-F]{4})(?:(SUB)([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?")
 _LOOSE: Final = re.compile(
-    r"(?:0X)?([0-9A-F]{4})[ _]*(?:(SUB)[ _]*([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?"
+    r"(?:0X)?([0-9A-F]{4})[ _]*(?:(SUB)[ _]*0*([0-9A-F]{1,2})|(NAME|VALUE|DENOTATION))?"
 )
-"""Titles as people write them: `1018 sub 1`, `0x1018`, `1018_sub_1`."""
-_DERIVED_TYPE: Final = re.compile(r"([0-9A-F]{1,3})SUB1")
+"""Titles as people write them: `1018 sub 1`, `0x1018`, `1018_sub_1`, `1018sub0001`."""
+_DERIVED_TYPE: Final = re.compile(r"([0-9A-F]{1,3})SUB([123])")
+_MODULE: Final = re.compile(
+    r"M([0-9]+)(?:(MODULEINFO|COMMENTS|FIXEDOBJECTS|SUBEXTENDS)"
+    r"|(FIXED|SUBEXT)([0-9A-F]{1,4})(?:SUB([0-9A-F]{1,2}))?)",
+    re.ASCII,
+)
+"""Titles of what modules of a modular device have: `M1ModuleInfo`, `M1SubExt6000`."""
+_MODULE_WORDS: Final = {
+    word.upper(): word
+    for word in ("ModuleInfo", "Comments", "FixedObjects", "SubExtends", "Fixed", "SubExt")
+}
 _TITLE: Final = re.compile(r"\[([^\]]+)\]")
 _COMMENT: Final = re.compile(r"(^|\s);.*|^\s*#.*")
 
@@ -39,7 +50,7 @@ class EdsLine(NamedTuple):
         section: that it begins or stands in, as CiA 306 spells it; empty before the first.
         title: of the section that it begins, as it stands there; empty elsewhere.
         key: of a keyword, empty elsewhere.
-        value: of a keyword.
+        value: of a keyword; `#` and `//` stay there, for a text may have them.
         content: what is left of it without a comment.
     """
 
@@ -96,10 +107,19 @@ def canonical_section(title: str) -> str:
     ('1A00subA', 'DeviceInfo', 'a0')
     >>> canonical_section("1018 sub 1"), canonical_section("0x1018")
     ('1018sub1', '1018')
+    >>> canonical_section("1018sub0001")
+    '1018sub1'
+    >>> canonical_section("m1fixed6000SUB01"), canonical_section("m1subextends")
+    ('M1Fixed6000sub1', 'M1SubExtends')
     """
     title = title.strip()
+    if module := _MODULE.fullmatch(title.upper()):
+        number, listing, kind, index, sub = module.groups()
+        head = f"M{int(number)}{_MODULE_WORDS[listing or kind]}"
+        of_object = f"{int(index, 16):04X}" if index else ""
+        return f"{head}{of_object}" + (f"sub{int(sub, 16):X}" if sub else "")
     if derived := _DERIVED_TYPE.fullmatch(title.upper()):
-        return f"{derived[1]}sub1"
+        return f"{derived[1]}sub{derived[2]}"
     match = _LOOSE.fullmatch(title.upper())
     if match is None:
         return KNOWN_SECTIONS.get(title.lower(), title)
@@ -123,4 +143,16 @@ def object_section(section: str) -> tuple[int, int | None] | None:
 @lru_cache(maxsize=4096)
 def describes_device(section: str) -> bool:
     """Return whether a section, or what stands before the first one, describes the device."""
-    return not section or section in SECTIONS or _OBJECT.fullmatch(section.upper()) is not None
+    if not section or section in SECTIONS or _OBJECT.fullmatch(section.upper()):
+        return True
+    return is_module_object(section)
+
+
+def is_module_object(section: str) -> bool:
+    """Return whether a section describes an object of a module.
+
+    >>> is_module_object("M1Fixed6000sub1"), is_module_object("M1SubExtends")
+    (True, False)
+    """
+    module = _MODULE.fullmatch(section.upper())
+    return module is not None and module[3] is not None

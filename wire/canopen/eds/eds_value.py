@@ -20,15 +20,30 @@ TIMES: Final = (DataType.TIME_OF_DAY, DataType.TIME_DIFFERENCE)
 
 WIDEST: Final = 64
 """Bits of the widest number."""
+C_WIDTHS: Final = (8, 16, 32, 64)
+"""Bits of the integers of C."""
 
 _PLAIN: Final = re.compile(r"0x[0-9A-Fa-f]+|0|[1-9][0-9]*|", re.ASCII)
 _C_SUFFIX: Final = re.compile(r"\b(0x[0-9a-f]+|[0-9]+)[ul]{1,3}\b", re.IGNORECASE | re.ASCII)
 _SPLIT_HEX: Final = re.compile(r"0x((?: *[0-9a-f])+)", re.IGNORECASE | re.ASCII)
-_ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f]*)h", re.IGNORECASE | re.ASCII)
+_ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f ]*)h", re.IGNORECASE | re.ASCII)
+_COMMENT: Final = re.compile(r"\s*(?:[#;]|//).*", re.DOTALL)
+_HEX_BYTES: Final = re.compile(r"0x([0-9a-f]+)", re.IGNORECASE | re.ASCII)
 _UNDERSCORE: Final = re.compile(r"(?<=[0-9a-f])_(?=[0-9a-f])", re.IGNORECASE)
 _OCTAL: Final = re.compile(r"0[0-7]+")
 _NO_OCTAL: Final = re.compile(r"\b0++(?=[0-7]*+[89])([0-9]++)\b", re.ASCII)
 _TRUTH: Final = {"true": True, "false": False}
+
+
+def without_comment(text: str) -> str:
+    """Return a number, or a word, without the comment behind it.
+
+    `#`, `//` and `;` begin one, with a blank before them or without.
+
+    >>> without_comment("0x07 # VAR"), without_comment("7//VAR"), without_comment("$NODEID+8;x")
+    ('0x07', '7', '$NODEID+8')
+    """
+    return _COMMENT.sub("", text, count=1)
 
 
 def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
@@ -46,8 +61,10 @@ def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
 
     >>> parse_value(DataType.UNSIGNED32, "$NODEID+0x180")
     (384, True)
-    >>> parse_value(DataType.INTEGER8, "0xFF")
-    (-1, False)
+    >>> parse_value(DataType.INTEGER8, "0xFF"), parse_value(DataType.INTEGER8, "0xFFFFFFFE")
+    ((-1, False), (-2, False))
+    >>> parse_value(DataType.UNSIGNED32, "-1") == (0xFFFF_FFFF, False)
+    True
     >>> parse_value(DataType.REAL32, "0x3F800000")
     (1.0, False)
     """
@@ -59,12 +76,31 @@ def parse_value(kind: DataType, text: str) -> tuple[Value, bool]:
         return _parse_float(FLOATS[kind], text), False
     if kind is DataType.BOOLEAN and text.lower() in _TRUTH:
         return _TRUTH[text.lower()], False
-    number, relative = _parse_sum(text)
+    number, relative = parse_sum(text)
     if kind in TIMES:
         return number.to_bytes(6, "little"), False
-    if kind.signed and 1 << kind.bits - 1 <= number < 1 << kind.bits:
-        number -= 1 << kind.bits
-    return number, relative
+    return twos_complement(kind, number), relative
+
+
+def twos_complement(kind: DataType, number: int) -> int:
+    """Return the number of an integer type whose bits are those of a number.
+
+    A negative number of an unsigned type is the two's complement, and so are, for a signed one,
+    its bits without a sign, in its own width or in that of a wider type of C. Others stay.
+
+    >>> twos_complement(DataType.UNSIGNED8, -128), twos_complement(DataType.UNSIGNED8, -129)
+    (128, -129)
+    >>> twos_complement(DataType.INTEGER16, 0xFFFF_8000), twos_complement(DataType.INTEGER16, 65536)
+    (-32768, 65536)
+    """
+    if not kind.signed:
+        half = 1 << kind.bits - 1
+        return number + 2 * half if kind.bits > 1 and -half <= number < 0 else number
+    lowest, highest = kind.limits
+    for width in (kind.bits, *C_WIDTHS):
+        if highest < number and lowest <= number - (1 << width) < 0:
+            return number - (1 << width)
+    return number
 
 
 def parse_number(text: str) -> int:
@@ -81,8 +117,9 @@ def parse_number(text: str) -> int:
 def plain_numbers(text: str) -> str:
     """Return numbers as CiA 306 writes them.
 
-    What C adds to them goes, blanks and underscores within them, and zeros that make no octal
-    number; hexadecimal ones of assemblers begin with 0x. Node-IDs are not touched.
+    What C adds to them goes, blanks and underscores within them, a comment behind them, and zeros
+    that make no octal number; hexadecimal ones of assemblers begin with 0x. Node-IDs are not
+    touched.
 
     >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
     ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
@@ -91,25 +128,41 @@ def plain_numbers(text: str) -> str:
     """
     if _PLAIN.fullmatch(text):  # most are such: a third of the time of a file
         return text
-    plain = _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", text))
+    plain = _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", without_comment(text)))
     if assembler := _ASSEMBLER_HEX.fullmatch(plain):
-        return f"0x{assembler[1]}"
+        return f"0x{assembler[1].replace(' ', '')}"
     plain = _UNDERSCORE.sub("", plain)
     return _SPLIT_HEX.sub(lambda match: "0x" + match[1].replace(" ", ""), plain)
 
 
-def parse_limit(kind: DataType, text: str) -> int | float | None:
+def parse_limit(kind: DataType, text: str, *, upper: bool = True) -> int | float | None:
     """Read a limit; None if the type has none or it is that of every value of the type.
+
+    Args:
+        kind: its data type.
+        text: not empty.
+        upper: whether it is HighLimit. A limit beyond the type, which cuts nothing, stays as it is.
 
     Raises:
         ValueError: it is no number of at most 64 bits.
+
+    >>> parse_limit(DataType.UNSIGNED8, "-1"), parse_limit(DataType.INTEGER8, "0xFFFF")
+    (255, 65535)
+    >>> parse_limit(DataType.INTEGER8, "0xFF80", upper=False)
+    -128
     """
-    if kind not in FLOATS and (not kind.is_integer or "NODEID" in text.upper()):
+    if kind in FLOATS:
+        return _parse_float(FLOATS[kind], text)
+    if not kind.is_integer or "NODEID" in text.upper():
         return None
-    value = parse_value(kind, text)[0]
-    if isinstance(value, int) and value.bit_length() > WIDEST:
+    if kind is DataType.BOOLEAN and text.lower() in _TRUTH:
+        return _TRUTH[text.lower()]
+    number = parse_sum(text)[0]
+    if number.bit_length() > WIDEST:
         raise ValueError("no data type is that wide")
-    return value if isinstance(value, int | float) else None
+    if number >> kind.bits == 0 or kind.signed is not upper:
+        return twos_complement(kind, number)
+    return number  # beyond the type on the side where that cuts nothing
 
 
 def format_limit(kind: DataType, limit: int | float) -> str:
@@ -142,7 +195,12 @@ def format_value(kind: DataType, data: bytes, *, relative: bool = False) -> str:
     return f"{NODE_ID}+0x{value:X}" if relative else f"0x{value:0{2 * kind.size}X}"
 
 
-def _parse_sum(text: str) -> tuple[int, bool]:
+def parse_sum(text: str) -> tuple[int, bool]:
+    """Read a sum of numbers, and whether the node-ID is one of them.
+
+    >>> parse_sum("$NODEID+0x180"), parse_sum("5")
+    ((384, True), (5, False))
+    """
     terms = text.replace(" ", "").upper().split("+")
     numbers = [parse_number(term) for term in terms if term not in NODE_IDS]
     total: int = sum(numbers)
@@ -158,9 +216,25 @@ def _parse_float(layout: str, text: str) -> float:
     return value
 
 
+def is_hex_bytes(text: str) -> bool:
+    """Return whether a text is hexadecimal bytes as CiA 306 writes them.
+
+    >>> is_hex_bytes("01 02FF"), is_hex_bytes("0x0102"), is_hex_bytes("hello")
+    (True, False, False)
+    """
+    with suppress(ValueError):
+        return bytes.fromhex(text) is not None
+    return False
+
+
 def _parse_bytes(text: str) -> bytes:
-    """Read hexadecimal bytes; some editors write a text instead."""
-    try:
+    r"""Read hexadecimal bytes; some editors write 0x before them, or a text instead.
+
+    >>> _parse_bytes("0102"), _parse_bytes("0x0102"), _parse_bytes("0x0"), _parse_bytes("no")
+    (b'\x01\x02', b'\x01\x02', b'\x00', b'no')
+    """
+    if is_hex_bytes(text):
         return bytes.fromhex(text)
-    except ValueError:
-        return text.encode()
+    if digits := _HEX_BYTES.fullmatch(text):
+        return bytes.fromhex(digits[1].rjust(len(digits[1]) + len(digits[1]) % 2, "0"))
+    return text.encode()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Flag, IntEnum
 from operator import attrgetter
@@ -10,6 +11,7 @@ from typing import ClassVar, Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.errors import FieldError
 
 MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
 """What a string or domain holds unless its description says less: all that SDO can carry."""
@@ -93,7 +95,7 @@ class EntryDescription:
         name: as in the EDS.
         data_type: decides size and notation; DOMAIN where a file names an unknown one.
         access: what the bus may do.
-        default: power-on value or its bytes; zero, or empty, if left out.
+        default: power-on value or its bytes; if left out, zero or the limit next to it, or empty.
         low: smallest value, None for that of the data type.
         high: largest value.
         relative: the node-ID is added to the default ($NODEID).
@@ -144,10 +146,27 @@ class EntryDescription:
         self.readable, self.writable = Access.READ in access, Access.WRITE in access
         self.has_default = default is not None
         if default is None:
-            default = bytes(self.size)
+            default = _nearest_to_zero(data_type, low, high)
         self.default = default if isinstance(default, bytes) else data_type.encode(default)
         self.low, self.high, self.relative, self.max_bytes = low, high, relative, max_bytes
         self.unit, self.factor = unit, factor
+
+    def with_default(self, default: Value, *, relative: bool = False) -> EntryDescription:
+        """Return the same entry with another power-on value.
+
+        Raises:
+            FieldError: the default is no value of the data type.
+        """
+        return EntryDescription(
+            *(self.index, self.sub, self.name, self.data_type, self.access),
+            default=default,
+            low=self.low,
+            high=self.high,
+            relative=relative,
+            max_bytes=self.max_bytes,
+            unit=self.unit,
+            factor=self.factor,
+        )
 
     def __repr__(self) -> str:
         """Name it as a log line would."""
@@ -163,6 +182,19 @@ class EntryDescription:
             return self.default
         value = int.from_bytes(self.default, "little") + node_id
         return (value & (1 << 8 * self.size) - 1).to_bytes(self.size, "little")
+
+
+def _nearest_to_zero(kind: DataType, low: int | float | None, high: int | float | None) -> bytes:
+    """Return the bytes of the value that nobody gives: 0, or the limit next to it."""
+    nearest: int | float = 0
+    if low is not None and low > 0:
+        nearest = low
+    elif high is not None and high < 0:
+        nearest = high
+    if nearest:
+        with suppress(FieldError):  # a limit beyond the type, or of a text
+            return kind.encode(round(nearest) if kind.is_integer else nearest)
+    return bytes(kind.size)
 
 
 class Element(NamedTuple):

@@ -30,7 +30,9 @@ ACCESS: Final = {
 }
 _MAPPED_AS: Final = {("rw", "TPDO"): "rwr", ("rw", "RPDO"): "rww"}
 _FLAGS: Final = {"true": "1", "false": "0"}
-_RATE: Final = re.compile(r"([0-9]+) *[Kk]bps|([0-9]+) *[Mm]bps", re.ASCII)
+_RATE: Final = re.compile(
+    r"([0-9]+) *(?:(k)|(m))? *(?:bps|bit/s|bd|baud)?", re.ASCII | re.IGNORECASE
+)
 
 IDENTITY: Final = {
     **{"vendorName": "VendorName", "vendorID": "VendorNumber", "productName": "ProductName"},
@@ -40,9 +42,15 @@ FEATURES: Final = {
     **{"granularity": "Granularity", "nrOfRxPDO": "NrOfRXPDO", "nrOfTxPDO": "NrOfTXPDO"},
     **{"bootUpSlave": "SimpleBootUpSlave", "bootUpMaster": "SimpleBootUpMaster"},
     **{"groupMessaging": "GroupMessaging", "dynamicChannels": "DynamicChannelsSupported"},
-    "layerSettingServiceSlave": "LSS_Supported",
+    **{"layerSettingServiceSlave": "LSS_Supported", "ngSlave": "NG_Slave"},
+    **{"ngMaster": "NG_Master", "NrOfNG_MonitoredNodes": "NrOfNG_MonitoredNodes"},
 }
-COMMISSIONING: Final = {"nodeID": "NodeID", "nodeName": "NodeName", "networkName": "NetworkName"}
+COMMISSIONING: Final = {
+    **{"nodeID": "NodeID", "NodeID": "NodeID", "nodeName": "NodeName"},
+    **{"networkName": "NetworkName", "networkNumber": "NetNumber"},
+    "CANopenManager": "CANopenManager",
+}
+"""`nodeID` by CiA 311, `NodeID` as CANopenEditor writes it."""
 OBJECT: Final = {
     **{"name": "ParameterName", "subNumber": "SubNumber", "defaultValue": "DefaultValue"},
     **{"actualValue": "ParameterValue", "denotation": "Denotation", "objFlags": "ObjFlags"},
@@ -194,8 +202,9 @@ def _head_items(element: Element) -> Iterator[tuple[str, Item]]:
             yield from (("DeviceInfo", item) for item in _renamed(element, FEATURES))
         case "deviceCommissioning":
             yield from (("DeviceComissioning", item) for item in _renamed(element, COMMISSIONING))
-            rate = _kbit(element.attributes.get("actualBaudRate", ""))
-            yield "DeviceComissioning", ("Baudrate", rate, element.line)
+            if "actualBaudRate" in element.attributes:
+                rate = _kbit(element.attributes["actualBaudRate"])
+                yield "DeviceComissioning", ("Baudrate", rate, element.line)
         case "supportedBaudRate":
             rate = _kbit(element.attributes.get("value", ""))
             yield "DeviceInfo", (f"BaudRate_{rate}", "1", element.line)
@@ -211,13 +220,13 @@ def _head_items(element: Element) -> Iterator[tuple[str, Item]]:
 def _kbit(text: str) -> str:
     """Return a bit rate in kbit/s; a text that is none as it is.
 
-    >>> _kbit("250 Kbps"), _kbit("1 Mbps"), _kbit("auto-baudRate")
-    ('250', '1000', 'auto-baudRate')
+    >>> _kbit("250 Kbps"), _kbit("1 Mbps"), _kbit("500000"), _kbit("auto-baudRate")
+    ('250', '1000', '500000', 'auto-baudRate')
     """
-    match = _RATE.fullmatch(text)
+    match = _RATE.fullmatch(text.strip())
     if match is None:
         return text
-    return match[1] or f"{match[2]}000"
+    return f"{match[1]}000" if match[3] else match[1]
 
 
 def _objects(elements: list[Element], parameters: _Parameters) -> Iterator[EdsLine]:
@@ -246,6 +255,10 @@ def _entry(element: Element, parameters: _Parameters) -> Iterator[Item]:
         if "AccessType" in said:
             access, line = said["AccessType"]
             said["AccessType"] = _MAPPED_AS.get((access, mapping), access), line
+    else:
+        misplaced = (item for item in parameters.items(parameter) if item[0] == "ParameterValue")
+        for key, text, line in misplaced:  # of a sub-object: CANopenEditor writes it here
+            said.setdefault(key, (text, line))
     for key, (text, line) in said.items():
         yield key, text, line
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.object_reader import ObjectReader
-from tickrig.host.canopen.data_sheet.rules.standard_objects import standard_object
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.standard_objects import standard_object
 
 ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
 COUNTED: Final = (0x1018, 0x1016, 0x1010, 0x1200)

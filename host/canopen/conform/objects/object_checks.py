@@ -20,7 +20,8 @@ from tickrig.host.canopen.conform.objects.accepted_codes import (
     WRITE_ONLY,
 )
 from tickrig.host.canopen.conform.objects.profile_checks import profile_checks
-from tickrig.wire.canopen.eds.eds_device import COUNTS, EdsDevice
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
 GROUP: Final = "OD"

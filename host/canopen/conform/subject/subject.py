@@ -14,11 +14,11 @@ from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
 from tickrig.host.canopen.conform.subject.node_names import NodeNames
-from tickrig.host.canopen.data_sheet.rules.standard_objects import standard_object
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.standard_objects import standard_object
 
 TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
 IDENTITY: Final = ("vendor", "product", "revision", "serial")

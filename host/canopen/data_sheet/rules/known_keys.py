@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from tickrig.wire.canopen.eds.eds_lines import object_section
+from tickrig.wire.canopen.eds.eds_lines import is_module_object, object_section
 from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
 FILE_INFO: Final = (
@@ -33,6 +33,7 @@ ENTRY: Final = (
     *("InvertedSRAD", "UniqueID", "StorageLocation"),
 )
 OF_DCF: Final = ("ParameterValue", "Denotation", "UploadFile", "DownloadFile", "ParamRefd")
+OF_MODULE: Final = ("Count", "ObjExtend")
 OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
 """Not of CiA 306; our reader, and in part the canopen library, take them."""
 
@@ -63,12 +64,57 @@ _BY_SECTION: Final = {
     **{section: _spelled("SupportedObjects", "Lines") for section in KEYS},
 }
 _OBJECT: Final = _spelled(*ENTRY, *OF_DCF, *OURS)
+_OF_MODULE: Final = {**_OBJECT, **_spelled(*OF_MODULE)}
+
+_OBJECT_NUMBERS: Final = frozenset(
+    {
+        *("objecttype", "datatype", "pdomapping", "subnumber", "compactsubobj"),
+        *("objflags", "objextend", "maxbytes"),
+    }
+)
+_NUMBERS: Final = {
+    "FileInfo": r"FileVersion|FileRevision",
+    "DeviceInfo": "|".join((*NUMBERS, *FLAGS, *OPTIONAL_INFO)),
+    "DeviceComissioning": r"NodeID|Baudrate|NetNumber|CANopenManager|LSS_SerialNumber",
+    "Comments": r"Lines",
+    "DummyUsage": r"Dummy[0-9A-F]{4}",
+    "DynamicChannels": r"NrOfSeg|(Type|PPOffset)[0-9]+",
+    "Tools": r"Items",
+}
+"""The keywords of sections that have numbers."""
+_LISTED_NUMBERS: Final = re.compile(
+    r"(Mandatory|Optional|Manufacturer)Objects|(Supported|Connected)Modules"
+    r"|M[0-9]+(FixedObjects|SubExtends)|[0-9A-F]{4}ObjectLinks",
+    re.IGNORECASE,
+)
+"""Sections that have nothing but numbers."""
+_COUNTED: Final = re.compile(r"NrOfEntries|Lines|ProductVersion|ProductRevision", re.IGNORECASE)
+"""Keywords of other sections that have numbers."""
+
+
+def is_number(section: str, key: str) -> bool:
+    """Return whether a keyword has a number, whatever the data type of its object.
+
+    >>> is_number("DeviceInfo", "VendorNumber"), is_number("1600Value", "NrOfEntries")
+    (True, True)
+    >>> is_number("DeviceInfo", "VendorName"), is_number("1017", "DefaultValue")
+    (False, False)
+    """
+    if object_section(section) is not None or is_module_object(section):
+        return key.lower() in _OBJECT_NUMBERS
+    if (known := _NUMBERS.get(section)) is not None:
+        return re.fullmatch(known, key, re.IGNORECASE) is not None
+    if _LISTED_NUMBERS.fullmatch(section):
+        return True
+    return _COUNTED.fullmatch(key) is not None and SECTION.fullmatch(section) is not None
 
 
 def keys_of(section: str) -> dict[str, str] | None:
     """Return the keywords of a section by their lower case; None where any may stand."""
     if object_section(section) is not None:
         return _OBJECT
+    if is_module_object(section):
+        return _OF_MODULE
     return _BY_SECTION.get(section)
 
 

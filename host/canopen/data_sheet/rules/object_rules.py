@@ -9,7 +9,7 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_device import COUNTS
+from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.eds_lines import object_section
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES, entry_lines
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

@@ -94,7 +94,7 @@ def _cob_id(
 def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
     """Return whether a default is that of the first server; that of one node is, in a DCF."""
     default = int.from_bytes(row.default, "little")
-    if document.is_dcf and not row.relative:
+    if document.file.is_dcf and not row.relative:
         return default in range(base + LOWEST_NODE, base + HIGHEST_NODE + 1)
     return row.relative and default == base
 

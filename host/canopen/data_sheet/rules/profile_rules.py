@@ -7,16 +7,17 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
-from tickrig.host.canopen.data_sheet.rules.standard_objects import StandardObject, standard_object
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.eds.standard_objects import StandardObject, standard_object
 
 MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 DEVICE_TYPE: Final = (0x1000, 0)
 IDENTITY: Final = 0x1018
 COMMUNICATION: Final = range(0x1000, 0x2000)
-DOWNLOADS: Final = range(0x1F50, 0x1F60)
+WRITE_ONLY: Final = (0x1026, *range(0x1F50, 0x1F60))
+"""Objects that take bytes and need not give them back: a prompt, programs."""
 PROFILE_AREA: Final = range(0x6000, 0xA000)
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.OCTET_STRING)
 INPUTS_OUTPUTS: Final = (
@@ -84,7 +85,7 @@ def _entry(
     if Access.WRITE in row.access and standard is not None and standard.fixed:
         what = "the bus may write it, reading was allowed"
         yield document.found("communication-access", what, place, "AccessType")
-    elif Access.READ not in row.access and row.index not in DOWNLOADS and standard is not None:
+    elif Access.READ not in row.access and row.index not in WRITE_ONLY and standard is not None:
         what = "the bus may not read it"
         yield document.found("communication-access", what, place, "AccessType")
 
@@ -98,7 +99,12 @@ def _is_composed(document: Document, row: EntryDescription) -> bool:
 def profile(document: Document) -> Iterator[RuleFinding]:
     """Hold the device type against the objects of the profile."""
     row, objects = document.rows.get(DEVICE_TYPE), document.device.objects
-    if row is None or not row.has_default or row.data_type is not DataType.UNSIGNED32:
+    if row is None or row.data_type is not DataType.UNSIGNED32:
+        return
+    if not row.has_default:
+        drive = ", but 6040h and 6041h of a drive" if set(DRIVE) <= objects.keys() else ""
+        text = f"1000h has no value: no profile{drive}"
+        yield document.found("device-type-missing", text, "1000")
         return
     device_type = int.from_bytes(row.default, "little")
     number, more = device_type & 0xFFFF, device_type & 0xFFFF_0000

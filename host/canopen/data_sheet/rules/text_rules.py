@@ -8,7 +8,13 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
-from tickrig.host.canopen.data_sheet.rules.known_keys import SECTION, keys_of, numbered
+from tickrig.host.canopen.data_sheet.rules.known_keys import (
+    SECTION,
+    is_number,
+    keys_of,
+    numbered,
+)
+from tickrig.host.canopen.data_sheet.rules.value_rules import kind_of
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import KNOWN_SECTIONS, EdsLine
 
@@ -18,6 +24,7 @@ _PLAIN: Final = re.compile(
     r"|\[(M[0-9]|Tool).*\]"
 )
 _INLINE: Final = re.compile(r"(?<!\s)\s++;.*$")
+_BEHIND_WORD: Final = re.compile(r"(?<!\s)\s*+(?:[#;]|//).*$")
 
 
 def encoding(document: Document) -> Iterator[RuleFinding]:
@@ -29,6 +36,10 @@ def encoding(document: Document) -> Iterator[RuleFinding]:
         yield document.found("bom", "a byte order mark stands before the file", "", 0, edit)
     if document.file.is_xml:
         return
+    if not document.is_unicode:
+        first = next(at for at, text in enumerate(document.texts, 1) if not text.isascii())
+        what = f"the file is not UTF-8; {document.letters(first)}"
+        yield document.found("not-utf-8", what, "", first, edit)
     for number, text in enumerate(document.texts, 1):
         if not text.isascii():
             what = f"{shorten(text.strip())!r} has letters beyond ASCII"
@@ -99,13 +110,24 @@ def comments(document: Document) -> Iterator[RuleFinding]:
     """Find comments that some readers take for something else."""
     for line in () if document.file.is_xml else document.file.lines:
         text = line.text.strip()
+        raw = document.texts[line.number - 1]
         if text.startswith("#"):
             what = f"{shorten(text)!r} begins with #"
             yield document.found("hash-comment", what, line.section, line.number)
-        elif line.content and text != line.content:
-            raw = document.texts[line.number - 1]
-            match = _INLINE.search(raw)
-            if match:
-                alone = Edit(line.number, lines=(match[0].strip(), raw[: match.start()]))
-                what = f"a comment stands behind {shorten(line.content)!r}"
-                yield document.found("inline-comment", what, line.section, line.number, alone)
+            continue
+        match = _INLINE.search(raw) if line.content and text != line.content else None
+        if match is None and line.is_keyword and _is_word(document, line):
+            match = _BEHIND_WORD.search(raw, raw.index("=") + 1)
+        if match is not None:
+            remark = match[0].strip().lstrip("#/;").strip()
+            kept = [f"; {remark}"] if remark else []
+            alone = Edit(line.number, lines=(*kept, raw[: match.start()]))
+            what = f"a comment stands behind {shorten(raw[: match.start()].strip())!r}"
+            yield document.found("inline-comment", what, line.section, line.number, alone)
+
+
+def _is_word(document: Document, line: EdsLine) -> bool:
+    """Return whether a line gives a number, or an access type: no text in which `#` may stand."""
+    if line.key.lower() == "accesstype" or is_number(line.section, line.key):
+        return line.key.lower() != "count"
+    return kind_of(document, line) is not None

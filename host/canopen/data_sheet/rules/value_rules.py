@@ -10,41 +10,90 @@ from typing import Final
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, RuleFinding
 from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.rules.known_keys import is_number
 from tickrig.host.canopen.data_sheet.rules.object_rules import compact_edits
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS
 from tickrig.wire.canopen.eds.eds_file import Finding, shorten
 from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object_section
-from tickrig.wire.canopen.eds.eds_value import NODE_IDS, parse_limit, plain_numbers
+from tickrig.wire.canopen.eds.eds_value import (
+    FLOATS,
+    NODE_IDS,
+    TIMES,
+    parse_limit,
+    plain_numbers,
+    without_comment,
+)
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectCode
 
 OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
 NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
-NUMBERS: Final = ("ObjectType", "DataType", "PDOMapping", "SubNumber", "CompactSubObj")
-VALUES: Final = ("DefaultValue", "LowLimit", "HighLimit", "ParameterValue")
+NUMBERS: Final = frozenset(
+    kind for kind in DataType if kind.is_integer or kind in (*FLOATS, *TIMES)
+)
+"""Data types that have a number for a value."""
+VALUES: Final = frozenset({"defaultvalue", "lowlimit", "highlimit", "parametervalue"})
+NUMBERED: Final = re.compile(r"(line)?0+([1-9][0-9]*)", re.IGNORECASE | re.ASCII)
+"""Keywords of lists that are written with leading zeros."""
+OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
 
 
 def numbers(document: Document) -> Iterator[RuleFinding]:
     """Find numbers that are octal for some readers and decimal for others, and odd node-IDs."""
-    for section, index, sub in document.file.objects():
-        row = document.rows.get((index, sub or 0))
-        values = VALUES if row is not None and row.data_type.is_integer else ()
-        for key in (*NUMBERS, *values):
-            line = document.keyword(section, key)
-            if line is None:
-                continue
-            if OCTAL.fullmatch(line.value):
-                yield _leading_zero(document, section, line)
-            elif key in VALUES and "nodeid" in line.value.lower():
-                yield from _node_id(document, section, line)
+    for line in document.file.lines:
+        if not line.is_keyword or document.keyword(line.section, line.key) is not line:
+            continue
+        kind = kind_of(document, line)
+        if kind is None and not is_number(line.section, line.key):
+            continue
+        terms = without_comment(line.value).replace(" ", "").split("+")
+        if any(OCTAL.fullmatch(term) for term in terms) and (kind is None or kind.is_integer):
+            yield _leading_zero(document, line, terms)
+        elif kind is not None and kind.is_integer and "nodeid" in line.value.lower():
+            yield from _node_id(document, line.section, line)
 
 
-def _leading_zero(document: Document, section: str, line: EdsLine) -> RuleFinding:
-    value = int(line.value, 8)
-    same = value == int(line.value)
-    what = f"{shorten(line.content)} is {value} in octal, {int(line.value)} in decimal"
-    edits = (document.with_value(line, str(value)),) if same and not document.file.is_xml else ()
-    return document.found("leading-zero", what, section, line.number, *edits)
+def list_numbers(document: Document) -> Iterator[RuleFinding]:
+    """Find keywords of lists whose own number has leading zeros: other readers do not find them."""
+    for line in () if document.file.is_xml else document.file.lines:
+        zeros = NUMBERED.fullmatch(line.key) if line.is_keyword else None
+        if zeros is None or object_section(line.section) is not None:
+            continue
+        spelled = f"{zeros[1] or ''}{zeros[2]}"
+        text = document.texts[line.number - 1].replace(line.key, spelled, 1)
+        what = f"{shorten(line.key)} stands for {spelled}"
+        edit = Edit(line.number, lines=(text,))
+        yield document.found("leading-zero", what, line.section, line.number, edit)
+
+
+def kind_of(document: Document, line: EdsLine) -> DataType | None:
+    """Return the data type of the value that a line gives, None if it gives none, or no number."""
+    of_elements = OF_ELEMENTS.fullmatch(line.section)
+    place = object_section(line.section)
+    if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():
+        at = int(of_elements[1], 16), int(line.key)
+    elif place is not None and line.key.lower() in VALUES:
+        compact = place[1] is None and document.file.has(line.section, "CompactSubObj")
+        at = place[0], int(compact) if place[1] is None else place[1]
+    else:
+        return None
+    row = document.rows.get(at)
+    return row.data_type if row is not None and row.data_type in NUMBERS else None
+
+
+def _leading_zero(document: Document, line: EdsLine, terms: list[str]) -> RuleFinding:
+    """Judge a number, or a sum with the node-ID; a value is mended that is one either way."""
+    octal = [term for term in terms if OCTAL.fullmatch(term)]
+    first = octal[0]
+    what = f"{shorten(line.content)} is {int(first, 8)} in octal, {int(first)} in decimal"
+    if len(terms) > 1:
+        what = f"{shorten(line.content)}: {what.partition(' is ')[2]}"
+    edits: tuple[Edit, ...] = ()
+    if all(int(term, 8) == int(term) for term in octal) and not document.file.is_xml:
+        plain = "+".join(str(int(term)) if term in octal else term for term in terms)
+        said = without_comment(line.value)
+        edits = (document.with_value(line, line.value.replace(said, plain, 1)),)
+    return document.found("leading-zero", what, line.section, line.number, *edits)
 
 
 def _node_id(document: Document, section: str, line: EdsLine) -> Iterator[RuleFinding]:
@@ -113,6 +162,8 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
     file = document.file
     by_line = {line.number: line for line in file.lines}
     for finding in (*file.errors, *file.warnings):
+        if finding.rule in OF_LINES:
+            continue
         line, mend = by_line.get(finding.line), _MENDS.get(finding.rule)
         edits: tuple[Edit, ...] = ()
         if mend is not None and line is not None and not file.is_xml:
@@ -162,16 +213,30 @@ def _access(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, 
 
 
 def _empty(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
-    """Give an empty keyword the value that it counts as; what a DataType is nobody knows."""
-    if line.key.lower() == "datatype" and not line.section.endswith("sub0"):
+    """Give an empty keyword the value that it counts as; a DataType only where CiA 301 has one."""
+    if line.key.lower() == "datatype" and _taken(finding) == str(int(DataType.DOMAIN)):
         return ()
     return (document.with_value(line, _taken(finding)),)
 
 
-def _type_of_sub0(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
-    if finding.section.endswith("sub0"):
-        return (document.add_to(finding.section, ["DataType=0x0005"]),)
-    return ()
+def _standard_type(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Add the data type that CiA 301 gives an object, where it gives one."""
+    kind = DataType[_taken(finding)]
+    if kind is DataType.DOMAIN:
+        return ()
+    return (document.add_to(finding.section, [f"DataType=0x{kind:04X}"]),)
+
+
+def _bytes(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Write the bytes that are taken; what a text is meant for is left to the author."""
+    taken = finding.reason.rpartition(": ")[2].removesuffix(" is taken").replace(" ", "")
+    return (document.with_value(line, taken),) if line.value[:2].lower() == "0x" else ()
+
+
+def _bit_rate(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+    """Write kbit/s where bit/s are meant."""
+    taken = _taken(finding)
+    return (document.with_value(line, taken),) if taken.isdecimal() else ()
 
 
 def _kind(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
@@ -248,7 +313,10 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]
     "number-word": _word,
     "access-form": _access,
     "empty-value": _empty,
-    "data-type-missing": _type_of_sub0,
+    "data-type-missing": _standard_type,
+    "value-sign": _word,
+    "byte-form": _bytes,
+    "bit-rate-unit": _bit_rate,
     "object-type": _kind,
     "no-keyword": _comment,
     "doubled-key": _doubled_key,
@@ -256,6 +324,8 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]
     "compact-record": _compact,
 }
 
+OF_LINES: Final = ("inline-comment",)
+"""Rules of the reader that a rule over lines tells of, too, with what mends them."""
 OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
 
 

@@ -179,6 +179,23 @@ def counted_only(text: str) -> str:
     return COUNTED(f"{head}{title}{re.sub('SupportedObjects=.*', count, listed)}{blank}{tail}")
 
 
+def without_pdo(number: str) -> Change:
+    """Take an RPDO out, and out of its list: only the count tells that there was one."""
+
+    def change(text: str) -> str:
+        for index in (f"140{number}", f"160{number}"):
+            text = without_object(index)(text)
+            listed = re.search(rf"([0-9]+)=0x{index}\n", text)
+            assert listed is not None
+            at, last = int(listed[1]), int(re.findall(r"Objects=([0-9]+)", text)[1])
+            text = text.replace(listed[0], "", 1).replace(f"Objects={last}", f"Objects={last - 1}")
+            for follows in range(at + 1, last + 1):
+                text = re.sub(rf"(?m)^{follows}=0x1", f"{follows - 1}=0x1", text, count=0)
+        return text
+
+    return change
+
+
 def doubled(text: str) -> str:
     """Tear a section in two."""
     torn = out("1017", "AccessType")(text)
@@ -205,6 +222,16 @@ CORPUS: Final = (
     Deviation("control-character", put("=Device type", "=Device\x00\x07 type"), True, anything),
     Deviation("non-ascii", lambda text: put("u8 w", "µ8 w")(text).encode("cp1252"), True, anything),
     Deviation("non-ascii", put("=u8 write", "=µ8 write"), True, anything),
+    *(
+        Deviation(
+            "not-utf-8",
+            lambda text, page=page: put("u8 write", "u8 für Öl")(text).encode(page),
+            True,
+            entry(0x2004, 0, name="u8 für Öl only"),
+            keeps=("u8 für Öl only",),
+        )
+        for page in ("cp1252", "cp850")
+    ),
     # lines
     Deviation("no-keyword", put("AccessType=ro\n", "AccessType=ro\nAccess type is ro\n")),
     Deviation("no-keyword", put("AccessType=ro\n", "AccessType=ro\n=ro\n")),
@@ -228,6 +255,23 @@ CORPUS: Final = (
     Deviation("section-form", put("[DeviceInfo]", "[deviceinfo]")),
     Deviation("section-form", put("[1017]", "[1017] heartbeat")),
     Deviation("inline-comment", within("1017", "AccessType=rw", "AccessType=rw   ; or ro?")),
+    *(
+        Deviation("inline-comment", within(place, text, f"{text}{remark}"), keeps=(f"\n{text}\n",))
+        for place, text, remark in (
+            ("1017", "DataType=0x0006", " # UNSIGNED16"),
+            ("1017", "ObjectType=0x7", " // VAR"),
+            ("1017", "AccessType=rw", " # rw;"),
+            ("1018", "SubNumber=5", "//five"),
+            ("2006", "DefaultValue=0x10", ";16"),
+            ("1400sub1", "DefaultValue=$NODEID+0x200", "#RPDO1"),
+            ("200A", "DefaultValue=0", " # V"),
+            ("DeviceInfo", "VendorNumber=0x0000AB01", " #"),
+            ("OptionalObjects", "1=0x1003", "// errors"),
+            ("MandatoryObjects", "SupportedObjects=3", " # three"),
+            ("DummyUsage", "Dummy0001=1", ";BOOLEAN"),
+            ("Comments", "Lines=2", " # two"),
+        )
+    ),
     Deviation("hash-comment", put("[1017]\n", "# heartbeat\n[1017]\n")),
     Deviation("key-case", put("NrOfRXPDO", "NrOfRxPDO")),
     Deviation("unknown-key", put_in("1017", "Colour=blue")),
@@ -253,6 +297,13 @@ CORPUS: Final = (
         "pdo-count", without_object("1403"), False, lacks(0x1403), keeps=("NrOfRXPDO=4", "=0x1403")
     ),
     Deviation("pdo-count", all_of(COUNTED, put("NrOfRXPDO=4", "NrOfRXPDO=3"))),
+    Deviation(
+        "pdo-count",
+        all_of(*(without_pdo(number) for number in ("0", "1", "2", "3"))),
+        False,
+        lacks(0x1403),
+        keeps=("NrOfRXPDO=4",),
+    ),
     Deviation(
         "pdo-count",
         all_of(counted_only, put("NrOfTXPDO=4", "NrOfTXPDO=513")),
@@ -285,6 +336,22 @@ CORPUS: Final = (
         "dcf-key", put_in("1017", "ParameterValue=5"), False, entry(0x1017, 0, default=b"\5\0")
     ),
     Deviation("dcf-section", section("DeviceComissioning", "NodeID=5"), False),
+    Deviation(
+        "bit-rate-unit",
+        section("DeviceComissioning", "NodeID=5", "Baudrate=500000"),
+        True,
+        lambda document: document.device.bit_rate == 500_000,
+        "r1.dcf",
+        ("Baudrate=500\n",),
+    ),
+    Deviation(
+        "bit-rate-unit",
+        section("DeviceComissioning", "NodeID=5", "Baudrate=5000"),
+        False,
+        lambda document: document.device.bit_rate is None,
+        "r1.dcf",
+    ),
+    Deviation("modules", section("SupportedModules", "NrOfEntries=2"), False),
     Deviation("node-id", section("DeviceCommissioning", "NodeID=128"), False, None, "r1.dcf"),
     # lists
     Deviation("list-count", put("SupportedObjects=12", "SupportedObjects=11")),
@@ -320,9 +387,19 @@ CORPUS: Final = (
     Deviation("object-type-missing", out("1018", "ObjectType")),
     Deviation(
         "data-type-missing",
-        out("1017", "DataType"),
+        out("2009", "DataType"),
         False,
-        entry(0x1017, 0, data_type=DataType.DOMAIN),
+        entry(0x2009, 0, data_type=DataType.DOMAIN),
+    ),
+    Deviation("data-type-missing", out("1017", "DataType"), keeps=("DataType=0x0006",)),
+    Deviation("data-type-missing", out("1A00sub1", "DataType")),
+    Deviation(
+        "data-type-derived",
+        all_of(
+            within("2006", "DataType=0x0005", "DataType=0x00A0"),
+            section("A0sub1", "ParameterName=Type", "DefaultValue=0x05"),
+        ),
+        False,
     ),
     Deviation("data-type-missing", out("1018sub0", "DataType")),
     Deviation(
@@ -343,10 +420,11 @@ CORPUS: Final = (
     Deviation("empty-value", within("1017", "PDOMapping=0", "PDOMapping=")),
     Deviation(
         "empty-value",
-        within("1017", "DataType=0x0006", "DataType="),
+        within("2009", "DataType=0x0003", "DataType="),
         False,
-        entry(0x1017, 0, data_type=DataType.DOMAIN),
+        entry(0x2009, 0, data_type=DataType.DOMAIN),
     ),
+    Deviation("empty-value", within("1017", "DataType=0x0006", "DataType=")),
     Deviation("number-word", within("2005", "PDOMapping=1", "PDOMapping=yes")),
     Deviation("number-word", within("1017", "DataType=0x0006", "DataType=UNSIGNED16")),
     Deviation("number-word", within("1018", "ObjectType=0x9", "ObjectType=record")),
@@ -380,6 +458,7 @@ CORPUS: Final = (
         False,
         entry(0x1018, 0, data_type=DataType.UNSIGNED16),
     ),
+    Deviation("value-place", put_in("1018", "ParameterValue=5"), False),
     Deviation(
         "sub0-value",
         within("1018sub0", "DefaultValue=0x04", "DefaultValue=5"),
@@ -404,6 +483,61 @@ CORPUS: Final = (
     ),
     Deviation("leading-zero", within("2006", "DefaultValue=0x10", "DefaultValue=020"), False),
     Deviation("leading-zero", within("1018sub0", "DefaultValue=0x04", "DefaultValue=04")),
+    Deviation("leading-zero", put("ProductNumber=0x00000002", "ProductNumber=002")),
+    Deviation("leading-zero", put("ProductNumber=0x00000002", "ProductNumber=010"), False),
+    Deviation("leading-zero", put("NrOfRXPDO=4", "NrOfRXPDO=04")),
+    Deviation("leading-zero", put("BaudRate_125=1", "BaudRate_125=01")),
+    Deviation("leading-zero", put("FileRevision=1", "FileRevision=01")),
+    Deviation("leading-zero", put("Lines=2", "Lines=02")),
+    Deviation("leading-zero", put("Line2=", "Line02="), True, entry(0x2008, 0, max_bytes=20_000)),
+    Deviation("leading-zero", put("Dummy0001=1", "Dummy0001=01")),
+    Deviation("leading-zero", put("SupportedObjects=3\n", "SupportedObjects=03\n")),
+    Deviation("leading-zero", put("\n1=0x1003", "\n01=0x1003")),
+    Deviation("leading-zero", within("1018", "SubNumber=5", "SubNumber=05")),
+    Deviation("leading-zero", put_in("2009", "HighLimit=07"), True, entry(0x2009, 0, high=7)),
+    Deviation(
+        "leading-zero",
+        section("DeviceComissioning", "NodeID=05", "Baudrate=0125"),
+        False,
+        None,
+        "r1.dcf",
+    ),
+    Deviation("leading-zero", put(COB_ID, "DefaultValue=$NODEID+01000"), False),
+    Deviation(
+        "value-sign",
+        within("2000", "DefaultValue=0x00", "DefaultValue=-1"),
+        True,
+        entry(0x2000, 0, default=b"\xff"),
+        keeps=("DefaultValue=0xFF",),
+    ),
+    Deviation(
+        "value-sign",
+        within("2009", "DefaultValue=0", "DefaultValue=0xFFFFFFFE"),
+        True,
+        entry(0x2009, 0, default=b"\xfe\xff"),
+        keeps=("DefaultValue=-2",),
+    ),
+    Deviation("value-sign", put_in("2000", "HighLimit=-1"), True, entry(0x2000, 0, high=255)),
+    Deviation(
+        "byte-form",
+        within("2008", "DefaultValue=", "DefaultValue=0x0102FF"),
+        True,
+        entry(0x2008, 0, default=b"\1\2\xff"),
+        keeps=("DefaultValue=0102FF",),
+    ),
+    Deviation(
+        "byte-form",
+        within("2008", "DefaultValue=", "DefaultValue=0x0"),
+        True,
+        entry(0x2008, 0, default=b"\0"),
+        keeps=("DefaultValue=00",),
+    ),
+    Deviation(
+        "byte-form",
+        within("2008", "DefaultValue=", "DefaultValue=hello"),
+        False,
+        entry(0x2008, 0, default=b"hello"),
+    ),
     Deviation("nodeid-form", put(COB_ID, "DefaultValue=0x200+$NODEID")),
     Deviation("nodeid-form", put(COB_ID, "DefaultValue=$nodeid+0x200")),
     Deviation("nodeid-form", put(COB_ID, "DefaultValue=NODEID + 512")),
@@ -495,6 +629,12 @@ CORPUS: Final = (
         False,
         anything,
         "epos.eds",
+    ),
+    Deviation(
+        "device-type-missing",
+        within("1000", "DefaultValue=0x000F0191", "DefaultValue="),
+        False,
+        entry(0x1000, 0, has_default=False),
     ),
     Deviation("profile-none", put("0x000F0191", "0"), True, anything),
     # what is cut off

@@ -134,13 +134,39 @@ CHARACTERS: Final = {"control-character"}
 
 def test_lines_that_no_finding_names_stay_to_the_byte() -> None:
     made = GOOD.replace("u8 write", "µ8 write").replace("NrOfRXPDO=4", "NrOfRXPDO = 7 ")
-    data = made.replace("\n", "\r\n").encode("cp1252")
+    data = made.replace("\n", "\r\n").encode()
     fixed = fix(Document(NAME, data))
     assert fixed.document.data == data.replace(b"NrOfRXPDO = 7 ", b"NrOfRXPDO = 4 ")
     assert [(one.rule.name, one.line) for one in fixed.mended] == [("pdo-count", 29)]
 
 
-def test_bytes_that_no_code_page_has_survive() -> None:
-    data = GOOD.replace("u8 write", "\x81 write").encode("latin-1").replace(b"=4\n", b"=4 \n")
-    data = data.replace(b"Lines=2", b"Lines=3")
-    assert fix(Document(NAME, data)).document.data == data.replace(b"Lines=3", b"Lines=2")
+@pytest.mark.parametrize("page", ["cp1252", "cp850"])
+def test_what_is_not_utf_8_becomes_utf_8_and_its_letter_is_told(page: str) -> None:
+    made = GOOD.replace("u8 write", "größer als 5 °C")
+    fixed = fix(Document(NAME, made.encode(page)))
+    assert fixed.document.data.decode() == made
+    ((rule, text),) = [(one.rule.name, one.text) for one in fixed.mended]
+    assert rule == "not-utf-8"
+    byte = "ö".encode(page).hex().upper()
+    assert text.startswith(f"the file is not UTF-8; byte {byte}h is 'ö' in {page}, ")
+
+
+def test_the_encoding_that_is_named_is_that_of_the_file() -> None:
+    data = GOOD.replace("u8 write", "5 °C").encode("cp850")
+    assert "5 °C" in fix(Document(NAME, data, "cp850")).document.data.decode()
+    assert "5 ø" in fix(Document(NAME, data)).document.data.decode()
+
+
+def test_a_byte_that_no_code_page_has_is_no_letter_of_another() -> None:
+    data = GOOD.replace("u8 write", "\x81 write").encode("latin-1")
+    fixed = fix(Document(NAME, data))
+    assert fixed.document.data.decode() == GOOD.replace("u8 write", "\ufffd write")
+    assert "byte 81h is '\ufffd' in cp1252, 'ü' in cp850" in fixed.mended[0].text
+
+
+def test_letters_may_be_written_in_ascii() -> None:
+    made = GOOD.replace("u8 write", "größer als 5 °C, ✓")
+    fixed = fix(Document(NAME, made.encode("cp1252", "replace")), ascii_only=True)
+    assert fixed.document.data == GOOD.replace("u8 write", "groesser als 5 degC, ?").encode()
+    told = [one.text for one in fixed.mended if one.rule.name == "non-ascii"]
+    assert told == ["letters beyond ASCII are written: 'ö' as 'oe', 'ß' as 'ss', '°' as 'deg'"]

@@ -10,6 +10,7 @@ from tickrig.wire.canopen.eds.object_table import RO, RW, WO, EntryDescription
 
 U8 = "ParameterName=x\nDataType=5\nAccessType=rw\n"
 SOUND = f"[1000]\n{U8}"
+COMMENT = "the comment behind a number or an access type is skipped"
 
 
 def read(text: str) -> tuple[EdsDevice, list[str], list[str]]:
@@ -38,8 +39,8 @@ def entries(text: str) -> list[EntryDescription]:
             "a.eds:5: [2000] DefaultValue=three is no UNSIGNED8 (default-value)",
         ),
         (
-            f"[2000]\n{U8}ParameterValue=-1\n",
-            "a.eds:5: [2000] ParameterValue=-1 is no UNSIGNED8 (default-value)",
+            f"[2000]\n{U8}DefaultValue=-129\n",
+            "a.eds:5: [2000] DefaultValue=-129 is no UNSIGNED8 (default-value)",
         ),
         (
             f"[2000]\n{U8}DefaultBytes=0g\n",
@@ -104,7 +105,71 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
         ),
         (
             "[1017]\nParameterName=x\nAccessType=rw\n",
-            "a.eds:1: [1017] DataType is missing: DOMAIN is taken (data-type-missing)",
+            "a.eds:1: [1017] DataType is missing: UNSIGNED16 is taken (data-type-missing)",
+        ),
+        (
+            "[2017]\nParameterName=x\nAccessType=rw\n",
+            "a.eds:1: [2017] DataType is missing: DOMAIN is taken (data-type-missing)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=0x0007 # UNSIGNED32\nAccessType=rw\n",
+            f"a.eds:3: [2000] {COMMENT} (inline-comment)",
+        ),
+        (f"[2000]\n{U8}ObjectType=0x07 // VAR\n", f"a.eds:5: [2000] {COMMENT} (inline-comment)"),
+        (f"[2000]\n{U8}PDOMapping=1;yes\n", f"a.eds:5: [2000] {COMMENT} (inline-comment)"),
+        (
+            "[2000]\nParameterName=x\nDataType=5\nAccessType=ro # read only\n",
+            f"a.eds:4: [2000] {COMMENT} (inline-comment)",
+        ),
+        (f"[2000]\n{U8}DefaultValue=# none\n", f"a.eds:5: [2000] {COMMENT} (inline-comment)"),
+        (f"[2000]\n{U8}HighLimit=9//most\n", f"a.eds:5: [2000] {COMMENT} (inline-comment)"),
+        (f"[2000]\n{U8}Factor=2 # times\n", f"a.eds:5: [2000] {COMMENT} (inline-comment)"),
+        (
+            "[2000]\nParameterName=x\nDataType=8\nAccessType=rw\nDefaultValue=1.5 # V\n",
+            f"a.eds:5: [2000] {COMMENT} (inline-comment)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=7\nAccessType=rw\nDefaultValue=0000 0080h\n",
+            "a.eds:5: [2000] DefaultValue=0000 0080h is no number of CiA 306: 0x00000080 is "
+            "taken (number-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=7\nAccessType=rw\nDefaultValue=-1\n",
+            "a.eds:5: [2000] DefaultValue=-1 is no UNSIGNED32: 0xFFFFFFFF is taken (value-sign)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=2\nAccessType=rw\nDefaultValue=0xFFFFFFFF\n",
+            "a.eds:5: [2000] DefaultValue=0xFFFFFFFF is no INTEGER8: -1 is taken (value-sign)",
+        ),
+        (
+            f"[2000]\n{U8}HighLimit=-1\n",
+            "a.eds:5: [2000] HighLimit=-1 is no UNSIGNED8: 0xFF is taken (value-sign)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=0xA\nAccessType=rw\nDefaultValue=0x0102FF\n",
+            "a.eds:5: [2000] DefaultValue=0x0102FF is no hexadecimal bytes: 01 02 FF is taken "
+            "(byte-form)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=0xF\nAccessType=rw\nDefaultValue=hello\n",
+            "a.eds:5: [2000] DefaultValue=hello is no hexadecimal bytes: its text is taken "
+            "(byte-form)",
+        ),
+        (
+            f"[2000]\n{U8}ParameterValue=7\n",
+            "a.eds:5: [2000] ParameterValue stands in an EDS: it is taken, not DefaultValue "
+            "(dcf-key)",
+        ),
+        (
+            f"{SOUND}[SupportedModules]\nNrOfEntries=2\n",
+            "a.eds:5: [SupportedModules] a modular device: the objects of its modules are left "
+            "out, for [ConnectedModules] of a DCF has to say which are there (modules)",
+        ),
+        (
+            "[2000]\nParameterName=x\nDataType=0xA0\nAccessType=rw\n[A0sub1]\nDefaultValue=5\n"
+            "[A0sub2]\nDefaultValue=2\n[A0sub3]\nDefaultValue=9\n",
+            "a.eds:3: [2000] DataType=0x00A0 is derived in [A0sub1]: UNSIGNED8 of 2 to 9 is taken "
+            "(data-type-derived)",
         ),
         (
             f"[1017]\n{U8}PDOMapping=yes\n",
@@ -116,7 +181,7 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
         ),
         (
             "[1017]\nParameterName=x\nDataType=0x17\nAccessType=rw\n",
-            "a.eds:3: [1017] DataType=0x0017 is unknown: DOMAIN is taken (data-type-unknown)",
+            "a.eds:3: [1017] DataType=0x0017 is unknown: UNSIGNED16 is taken (data-type-unknown)",
         ),
         (
             "[1017]\nParameterName=x\nDataType=5\nAccessType=rx\n",
@@ -302,6 +367,129 @@ def test_a_data_type_of_the_file_is_what_its_section_says() -> None:
     assert read(own.format("six"))[2] == [
         "a.eds:6: [A0sub1] DefaultValue=six is not a number: 15 is taken (no-number)"
     ]
+
+
+def test_limits_and_lengths_of_a_data_type_of_the_file_count() -> None:
+    row = "[2000]\nParameterName=x\nDataType=0xA0\nAccessType=rw\n"
+    numbers = "[00A0]\nObjectType=6\n[00A0sub1]\nDefaultValue=3\n[00A0sub2]\nDefaultValue=-5\n"
+    (entry,) = entries(f"{row}{numbers}[00A0sub3]\nDefaultValue=5\n")
+    assert (entry.data_type, entry.low, entry.high) == (DataType.INTEGER16, -5, 5)
+    (entry,) = entries(f"{row}LowLimit=0\n{numbers}")
+    assert (entry.low, entry.high) == (0, None)
+    (entry,) = entries(f"{row}[A0sub1]\nDefaultValue=9\n[A0sub2]\nDefaultValue=10\n")
+    assert (entry.data_type, entry.max_bytes) == (DataType.VISIBLE_STRING, 10)
+
+
+@pytest.mark.parametrize("text", ["a#b", "a//b", "a;b", "a # b", "//", "#"])
+def test_a_text_keeps_what_would_be_a_comment_behind_a_number(text: str) -> None:
+    row = "[2000]\nParameterName=x #1\nDataType=9\nAccessType=ro\n"
+    (entry,) = entries(f"{row}DefaultValue={text}\n")
+    assert (entry.name, entry.default) == ("x #1", text.encode())
+    assert read(f"{row}DefaultValue={text}\n")[2] == []
+
+
+@pytest.mark.parametrize(
+    ("index", "sub", "kind"),
+    [
+        ("1001", "", DataType.UNSIGNED8),
+        ("1008", "", DataType.VISIBLE_STRING),
+        ("1021", "", DataType.DOMAIN),
+        ("1016", "sub1", DataType.UNSIGNED32),
+        ("1023", "sub2", DataType.UNSIGNED8),
+        ("1400", "sub2", DataType.UNSIGNED8),
+        ("1800", "sub5", DataType.UNSIGNED16),
+        ("1600", "sub0", DataType.UNSIGNED8),
+        ("1600", "sub8", DataType.UNSIGNED32),
+        ("1280", "sub3", DataType.UNSIGNED8),
+        ("1F50", "sub1", DataType.DOMAIN),
+        ("1F89", "", DataType.UNSIGNED32),
+        ("1400", "sub9", DataType.DOMAIN),
+        ("1017", "sub1", DataType.DOMAIN),
+        ("6040", "", DataType.DOMAIN),
+    ],
+)
+def test_a_communication_object_has_the_data_type_of_cia_301(
+    index: str, sub: str, kind: DataType
+) -> None:
+    head = f"[{index}]\nParameterName=x\nObjectType=9\n" if sub else ""
+    text = f"{head}[{index}{sub}]\nParameterName=x\nAccessType=rw\n"
+    assert entries(text)[0].data_type is kind
+    assert "DataType is missing" in read(text)[2][-1]
+
+
+def test_the_elements_of_a_compact_communication_object_have_its_data_type() -> None:
+    head = "[1016]\nParameterName=x\nObjectType=8\nAccessType=rw\nCompactSubObj=2\n"
+    assert [row.data_type for row in entries(head)] == [
+        *(DataType.UNSIGNED8, DataType.UNSIGNED32, DataType.UNSIGNED32),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("kind", "limits", "default"),
+    [
+        (5, "LowLimit=1\n", b"\1"),
+        (2, "HighLimit=-3\n", b"\xfd"),
+        (2, "LowLimit=-3\nHighLimit=3\n", b"\0"),
+        (8, "LowLimit=1.5\n", b"\0\0\xc0?"),
+        (5, "LowLimit=300\n", b"\0"),
+        (9, "LowLimit=3\n", b""),
+        (7, "LowLimit=-1\n", bytes(4)),
+    ],
+)
+def test_without_a_default_the_value_next_to_0_is_there(
+    kind: int, limits: str, default: bytes
+) -> None:
+    text = f"[2000]\nParameterName=x\nDataType={kind}\nAccessType=rw\n{limits}"
+    (entry,) = entries(text)
+    assert (entry.default, entry.has_default) == (default, False)
+
+
+def test_an_object_without_a_known_data_type_has_the_text_of_its_value_without_a_word_of_it() -> (
+    None
+):
+    text = "[2000]\nParameterName=x\nAccessType=ro\nDefaultValue=0x01\n"
+    device, errors, warnings = read(text)
+    assert (device.entries[0].default, errors) == (b"\1", [])
+    assert [warning.rpartition(" ")[2] for warning in warnings] == ["(data-type-missing)"]
+
+
+def test_an_object_may_be_a_domain() -> None:
+    text = "[2000]\nParameterName=x\nObjectType=2\nAccessType=ro\nDefaultValue=0102\n"
+    assert [(row.data_type, row.default) for row in entries(text)] == [
+        (DataType.DOMAIN, b"\1\2"),
+    ]
+
+
+def test_a_boolean_and_a_time_have_values_and_limits_of_their_own() -> None:
+    head = "[2000]\nParameterName=x\nAccessType=ro\nDataType="
+    (entry,) = entries(f"{head}1\nDefaultValue=true\nHighLimit=true\nLowLimit=false\n")
+    assert (entry.default, entry.low, entry.high) == (b"\1", False, True)
+    (entry,) = entries(f"{head}0xC\nDefaultValue=0x102 # then\nLowLimit=1\n")
+    assert (entry.default, entry.low) == (b"\2\1\0\0\0\0", None)
+
+
+def test_a_list_is_numbered_with_leading_zeros_too() -> None:
+    text = f"{PDO_MAPPING.format(access='rw')}".replace("\n1=", "\n01=").replace("\n2=", "\n002=")
+    assert [row.default for row in entries(text)] == [
+        row.default for row in entries(PDO_MAPPING.format(access="rw"))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("said", "bit_rate", "taken"),
+    [
+        ("500", 500_000, ""),
+        ("0", None, ""),
+        ("500000", 500_000, "500 kbit/s is"),
+        ("1001", None, "none is"),
+    ],
+)
+def test_a_bit_rate_of_a_dcf_is_in_kbit(said: str, bit_rate: int | None, taken: str) -> None:
+    device, errors, warnings = read(f"{SOUND}[DeviceComissioning]\nBaudrate={said}\n")
+    assert (device.bit_rate, errors) == (bit_rate, [])
+    where = "a.eds:6: [DeviceComissioning]"
+    text = f"{where} Baudrate={said} is more than 1000 kbit/s: {taken} taken (bit-rate-unit)"
+    assert warnings == ([text] if taken else [])
 
 
 def test_what_describes_no_device_may_say_what_it_wants() -> None:

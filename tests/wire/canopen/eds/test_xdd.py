@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.wire.canopen.eds.xdd_text import XDD
+from tests.wire.canopen.eds.xdd_text import EDITOR, XDD
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile, decode_text, encoding_of
@@ -51,6 +51,50 @@ def test_objects_have_their_attributes_and_those_of_the_parameters_they_name() -
         "a.xdd:49: [2003] AccessType is missing: rw is taken (access-missing)",
         "a.xdd:50: [2004] DataType is missing: DOMAIN is taken (data-type-missing)",
     ]
+
+
+@pytest.mark.parametrize(
+    ("rate", "bit_rate", "warnings"),
+    [
+        ("500", 500_000, []),
+        ("500 kbit/s", 500_000, []),
+        ("1 Mbps", 1_000_000, []),
+        (
+            "500000",
+            500_000,
+            ["Baudrate=500000 is more than 1000 kbit/s: 500 kbit/s is taken (bit-rate-unit)"],
+        ),
+        ("auto-baudRate", None, ["Baudrate=auto-baudRate is not a number: 0 is taken (no-number)"]),
+    ],
+)
+def test_a_file_of_canopen_editor_is_read(
+    rate: str, bit_rate: int | None, warnings: list[str]
+) -> None:
+    file = EdsFile("e.xdc", EDITOR.replace("{rate}", rate))
+    device = read_device(file)
+    rows = [(row.index, row.sub, row.default) for row in device.entries]
+    assert rows == [
+        *((0x1000, 0, b"\x91\1\0\0"), (0x1018, 0, b"\1"), (0x1018, 1, b"\7\0\0\0")),
+    ]
+    assert (device.node_id, device.bit_rate) == (17, bit_rate)
+    commissioning = file.sections["DeviceComissioning"]
+    assert {key: commissioning[key] for key in ("netnumber", "networkname", "canopenmanager")} == {
+        **{"netnumber": "2", "networkname": "net", "canopenmanager": "1"},
+    }
+    assert file.errors == ()
+    said = [str(one).partition("] ")[2] for one in file.warnings]
+    assert said == [
+        *["subIndex has more than two digits: they are taken for one number (section-form)"] * 2,
+        "ParameterValue belongs to a sub-index of the RECORD: it is skipped (value-place)",
+        *warnings,
+    ]
+
+
+def test_what_is_not_said_of_a_node_is_not_there() -> None:
+    text = EDITOR.replace(' actualBaudRate="{rate}"', "").replace(' NodeID="17"', "")
+    device, file = read(text)
+    assert (device.node_id, device.bit_rate, file.errors) == (None, None, ())
+    assert "baudrate" not in file.sections["DeviceComissioning"]
 
 
 BOMB = '<!DOCTYPE a [<!ENTITY b "bbbb"><!ENTITY c "&b;&b;&b;">]><a>&c;</a>'

@@ -4,6 +4,36 @@ from __future__ import annotations
 
 from typing import Final
 
+EDITOR: Final = """<?xml version="1.0" encoding="utf-8"?>
+<!-- attributes as CANopenEditor writes them -->
+<ISO15745ProfileContainer xmlns="http://www.canopen.org/xml/1.1">
+  <ISO15745Profile><ProfileBody xmlns="" fileName="e.xdc">
+    <ApplicationProcess><parameterList>
+      <parameter uniqueID="UID_OBJ_1018"><actualValue value="0x9"/></parameter>
+      <parameter uniqueID="UID_SUB_101801"><UDINT/><defaultValue value="0x7"/></parameter>
+    </parameterList></ApplicationProcess>
+  </ProfileBody></ISO15745Profile>
+  <ISO15745Profile><ProfileBody xmlns="">
+    <ApplicationLayers><CANopenObjectList>
+      <CANopenObject index="1000" name="Device type" objectType="7" PDOmapping="no"
+          dataType="0007" accessType="ro" defaultValue="0x191"/>
+      <CANopenObject index="1018" name="Identity" objectType="9" subNumber="2"
+          uniqueIDRef="UID_OBJ_1018">
+        <CANopenSubObject subIndex="0000" name="n" objectType="7" dataType="0005"
+            accessType="ro" defaultValue="1" PDOmapping="no"/>
+        <CANopenSubObject subIndex="0001" name="Vendor-ID" objectType="7" PDOmapping="no"
+            uniqueIDRef="UID_SUB_101801"/>
+      </CANopenObject>
+    </CANopenObjectList></ApplicationLayers>
+    <NetworkManagement>
+      <CANopenGeneralFeatures granularity="8" ngSlave="false" NrOfNG_MonitoredNodes="0"/>
+      <deviceCommissioning NodeID="17" nodeName="n" actualBaudRate="{rate}" networkNumber="2"
+          networkName="net" CANopenManager="true"/>
+    </NetworkManagement>
+  </ProfileBody></ISO15745Profile>
+</ISO15745ProfileContainer>
+"""
+
 XDD: Final = """<?xml version="1.0" encoding="utf-8"?>
 <!-- written for these tests -->
 <ISO15745ProfileContainer xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"
