@@ -20,7 +20,7 @@ SAVE: Final = int.from_bytes(b"save", "little")
 LOAD: Final = int.from_bytes(b"load", "little")
 
 ON_COMMAND: Final = b"\x01"
-"""What both objects read: bit 0, on command; bit 1, by itself, is never set."""
+"""What both objects read unless the device has a default: bit 0, on command."""
 
 ALL, COMMUNICATION, APPLICATION = 1, 2, 3
 """Sub-indices."""
@@ -45,7 +45,8 @@ class ParameterStore(Service):
     RPDOs alone). What has its default value is not kept, so that COB-IDs go on
     following the node-ID. "load" acts with the next reset, of the node or, for
     1000h to 1FFFh, of communication. Another signature is refused with 0800 0020h.
-    It works in every NMT state that has SDOs.
+    It works in every NMT state that has SDOs, and whatever the objects say of it when they are
+    read: that is their default.
 
     Not emulated: the time that it takes, a failing memory, saving by itself.
 
@@ -63,14 +64,15 @@ class ParameterStore(Service):
         ]
         for entry in self._entries:
             entry.guard, entry.written = _check_signature, self._act
+            entry.takes_commands = True
 
     def start(self) -> None:
         """Show what it can."""
         for entry in self._entries:
-            _show_on_command(entry)
+            _show_capability(entry)
 
     def _act(self, entry: Entry) -> None:
-        _show_on_command(entry)
+        _show_capability(entry)
         area = _AREAS.get(entry.sub, _MANUFACTURER_AREA)
         (self._save if entry.index == STORE_PARAMETERS else self._load)(area)
         self.node.nonvolatile.changed()
@@ -100,9 +102,10 @@ class ParameterStore(Service):
         )
 
 
-def _show_on_command(entry: Entry) -> None:
+def _show_capability(entry: Entry) -> None:
     """Put back what is read there; the signature was only a command."""
-    entry.assign(ON_COMMAND.ljust(entry.size, b"\0"))
+    given = entry.description
+    entry.assign(given.default if given.has_default else ON_COMMAND.ljust(entry.size, b"\0"))
 
 
 def _check_signature(entry: Entry, value: Value) -> None:

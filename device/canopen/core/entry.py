@@ -35,9 +35,14 @@ class Entry(Part):
         measured: `source` gives what is measured, whenever it is asked; it never raises, and
             asking changes nothing.
         watchers: called whenever the value has changed, from the bus or from the inside.
+        takes_commands: what is written is a command, as "save": the guard alone judges it, for the
+            limits are those of what is read.
     """
 
-    __slots__ = ("data", "description", "guard", "measured", "source", "watchers", "written")
+    __slots__ = (
+        *("data", "description", "guard", "measured", "source", "takes_commands", "watchers"),
+        "written",
+    )
 
     def __init__(self, description: EntryDescription) -> None:
         self.description = description
@@ -45,7 +50,7 @@ class Entry(Part):
         self.guard: Guard | None = None
         self.written: OnEntry | None = None
         self.source: Callable[[Entry], bytes] | None = None
-        self.measured = False
+        self.measured = self.takes_commands = False
         self.watchers: tuple[OnEntry, ...] = ()
 
     def __repr__(self) -> str:
@@ -154,12 +159,12 @@ class Entry(Part):
         self.check_writable()
         self.check_size(len(data))
         value = self.data_type.decode(data)
-        if isinstance(value, int | float):
-            self._check_limits(value)
         if self.data_type is DataType.BOOLEAN and value not in TRUTH:
             raise SdoAbort(AbortCode.VALUE_RANGE)
-        if self.guard is not None:
+        if self.guard is not None:  # what the object itself refuses has a code of its own
             self.guard(self, value)
+        if isinstance(value, int | float) and not self.takes_commands:
+            self._check_limits(value)
         self.force(data)
 
     def receive(self, data: bytes) -> None:

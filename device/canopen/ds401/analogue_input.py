@@ -11,6 +11,7 @@ from tickrig.device.canopen.ds401.analogue_channel import AnalogueChannel, quant
 from tickrig.device.canopen.ds401.converter import Converter
 from tickrig.device.canopen.ds401.families import (
     ANALOGUE_INPUT,
+    DEFAULT_TRIGGER,
     INTEGER_LIMITS,
     INTERRUPT_SOURCE,
     INTERRUPT_TRIGGER,
@@ -108,10 +109,6 @@ def _read(entry: Entry) -> bytes:
     data = entry.data
     entry.assign(bytes(entry.size))
     return data
-
-
-DEFAULT_TRIGGER: Final = 7
-"""Limits and delta (6421h)."""
 
 
 class AnalogueInput(Part):

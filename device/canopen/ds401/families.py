@@ -47,6 +47,8 @@ DIGITAL_INTERRUPT_ENABLE: Final = 0x6005
 ANALOGUE_INTERRUPT_ENABLE: Final = 0x6423
 INTERRUPT_TRIGGER: Final = 0x6421
 INTERRUPT_SOURCE: Final = 0x6422
+DEFAULT_TRIGGER: Final = 7
+"""Limits and delta (6421h)."""
 
 
 class AnalogueObjects(NamedTuple):
@@ -82,6 +84,28 @@ REAL_LIMITS: Final = 0x6429
 ANALOGUE_ERROR_MODE: Final = 0x6443
 INTEGER_ERROR_VALUE: Final = 0x6444
 REAL_ERROR_VALUE: Final = 0x6445
+
+
+_ALL_ONES: Final = (INTERRUPT_ANY_CHANGE, ERROR_MODE_OUTPUT, FILTER_MASK_OUTPUT)
+DEFAULTS: Final[dict[int, int]] = {
+    **{
+        index: -1
+        for family in _ALL_ONES
+        for index in (
+            *range(family.single, family.single + SINGLE_BANKS),
+            *(family.by_8, family.by_16, family.by_32),
+        )
+    },
+    DIGITAL_INTERRUPT_ENABLE: 1,
+    INTERRUPT_TRIGGER: DEFAULT_TRIGGER,
+    ANALOGUE_ERROR_MODE: 1,
+    **{
+        index: 1
+        for objects in (ANALOGUE_INPUT, ANALOGUE_OUTPUT)
+        for index in (objects.real_scaling, objects.integer_scaling)
+    },
+}
+"""Of each element by index, -1 for all bits; 0 where nothing is said (CiA 401, default values)."""
 
 
 def elements(dictionary: Dictionary, index: int) -> Iterator[tuple[int, Entry]]:
