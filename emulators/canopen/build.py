@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -24,7 +24,6 @@ from tickrig.emulators.canopen.node.node import NODE_INPUTS, Node
 from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
-from tickrig.emulators.canopen.profiles import application_of
 from tickrig.emulators.canopen.second_node import SecondNodeAlarm
 from tickrig.emulators.record.candump_file import CandumpFile
 from tickrig.emulators.rig.clock import Clock
@@ -140,8 +139,7 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
     """
     if isinstance(device, str):
         return _bus_node(cache, device) if is_bus_node(device) else describe_device(device)
-    description = _read(cache, device)
-    return replace(description, application=application_of(description.template, profile))
+    return _read(cache, device, profile)
 
 
 def _read_bus(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
@@ -165,9 +163,9 @@ def _bus_node(cache: EdsCache, spec: str) -> DeviceDescription:
     return found.description
 
 
-def _read(cache: EdsCache, file: Path) -> DeviceDescription:
+def _read(cache: EdsCache, file: Path, profile: str) -> DeviceDescription:
     try:
-        return cache.read(file)
+        return cache.read(file, profile)
     except EdsError as error:
         raise Refused(str(error)) from None
     except OSError as error:

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
 from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import ServiceMaker
+from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.ds402.modes.modes import MODES, supported
+from tickrig.device.canopen.ds402.objects import indices
+from tickrig.emulators.canopen.choices import AUTO
+from tickrig.emulators.canopen.profiles import (
+    DEVICE_TYPE,
+    application_of,
+    default_of,
+    looks_like,
+    profile_name,
+)
 from tickrig.host.canopen.eds import open_eds
-from tickrig.host.text.values import Setting
+from tickrig.host.text.values import Setting, counted
+from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
+from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription
 
 
@@ -30,7 +43,7 @@ class DeviceDescription:
         node_id: of a DCF or model, None if it gives none.
         bit_rate: of a DCF in bit/s, None if it gives none.
         application: what the device does with its objects.
-        warnings: what is not by the standard in its file.
+        warnings: what is not by the standard in its file, and which values it leaves open.
         start: inputs that are not as usual when a slave of it begins, by name.
         files: of a node of a bus.yml: its EDS or DCF, and the URDF that has its joint.
     """
@@ -50,6 +63,7 @@ class DeviceDescription:
         return self.template.copy()
 
 
+OPEN: Final[Mapping[tuple[int, int], int]] = {}
 INVALID: Final = 1 << 31
 
 FIXED: Final = {(0x1005, 0): 0x80, (0x1012, 0): 0x100}
@@ -83,11 +97,13 @@ def predefined(index: int, sub: int) -> tuple[int, bool] | None:
     return (INVALID, False) if invalid else None
 
 
-def read_eds(path: Path) -> DeviceDescription:
+def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
     """Read an EDS or DCF file (CiA 306).
 
     Args:
         path: the file; what its name ends with does not matter.
+        profile: whose defaults count where the file gives none: `auto` for that of the device
+            type, `401`, `402` or `none`.
 
     Returns:
         What it says of the device; `make_dictionary()` of it is what `make_slave` takes.
@@ -96,20 +112,30 @@ def read_eds(path: Path) -> DeviceDescription:
         OSError: the file cannot be read.
         EdsError: it is malformed.
     """
-    return describe(open_eds(path))
+    return describe(open_eds(path), profile)
 
 
-def describe(file: EdsFile) -> DeviceDescription:
+def describe(file: EdsFile, profile: str = AUTO) -> DeviceDescription:
     """Describe the device of an EDS or DCF.
 
     What is not by the standard is a warning of the description where it has one
     meaning. Where no default is given, a COB-ID gets that of the pre-defined
-    connection set and a sub-index 0 the number of entries.
+    connection set, a sub-index 0 the number of entries, what the device profile
+    knows its default, and all else the value of its limits that is next to 0.
+
+    Args:
+        file: the EDS or DCF.
+        profile: of `choices.PROFILES`.
 
     Raises:
         EdsError: something has no meaning: it would be another device. All that is
             wrong stands in it.
     """
+    return in_profile(_describe(file), profile)
+
+
+def _describe(file: EdsFile) -> DeviceDescription:
+    """Describe what the file alone says of a device; its values may be open."""
     device = read_device(file)
     if file.errors:
         raise EdsError(file.errors)
@@ -121,6 +147,96 @@ def describe(file: EdsFile) -> DeviceDescription:
         device.bit_rate,
         warnings=file.warnings,
     )
+
+
+def in_profile(
+    description: DeviceDescription, profile: str, defaults: Mapping[tuple[int, int], int] = OPEN
+) -> DeviceDescription:
+    """Return a device with its profile, whose defaults count where its file gives none.
+
+    Args:
+        description: what the file alone says, of `EdsCache.read`.
+        profile: of `choices.PROFILES`.
+        defaults: those that come before the ones of the profile, by (index, sub-index).
+
+    Returns:
+        The device; its warnings say which values were chosen.
+    """
+    given = description.template.description
+    application = application_of(description.template, profile)
+    entries = [_in_profile(row, application, defaults) for row in given]
+    chosen = [row for row, before in zip(entries, given, strict=True) if row is not before]
+    template = description.template if not chosen else Dictionary(entries, given.objects)
+    limited = [row for row in entries if not row.has_default and any(row.default)]
+    which = f"of CiA {profile_name(application)}: those of the profile are taken"
+    told = (
+        *_told_of_type(description.template, application, profile),
+        *_told_of_values(chosen, which),
+        *_told_of_values(limited, "whose limits leave 0 out: the limit next to 0 is taken"),
+    )
+    findings = (Finding(description.file, "", reason) for reason in told)
+    return replace(
+        description,
+        template=template,
+        application=application,
+        warnings=(*description.warnings, *findings),
+    )
+
+
+def _in_profile(
+    row: EntryDescription, application: ServiceMaker, defaults: Mapping[tuple[int, int], int]
+) -> EntryDescription:
+    if row.has_default or not row.data_type.size:
+        return row
+    value = defaults.get((row.index, row.sub))
+    if value is None:
+        value = default_of(application, row.index, row.sub)
+    return row if value is None else row.with_default(fitting(row, value))
+
+
+def fitting(row: EntryDescription, value: int) -> Value:
+    """Return the value next to a number that an entry takes; -1 is all bits of an unsigned one."""
+    low, high = row.low, row.high
+    nearest: int | float = value
+    if row.data_type.is_integer:
+        lowest, highest = row.data_type.limits
+        nearest = highest if value == -1 and not row.signed else max(lowest, min(highest, value))
+    if high is not None:
+        nearest = min(nearest, high)
+    if low is not None:
+        nearest = max(nearest, low)
+    return round(nearest) if row.data_type.is_integer else nearest
+
+
+SHOWN: Final = 3
+"""Entries that a warning names."""
+
+
+def _told_of_values(rows: Sequence[EntryDescription], what: str) -> Iterator[str]:
+    """Say once which values were chosen."""
+    if rows:
+        named = (
+            f"{_place(row)}={format_value(row.data_type, row.default)}" for row in rows[:SHOWN]
+        )
+        more = ", ..." if rows[SHOWN:] else ""
+        values = counted(len(rows), "value")
+        yield f"no DefaultValue for {values} {what}, as {', '.join(named)}{more}"
+
+
+def _place(row: EntryDescription) -> str:
+    return f"{row.index:04X}h" + (f":{row.sub:02X}" if row.sub else "")
+
+
+def _told_of_type(dictionary: Dictionary, application: ServiceMaker, profile: str) -> Iterator[str]:
+    """Say that a device has no profile and looks like one, or serves other modes than it says."""
+    row, likely = dictionary.find(DEVICE_TYPE), looks_like(dictionary)
+    if profile == AUTO and likely and (row is None or not row.number & 0xFFFF):
+        said = "has no value" if row and not row.description.has_default else "names none"
+        what = f"1000h {said}" if row else "there is no 1000h"
+        yield f'{what}: no profile; use --profile {likely} (in a rig file: profile = "{likely}")'
+    modes = dictionary.find(indices.SUPPORTED_MODES)
+    if application is Ds402 and modes and modes.description.has_default and not modes.number:
+        yield f"6502h=0 lists no mode of operation: 0x{supported(MODES):08X} is served"
 
 
 def _entries(found: Iterable[EntryDescription]) -> Iterable[EntryDescription]:
@@ -141,14 +257,7 @@ def _completed(row: EntryDescription, highest: int) -> EntryDescription:
     else:
         return row
     with suppress(ValueError):  # not of the type that such an object has
-        return EntryDescription(
-            *(row.index, row.sub, row.name, row.data_type, row.access),
-            default=number,
-            low=row.low,
-            high=row.high,
-            relative=relative,
-            max_bytes=row.max_bytes,
-        )
+        return row.with_default(number, relative=relative)
     return row
 
 
@@ -164,21 +273,22 @@ class EdsCache:
     """
 
     def __init__(self) -> None:
-        self._known: dict[Path, tuple[Version, DeviceDescription]] = {}
+        self._known: dict[tuple[Path, str | None], tuple[Version, DeviceDescription]] = {}
         self.others: dict[object, tuple[Mapping[Path, Version], object]] = {}
 
-    def read(self, path: Path) -> DeviceDescription:
-        """Return what a file describes.
+    def read(self, path: Path, profile: str | None = AUTO) -> DeviceDescription:
+        """Return what a file describes, see `read_eds`; with None what it says alone.
 
         Raises:
             OSError: the file cannot be read.
             EdsError: it is malformed.
         """
         version = version_of(path)
-        known = self._known.get(path)
+        known = self._known.get((path, profile))
         if known is None or known[0] != version:
-            known = version, read_eds(path)
-            self._known[path] = known
+            found = _describe(open_eds(path))
+            known = version, found if profile is None else in_profile(found, profile)
+            self._known[path, profile] = known
         return known[1]
 
 

@@ -8,14 +8,12 @@ from typing import Final
 from tickrig.device.canopen.core.dictionary import Dictionary, DictionaryDescription
 from tickrig.device.canopen.ds402.modes.modes import MODES
 from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.objects.parameters import clamped
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.canopen.bus_file.joint_drive import Defaults
+from tickrig.emulators.canopen.eds import fitting
+from tickrig.emulators.canopen.profiles import PROFILE_AREA
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-
-PROFILE_AREA: Final = range(0x6000, 0xA000)
-"""Indices of device profiles (CiA 301)."""
 
 NAMES: Final = {
     1: "pp",
@@ -105,7 +103,7 @@ def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value])
         return dictionary
     given = dictionary.description
     entries = (
-        each if (value := values.get((each.index, each.sub))) is None else _replaced(each, value)
+        each if (value := values.get((each.index, each.sub))) is None else each.with_default(value)
         for each in given
     )
     return Dictionary(entries, given.objects)
@@ -115,7 +113,7 @@ def with_factors(dictionary: Dictionary, defaults: Defaults) -> Dictionary:
     """Return a dictionary whose position units are those of some defaults, not of its EDS."""
     values = {at: value for at, value in defaults.items() if at[0] in _FACTORS}
     found = {
-        at: _fitting(entry.description, value)
+        at: fitting(entry.description, value)
         for at, value in {**values, (indices.SI_UNIT_POSITION, 0): 0}.items()
         if (entry := dictionary.find(*at)) is not None and entry.description.data_type.is_integer
     }
@@ -141,19 +139,10 @@ def _with_default(
     """
     value = defaults.get((entry.index, entry.sub))
     open_zero = entry.index in NEVER_ZERO and not any(entry.default)
-    own = entry.has_default and not (anew or open_zero)
+    own = entry.has_default and not (anew or open_zero)  # `in_profile` has filled the others
     if own or value is None or entry.index not in PROFILE_AREA or not entry.data_type.is_integer:
         return entry
-    return _replaced(entry, _fitting(entry, value))
-
-
-def _fitting(entry: EntryDescription, value: int) -> int:
-    """Return the nearest number that an entry of an integer takes."""
-    fitting = clamped(value, 8 * entry.size, signed=entry.signed)
-    low, high = entry.low, entry.high
-    if low is not None and high is not None:
-        fitting = round(max(low, min(high, fitting)))
-    return fitting
+    return entry.with_default(fitting(entry, value))
 
 
 def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescription:
@@ -162,16 +151,4 @@ def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescriptio
         return entry
     known = sum(1 << number - 1 for number in NAMES)
     more = int.from_bytes(entry.default, "little") & ~known
-    return _replaced(entry, more | sum(1 << number - 1 for number in modes))
-
-
-def _replaced(entry: EntryDescription, value: Value) -> EntryDescription:
-    return EntryDescription(
-        *(entry.index, entry.sub, entry.name, entry.data_type, entry.access),
-        default=value,
-        low=entry.low,
-        high=entry.high,
-        max_bytes=entry.max_bytes,
-        unit=entry.unit,
-        factor=entry.factor,
-    )
+    return entry.with_default(more | sum(1 << number - 1 for number in modes))

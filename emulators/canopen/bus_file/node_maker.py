@@ -25,7 +25,7 @@ from tickrig.emulators.canopen.bus_file.joint_drive import UNITS, JointDrive
 from tickrig.emulators.canopen.bus_file.mistake import Mistake
 from tickrig.emulators.canopen.bus_file.node_keys import JOINT_KEYS, NodeKeys, read_keys
 from tickrig.emulators.canopen.bus_file.urdf import PRISMATIC, Urdf, UrdfJoint
-from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
+from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache, in_profile
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.profiles import application_of
@@ -100,7 +100,7 @@ class NodeMaker:
         for slave in self._bus.slaves.values():
             keys = read_keys((slave.extra, self._bus.options.extra), slave.name, self._mistakes)
             try:
-                sheet = self._cache.read(slave.sheet)
+                sheet = self._cache.read(slave.sheet, None)
             except (EdsError, OSError):
                 continue  # the reader of the file has noted it
             master = self._bus.master
@@ -123,22 +123,24 @@ class NodeMaker:
 
     def _node(self, slave: BusSlave, keys: NodeKeys, sheet: DeviceDescription) -> BusNode:
         sheet = replace(sheet, template=self._identified(slave, sheet.template))
-        application, about = application_of(sheet.template, keys.profile or self._profile), ""
+        profile, about = keys.profile or self._profile, ""
         start = dict(keys.start)
-        if application is Ds402:
+        if application_of(sheet.template, profile) is Ds402:
             self._check_axes(slave, sheet.template)
             joint = self._joint(slave, keys)
             self._check_units(slave, sheet.template)
+            sheet = in_profile(sheet, profile, joint.defaults())
             template = self._completed(slave, keys, sheet.template, joint)
-            sheet, application = replace(sheet, template=template), joint.application()
+            sheet = replace(sheet, template=template, application=joint.application())
             about, start = joint.about(template), {**joint.start, **start}
         else:
+            sheet = in_profile(sheet, profile)
             self._check_no_joint(slave, keys)
         if keys.configured:
             written = {(each.index, each.sub_index): each.data for each in slave.writes}
             sheet = replace(sheet, template=with_values(sheet.template, written))
         files = (slave.sheet, *self._robot)
-        description = replace(sheet, application=application, start=start, files=files)
+        description = replace(sheet, start=start, files=files)
         self._check_start(slave, keys, description)
         return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
 
