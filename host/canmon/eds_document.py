@@ -43,6 +43,8 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> Documen
 
         if is_bus_file(data):
             raise Refused(f"{what} {path}: a bus.yml, not an EDS; use: tickrig check {path}")
+    if path.suffix.lower() == ".toml":
+        raise Refused(f"{what} {path}: TOML, not an EDS; for a rig file use: tickrig check {path}")
     return Document(str(path), data, encoding)
 
 

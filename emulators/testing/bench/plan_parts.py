@@ -35,8 +35,12 @@ from tickrig.emulators.testing.rig_file.plan import (
 )
 from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.host.cli.messages import finding_lines
 from tickrig.host.text.bench_header import DeviceEntry
+from tickrig.host.text.log import log_of
 from tickrig.host.text.values import Setting
+
+_logger = log_of(__name__)
 
 
 class NoNodeIdError(ValueError):
@@ -145,6 +149,8 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
     description = describe(eds_cache(), kind, device.profile or AUTO)
+    for line in finding_lines(description.warnings):
+        _logger.warning("%s: %s", device.name, line)
     node_id = description.node_id if device.node_id is None else device.node_id
     if node_id is None:
         raise NoNodeIdError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")

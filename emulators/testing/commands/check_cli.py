@@ -14,6 +14,7 @@ from tickrig.host.cli.start import loading
 
 MISTAKES: Final = 1
 UNREADABLE: Final = 2
+EDS_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
 LOOKED_AT: Final = 65_536
 """Bytes at its beginning by which a bus.yml is known."""
 
@@ -41,6 +42,9 @@ def check(context: click.Context, /, files: tuple[Path, ...], strict: bool) -> N
 
 def _check(file: Path, strict: bool) -> int:
     """Check a file, and return the exit status."""
+    if file.suffix.lower() in EDS_ENDINGS:
+        say(f"Error: {file}: an EDS, no rig file or bus.yml; use: canmon eds check {file}")
+        return UNREADABLE
     try:
         return _check_bus(file, strict) if _is_bus(file) else _check_rig(file)
     except OSError as error:

@@ -81,7 +81,7 @@ def command(
 def _known(encoding: str) -> str:
     """Return the name of an encoding of texts, or empty; Refused if there is none of that name."""
     try:
-        b"".decode(encoding or "ascii")
+        b"a".decode(encoding or "ascii")
     except LookupError:
         text = f"--from-encoding {encoding!r} is no encoding, as cp1252, cp850 or latin-1"
         raise Refused(text) from None

@@ -88,6 +88,12 @@ _WARNINGS: Final = (
     ),
     ("not-whole", DCFGEN, "dcfgen cuts it off", "write a whole number"),
     ("flag-text", DCFGEN, "dcfgen takes any text for true", "true or false, without quotes"),
+    (
+        "pdo-key",
+        DCFGEN,
+        "dcfgen drops it",
+        "a TPDO has event_timer, inhibit_time, sync_start; write 14xxh:05 of an RPDO as sdo",
+    ),
     ("unknown-key", DCFGEN, "nobody reads it", "write the key that is meant"),
     ("section-lost", COGEN, "cogen drops it", "put it under nodes:"),
     (

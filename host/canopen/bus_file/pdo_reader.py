@@ -22,6 +22,11 @@ MAPPING: Final = 0x200
 MOST_PDOS: Final = 0x200
 PREDEFINED: Final = 4
 AUTO: Final = "auto"
+OTHER_WAY: Final = {
+    True: ("event_deadline",),
+    False: ("event_timer", "inhibit_time", "sync_start"),
+}
+"""Keys that dcfgen reads of PDOs of the other direction alone, by whether it is a TPDO."""
 FIRST_FREE: Final = 0x680
 END_OF_FREE: Final = 0x6E0
 
@@ -84,6 +89,10 @@ class PdoReader:
     def _configured(self, pdo: BusPdo, index: int, section: Section) -> BusPdo:
         """Write what differs from the EDS, in the order of dcfgen: off, parameters, mapping, on."""
         check_keys(section, PDO)
+        for key in OTHER_WAY[pdo.transmit]:
+            if key in section:
+                kind = "a TPDO" if pdo.transmit else "an RPDO"
+                section.note("pdo-key", key, f"{key} of {kind}: dcfgen writes nothing of it")
         place = section.place
         was, pdo = pdo.cob_id, replace(pdo, cob_id=self._cob_id(pdo, section))
         if was != pdo.cob_id | INVALID:

@@ -123,6 +123,26 @@ def test_an_eds_that_is_not_by_the_standard_is_used_and_said_so_once(tmp_path: P
     assert result.stderr.splitlines().count(line) == 1
 
 
+def test_values_that_an_eds_leaves_open_are_told_once_for_all_nodes(tmp_path: Path) -> None:
+    file = tmp_path / "drive.eds"
+    rows = ((0x1000, 7), (0x6040, 6), (0x6041, 6), (0x6060, 2), (0x6065, 7), (0x6081, 7))
+    file.write_text(
+        "".join(
+            f"[{index:04X}]\nParameterName=x\nDataType={kind}\nAccessType=rw\n"
+            for index, kind in rows
+        )
+    )
+    hint = f"{file}: 1000h has no value: no profile; use --profile 402"
+    told = play("1ms end\n", "--node", f"1-3={file}").stderr
+    assert (told.count(hint), told.count("no DefaultValue")) == (1, 0)
+    told = play("1ms end\n", "--node", f"1-3={file}", "--profile", "402").stderr
+    assert told.splitlines()[0] == (
+        f"{file}: no DefaultValue for 3 values of CiA 402: those of the profile are taken, as"
+        " 1000h=0x00000192, 6065h=0xFFFFFFFF, 6081h=0x00002710"
+    )
+    assert told.count("no DefaultValue") == 1
+
+
 def test_an_eds_that_cannot_be_used_says_all_that_is_wrong(tmp_path: Path) -> None:
     eds = tmp_path / "bad.eds"
     eds.write_text(

@@ -73,5 +73,12 @@ def test_a_file_that_cannot_be_read_is_told_and_the_others_are_checked(folder: P
     assert err == ("Error: nowhere.toml: No such file or directory\nError: .: Is a directory\n")
 
 
+def test_an_eds_has_a_check_of_its_own(folder: Path) -> None:
+    (folder / "a.eds").write_text("[FileInfo]\n")
+    status, out, err = run("a.eds")
+    assert (status, out) == (2, "")
+    assert err == "Error: a.eds: an EDS, no rig file or bus.yml; use: canmon eds check a.eds\n"
+
+
 def test_at_least_one_file_is_wanted() -> None:
     assert run()[0] == 2

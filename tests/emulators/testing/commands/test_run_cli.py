@@ -50,6 +50,37 @@ def tickrig_run(*words: str) -> tuple[int, str, str]:
     return result.exit_code, result.stdout, result.stderr
 
 
+INERT = """\
+[1000]
+ParameterName=Device type
+DataType=7
+AccessType=ro
+[6040]
+ParameterName=Controlword
+DataType=6
+AccessType=rww
+[6041]
+ParameterName=Statusword
+DataType=6
+AccessType=ro
+[6060]
+ParameterName=Modes of operation
+DataType=2
+AccessType=rw
+"""
+
+
+def test_what_an_eds_leaves_open_is_told(folder: Path) -> None:
+    (folder / "drive.eds").write_text(INERT)
+    rig = '[device.left]\ntype = "drive.eds"\nnode_id = 1\n'
+    (folder / "rig.toml").write_text(rig)
+    status, _, err = tickrig_run("rig.toml", "--virtual", "--for", "1s")
+    hint = '1000h has no value: no profile; use --profile 402 (in a rig file: profile = "402")'
+    assert (status, err.splitlines()[0]) == (0, f"left: drive.eds: {hint}")
+    (folder / "rig.toml").write_text(f'{rig}profile = "402"\n')
+    assert "no profile" not in tickrig_run("rig.toml", "--virtual", "--for", "1s")[2]
+
+
 @pytest.mark.usefixtures("folder")
 def test_in_virtual_time_it_runs_as_fast_as_it_goes_and_shows_events() -> None:
     status, out, err = tickrig_run("rig.toml", "--virtual", "--for", "3s", "-v")

@@ -125,6 +125,21 @@ def test_a_report_has_a_case_for_each_rule_of_each_file(
             "'60' is not INDEX or INDEX:SUB in hexadecimal, as 6040 or 1018:01",
         ),
         (("show", "r1.eds", "6040"), "r1.eds: no 6040 is there"),
+        *(
+            (
+                (verb, "bus.yml", *more),
+                "FILE bus.yml: a bus.yml, not an EDS; use: tickrig check bus.yml",
+            )
+            for verb, *more in (("check",), ("fix", "--dry-run"), ("show",), ("diff", "bus.yml"))
+        ),
+        (
+            ("check", "rig.toml"),
+            "FILE rig.toml: TOML, not an EDS; for a rig file use: tickrig check rig.toml",
+        ),
+        (
+            ("fix", "r1.eds", "--dry-run", "--from-encoding", "cp999"),
+            "--from-encoding 'cp999' is no encoding, as cp1252, cp850 or latin-1",
+        ),
         (("show", "bomb.xdd"), "FILE bomb.xdd:1: has a document type, which is refused (xml)"),
     ],
 )
@@ -134,6 +149,8 @@ def test_what_cannot_be_done_is_one_line_and_2(
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "empty.eds", "")
     write(tmp_path / "r1.eds", GOOD)
+    write(tmp_path / "bus.yml", "master:\n  node_id: 1\n")
+    write(tmp_path / "rig.toml", "[wires.can]\n")
     write(tmp_path / "a.xdd", XDD)
     make_large(tmp_path / "large.eds")
     write(tmp_path / "bomb.xdd", '<!DOCTYPE a [<!ENTITY b "b">]><a>&b;</a>')
@@ -186,6 +203,26 @@ def test_fix_writes_a_file_and_tells_what_is_left(odd: Path, tmp_path: Path) -> 
     assert mended.startswith(f"{odd}:29: mended: [pdo-count] [DeviceInfo] NrOfRXPDO=7")
     assert f"[{OUT_OF_LIMITS}] [2006] the default 9 is not in 16..32" in left
     assert result.stderr == "1 mended, 1 left\n"
+
+
+def test_fix_writes_utf_8_or_ascii_and_tells_which_letter_it_took(tmp_path: Path) -> None:
+    path, out = tmp_path / NAME, tmp_path / "out" / NAME
+    out.parent.mkdir()
+    path.write_bytes(GOOD.replace("u8 write", "für Schönaich").encode("cp850"))
+    check = run("check", path)
+    assert check.exit_code == 0
+    assert "warning: [not-utf-8] the file is not UTF-8; byte 81h is 'ü' in cp850" in check.stdout
+    assert (
+        "the canopen library"
+        in json.loads(run("check", path, "--json").stdout.splitlines()[0])["breaks"]
+    )
+    result = run("fix", path, "-o", out)
+    assert (result.exit_code, "für Schönaich" in out.read_text("utf-8")) == (0, True)
+    assert "byte 81h is 'ü' in cp850" in result.stdout
+    assert run("fix", path, "-o", out, "--encoding", "ascii").exit_code == 0
+    assert "fuer Schoenaich" in out.read_text("ascii")
+    told = run("fix", path, "-o", out, "--from-encoding", "latin-1").stdout
+    assert "byte 81h is '\\x81' in latin-1, '\ufffd' in cp1252, 'ü' in cp850" in told
 
 
 def test_fix_in_place_ends_with_0_where_nothing_is_left(tmp_path: Path) -> None:

@@ -115,6 +115,11 @@ CORPUS: Final = (
         *(2, "none is left, 0x680..0x6DF are taken"),
     ),
     Case("event-deadline", NODE + "  rpdo: {1: {event_deadline: 5}}\n", 5, "dcfgen fails at it"),
+    Case("pdo-key", NODE + "  tpdo: {1: {event_deadline: 5}}\n", 5, "event_deadline of a TPDO"),
+    *(
+        Case("pdo-key", f"{NODE}  rpdo: {{1: {{{key}: 5}}}}\n", 5, f"{key} of an RPDO: dcfgen")
+        for key in ("event_timer", "inhibit_time", "sync_start")
+    ),
     Case("no-node-id", MASTER + "axis: {dcf: epos.eds}\n", 2, "no node_id, and none in epos.eds"),
     Case("no-node-id", ROS_NODE.replace("  node_id: 5\n", ""), 5, "and none in epos.eds"),
     Case("no-node-id", NODE.replace("5", "255"), 3, "dcfgen leaves it out"),

@@ -60,6 +60,11 @@ def put(old: str, new: str) -> Change:
     return change
 
 
+def coded(page: str, old: str, new: str) -> Callable[[str], bytes]:
+    """Replace a text, and write it all in a code page."""
+    return lambda text: put(old, new)(text).encode(page)
+
+
 def within(section: str, old: str, new: str) -> Change:
     """Replace a text within a section."""
 
@@ -225,7 +230,7 @@ CORPUS: Final = (
     *(
         Deviation(
             "not-utf-8",
-            lambda text, page=page: put("u8 write", "u8 für Öl")(text).encode(page),
+            coded(page, "u8 write", "u8 für Öl"),
             True,
             entry(0x2004, 0, name="u8 für Öl only"),
             keeps=("u8 für Öl only",),
