@@ -20,14 +20,16 @@ from tickrig.host.canopen.data_sheet.rules.known_keys import (
 from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import object_section
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers, without_comment
 
 NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
 DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
 TIME: Final = re.compile(r"[0-9]{1,2}:[0-9]{2} ?[AP]M", re.ASCII | re.IGNORECASE)
+NUMBER: Final = re.compile(r"0|[1-9][0-9]*|0x[0-9a-f]+", re.ASCII | re.IGNORECASE)
 FORMS: Final = {
     **dict.fromkeys(("CreationDate", "ModificationDate"), (DATE, "mm-dd-yyyy")),
     **dict.fromkeys(("CreationTime", "ModificationTime"), (TIME, "hh:mmAM or hh:mmPM")),
+    **dict.fromkeys(("FileVersion", "FileRevision"), (NUMBER, "a number, as 1")),
     "EDSVersion": (re.compile(r"[34]\.[0-9]"), "3.0 or 4.0"),
 }
 MOST_GRANULARITY: Final = 64
@@ -71,7 +73,7 @@ def file_info(document: Document) -> Iterator[RuleFinding]:
             what = f"{key} is missing"
             yield document.found("file-info-missing", what, "FileInfo", key)
     for key, (form, wanted) in FORMS.items():
-        text = file.value("FileInfo", key)
+        text = without_comment(file.value("FileInfo", key))
         if text and not form.fullmatch(text):
             what = f"{key}={shorten(text)} is not {wanted}"
             yield document.found("file-info-form", what, "FileInfo", key)

@@ -16,10 +16,13 @@ MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 DEVICE_TYPE: Final = (0x1000, 0)
 IDENTITY: Final = 0x1018
 COMMUNICATION: Final = range(0x1000, 0x2000)
-WRITE_ONLY: Final = (0x1026, *range(0x1F50, 0x1F60))
-"""Objects that take bytes and need not give them back: a prompt, programs."""
+WRITE_ONLY: Final = (0x1024, 0x1026, *range(0x1F50, 0x1F60))
+"""Objects that take what they need not give back: commands, programs."""
 PROFILE_AREA: Final = range(0x6000, 0xA000)
-TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.OCTET_STRING)
+TEXTS: Final = (
+    *(DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.OCTET_STRING, DataType.DOMAIN),
+)
+"""Data types whose values are as long as they are."""
 INPUTS_OUTPUTS: Final = (
     (1 << 16, "digital inputs", (0x6000, 0x6020, 0x6100, 0x6120)),
     (1 << 17, "digital outputs", (0x6200, 0x6220, 0x6300, 0x6320)),

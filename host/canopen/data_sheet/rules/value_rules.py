@@ -46,6 +46,8 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
         kind = kind_of(document, line)
         if kind is None and not is_number(line.section, line.key):
             continue
+        if line.section == "FileInfo" or (document.file.is_xml and line.key == "ObjFlags"):
+            continue  # `file_info` looks at the form of a version; flags of XML are hexadecimal
         terms = without_comment(line.value).replace(" ", "").split("+")
         if any(OCTAL.fullmatch(term) for term in terms) and (kind is None or kind.is_integer):
             yield _leading_zero(document, line, terms)
