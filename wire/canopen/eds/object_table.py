@@ -154,6 +154,13 @@ class EntryDescription:
     def with_default(self, default: Value, *, relative: bool = False) -> EntryDescription:
         """Return the same entry with another power-on value.
 
+        Args:
+            default: the value, or its bytes.
+            relative: the node-ID is added to it.
+
+        Returns:
+            A description of its own.
+
         Raises:
             FieldError: the default is no value of the data type.
         """
