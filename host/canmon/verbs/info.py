@@ -83,7 +83,9 @@ def read_head(path: Path) -> LogHead:
     whole = len(head) < HEAD_FRAMES
     last_us = head[-1].at_us if whole and head else None
     if not whole and kind in TEXT and not compressed:
-        last_us = _last_us(path)
+        last_us = None if reader.tally.shifted_us else _last_us(path)
+    if kind is LogFormat.CSV and reader.tally.without_errors:
+        kind = LogFormat.GVRET
     return LogHead(
         kind,
         compressed,
@@ -103,7 +105,8 @@ def _last_us(path: Path) -> int | None:
         file.seek(-min(TAIL_BYTES, path.stat().st_size), os.SEEK_END)
         lines = LogLines()
         tail = lines.push(file.read()) + lines.finish()
-    return tail[-1].at_us if tail and not lines.deltas else None
+    known = tail and not (lines.deltas or lines.tally.shifted_us)
+    return tail[-1].at_us if known else None
 
 
 @click.command()

@@ -1,128 +1,34 @@
-"""Log files that python-can reads: ASC, BLF, TRC and, with asammdf, MF4.
+"""Log files that python-can reads: BLF and, with asammdf, MF4.
 
-Its readers of text end at the first line that they do not understand, and pass
-over others in silence. Here the lines are watched: such a line is counted, and
-reading goes on behind it.
+A BLF log is a header and objects. Most are containers, whose contents, put together,
+are the objects of interest; one may lie across two containers. python-can reads a log that was
+cut as far as it goes, in silence, and passes over two of the three kinds of error frames.
 """
 
 from __future__ import annotations
 
-import io
 import logging
-import re
 import struct
 import zlib
-from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, Final, TextIO
+from typing import BinaryIO, Final
 
 import can
 from can.io.blf import BLFParseError
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.blf_damage import BlfReader, has_end, missing_end
 from tickrig.host.monitor.logs.can_record import to_record
-from tickrig.host.monitor.logs.fd_lines import told_by_flags
 from tickrig.host.monitor.logs.log_file import NO_MF4, LogError, LogFormat, open_log
-from tickrig.host.monitor.logs.log_reader import Item
-from tickrig.host.monitor.logs.mark import Mark, read_mark
 from tickrig.host.monitor.logs.notation import LONGEST_NAME, UNNAMED
-from tickrig.host.monitor.logs.tally import OTHER_LINES, OTHER_OBJECTS, Tally
-
-MOST_MARKS: Final = 1_000
-"""Between two frames: more are a damaged log."""
-
-_SILENT: Final = {
-    LogFormat.ASC: re.compile(
-        r"\s*(?:$|//|date\b|base\b|(?:no\s+)?internal\s+events|(?:begin|end)\s+triggerblock"
-        r"|[0-9]+\.[0-9]+\s+(?:Start of measurement|//))",
-        re.IGNORECASE,
-    ),
-    LogFormat.TRC: re.compile(r"\s*(?:$|;)"),
-}
-"""Headers, comments and empty lines."""
-
-_EVENTS: Final = {
-    LogFormat.ASC: re.compile(
-        r"\s*[0-9]+\.[0-9]+\s+(?!CANFD\b|[0-9]+\s+(?:[0-9A-F]+x?|ErrorFrame)\b)\S", re.IGNORECASE
-    ),
-    LogFormat.TRC: re.compile(
-        r"\s*[0-9]+\)?\s+[0-9.]+\s+(?:[0-9]+\s+)?(?:Warng|Error|ST|ER|EC|EV|F{8})\b"
-    ),
-}
-"""Lines with what is no data or remote frame. What is neither of these was meant as a frame."""
-
-
-class WatchedLines(Iterator[str]):
-    """A file for a reader that takes line after line.
-
-    A reader that raises may be started again: it finds an empty line first, for
-    readers take a first line as header, and then what follows the bad one.
-
-    Attributes:
-        ended: the file has no more lines.
-        marks: comments that are marks, for who takes them out; without their time.
-    """
-
-    def __init__(self, file: TextIO, kind: LogFormat, tally: Tally) -> None:
-        self._file, self._silent, self._event = file, _SILENT[kind], _EVENTS[kind]
-        self._tally = tally
-        self.marks: deque[Mark] = deque(maxlen=MOST_MARKS)
-        self._line, self._number, self._again, self.ended = "", 0, False, False
-
-    def __next__(self) -> str:
-        """Return the next line; the one before it came to nothing if it was not taken."""
-        if self._again:
-            self._again = False
-            return "\n"
-        self._pass_over()
-        try:
-            self._line = next(self._file)
-        except StopIteration:
-            self.ended = True
-            raise
-        self._number += 1
-        return self._line
-
-    def _pass_over(self) -> None:
-        """Count the latest line, if it was not taken."""
-        line, self._line = self._line, ""
-        if self._silent.match(line):
-            if line and (mark := read_mark(0, line.strip().lstrip("/;"))):
-                self._tally.lost += mark.frames
-                self.marks.append(mark)
-            return
-        if self._event.match(line):
-            self._tally.passed_over[OTHER_LINES] += 1
-        else:
-            self._tally.bad_lines.add(self._number, line.rstrip("\r\n"))
-
-    @property
-    def line(self) -> str:
-        """The latest line; empty once it was taken."""
-        return self._line
-
-    def taken(self) -> None:
-        """Note that the latest line came to a frame."""
-        self._line = ""
-
-    def refused(self, error: Exception) -> None:
-        """Note that the latest line is none of the log; raise what is wrong with the file.
-
-        A reader that refuses the empty line it was started with lacks something before it.
-        """
-        if self.ended or not self._line or isinstance(error, (EOFError, zlib.error)):
-            raise error
-        self._tally.bad_lines.add(self._number, self._line.rstrip("\r\n"))
-        self._line, self._again = "", True
-
-    def close(self) -> None:
-        """Leave the file to whom it belongs."""
-
-
-BUS_ERROR: Final = 0x80
-"""The class of what ASC calls ErrorFrame (linux/can/error.h, CAN_ERR_BUSERROR)."""
+from tickrig.host.monitor.logs.tally import (
+    COUNTERS_TOLD,
+    ERRORS_COUNTED,
+    OTHER_OBJECTS,
+    Tally,
+)
+from tickrig.wire.can import STANDARD_MAX
+from tickrig.wire.can_error import ErrorClass
 
 BROKEN: Final = (
     *(ValueError, LookupError, TypeError, ArithmeticError, EOFError, NotImplementedError),
@@ -131,12 +37,7 @@ BROKEN: Final = (
 """What python-can's readers raise in files that they do not understand."""
 
 UNSAID: Final = logging.NullHandler()
-"""For what python-can logs of lines and objects: what is not read of them is counted here."""
-
-_TEXT: Final[dict[LogFormat, Any]] = {
-    LogFormat.ASC: lambda lines: can.ASCReader(lines, relative_timestamp=False),
-    LogFormat.TRC: can.TRCReader,
-}
+"""For what python-can logs of objects: what is not read of them is counted here."""
 
 
 class CanLogReader:
@@ -144,48 +45,28 @@ class CanLogReader:
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, Tally()
-        self._marks: deque[Mark] = deque()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
         self.tally = Tally()
-        names: dict[Any, str] = {}
+        names: dict[object, str] = {}
         for message in self._messages():
             if message.channel not in names:
-                names[message.channel] = self._name(message.channel)
-            if message.is_error_frame and self._kind is LogFormat.ASC:
-                message.arbitration_id = BUS_ERROR
+                names[message.channel] = channel_name(message.channel)
+            message.is_extended_id |= message.arbitration_id > STANDARD_MAX  # as ASC without its x
             record = to_record(message, names[message.channel], self.tally)
             if record is not None:
                 yield record
 
-    def items(self) -> Iterator[Item]:
-        """Read the file, with the marks among its frames: what says them in BLF is counted."""
-        at_us = 0
-        for record in self:
-            at_us = record.at_us
-            yield from self._passed_marks(at_us)
-            yield record
-        yield from self._passed_marks(at_us)
-
-    def _passed_marks(self, at_us: int) -> Iterator[Mark]:
-        while self._marks:
-            yield self._marks.popleft()._replace(at_us=at_us)
-
-    def _name(self, channel: object) -> str:
-        """Return the name of a bus; of TRC alone python-can leaves the count from one."""
-        if self._kind is LogFormat.TRC and isinstance(channel, int) and channel > 0:
-            return channel_name(channel - 1)
-        return channel_name(channel)
+    def items(self) -> Iterator[Record]:
+        """Read the file; its marks are counted alone."""
+        return iter(self)
 
     def _messages(self) -> Iterator[can.Message]:
-        for name in ("can.io.trc", "can.io.asc", "can.io.blf"):
-            logging.getLogger(name).addHandler(UNSAID)
+        logging.getLogger("can.io.blf").addHandler(UNSAID)
         with open_log(self._path) as file:
             try:
-                if self._kind in _TEXT:
-                    yield from self._text(file)
-                elif self._kind is LogFormat.BLF:
+                if self._kind is LogFormat.BLF:
                     yield from self._blf(BlfReader(file))
                 else:
                     yield from self._mf4(file)
@@ -200,21 +81,6 @@ class CanLogReader:
             return "it is empty"
         return " ".join(str(error).split()) or type(error).__name__
 
-    def _text(self, file: BinaryIO) -> Iterator[can.Message]:
-        with io.TextIOWrapper(file, "utf-8", errors="replace") as text:
-            lines = WatchedLines(text, self._kind, self.tally)
-            self._marks = lines.marks
-            reader = _TEXT[self._kind](lines)
-            while not lines.ended:
-                try:
-                    for message in reader:
-                        if message.is_fd and self._kind is LogFormat.ASC:
-                            told_by_flags(message, lines.line)
-                        lines.taken()
-                        yield message
-                except BROKEN as error:
-                    lines.refused(error)
-
     def _mf4(self, file: BinaryIO) -> can.MF4Reader:
         try:
             return can.MF4Reader(file)
@@ -222,7 +88,7 @@ class CanLogReader:
             raise LogError(f"{self._path}: {NO_MF4}") from error
 
     def _blf(self, reader: BlfReader) -> Iterator[can.Message]:
-        count = 0
+        count, reader.tally = 0, self.tally
         for count, message in enumerate(reader, 1):  # noqa: B007 - counted
             yield message
         with open_log(self._path) as file:
@@ -241,3 +107,145 @@ def channel_name(channel: object) -> str:
     if channel is None or not name:
         return UNNAMED
     return (f"can{name}" if name.isdecimal() else name)[:LONGEST_NAME]
+
+
+_FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
+_OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
+_CONTAINER: Final = struct.Struct("<H6xL4x")  # compression, size of what is in it
+_SIGNATURE: Final = b"LOBJ"
+_SEARCHED: Final = 8
+"""Bytes in which an object begins: behind the padding of the one before."""
+
+_CONTAINER_TYPE: Final = 10
+_DEFLATED: Final = 2
+
+ERROR, STATISTIC, DRIVER_ERROR, FD_ERROR = 2, 4, 31, 104
+"""Types of objects that tell of errors and that python-can passes over."""
+_STAMP: Final = struct.Struct("<L4xQ")  # flags, time
+_IN_10_US: Final = 1
+"""The flag of a time that is not in nanoseconds."""
+_BODY: Final = {1: 32, 2: 40}
+"""Where the body of an object begins, by the version of its header."""
+_ERROR_COUNT: Final = struct.Struct("<20xL")
+_COUNTERS: Final = struct.Struct("<2xBB")
+
+
+class BlfReader(can.BLFReader):
+    """python-can's reader, with all error frames, and an end at objects without a size.
+
+    Attributes:
+        tally: takes what objects say of errors that are no frames.
+    """
+
+    tally: Tally
+
+    def _parse_data(self, data: bytes) -> Iterator[can.Message]:
+        begin = at = 0
+        for at, size, kind in _objects(data):
+            if kind in (ERROR, FD_ERROR):
+                yield from self._part(data, begin, at)
+                yield self._error_frame(data[at : at + size], kind)
+                begin = at + size
+            elif kind in (STATISTIC, DRIVER_ERROR):
+                self._note(data[at : at + size], kind)
+        yield from self._part(data, begin, len(data))
+
+    def _part(self, data: bytes, begin: int, end: int) -> Iterator[can.Message]:
+        """Have python-can read some objects."""
+        try:
+            yield from super()._parse_data(data[begin:end] if begin or end < len(data) else data)
+        finally:
+            self._pos += begin
+
+    def _error_frame(self, item: bytes, kind: int) -> can.Message:
+        flags, stamp = _STAMP.unpack_from(item.ljust(_OBJECT.size + _STAMP.size), _OBJECT.size)
+        body = _body(item)
+        channel = body[0] if kind == FD_ERROR else int.from_bytes(body[:2], "little")
+        return can.Message(
+            timestamp=stamp * (1e-5 if flags == _IN_10_US else 1e-9) + self.start_timestamp,
+            arbitration_id=ErrorClass.BUS_ERROR,
+            is_error_frame=True,
+            channel=channel - 1,
+        )
+
+    def _note(self, item: bytes, kind: int) -> None:
+        """Note what an object says of errors that no frame shows."""
+        layout = _ERROR_COUNT if kind == STATISTIC else _COUNTERS
+        text = ERRORS_COUNTED if kind == STATISTIC else COUNTERS_TOLD
+        if any(layout.unpack_from(_body(item))):
+            self.tally.errors_told[text] += 1
+
+
+def _body(item: bytes) -> bytes:
+    _, _, version, _, _ = _OBJECT.unpack_from(item)
+    return item[_BODY.get(version, len(item)) :].ljust(_ERROR_COUNT.size, b"\0")
+
+
+def _objects(data: bytes) -> Iterator[tuple[int, int, int]]:
+    """Give place, size and type of each whole object; ValueError if one has no size."""
+    at, last = 0, len(data) - _OBJECT.size
+    while 0 <= (begin := data.find(_SIGNATURE, at, at + _SEARCHED)) <= last:
+        _, _, _, size, kind = _OBJECT.unpack_from(data, begin)
+        if size < _OBJECT.size:
+            raise ValueError(f"it has an object of {size} bytes")
+        if begin + size > len(data):
+            return
+        yield begin, size, kind
+        at = begin + size
+
+
+def missing_end(file: BinaryIO) -> str:
+    """Say what is missing at the end of a log; empty where nothing is.
+
+    Args:
+        file: a log that python-can has read without an error; it is read from its beginning.
+    """
+    file.seek(0)
+    _, header_bytes, _, declared = _FILE.unpack(file.read(_FILE.size))
+    file.seek(header_bytes)
+    found, held = 0, b""
+    for content in _contents(file):
+        if content is None:
+            return f"it is cut after {found} objects"
+        objects, held = _count(held + content)
+        found += objects + 1
+    if len(held) >= _OBJECT.size:
+        return f"it is cut after {found} objects"
+    return f"it ends after {found} of {declared} objects" if found < declared else ""
+
+
+def has_end(file: BinaryIO) -> bool:
+    """Say whether whoever wrote a log ended it: only then its header tells the size of the file."""
+    _, header_bytes, file_bytes, _ = _FILE.unpack(file.read(_FILE.size))
+    return bool(file_bytes != header_bytes)
+
+
+def _contents(file: BinaryIO) -> Iterator[bytes | None]:
+    """Yield what is in each object of the file: of others than containers nothing, None if cut."""
+    while head := file.read(_OBJECT.size):
+        if len(head) < _OBJECT.size:
+            yield None
+            return
+        _, _, _, size, kind = _OBJECT.unpack(head)
+        body = file.read(max(0, size - _OBJECT.size))
+        file.read(size % 4)
+        if len(body) < size - _OBJECT.size:
+            yield None
+            return
+        yield _content(body) if kind == _CONTAINER_TYPE else b""
+
+
+def _content(body: bytes) -> bytes | None:
+    method, size = _CONTAINER.unpack_from(body)
+    if method != _DEFLATED:
+        return body[_CONTAINER.size :]
+    content = zlib.decompressobj().decompress(body[_CONTAINER.size :])
+    return content if len(content) >= size else None
+
+
+def _count(data: bytes) -> tuple[int, bytes]:
+    """Return how many objects are whole, and the bytes behind them."""
+    count = at = 0
+    for count, (begin, size, _) in enumerate(_objects(data), 1):  # noqa: B007 - counted
+        at = begin + size
+    return count, data[at:]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-import re
 import time
 from collections import Counter
 from datetime import datetime
@@ -13,13 +12,25 @@ from typing import Any, Final, TextIO
 
 import can
 from can.io.blf import FILE_HEADER_SIZE
+from can.util import channel2int, len2dlc
 
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_record import to_can
-from tickrig.host.monitor.logs.fd_lines import fd_asc_event, fd_trc_line
 from tickrig.host.monitor.logs.log_file import COMPRESSED, NO_MF4, LogError, LogFormat, open_log
+from tickrig.host.monitor.logs.log_writer import BusNumbers
 from tickrig.host.monitor.logs.mark import Mark
 from tickrig.wire.can_error import ErrorFrame
+
+FD_FLAGS: Final = 0x1000
+"""A CAN FD frame in ASC; the bits above it say BRS and ESI."""
+
+TRC_TYPES: Final = {
+    (False, False): "FD",
+    (True, False): "FB",
+    (False, True): "BI",
+    (True, True): "FE",
+}
+"""Types of CAN FD frames in TRC by BRS and ESI."""
 
 _DATE: Final = "%a %b %d %H:%M:%S.{:03d} %Y"
 _END: Final = "End TriggerBlock\n"
@@ -85,10 +96,21 @@ def _event(message: can.Message) -> str:
     ident = f"{message.arbitration_id:X}{'x' * message.is_extended_id}"
     direction = "Rx" if message.is_rx else "Tx"
     if message.is_fd:
-        return fd_asc_event(message, channel, ident, direction)
+        return _fd_event(message, channel, ident, direction)
     kind = "r" if message.is_remote_frame else "d"
     data = f" {message.data.hex(' ').upper()}" if message.data else ""
     return f"{channel}  {ident:<15} {direction:<4} {kind} {message.dlc:x}{data}"
+
+
+def _fd_event(message: can.Message, channel: int, ident: str, direction: str) -> str:
+    """Write what stands behind the time; durations, bit timings and CRC, never told, are 0."""
+    brs, esi = int(message.bitrate_switch), int(message.error_state_indicator)
+    flags = FD_FLAGS * (1 + 2 * brs + 4 * esi)
+    data = f" {message.data.hex(' ').upper()}" if message.data else ""
+    return (
+        f"CANFD {channel:>3} {direction:<4} {ident:>8}  {'':>32} {brs} {esi}"
+        f" {len2dlc(message.dlc):x} {message.dlc:>2}{data} {0:>8} {0:>4} {flags:8X} 0 0 0 0 0"
+    )
 
 
 FIRST_BLF_S: Final = 631_152_000
@@ -108,7 +130,7 @@ class TrcWriter(can.TRCWriter):
             super().on_message_received(msg)
             return
         self.msgnr += 1
-        self.file.write(fd_trc_line(msg, self.msgnr, self.first_timestamp or 0.0))
+        self.file.write(_fd_trc_line(msg, self.msgnr, self.first_timestamp or 0.0))
 
     def mark(self, mark: Mark) -> None:
         """Write a comment."""
@@ -122,6 +144,18 @@ class TrcWriter(can.TRCWriter):
         if self.first_timestamp is None:
             self.first_timestamp = at_us // TRC_STEP_US * TRC_STEP_US / 1e6
             self.write_header(self.first_timestamp)
+
+
+def _fd_trc_line(message: can.Message, number: int, begin_s: float) -> str:
+    """Write the line of a frame, which python-can reads but does not write."""
+    kind = TRC_TYPES[message.bitrate_switch, message.error_state_indicator]
+    offset_ms = (message.timestamp - begin_s) * 1000
+    ident = f"{message.arbitration_id:0{7 if message.is_extended_id else 4}X}"
+    direction, channel = "Rx" if message.is_rx else "Tx", (channel2int(message.channel) or 0) + 1
+    return (
+        f"{number:>7} {offset_ms:13.3f} {kind} {channel:>2} {ident:>8} {direction} -  "
+        f"{len2dlc(message.dlc):<4} {message.data.hex(' ').upper()}\n"
+    )
 
 
 class BlfWriter(can.BLFWriter):
@@ -182,8 +216,6 @@ END_US: Final = 16_725_225_600_000_000
 
 MARKS: Final = "marks of gaps and triggers"
 
-_NUMBER: Final = re.compile(r"can([0-9]{1,3})")
-
 
 class CanLogWriter:
     """A log that python-can writes.
@@ -200,7 +232,7 @@ class CanLogWriter:
         if kind in BINARY and path.suffix.lower() == COMPRESSED:
             raise LogError(f"{path}: {kind} is compressed by itself, it is not written with .gz")
         self._path, self._kind, self._closed = path, kind, False
-        self._numbers: dict[str, int] = {}
+        self._numbers = BusNumbers()
         self._passed_over: Counter[str] = Counter()
         self._file: Any = open_log(path, "wb")
         if kind in TEXT:
@@ -218,7 +250,7 @@ class CanLogWriter:
             self._passed_over[what] += 1
             if self._kind is LogFormat.TRC or record.at_us >= END_US:
                 return
-        self._writer.on_message_received(to_can(record, self._number(record.channel)))
+        self._writer.on_message_received(to_can(record, self._numbers.number(record.channel)))
 
     def mark(self, mark: Mark, /) -> None:
         """Add a comment or marker, or count it."""
@@ -245,23 +277,10 @@ class CanLogWriter:
         """Say what the format could not hold."""
         named = self._path.name
         said = [f"{named}: {count} {what} left out" for what, count in self._passed_over.items()]
-        said += [
-            f"{named}: {name} became can{number}"
-            for name, number in self._numbers.items()
-            if name != f"can{number}"
-        ]
+        said += self._numbers.messages(named)
         if isinstance(self._writer, BlfWriter) and self._writer.early:
             said.append(f"{named}: {self._writer.early} frames from before its start moved there")
         return said
-
-    def _number(self, channel: str) -> int:
-        if channel not in self._numbers:
-            match = _NUMBER.fullmatch(channel)
-            number = int(match[1]) if match else 0
-            while number in self._numbers.values():
-                number += 1
-            self._numbers[channel] = number
-        return self._numbers[channel]
 
 
 class _Text(io.TextIOWrapper):

@@ -12,11 +12,9 @@ from tickrig.host.links.can_message import (
 )
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import to_us
-from tickrig.host.monitor.logs.tally import NO_TIME, Tally
+from tickrig.host.monitor.logs.tally import BAD_FRAMES, NO_TIME, Tally
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.errors import WireError
-
-BAD_FRAMES = "frames that CAN cannot have"
 
 
 def to_record(message: can.Message, channel: str, tally: Tally) -> Record | None:

@@ -25,6 +25,7 @@ class LogFormat(StrEnum):
     BLF = "blf"
     TRC = "trc"
     CSV = "csv"
+    GVRET = "gvret"
     MF4 = "mf4"
     TRACE = "trace"
     PCAPNG = "pcapng"
@@ -40,6 +41,7 @@ SUFFIXES: Final = {
     ".blf": LogFormat.BLF,
     ".trc": LogFormat.TRC,
     ".csv": LogFormat.CSV,
+    ".gvret.csv": LogFormat.GVRET,
     ".mf4": LogFormat.MF4,
     ".trace": LogFormat.TRACE,
     ".pcapng": LogFormat.PCAPNG,
@@ -51,7 +53,7 @@ COMPRESSED: Final = ".gz"
 NO_MF4: Final = "MF4 needs asammdf: pip install 'python-can[mf4]'"
 """Said where it is not there."""
 
-TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV)
+TEXT: Final = (LogFormat.CANDUMP, LogFormat.JSONL, LogFormat.CSV, LogFormat.GVRET)
 """Formats of lines that `LogLines` reads."""
 
 
@@ -69,14 +71,24 @@ def log_format(path: Path) -> LogFormat:
     Raises:
         LogFormatError: its name does not tell.
 
-    >>> log_format(Path("run.asc.gz")).value
-    'asc'
+    >>> log_format(Path("run.asc.gz")).value, log_format(Path("run.gvret.csv")).value
+    ('asc', 'gvret')
     """
-    suffix = Path(path.stem if path.suffix.lower() == COMPRESSED else path).suffix.lower()
+    suffix = log_ending(path).lower().removesuffix(COMPRESSED)
     if suffix not in SUFFIXES:
         known = ", ".join(SUFFIXES)
         raise LogFormatError(f"{path}: a log's name ends in {known}, with .gz behind it or not")
     return SUFFIXES[suffix]
+
+
+def log_ending(path: Path) -> str:
+    """Return the end of a file's name, as `.log`, `.gvret.csv` or `.asc.gz`."""
+    suffixes = path.suffixes
+    count = 1 + (path.suffix.lower() == COMPRESSED)
+    longer = "".join(suffixes[-count - 1 :])
+    if longer.lower().removesuffix(COMPRESSED) in SUFFIXES:
+        return longer
+    return "".join(suffixes[-count:])
 
 
 END_S: Final = 10**12

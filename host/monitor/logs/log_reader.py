@@ -16,15 +16,23 @@ Counter({'CAN XL frames': 1})
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log, read_blocks
+from tickrig.host.monitor.logs.log_file import (
+    LogError,
+    LogFormat,
+    log_format,
+    open_log,
+    read_blocks,
+)
 from tickrig.host.monitor.logs.mark import Mark, lost_frames, read_mark
 from tickrig.host.monitor.logs.notation import (
+    LONGEST_NAME,
     parse_csv_line,
     parse_frame,
     parse_json_line,
@@ -114,7 +122,7 @@ def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | 
         return parse_json_line(text, tally)
     if match := _LINE.fullmatch(text):
         return _logged(match, tally)
-    return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally)
+    return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally, clock)
 
 
 def _logged(match: re.Match[str], tally: Tally) -> Record | str | None:
@@ -242,9 +250,10 @@ READERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogReader"),
     LogFormat.JSONL: (__name__, "TextLogReader"),
     LogFormat.CSV: (__name__, "TextLogReader"),
-    LogFormat.ASC: (CAN_LOG, "CanLogReader"),
+    LogFormat.GVRET: (__name__, "TextLogReader"),
+    LogFormat.ASC: ("tickrig.host.monitor.logs.asc_log", "AscLogReader"),
     LogFormat.BLF: (CAN_LOG, "CanLogReader"),
-    LogFormat.TRC: (CAN_LOG, "CanLogReader"),
+    LogFormat.TRC: ("tickrig.host.monitor.logs.trc_log", "TrcLogReader"),
     LogFormat.MF4: (CAN_LOG, "CanLogReader"),
     LogFormat.TRACE: ("tickrig.host.monitor.logs.trace_log", "TraceLogReader"),
     LogFormat.PCAPNG: (CAPTURE, "PcapReader"),
@@ -307,3 +316,96 @@ class TextLogReader:
             for data in read_blocks(file, self._path, BLOCK_BYTES):
                 yield lines.push(data), lines
         yield lines.finish(), lines
+
+
+MOST_MARKS: Final = 1_000
+"""Between two frames: more are a damaged log."""
+
+
+class Lines(Protocol):
+    """Reads the lines of one log, in their order."""
+
+    def read(self, line: str, tally: Tally, /) -> Record | str | None:
+        """Return a frame, what the line is instead, or None for a bad line.
+
+        Raises:
+            ValueError: this is no such log.
+        """
+        ...
+
+
+class LineLogReader:
+    """A reader of a log whose head tells how its lines are read.
+
+    Attributes:
+        comments: what lines begin with that may be marks.
+        make_lines: makes what reads the lines.
+    """
+
+    comments: tuple[str, ...] = ()
+    make_lines: Callable[[], Lines]
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._path, self._kind, self.tally = path, kind, Tally()
+
+    def __iter__(self) -> Iterator[Record]:
+        """Read the file."""
+        return (item for item in self.items() if isinstance(item, Record))
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames: they have the time of the next one."""
+        tally = self.tally = Tally()
+        lines, marks, at_us = type(self).make_lines(), deque[Mark](maxlen=MOST_MARKS), 0
+        for number, line in enumerate(self._lines(), 1):
+            try:
+                found = lines.read(line, tally)
+            except ValueError as error:
+                raise LogError(f"{self._path} is no {self._kind} log: {error}") from error
+            if isinstance(found, Record):
+                at_us = found.at_us
+                if marks:
+                    yield from (mark._replace(at_us=at_us) for mark in marks)
+                    marks.clear()
+                yield found
+            elif found is None:
+                tally.bad_lines.add(number, line.rstrip("\r"))
+            elif found.startswith(self.comments) and (mark := read_mark(0, found.lstrip("/;"))):
+                tally.lost += mark.frames
+                marks.append(mark)
+        yield from (mark._replace(at_us=at_us) for mark in marks)
+
+    def _lines(self) -> Iterator[str]:
+        """Give the lines: in UTF-8, or else in Latin-1."""
+        whole = WholeLines()
+        with open_log(self._path) as file:
+            first = True
+            for data in read_blocks(file, self._path, BLOCK_BYTES):
+                if lines := whole.push(data):
+                    text = _text(lines[:-1])
+                    yield from (text.removeprefix(BOM) if first else text).split("\n")
+                    first = False
+        if rest := whole.finish():
+            yield _text(rest)
+
+
+NUMBERLESS: Final = "canX"
+
+
+def bus_name(number: str) -> str:
+    """Return the name of a bus of a log that numbers them from 1; ValueError if it is no number.
+
+    >>> bus_name("1"), bus_name("0")
+    ('can0', 'canX')
+    """
+    count = int(number[:LONGEST_NAME])
+    return f"can{count - 1}"[:LONGEST_NAME] if count > 0 else NUMBERLESS
+
+
+BOM: Final = "\ufeff"
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")

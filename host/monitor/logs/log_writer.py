@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from importlib import import_module
 from pathlib import Path
 from typing import Final, Protocol, cast
@@ -9,7 +11,15 @@ from typing import Final, Protocol, cast
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
 from tickrig.host.monitor.logs.mark import Mark
-from tickrig.host.monitor.logs.notation import LOG_HEADER, csv_row, json_line
+from tickrig.host.monitor.logs.notation import (
+    GVRET_HEADER,
+    LOG_HEADER,
+    csv_row,
+    gvret_row,
+    json_line,
+)
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
 
 BLOCK_LINES: Final = 256
 
@@ -25,6 +35,7 @@ WRITERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogWriter"),
     LogFormat.JSONL: (__name__, "TextLogWriter"),
     LogFormat.CSV: (__name__, "CsvLogWriter"),
+    LogFormat.GVRET: (__name__, "GvretLogWriter"),
     LogFormat.ASC: (CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.BLF: (CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.TRC: (CAN_LOG_WRITER, "CanLogWriter"),
@@ -108,11 +119,11 @@ class TextLogWriter:
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
         self._file, self._lines = open_log(path, "wb"), list[str]()
-        self._text, self._kind = _LINES[kind], kind
+        self._kind = kind
 
     def write(self, record: Record, /) -> None:
         """Add a line."""
-        self._lines.append(self._text(record))
+        self._lines.append(self._row(record))
         if len(self._lines) >= BLOCK_LINES:
             self._give()
 
@@ -136,6 +147,9 @@ class TextLogWriter:
     def messages(self) -> list[str]:
         """Nothing: these formats hold all there is."""
         return []
+
+    def _row(self, record: Record) -> str:
+        return _LINES[self._kind](record)
 
     def _give(self) -> None:
         self._file.write("".join(f"{line}\n" for line in self._lines).encode())
@@ -166,3 +180,62 @@ class CsvLogWriter(TextLogWriter):
             buses = ", ".join(self._channels)
             said.append(f"{self._name}: csv does not tell buses apart: {buses}")
         return said
+
+
+_NUMBERED: Final = re.compile(r"can([0-9]{1,3})")
+
+
+class BusNumbers:
+    """Numbers of buses in a log without names: `can3` is number 3, others take free numbers."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+
+    def number(self, channel: str) -> int:
+        """Return the number of a bus."""
+        if channel not in self._numbers:
+            match = _NUMBERED.fullmatch(channel)
+            number = int(match[1]) if match else 0
+            while number in self._numbers.values():
+                number += 1
+            self._numbers[channel] = number
+        return self._numbers[channel]
+
+    def messages(self, name: str) -> list[str]:
+        """Say which bus became which number, where its name does not."""
+        return [
+            f"{name}: {channel} became can{number}"
+            for channel, number in self._numbers.items()
+            if channel != f"can{number}"
+        ]
+
+
+class GvretLogWriter(TextLogWriter):
+    """Rows as SavvyCAN reads them: data frames of at most 8 bytes, with numbers of buses."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        super().__init__(path, kind)
+        self._name, self._numbers, self._left_out = path.name, BusNumbers(), Counter[str]()
+        self._lines.append(GVRET_HEADER)
+
+    def write(self, record: Record, /) -> None:
+        """Add a row, or count what such a log does not hold."""
+        frame = record.frame
+        if isinstance(frame, CanFrame) and not frame.remote:
+            super().write(record)
+        else:
+            is_error = isinstance(frame, ErrorFrame)
+            kind = "remote" if isinstance(frame, CanFrame) else "error" if is_error else "CAN FD"
+            self._left_out[f"{kind} frames left out"] += 1
+
+    def mark(self, mark: Mark, /) -> None:
+        """Count it."""
+        self._left_out[MARKS] += 1
+
+    def messages(self) -> list[str]:
+        """Say what was left out, and which bus has which number."""
+        said = [f"{self._name}: {count} {what}" for what, count in self._left_out.items()]
+        return said + self._numbers.messages(self._name)
+
+    def _row(self, record: Record) -> str:
+        return gvret_row(record, self._numbers.number(record.channel))

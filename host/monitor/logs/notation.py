@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import re
 from binascii import a2b_base64, b2a_base64
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from tickrig.host.monitor.frames.record import AnyFrame, LineRecord, Record
 from tickrig.host.monitor.logs.log_file import to_us
 from tickrig.host.monitor.logs.mark import DROP, Mark, dropped, read_mark
 from tickrig.host.monitor.logs.tally import SERIAL_LINES, Tally
-from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
+from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
 from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame, parse_sent
 from tickrig.wire.errors import WireError
@@ -172,6 +172,21 @@ SENT: Final = ">"
 FD, FD_BRS, FD_ESI = "#", "!", "*"
 """Behind the data of a row: base64 does not have them."""
 
+
+class Counting(Protocol):
+    """Tells the time of a counter of microseconds.
+
+    Attributes:
+        shift_us: what it adds to the counter.
+    """
+
+    shift_us: int
+
+    def counted_us(self, count: int) -> int:
+        """Return microseconds, not below 0."""
+        ...
+
+
 _DUMPED: Final = re.compile(
     r"([0-9]{1,12}\.[0-9]{6}),([^,\"\s]{1,32}),([0-9A-Fa-f]*),([rt]x),[0-9]+,"
     r"(R[0-8]?|#?[0-9A-Fa-f]*),.*"
@@ -198,16 +213,67 @@ def csv_row(record: Record) -> str:
     return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{marks}"
 
 
-def parse_csv_line(text: str, tally: Tally) -> Record | str | None:
-    """Return a frame, the name of a header or of what was counted instead, or None."""
-    if text.startswith((LOG_HEADER, DUMP_HEADER)):
+GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"
+"""Of SavvyCAN's own logs; older ones have no `Dir`."""
+GVRET_BYTES: Final = 8
+"""So many columns of data there are, whatever the length."""
+WITHOUT_ERRORS: Final = "a GVRET log holds no error frames"
+
+_GVRET_HEAD: Final = re.compile(r"time stamp,\s*id,\s*extended,.*", re.IGNORECASE)
+_GVRET: Final = re.compile(
+    r"(-?[0-9]{1,18}),\s*([0-9A-F]{1,8}),\s*(true|false),(?:\s*(Rx|Tx),)?\s*([0-9]{1,3}),"
+    r"\s*([0-9]{1,2})((?:,\s*[0-9A-F]{1,2})*)(?:,\s*)*",
+    re.ASCII | re.IGNORECASE,
+)
+
+
+def gvret_row(record: Record, bus: int) -> str:
+    """Write a data frame of at most 8 bytes below `GVRET_HEADER`.
+
+    >>> gvret_row(Record(1_500_000, "can0", CanFrame(0x705, b"7"), sent=True), 0)
+    '1500000,00000705,false,Tx,0,1,37,00,00,00,00,00,00,00,'
+    """
+    frame = record.frame
+    assert isinstance(frame, CanFrame), "the log holds no others"
+    direction = "Tx" if record.sent else "Rx"
+    cells = frame.data.ljust(GVRET_BYTES, b"\0").hex(",").upper()
+    extended = "true" if frame.extended else "false"
+    head = f"{record.at_us},{frame.can_id:08X},{extended},{direction},{bus}"
+    return f"{head},{len(frame.data)},{cells},"
+
+
+def parse_csv_line(text: str, tally: Tally, clock: Counting) -> Record | str | None:
+    """Return a frame, the name of a header or of what was counted instead, or None.
+
+    What a row is, itself tells: one of python-can, of `canmon dump --csv`, or of SavvyCAN.
+    """
+    if text.startswith((LOG_HEADER, DUMP_HEADER)) or _GVRET_HEAD.fullmatch(text):
         return text
     try:
         if match := _DUMPED.fullmatch(text):
             return _dumped(match, tally)
+        if match := _GVRET.fullmatch(text):
+            return _of_savvycan(match, tally, clock)
         return _logged(text.split(","))
     except (ValueError, WireError):
         return None
+
+
+def _of_savvycan(match: re.Match[str], tally: Tally, clock: Counting) -> Record:
+    """Return the frame of a row; some programs do not say of a CAN-ID that it has 29 bits."""
+    stamp, ident, extended, direction, bus, length, cells = match.groups()
+    can_id, size = int(ident, 16), int(length)
+    data = bytes(int(cell, 16) for cell in cells.split(",")[1 : size + 1])
+    if len(data) != size:
+        raise ValueError(f"{len(data)} bytes, {size} were announced")
+    long = extended.lower() == "true" or can_id > STANDARD_MAX
+    fd = size > MAX_DATA_BYTES
+    frame = FdFrame(can_id, data, long) if fd else CanFrame(can_id, data, False, long)
+    checked = frame.checked()
+    tally.without_errors = WITHOUT_ERRORS
+    at_us = clock.counted_us(int(stamp))
+    tally.shifted_us = clock.shift_us
+    return Record(at_us, f"can{int(bus)}", checked, (direction or "").lower() == "tx")
 
 
 def _dumped(match: re.Match[str], tally: Tally) -> Record | str:

@@ -45,15 +45,24 @@ _ABSOLUTE: Final = 10
 """Digits of the seconds since the epoch; with fewer it is a span of time."""
 
 
+WRAP_US: Final = 1 << 32
+"""So far a counter of microseconds with 32 bits goes."""
+
+
 class ScreenClock:
     """Tells the time of a frame from the stamp before it.
 
     Args:
         deltas: spans count from the frame before (`-t d`), not from the first (`-t z`).
+
+    Attributes:
+        shift_us: what is added to a counter of microseconds, so that no time is below 0.
     """
 
     def __init__(self, deltas: bool = False) -> None:
         self.deltas, self._now_us = deltas, 0
+        self.shift_us = 0
+        self._count: int | None = None
 
     @classmethod
     def of(cls, text: str) -> ScreenClock:
@@ -79,6 +88,20 @@ class ScreenClock:
             before_us = self._now_us if self.deltas and len(seconds) < _ABSOLUTE else 0
             self._now_us = max(0, before_us + span_us)
         return self._now_us
+
+    def counted_us(self, count: int) -> int:
+        """Return the time of a counter of microseconds, as an adapter has it.
+
+        One that begins below 0 begins at 0; one of 32 bits that overflows, with a sign or without,
+        goes on.
+        """
+        before = self._count
+        if before is None:
+            self.shift_us = max(0, -count)
+        elif before - count > WRAP_US // 2 and before < WRAP_US:
+            self.shift_us += WRAP_US
+        self._count = count
+        return max(0, count + self.shift_us)
 
 
 def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | str | None:

@@ -6,6 +6,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Final
 
+from tickrig.host.text.values import counted
+
 KEPT: Final = 5
 """Bad lines that are kept; the others are counted."""
 
@@ -13,8 +15,11 @@ SHOWN: Final = 60
 """Characters of a bad line that are shown."""
 
 
+BAD_FRAMES: Final = "frames that CAN cannot have"
 CAN_XL: Final = "CAN XL frames"
 SERIAL_LINES: Final = "lines of a serial port"
+ERRORS_COUNTED: Final = "that error frames were counted"
+COUNTERS_TOLD: Final = "that error counters are above 0"
 OTHER_LINES: Final = "lines with other events"
 OTHER_OBJECTS: Final = "objects that are no frames"
 NO_TIME: Final = "frames with what is no time"
@@ -22,6 +27,16 @@ BAD_PACKETS: Final = "packets that are no frames"
 OTHER_PACKETS: Final = "packets of other links"
 NO_FRAMES: Final = (SERIAL_LINES, OTHER_LINES, OTHER_OBJECTS, OTHER_PACKETS)
 """What a log may hold beside frames."""
+
+
+FOREIGN: Final = {
+    "***BUSMASTER": "a log of BUSMASTER",
+    "Microchip Technology": "a log of Microchip's CAN BUS Analyzer",
+    "GVRET-PC Reverse": "a CRTD log",
+    "ID,Data Bytes": "a list of frames without times",
+    "@ TEXT @": "a trace of CARBUS Analyzer",
+}
+"""Words among the first lines of other programs' logs, and whose they are."""
 
 
 @dataclass(slots=True)
@@ -44,6 +59,11 @@ class BadLines:
 
     def messages(self, name: str) -> list[str]:
         """Say it to people, one line each; nothing if there are none."""
+        texts = [line for _, line in self.first]
+        for begin, program in FOREIGN.items():
+            if any(begin in text for text in texts):
+                hint = "SavvyCAN saves it as GVRET, which is read"
+                return [f"{name}: {program} is not read ({self.count} lines); {hint}"]
         said = [
             f"{name}: line {number} is no frame: {line!a:.{SHOWN}}" for number, line in self.first
         ]
@@ -62,12 +82,21 @@ class Tally:
             frame at all (`NO_FRAMES`), and how many.
         lost: frames that the recorder says it lost.
         untimed: frames that have no time in the log; they got that of the frame before.
+        undated: dates that could not be read; times count from 0 there.
+        shifted_us: what was added to the times of the log.
+        errors_told: what lines and objects that are no frames say of errors on the bus, and how
+            many do.
+        without_errors: why the log has no error frames whatever happened; empty if it may.
     """
 
     bad_lines: BadLines = field(default_factory=BadLines)
     passed_over: Counter[str] = field(default_factory=Counter)
     lost: int = 0
     untimed: int = 0
+    undated: int = 0
+    shifted_us: int = 0
+    errors_told: Counter[str] = field(default_factory=Counter)
+    without_errors: str = ""
 
     @property
     def unread(self) -> int:
@@ -86,8 +115,17 @@ class Tally:
 
     def remarks(self, name: str) -> list[str]:
         """Say what else there is to know of the log."""
-        untimed = [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
-        return self._passed_over(name, no_frames=True) + untimed
+        said = [f"{name}: {self.untimed} frames have no time"] if self.untimed else []
+        said += [f"{name}: its date cannot be read: times begin at 0"] if self.undated else []
+        if self.shifted_us:
+            why = "they begin below 0, or their counter overflows"
+            said.append(f"{name}: {self.shifted_us} us were added to its times: {why}")
+        return self._passed_over(name, no_frames=True) + said
+
+    def errors(self, name: str) -> list[str]:
+        """Say what the log tells of errors beside its error frames, one line each."""
+        told = self.errors_told.items()
+        return [f"{name}: it says {text}: {counted(count, 'time')}" for text, count in told]
 
     def _passed_over(self, name: str, *, no_frames: bool) -> list[str]:
         return [

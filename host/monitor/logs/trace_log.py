@@ -31,6 +31,8 @@ ERROR_FRAMES = "error frames"
 LOG_MARKS = "marks of gaps and triggers"
 FD_FRAMES = "CAN FD frames"
 
+WITHOUT_ERRORS = "a trace holds no error frames"
+
 MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
 
@@ -103,7 +105,7 @@ class TraceLogReader:
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
-        self.tally = Tally()
+        self.tally = Tally(without_errors=WITHOUT_ERRORS)
         try:
             with open_log(self._path) as file:
                 header = parse_bench_header(file.readline().decode("ascii").rstrip("\n"))

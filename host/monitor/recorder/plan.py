@@ -18,7 +18,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.logs.log_file import COMPRESSED, LogFormat, log_format
+from tickrig.host.monitor.logs.log_file import (
+    COMPRESSED,
+    LogFormat,
+    log_ending,
+    log_format,
+)
 
 MIN_BYTES: Final = 64 << 10
 """Of a file: smaller ones are no use."""
@@ -105,8 +110,7 @@ class Plan:
 
     @property
     def _ending(self) -> str:
-        suffixes = self.path.suffixes[-2:]
-        return "".join(suffixes if self.path.suffix.lower() == COMPRESSED else suffixes[-1:])
+        return log_ending(self.path)
 
 
 def read_plan(  # noqa: PLR0913 - all that people may say

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import struct
 import time
+import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from importlib.util import find_spec
@@ -213,7 +214,7 @@ def test_bad_lines_of_asc_are_counted_and_reading_goes_on(tmp_path: Path) -> Non
         ("run.asc", "\x01noise\n", 1),
         ("run.asc", "   0.000700 1  Statistic: D 0 R 0 XD 0 XR 0 E 0 O 0 B 0.00%\n", 0),
         ("run.trc", "     5)      1845.0  Ry         0705  1  7F\n", 1),
-        ("run.trc", "     5)      1845.0  Error      0004  4  00 00 00 08\n", 0),
+        ("run.trc", "     5)      1845.0  Warng  FFFFFFFF  4  00 00 00 08  BUSHEAVY\n", 0),
     ],
 )
 def test_a_line_that_its_reader_passes_over_is_bad_unless_it_is_an_event(
@@ -358,3 +359,63 @@ def test_blf_is_not_compressed_twice(tmp_path: Path) -> None:
 def test_a_name_without_a_format_is_refused() -> None:
     with pytest.raises(LogFormatError, match=r"\.log, \.candump"):
         log_format(Path("run.dat"))
+
+
+def blf_object(kind: int, body: bytes, at_ns: int = 0, version: int = 1) -> bytes:
+    """Return an object as Vector's tools write it."""
+    head = (
+        struct.pack("<LHHQ", 2, 0, 0, at_ns)
+        if version == 1
+        else bytes(8) + at_ns.to_bytes(16, "little")
+    )
+    size = 16 + len(head) + len(body)
+    return (
+        struct.pack("<4sHHLL", b"LOBJ", 16 + len(head), version, size, kind)
+        + head
+        + body
+        + bytes(size % 4)
+    )
+
+
+def blf_with(path: Path, *objects: bytes) -> Path:
+    """Write a log of one frame, then put objects before and behind it."""
+    with can.BLFWriter(path) as writer:
+        writer.on_message_received(can.Message(timestamp=1_436_509_053, data=[1]))
+    data = path.read_bytes()
+    packed = zlib.decompress(data[144 + 32 :])
+    body = zlib.compress(b"".join([*objects[:1], packed, *objects[1:]]))
+    head = struct.pack("<4sHHLL", b"LOBJ", 16, 1, 32 + len(body), 10)
+    path.write_bytes(data[:144] + head + struct.pack("<H6xL4x", 2, 0) + body)
+    return path
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_error_frames_that_python_can_passes_over_are_read(version: int, tmp_path: Path) -> None:
+    path = blf_with(
+        tmp_path / "run.blf",
+        blf_object(2, struct.pack("<HHL", 2, 6, 0), 1_000, version),
+        blf_object(104, struct.pack("<BBBB", 1, 8, 8, 0) + bytes(40), 2_000_000, version),
+    )
+    assert len(list(can.BLFReader(path))) == 1
+    assert [(one.channel, str(one.frame)) for one in read_log(path)] == [
+        ("can1", "20000080#0000000000000000"),
+        ("can0", "00000000#01"),
+        ("can0", "20000080#0000000000000000"),
+    ]
+    first, _, last = read_log(path)
+    assert last.at_us - first.at_us == 1_999
+
+
+def test_what_objects_of_blf_tell_of_errors_is_kept(tmp_path: Path) -> None:
+    counts = [struct.pack("<HH6L", 1, 0, 9, 0, 0, 0, errors, 0) for errors in (0, 3)]
+    path = blf_with(
+        tmp_path / "run.blf",
+        *(blf_object(4, body) for body in counts),
+        *(blf_object(31, struct.pack("<HBBL", 1, sent, 0, 0)) for sent in (0, 8)),
+    )
+    reader = read_log(path)
+    assert len(list(reader)) == 1
+    assert reader.tally.errors("x") == [
+        "x: it says that error frames were counted: 1 time",
+        "x: it says that error counters are above 0: 1 time",
+    ]
