@@ -13,7 +13,7 @@ from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.check.rule import FrameSelection
+    from tickrig.host.monitor.check.rule import Evidence, FrameSelection
     from tickrig.host.monitor.decode.decoded import Decoded
     from tickrig.host.monitor.decode.decoder import Decoder, FrameDecoder
     from tickrig.host.monitor.decode.node_memory import EdsObjects
@@ -112,6 +112,18 @@ class _CheckedRule(Rule):
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         return _called(self.name, lambda: list(self._rule.end(latest_us, end_us)))
+
+    def begin(self, at_us: int, /) -> None:
+        if isinstance(self._rule, Rule):
+            _called(self.name, self._rule.begin, at_us)
+
+    def unjudged(self, evidence: Evidence, /) -> str:
+        known = isinstance(self._rule, Rule)
+        return _called(self.name, self._rule.unjudged, evidence) if known else ""
+
+    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+        known = isinstance(self._rule, Rule)
+        return _called(self.name, lambda: list(self._rule.notes(evidence))) if known else ()
 
 
 def _called(name: str, call: Callable[..., T], *arguments: object) -> T:

@@ -9,6 +9,7 @@ from functools import partial
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.monitor.check.checker import Unjudged
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
 from tickrig.host.monitor.frames.record import Record
@@ -23,14 +24,21 @@ class Verdict:
         jsonl: show them as JSON.
         stamp: how times are shown as text; None for seconds of the epoch.
         kept: a report will want them.
+        rules: the names of all rules.
 
     Attributes:
         counts: how many there are, by rule.
         findings: all of them, where they are kept.
         frames: how many were held against the rules.
+        unjudged: what the rules could not judge, once all is over.
     """
 
-    def __init__(self, jsonl: bool, stamp: Stamp | None = None, *, kept: bool) -> None:
+    unjudged = Unjudged({})
+
+    def __init__(
+        self, jsonl: bool, stamp: Stamp | None = None, *, kept: bool, rules: Sequence[str] = ()
+    ) -> None:
+        self._rules = rules
         self.counts: Counter[str] = Counter()
         self.findings: list[Finding] = []
         self.frames = self._shown = 0
@@ -66,12 +74,32 @@ class Verdict:
             with until_unread():
                 click.echo("\n".join(map(self._text, new)))
 
+    def nothing_judged(self) -> str:
+        """Say why no rule judged anything; empty if one did."""
+        none = self.none_judged
+        if any(name not in none for name in self._rules):
+            return ""
+        return f"nothing was judged: {'; '.join(f'{name}: {why}' for name, why in none.items())}"
+
+    @property
+    def none_judged(self) -> dict[str, str]:
+        """Why rules judged nothing, by their names; one that found something did."""
+        return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
+
+    def doubts(self) -> list[str]:
+        """Say what was not judged, one line each."""
+        none = [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
+        return none + [f"not judged: {text}" for text in self.unjudged.notes]
+
     def summary(self) -> str:
         """Say how it ended."""
-        if not self.counts:
+        if self.counts:
+            counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
+            return f"{counted(self.counts.total(), 'finding')}: {counts}"
+        none = len(self.none_judged)
+        if not none:
             return "all rules hold"
-        counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
-        return f"{counted(self.counts.total(), 'finding')}: {counts}"
+        return f"{counted(len(self._rules) - none, 'rule')} held, {none} judged nothing"
 
 
 def finding_json(finding: Finding) -> str:

@@ -74,6 +74,16 @@ class AnySource(Generic[Taken_co]):
         """Say what of it got lost or could not be taken: not what is no frame by its nature."""
         return [text for name, tally in self.tallies() for text in tally.losses(name)]
 
+    def errors(self) -> list[str]:
+        """Say what of it tells of errors on the bus beside error frames."""
+        return [text for name, tally in self.tallies() for text in tally.errors(name)]
+
+    @property
+    def without_errors(self) -> str:
+        """Why no error frame can come, whatever happens; empty if some can."""
+        told = [tally.without_errors for _, tally in self.tallies()]
+        return told[0] if told and all(told) else ""
+
     def close(self) -> None:
         """Give back what it holds; closing twice is no error."""
         self._ended = True

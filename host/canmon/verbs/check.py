@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,7 +25,7 @@ from tickrig.host.canmon.output.verdict import Verdict
 from tickrig.host.canmon.sources.block_log import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import AnySource, Source
-from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
+from tickrig.host.canmon.verbs.decode_options import decode_options, decoder_of, read_eds_files
 from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, Decorator, add_options
@@ -36,6 +37,7 @@ from tickrig.host.monitor.check.rule_file import parse_rule_file
 from tickrig.host.monitor.check.rules import (
     SWITCHES,
     VALUES,
+    EdsHeartbeats,
     Rules,
     RuleValues,
     joined,
@@ -45,6 +47,7 @@ from tickrig.host.monitor.frames.dump_line import Stamp
 from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
+    from tickrig.host.monitor.check.column_check import ColumnChecker
     from tickrig.host.monitor.columns.columns import Columns
 
 _TEXTS: Final = {
@@ -177,26 +180,32 @@ def command(  # noqa: PLR0913 - options
     rules = read_rules([Path(word) for word in source if word.endswith(RULE_FILE)], options)
     bus = BusOptions(**{name: options[name] for name in NAMES})
     bit_rate = _bit_rate(rules, words, bus)
-    decoder = make_decoder(eds, dbc) if rules.expressions else None
+    objects = read_eds_files(eds)
+    decoder = decoder_of(objects, dbc) if rules.expressions else None
+    heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
     kept = bool(report_path or sarif_path)
-    verdict = Verdict(jsonl, Stamp(stamp) if stamp else None, kept=kept)
+    shown = Stamp(stamp) if stamp else None
+    verdict = Verdict(jsonl, shown, kept=kept, rules=rules.names())
     log = None if decoder else block_log(words)
-    log = _in_blocks(log, rules, bit_rate, verdict) if log else None
+    made = partial(_column_checker, rules, bit_rate, heartbeats)
+    log = _in_blocks(log, made, verdict) if log else None
     frames = log or open_source(words, bus)
     if reopen:
         frames.reopen()
     try:
         if not isinstance(frames, BlockLog):
-            held = DecodedCheck(rules, bit_rates_of(words, bus), decoder, around)
+            rates = bit_rates_of(words, bus)
+            held = DecodedCheck(rules, rates, decoder, around, heartbeats)
             _one_by_one(frames, words, held, verdict, span_us)
     finally:
         frames.close()
-    unjudged = "" if verdict.frames else _no_frame(frames, words)
+    unjudged = verdict.nothing_judged() if verdict.frames else _no_frame(frames, words)
     suite, why = " ".join(words), frames.failed or unjudged
-    judged = suite, rules.names(), verdict.findings, why
+    judged = suite, rules.names(), verdict.findings, why, verdict.none_judged
     _write("--junit", report_path, junit, judged)
     _write("--sarif", sarif_path, _sarif, judged)
-    report(frames, strict, [verdict.summary()] if verdict.counts or not why else ())
+    said = verdict.doubts() if verdict.counts or not unjudged else []
+    report(frames, strict, [*said, verdict.summary()] if verdict.counts or not why else said)
     if verdict.counts:
         click.get_current_context().exit(BROKEN)
     if unjudged:
@@ -226,12 +235,10 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
 
 
 def _in_blocks(
-    log: BlockLog, rules: Rules, bit_rate: int | None, verdict: Verdict
+    log: BlockLog, make: Callable[[], ColumnChecker], verdict: Verdict
 ) -> BlockLog | None:
     """Judge a log; return None where it is to be read again, frame by frame."""
-    from tickrig.host.monitor.check.column_check import ColumnChecker  # noqa: PLC0415 - numpy
-
-    checker = ColumnChecker(rules, bit_rate)
+    checker = make()
 
     def take(block: Columns) -> None:
         if len(block):
@@ -239,7 +246,8 @@ def _in_blocks(
         verdict.take(checker.take(block))
 
     if take_blocks(log, take):
-        verdict.take(checker.end(log.losses()))
+        verdict.take(checker.end(log.losses(), log.errors()))
+        verdict.unjudged = checker.unjudged(log.without_errors)
         return log
     verdict.begin_again()
     return None
@@ -262,10 +270,20 @@ def _one_by_one(
         listen(source, take, span_us or patience_us(source, words))
     lost, latest_us = source.losses(), watch.latest_us
     end_us = watch.now_us if source.live else latest_us
-    verdict.take(held.end(end_us, lost, end_us if has_clock else latest_us))
+    errors, judged_us = source.errors(), end_us if has_clock else latest_us
+    verdict.take(held.end(end_us, lost, judged_us, errors))
+    verdict.unjudged = held.unjudged(end_us, source.without_errors)
 
 
-Judged = tuple[str, list[str], list[Finding], str]
+def _column_checker(
+    rules: Rules, bit_rate: int | None, eds_heartbeats: EdsHeartbeats
+) -> ColumnChecker:
+    from tickrig.host.monitor.check.column_check import ColumnChecker  # noqa: PLC0415 - numpy
+
+    return ColumnChecker(rules, bit_rate, eds_heartbeats)
+
+
+Judged = tuple[str, list[str], list[Finding], str, Mapping[str, str]]
 
 
 def _write(option: str, path: Path | None, text: Callable[..., str], judged: Judged) -> None:
@@ -278,7 +296,7 @@ def _write(option: str, path: Path | None, text: Callable[..., str], judged: Jud
         refuse_path(option, error)
 
 
-def _sarif(suite: str, names: list[str], findings: list[Finding], why: str) -> str:
+def _sarif(*judged: Any) -> str:
     from tickrig.host.monitor.check.sarif import sarif  # noqa: PLC0415 - seldom wanted
 
-    return sarif(suite, names, findings, why)
+    return sarif(*judged)

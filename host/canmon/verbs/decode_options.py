@@ -64,9 +64,13 @@ def read_eds_paths(paths: Mapping[int, Path]) -> dict[int, EdsObjects]:
 
 def make_decoder(eds: Sequence[str] = (), dbc: Sequence[Path] = ()) -> Decoder:
     """Make a decoder of what `--eds` and `--dbc` name; Refused if a file is none."""
+    return decoder_of(read_eds_files(eds), dbc)
+
+
+def decoder_of(objects: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Decoder:
+    """Make a decoder of what `--eds` names and was read, and of what `--dbc` names."""
     from tickrig.host.canmon import extensions  # noqa: PLC0415 - slow
 
-    objects = read_eds_files(eds)
     with refusing_dbc():
         return extensions.make_decoder(objects, dbc)
 

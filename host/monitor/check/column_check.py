@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import starmap
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.monitor.check.checker import ended
-from tickrig.host.monitor.check.rule import NO_GAP_US, Finding, FrameSelection, Rule
-from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.checker import Unjudged, ended, unjudged
+from tickrig.host.monitor.check.rule import (
+    NO_GAP_US,
+    Evidence,
+    Finding,
+    FrameSelection,
+    Rule,
+    Seen,
+)
+from tickrig.host.monitor.check.rules import NO_EDS, EdsHeartbeats, Rules
 from tickrig.host.monitor.check.time_rules import MaxLoad
 from tickrig.host.monitor.columns.column_bits import column_bits
 from tickrig.host.monitor.columns.column_load import ColumnLoad
@@ -34,20 +42,31 @@ class ColumnChecker:
     Args:
         rules: what must hold.
         bit_rate: bits a second, for the load.
+        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
 
     Raises:
         ValueError: a limit of the load without a bit rate.
     """
 
-    def __init__(self, rules: Rules, bit_rate: int | None = None) -> None:
-        self._rules, self._made, self._limit = rules, rules.make(), rules.load(bit_rate)
+    def __init__(
+        self,
+        rules: Rules,
+        bit_rate: int | None = None,
+        eds_heartbeats: EdsHeartbeats = NO_EDS,
+    ) -> None:
+        self._rules, self._made = rules, rules.make(eds_heartbeats)
+        self._limit = rules.load(bit_rate)
         self._wanting: dict[int, list[tuple[int, Rule]]] = {}
         self._selections: dict[str, BusSelection] = {}
         self._loads: dict[str, ColumnLoad] = {}
-        self._last_us = 0
+        self._last_us, self._begun = 0, False
 
     def take(self, columns: Columns) -> list[Finding]:
         """Return what is wrong with a block of frames, and with the seconds that they ended."""
+        if len(columns) and not self._begun:
+            self._begun = True
+            for rule in self._made:
+                rule.begin(int(columns.at_us[0]))
         placed: list[Placed] = []
         found, gaps_us = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for channel, rows, frames in by_channel(columns):
@@ -63,11 +82,12 @@ class ColumnChecker:
         placed.sort(key=lambda one: one[:2])
         return [finding for _, _, finding in placed]
 
-    def end(self, lost: Iterable[str] = ()) -> list[Finding]:
+    def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[Finding]:
         """Return what is missing.
 
         Args:
             lost: what the source says was lost or is no frame.
+            errors: what the source says of errors beside its error frames.
         """
         found = []
         for channel, seconds in sorted(self._loads.items()):
@@ -76,9 +96,19 @@ class ColumnChecker:
             found += [Finding(window.at_us, MaxLoad.name, text)] if text else []
         latest_us: dict[int, int] = {}
         for selection in self._selections.values():
-            for ident, at_us in selection.latest_us():
-                latest_us[ident] = max(at_us, latest_us.get(ident, at_us))
-        return found + ended(self._rules, self._made, latest_us, self._last_us, lost)
+            for ident, one in selection.seen():
+                latest_us[ident] = max(one.last_us, latest_us.get(ident, one.last_us))
+        return found + ended(self._rules, self._made, latest_us, self._last_us, lost, errors)
+
+    def unjudged(self, without_errors: str = "") -> Unjudged:
+        """Return what was not judged; see `Checker.unjudged`."""
+        seen = {
+            (channel, ident): one
+            for channel, selection in self._selections.items()
+            for ident, one in selection.seen()
+        }
+        evidence = Evidence(seen, self._last_us, without_errors)
+        return unjudged(self._rules, self._made, evidence)
 
     def _too_busy(
         self, limit: MaxLoad, channel: str, rows: Ints, frames: Columns
@@ -128,6 +158,7 @@ class BusSelection:
         self._below_us, self._above_us = np.empty(0, np.int64), np.empty(0, np.int64)
         self._all, self._firsts = np.empty(0, np.bool_), np.empty(0, np.bool_)
         self._bytes = np.empty((0, 256), np.bool_)
+        self._frames = np.empty(0, np.int64)
 
     def take(self, frames: Columns) -> tuple[Ints, Ints]:
         """Return the rows of selected frames and error frames, and the gap before each."""
@@ -138,22 +169,27 @@ class BusSelection:
             return found, np.full(len(found), NO_GAP_US)
         runs = self._idents.take(frames.ident[plain], frames.at_us[plain])
         self._extend(len(self._idents))
+        self._frames[runs.numbers] += runs.lengths
         places = np.flatnonzero(self._selected(runs, frames.payload[plain]))
         gaps_us = runs.gaps_us
         gaps_us[runs.begins[runs.fresh]] = NO_GAP_US
         rows = np.concatenate((found, plain[runs.order[places]]))
         return rows, np.concatenate((np.full(len(found), NO_GAP_US), gaps_us[places]))
 
-    def latest_us(self) -> Iterable[tuple[int, int]]:
-        """Give each identifier and when it was heard last."""
-        return zip(self._idents.idents.tolist(), self._idents.last_us.tolist(), strict=True)
+    def seen(self) -> Iterable[tuple[int, Seen]]:
+        """Give each identifier and when it was heard."""
+        idents = self._idents
+        values = zip(
+            idents.first_us.tolist(), idents.last_us.tolist(), self._frames.tolist(), strict=True
+        )
+        return zip(idents.idents.tolist(), starmap(Seen, values), strict=True)
 
     def _extend(self, count: int) -> None:
         """Ask the rules what they suspect of identifiers that are new; there are `count` now."""
         before = len(self._all)
         self._below_us, self._above_us = grown(self._below_us, count), grown(self._above_us, count)
         self._all, self._firsts = grown(self._all, count), grown(self._firsts, count)
-        self._bytes = grown(self._bytes, count)
+        self._bytes, self._frames = grown(self._bytes, count), grown(self._frames, count)
         self._above_us[before:] = NEVER_US
         for number in range(before, count):
             ident = int(self._idents.idents[number])

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.checker import Checker, Unjudged
 from tickrig.host.monitor.check.rule import Finding
-from tickrig.host.monitor.check.rules import Rules
+from tickrig.host.monitor.check.rules import NO_EDS, EdsHeartbeats, Rules
 from tickrig.host.monitor.check.surroundings import Surroundings
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.bit_rates import BitRates
@@ -28,10 +28,18 @@ class DecodedCheck:
         rates: bit rates of the buses, for the load.
         decoder: None where no rule asks.
         around: frames that are shown before and after what such a rule finds.
+        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
     """
 
-    def __init__(self, rules: Rules, rates: BitRates, decoder: Decoder | None, around: int) -> None:
-        self._checker, self._decoder = Checker(rules, *rates), decoder
+    def __init__(
+        self,
+        rules: Rules,
+        rates: BitRates,
+        decoder: Decoder | None,
+        around: int,
+        eds_heartbeats: EdsHeartbeats = NO_EDS,
+    ) -> None:
+        self._checker, self._decoder = Checker(rules, *rates, eds_heartbeats), decoder
         self._around = Surroundings(around, (one.name for one in rules.expressions))
         self._latest_us = 0
 
@@ -58,6 +66,12 @@ class DecodedCheck:
             return []
         return self._around.flush(self._checker.advance(now_us - QUIET_US) if has_clock else ())
 
-    def end(self, end_us: int, lost: Iterable[str], judged_us: int) -> list[Finding]:
+    def end(
+        self, end_us: int, lost: Iterable[str], judged_us: int, errors: Iterable[str]
+    ) -> list[Finding]:
         """Return what is missing, as `Checker.end` does."""
-        return self._around.flush(self._checker.end(end_us, lost, judged_us))
+        return self._around.flush(self._checker.end(end_us, lost, judged_us, errors))
+
+    def unjudged(self, end_us: int, without_errors: str) -> Unjudged:
+        """Return what was not judged, as `Checker.unjudged` does."""
+        return self._checker.unjudged(end_us, without_errors)

@@ -5,28 +5,46 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from tickrig.host.monitor.check.rule import FrameSelection, Rule
-from tickrig.host.monitor.check.time_rules import BOOT_UP, ERROR_CONTROL_IDS
+from tickrig.host.monitor.check.rule import Evidence, FrameSelection, Rule
+from tickrig.host.monitor.check.time_rules import (
+    ANSWER_IDS,
+    BOOT_UP,
+    ERROR_CONTROL_IDS,
+    REQUEST_IDS,
+)
 from tickrig.host.monitor.frames.ident import ERROR, any_ident, ident_text, sender_of
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame, describe_error_frame
-from tickrig.wire.canopen.emcy import Emcy, describe
+from tickrig.wire.canopen.emcy import describe
 from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
 from tickrig.wire.canopen.sdo.abort import describe_abort
 from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand, index_sub
-from tickrig.wire.errors import WireError
 
 EMCY_IDS: Final = range(0x081, 0x100)
-ANSWER_IDS: Final = range(0x581, 0x600)
-REQUEST_IDS: Final = range(0x601, 0x680)
 NODE_MASK: Final = 0x7F
+CODE_BYTES: Final = 2
+EMCY_BYTES: Final = 8
+NAMED_BYTES: Final = 4
+"""An SDO frame of so many bytes names its object."""
 
 
-class NoEmcy(Rule):
-    """No EMCY but error reset, on the default COB-IDs."""
+class CanopenRule(Rule):
+    """A rule about frames that should not be there, among those that may be of CANopen."""
+
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say that no frame can be one of CANopen."""
+        return evidence.without_canopen
+
+
+class NoEmcy(CanopenRule):
+    """No EMCY but error reset, on the default COB-IDs; one that is cut short is one, too."""
 
     name = "no-emcy"
+
+    def __init__(self) -> None:
+        self._cut = 0
 
     def wants(self, ident: int, /) -> bool:
         """Take the COB-IDs of EMCY."""
@@ -36,18 +54,23 @@ class NoEmcy(Rule):
         """Name the error."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
-        try:
-            emcy = Emcy.parse(frame.data)
-        except WireError:
+        data, node = frame.data, frame.can_id & NODE_MASK
+        code = int.from_bytes(data[:CODE_BYTES], "little")
+        if len(data) < CODE_BYTES:
+            self._cut += 1
+        if not code or len(data) < CODE_BYTES:
             return None
-        if not emcy.code:
-            return None
-        node = frame.can_id & NODE_MASK
-        return f"node {node}: EMCY {emcy.code:04X}h {describe(emcy.code)}"
+        length = "" if len(data) == EMCY_BYTES else f" ({len(data)} B, {EMCY_BYTES} are right)"
+        return f"node {node}: EMCY {code:04X}h {describe(code)}{length}"
+
+    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+        """Say how many frames are too short to have an error code."""
+        if self._cut:
+            yield f"{counted(self._cut, 'frame')} of EMCY without a whole error code"
 
 
-class NoSdoAbort(Rule):
-    """No aborted transfer at a default SDO server."""
+class NoSdoAbort(CanopenRule):
+    """No aborted transfer at a default SDO server; an abort that is cut short is one, too."""
 
     name = "no-sdo-abort"
 
@@ -64,12 +87,14 @@ class NoSdoAbort(Rule):
         frame = record.frame
         assert isinstance(frame, CanFrame)
         data = frame.data
-        if len(data) != FRAME_BYTES or data[0] != ClientCommand.ABORT:
+        if len(data) < NAMED_BYTES or data[0] != ClientCommand.ABORT:
             return None
         index, sub = index_sub(data)
         which = f"{index:04X}h:{sub:02X}" if index or sub else "its transfer"
         side = "server" if frame.can_id in ANSWER_IDS else "client"
         reason = describe_abort(int.from_bytes(data[4:], "little"))
+        if len(data) < FRAME_BYTES:
+            reason = f"without a whole abort code ({len(data)} B, {FRAME_BYTES} are right)"
         node = frame.can_id & NODE_MASK
         return f"node {node}: {side} aborts {which}, {reason}"
 
@@ -88,6 +113,10 @@ class NoErrorFrames(Rule):
         frame = record.frame
         assert isinstance(frame, ErrorFrame)
         return describe_error_frame(frame)
+
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say that the source has no error frames whatever happened."""
+        return evidence.without_errors
 
 
 class KnownIds(Rule):
@@ -147,8 +176,11 @@ class NodesPresent(Rule):
                 yield f"node {node} was never heard"
 
 
-class NoReboot(Rule):
-    """No node that was heard before boots without an NMT reset."""
+class NoReboot(CanopenRule):
+    """No node that was heard before boots without an NMT reset.
+
+    A boot-up is what begins with 0: some nodes send more than its one byte.
+    """
 
     name = "no-reboot"
 
@@ -178,7 +210,7 @@ class NoReboot(Rule):
             return None
         is_new = (record.channel, node) not in self._present
         self._present.add((record.channel, node))
-        if frame.can_id not in ERROR_CONTROL_IDS or frame.data != BOOT_UP:
+        if frame.can_id not in ERROR_CONTROL_IDS or frame.data[:1] != BOOT_UP:
             return None
         expected = is_new or node in self._commanded
         self._commanded.discard(node)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final, Protocol
 from xml.sax.saxutils import escape, quoteattr
 
@@ -10,6 +11,9 @@ from tickrig.host.text.values import counted
 
 CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n\r"}
 """Characters that XML does not have."""
+
+
+NONE_SKIPPED: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class Judged(Protocol):
@@ -26,7 +30,13 @@ class Judged(Protocol):
         ...
 
 
-def junit(suite: str, names: Sequence[str], findings: Iterable[Judged], unjudged: str = "") -> str:
+def junit(
+    suite: str,
+    names: Sequence[str],
+    findings: Iterable[Judged],
+    unjudged: str = "",
+    skipped: Mapping[str, str] = NONE_SKIPPED,
+) -> str:
     """Return the report.
 
     Args:
@@ -34,6 +44,7 @@ def junit(suite: str, names: Sequence[str], findings: Iterable[Judged], unjudged
         names: of all rules, also of those that hold.
         findings: in their order.
         unjudged: why rules without a finding cannot be said to hold; empty if they can.
+        skipped: why some rules judged nothing, by their names.
     """
     by_rule: dict[str, list[Judged]] = {name: [] for name in names}
     for finding in findings:
@@ -41,17 +52,21 @@ def junit(suite: str, names: Sequence[str], findings: Iterable[Judged], unjudged
     failures = sum(bool(found) for found in by_rule.values())
     errors = len(by_rule) - failures if unjudged else 0
     counts = f"tests='{len(names)}' failures='{failures}' errors='{errors}'"
+    skips = {} if unjudged else skipped
+    counts += f" skipped='{len(skips)}'" * bool(skips)
     head = f"<testsuite name={_attribute(suite)} {counts}>"
-    cases = [_case(suite, name, found, unjudged) for name, found in by_rule.items()]
+    cases = [
+        _case(suite, name, found, unjudged, skips.get(name, "")) for name, found in by_rule.items()
+    ]
     lines = ["<?xml version='1.0' encoding='utf-8'?>", "<testsuites>", head, *cases]
     return "\n".join([*lines, "</testsuite>", "</testsuites>", ""])
 
 
-def _case(suite: str, name: str, found: Sequence[Judged], unjudged: str) -> str:
+def _case(suite: str, name: str, found: Sequence[Judged], unjudged: str, skipped: str) -> str:
     head = f"<testcase classname={_attribute(suite)} name={_attribute(name)}"
     if not found:
-        error = f"><error message={_attribute(unjudged)}/></testcase>"
-        return head + (error if unjudged else "/>")
+        kind, why = ("error", unjudged) if unjudged else ("skipped", skipped)
+        return head + (f"><{kind} message={_attribute(why)}/></testcase>" if why else "/>")
     message = f"{counted(len(found), 'finding')}, first: {found[0].text}"
     text = escape("\n".join(map(str, found)).translate(CONTROLS))
     return f"{head}><failure message={_attribute(message)}>{text}</failure></testcase>"

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from tickrig.host.monitor.frames.ident import REMOTE
 from tickrig.host.monitor.frames.record import Record
+from tickrig.wire.can import STANDARD_MAX
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.decode.decoded import Decoded
@@ -88,6 +90,59 @@ class FrameSelection(NamedTuple):
     firsts: bool = False
 
 
+class Seen(NamedTuple):
+    """The frames of an identifier on a bus.
+
+    Attributes:
+        first_us: when the first one came.
+        last_us: when the last one came.
+        frames: how many came.
+    """
+
+    first_us: int
+    last_us: int
+    frames: int
+
+    @property
+    def has_gaps(self) -> bool:
+        """Whether time passed from one to another."""
+        return self.frames > 1 and self.first_us != self.last_us
+
+
+class Evidence(NamedTuple):
+    """What there was to be judged.
+
+    Attributes:
+        seen: the frames of each identifier on each bus, error frames beside.
+        end_us: when listening ended.
+        without_errors: why the source has no error frames whatever happened; empty if it may.
+    """
+
+    seen: Mapping[tuple[str, int], Seen]
+    end_us: int
+    without_errors: str = ""
+
+    @property
+    def untimed(self) -> bool:
+        """Whether all frames have one time: it says nothing of gaps."""
+        times = {us for one in self.seen.values() for us in (one.first_us, one.last_us)}
+        return len(times) == 1 and sum(one.frames for one in self.seen.values()) > 1
+
+    def on(self, ident: int) -> list[Seen]:
+        """Return the frames of an identifier, bus by bus."""
+        return [one for (_, other), one in self.seen.items() if other == ident]
+
+    @property
+    def without_canopen(self) -> str:
+        """Say that no frame can be one of CANopen; empty if some can."""
+        if any(not ident & ~(REMOTE | STANDARD_MAX) for _, ident in self.seen):
+            return ""
+        return "no classic frame with an 11-bit CAN-ID came"
+
+
+ONE_TIME: Final = "all frames have one time"
+
+
 class Rule:
     """One rule; this one sees all frames that it wants, and has nothing to say at the end.
 
@@ -113,6 +168,25 @@ class Rule:
             gap_us: since the one before it with this identifier on this bus; None for the first.
         """
         raise NotImplementedError
+
+    def begin(self, at_us: int, /) -> None:
+        """Take the time of the first frame of all, before any is judged."""
+        return
+
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say why it has judged nothing, so that nobody takes it for one that holds.
+
+        Args:
+            evidence: at least one frame, or error frame.
+
+        Returns:
+            The reason; empty if it has judged something.
+        """
+        return ""
+
+    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+        """Say what it could not judge beside what it has judged."""
+        return ()
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
         """Say what is missing.

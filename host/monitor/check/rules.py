@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.monitor.check.frame_rules import (
@@ -23,15 +24,20 @@ from tickrig.host.monitor.check.time_rules import (
     MaxLoad,
     NoLostHeartbeat,
 )
-from tickrig.host.monitor.frames.ident import ident_text, parse_ident
+from tickrig.host.monitor.frames.ident import FD, REMOTE, ident_text, parse_ident
 from tickrig.host.text.names import closest
 from tickrig.host.text.values import parse_time_with_unit_us
+from tickrig.wire.can import EXTENDED_MAX
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.check.expression.parse_rule import Expression
 
 NO_LOSS: Final = "no-loss"
 """The rule that no frame was lost and every line of a log is one."""
+
+
+EdsHeartbeats = Mapping[int, int]
+NO_EDS: Final[EdsHeartbeats] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,14 +83,18 @@ class Rules:
         names += [rule.name for rule in self.make()]
         return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
 
-    def make(self) -> list[Rule]:
-        """Return new rules about frames."""
+    def make(self, eds_heartbeats: EdsHeartbeats = NO_EDS) -> list[Rule]:
+        """Return new rules about frames.
+
+        Args:
+            eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+        """
         made: list[Rule] = []
         made += [NoEmcy()] * self.no_emcy
         made += [NoSdoAbort()] * self.no_sdo_abort
         made += [NoErrorFrames()] * self.no_error_frames
         made += [NoReboot()] * self.no_reboot
-        made += [NoLostHeartbeat()] * self.no_lost_heartbeat
+        made += [NoLostHeartbeat(eds_heartbeats)] if self.no_lost_heartbeat else []
         made += [Heartbeat(times) for times in self.heartbeats]
         made += [NodesPresent(self.nodes)] * bool(self.nodes)
         made += [MaxGap(*gap) for gap in self.max_gaps]
@@ -124,6 +134,7 @@ _NAMES: Final = re.compile(r"[\w.-]*(?:\s*,\s*[\w.-]+)*", re.ASCII)
 _NAMED: Final = re.compile(r"(.*\S): (.*)", re.DOTALL)
 ONE_WORD: Final = ("dlc",)
 """Rules that are written out as one word, and no names."""
+_NODES: Final = re.compile(r"([0-9]{1,9})(?:-([0-9]{1,9}))?")
 _MAX_NODE: Final = 127
 _MAX_IDENTS: Final = 1 << 16
 
@@ -154,6 +165,9 @@ def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
     gaps = (text.partition("=") for text in _texts("max_gap", words))
     idents = [ident for text in _lists("known", words) for ident in _idents(text)]
     nodes = {node for text in _lists("nodes", words) for node in _nodes(text)}
+    for name in ("heartbeat", "nodes", "max_gap", "rule"):
+        if name in words and not _texts(name, words):
+            raise ValueError(f"{name} is empty: leave it out, or it is taken for a rule that holds")
     others, expressions = _named_and_written(_texts("rule", words))
     return Rules(
         **switches,
@@ -252,20 +266,28 @@ def _time_us(text: str) -> int:
 
 
 def _nodes(text: str) -> range:
-    first, _, last = text.partition("-")
-    if not (first.isdecimal() and (last or first).isdecimal()):
+    match = _NODES.fullmatch(text)
+    if match is None:
         raise ValueError(f"nodes {text!r} is not like 3 or 3-7")
-    nodes = range(int(first), int(last or first) + 1)
-    if not nodes:
+    first, last = int(match[1]), int(match[2] or match[1])
+    if first > last:
         raise ValueError(f"nodes {text!r}: the lower node-ID stands first, as {last}-{first}")
-    if nodes[0] < 1 or nodes[-1] > _MAX_NODE:
+    if first < 1 or last > _MAX_NODE:
         raise ValueError(f"nodes {text!r}: node-IDs are 1 to {_MAX_NODE}")
-    return nodes
+    return range(first, last + 1)
 
 
-def _idents(text: str) -> range:
-    first, _, last = text.partition("-")
-    idents = range(parse_ident(first), parse_ident(last or first) + 1)
-    if not 0 < len(idents) <= _MAX_IDENTS:
-        raise ValueError(f"known {text!r}: {ident_text(idents.start)} is not below the other end")
-    return idents
+def _idents(text: str) -> Iterator[int]:
+    """Give identifiers; those that say nothing of remote frames stand for these, too."""
+    words = text.split("-")
+    if len(words) > 2 or not all(words):
+        raise ValueError(f"known {text!r} is not like 181 or 181-18F")
+    first, last = parse_ident(words[0]), parse_ident(words[-1])
+    if (first ^ last) & ~EXTENDED_MAX:
+        raise ValueError(f"known {text!r}: write both ends alike, as 181-18F or 181R-18FR")
+    if not 0 < last + 1 - first <= _MAX_IDENTS:
+        raise ValueError(f"known {text!r}: {ident_text(first)} is not below the other end")
+    for ident in range(first, last + 1):
+        yield ident
+        if not ident & FD:
+            yield ident | REMOTE

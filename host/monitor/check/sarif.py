@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
 from urllib.parse import quote
 
+from tickrig.host.monitor.check.junit import NONE_SKIPPED
 from tickrig.host.monitor.check.rule import Finding
 
 SCHEMA: Final = (
@@ -15,7 +16,11 @@ SCHEMA: Final = (
 
 
 def sarif(
-    source: str, names: Sequence[str], findings: Iterable[Finding], unjudged: str = ""
+    source: str,
+    names: Sequence[str],
+    findings: Iterable[Finding],
+    unjudged: str = "",
+    skipped: Mapping[str, str] = NONE_SKIPPED,
 ) -> str:
     """Return the report.
 
@@ -27,24 +32,28 @@ def sarif(
         names: of all rules.
         findings: in their order.
         unjudged: why rules without a finding cannot be said to hold; empty if they can.
+        skipped: why some rules judged nothing, by their names.
     """
     uri = quote(source.encode("utf-8", "surrogateescape"))
     places = {name: place for place, name in enumerate(names)}
     driver = {"name": "canmon check", "rules": [{"id": name} for name in names]}
     run = {
         "tool": {"driver": driver},
-        "invocations": [_invocation(unjudged)],
+        "invocations": [_invocation(unjudged, skipped)],
         "results": [_result(uri, finding, places[finding.rule]) for finding in findings],
     }
     report = {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
     return json.dumps(report, ensure_ascii=False, indent=1) + "\n"
 
 
-def _invocation(unjudged: str) -> dict[str, object]:
+def _invocation(unjudged: str, skipped: Mapping[str, str]) -> dict[str, object]:
     said: dict[str, object] = {"executionSuccessful": not unjudged}
-    if unjudged:
-        note = {"level": "error", "message": {"text": unjudged}}
-        said["toolExecutionNotifications"] = [note]
+    notes = [("error", unjudged)] if unjudged else []
+    notes += [("warning", f"{name} judged nothing: {why}") for name, why in skipped.items()]
+    if notes:
+        said["toolExecutionNotifications"] = [
+            {"level": level, "message": {"text": text}} for level, text in notes
+        ]
     return said
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.check.rule import FrameSelection, Rule
-from tickrig.host.monitor.frames.ident import ident_text
+from tickrig.host.monitor.check.rule import ONE_TIME, Evidence, FrameSelection, Rule
+from tickrig.host.monitor.frames.ident import REMOTE, ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.traffic.traffic import WINDOW_US, Window
+from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
 
 
 class MaxLoad:
@@ -41,6 +43,8 @@ class MaxLoad:
 
 BOOT_UP: Final = bytes([NmtState.INITIALISING])
 ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 0x80)
+ANSWER_IDS: Final = range(RESPONSE_COB_ID + 1, RESPONSE_COB_ID + 0x80)
+REQUEST_IDS: Final = range(REQUEST_COB_ID + 1, REQUEST_COB_ID + 0x80)
 
 
 class HeartbeatTimes(NamedTuple):
@@ -68,6 +72,7 @@ class Heartbeat(Rule):
         self._times, self._ident = times, ERROR_CONTROL_COB_ID + times.node
         self.name = f"heartbeat {times.node}"
         self._booted_us: dict[str, int] = {}
+        self._free: Counter[str] = Counter()
 
     def wants(self, ident: int, /) -> bool:
         """Take its COB-ID."""
@@ -80,10 +85,15 @@ class Heartbeat(Rule):
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Compare the gap, unless the frame or the one before it is a boot-up."""
-        if record.frame.data == BOOT_UP:
+        booted_us = self._booted_us.get(record.channel)
+        behind_boot = gap_us is not None and record.at_us - gap_us == booted_us
+        if record.frame.data[:1] == BOOT_UP:
             self._booted_us[record.channel] = record.at_us
+            self._free[record.channel] += 2 - (gap_us is None or behind_boot)
             return None
-        if gap_us is None or record.at_us - gap_us == self._booted_us.get(record.channel):
+        if not record.frame.data:
+            return f"node {self._times.node}: heartbeat of 0 B, 1 is right"
+        if gap_us is None or behind_boot:
             return None
         if gap_us > self._times.high_us:
             return self._said(gap_us, "at most", self._times.high_us)
@@ -98,82 +108,191 @@ class Heartbeat(Rule):
         elif end_us - latest_us[self._ident] > self._times.high_us:
             yield self._said(end_us - latest_us[self._ident], "at most", self._times.high_us)
 
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say that no gap was there to be compared: those around boot-ups are free."""
+        if evidence.untimed:
+            return ONE_TIME
+        gaps = 0
+        for (channel, ident), seen in evidence.seen.items():
+            if ident == self._ident and seen.has_gaps:
+                ends_free = self._booted_us.get(channel) == seen.last_us
+                gaps += seen.frames - 1 - self._free[channel] + ends_free
+        came = sum(seen.frames for seen in evidence.on(self._ident))
+        return "" if gaps > 0 else f"{counted(came, 'frame')} of error control came, and no gap"
+
     def _said(self, gap_us: int, bound: str, limit_us: int) -> str:
         node, said = self._times.node, f"{bound} {ms_text(limit_us)} is right"
         return f"node {node}: {ms_text(gap_us)} ms since its last heartbeat, {said}"
 
 
+GUARD_TOGGLE: Final = 0x80
+NODE_MASK: Final = 0x7F
 LOST_AFTER: Final = 1.5
 """A heartbeat is lost after so many of its periods, as on the node board."""
-LEAST_GAPS: Final = 2
-GAPS_KEPT: Final = 9
-GUARD_TOGGLE: Final = 0x80
+SURE_GAPS: Final = 2
+"""So many gaps tell a period, where a heartbeat comes after all; silence wants one."""
 
 
-class _Beats:
-    """The heartbeats of one node on one bus.
+class Watched:
+    """What `NoLostHeartbeat` knows of a node on a bus.
+
+    Args:
+        channel: the bus.
+        node: its node-ID.
+        period_ms: what its EDS says of 1017h, 0 where none does.
 
     Attributes:
-        gaps: between the latest of them.
-        last_us: when it was heard last; None after a boot-up.
+        heard: it has sent a frame of error control.
+        guarded: it is guarded, and sends no heartbeats.
+        asked: a guarding request was not answered yet.
+        judged: a gap was compared with a period that is known.
     """
 
-    def __init__(self) -> None:
-        self.gaps: deque[int] = deque(maxlen=GAPS_KEPT)
-        self.last_us: int | None = None
+    def __init__(self, channel: str, node: int, period_ms: int) -> None:
+        from tickrig.host.monitor.decode.node_memory import (  # noqa: PLC0415 - seldom wanted
+            HEARTBEAT_TIME,
+            EdsObjects,
+            Heartbeats,
+            NodeMemory,
+        )
+        from tickrig.host.monitor.decode.sdo.sdo_channel import SdoChannel  # noqa: PLC0415
 
-    def overdue(self, at_us: int) -> tuple[int, int] | None:
-        """Return time since the last one and learnt period; None while it is in time."""
-        if self.last_us is None or len(self.gaps) < LEAST_GAPS:
+        values = {HEARTBEAT_TIME: period_ms.to_bytes(2, "little")} if period_ms else {}
+        self._name, self._memory = f"{channel} node {node}", NodeMemory(EdsObjects(values=values))
+        self._heartbeats, self._sdo = Heartbeats(self._memory), SdoChannel(node)
+        self._heartbeat_time = HEARTBEAT_TIME
+        self.heard = self.guarded = self.asked = self.judged = False
+
+    def hear_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
+        """Learn what SDO traffic says of its objects."""
+        step = (self._sdo.request if request else self._sdo.response)(at_us, data)
+        for transfer in step.ended:
+            if self._memory.learn(transfer) and transfer.entry == self._heartbeat_time:
+                self._heartbeats.learn(at_us, transfer)
+
+    def hear(self, at_us: int, data: bytes) -> str | None:
+        """Take a frame of error control; say that a heartbeat is lost before it."""
+        self.heard = True
+        if data[:1] == BOOT_UP:
+            self._memory.boot()
+            self._heartbeats.boot(at_us)
+            self.guarded = self.asked = False
             return None
-        since_us, period_us = at_us - self.last_us, sorted(self.gaps)[len(self.gaps) // 2]
-        return (since_us, period_us) if since_us > LOST_AFTER * period_us else None
+        self.guarded |= bool(data and data[0] & GUARD_TOGGLE)
+        sure = self._heartbeats.told or len(self._heartbeats.gaps) >= SURE_GAPS
+        eds_alone = not self._heartbeats.gaps
+        said = self.overdue(at_us) if sure or eds_alone else None
+        self._heartbeats.beat(at_us, learns=not self.asked)
+        self.asked = False
+        return said
+
+    def overdue(self, at_us: int) -> str | None:
+        """Say that its heartbeat is lost at a time."""
+        beats = self._heartbeats
+        period_us = None if self.guarded else beats.period_us
+        if period_us is None or beats.since_us is None:
+            return None
+        since_us = at_us - beats.since_us
+        self.judged |= since_us >= period_us
+        if not beats.is_late(at_us):
+            return None
+        learnt = beats.gaps and not beats.told
+        period = f"{ms_text(period_us)} ms"
+        says = f"one each {period} before" if learnt else f"its 1017h says {period}"
+        return f"{self._name}: no heartbeat for {ms_text(since_us)} ms, {says}"
+
+    @property
+    def watched(self) -> bool:
+        """Whether it was heard, or SDO traffic says what its period is."""
+        return self.heard or self._heartbeats.told
+
+    @property
+    def doubt(self) -> str:
+        """Why nothing was judged of it."""
+        if self.guarded:
+            return f"{self._name} is guarded"
+        if self._heartbeats.period_us is None:
+            return f"of {self._name} no period is known"
+        return f"of {self._name} no period has passed"
 
 
 class NoLostHeartbeat(Rule):
-    """No heartbeat of any node that sends one is lost; its period is learnt from three of them.
+    """No heartbeat of any node that sends one is lost.
 
-    Answers to guarding requests are none: these have a toggle bit. A boot-up begins anew.
+    The period is what SDO traffic says of 1017h, else as heard, else as an EDS says, as on the
+    node board. A boot-up begins anew. Answers to guarding requests are none: these have a toggle
+    bit.
+
+    Args:
+        periods_ms: what EDS files say of 1017h, by node-ID: these nodes must be heard.
     """
 
     name = "no-lost-heartbeat"
 
-    def __init__(self) -> None:
-        self._beats: dict[tuple[str, int], _Beats] = {}
-        self._guarded: set[tuple[str, int]] = set()
+    def __init__(self, periods_ms: Mapping[int, int]) -> None:
+        self._periods_ms = {node: ms for node, ms in periods_ms.items() if ms}
+        self._nodes: dict[tuple[str, int], Watched] = {}
+        self._begin_us: int | None = None
 
     def wants(self, ident: int, /) -> bool:
-        """Take the COB-IDs of error control."""
-        return ident in ERROR_CONTROL_IDS
+        """Take the COB-IDs of error control, and those of SDO, which may tell 1017h."""
+        is_sdo = ident in ANSWER_IDS or ident in REQUEST_IDS
+        return is_sdo or ident & ~REMOTE in ERROR_CONTROL_IDS
+
+    def begin(self, at_us: int, /) -> None:
+        """Note when listening began."""
+        self._begin_us = at_us
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
-        """Compare the gap with those before."""
+        """Compare the gap with the period."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
-        key = record.channel, frame.can_id - ERROR_CONTROL_COB_ID
-        if len(frame.data) == 1 and frame.data[0] & GUARD_TOGGLE:
-            self._guarded.add(key)
-        if key in self._guarded or frame.data == BOOT_UP:
-            self._beats.pop(key, None)
-            return None
-        beats = self._beats.setdefault(key, _Beats())
-        overdue = beats.overdue(record.at_us)
-        if beats.last_us is not None and record.at_us > beats.last_us:
-            beats.gaps.append(record.at_us - beats.last_us)
-        beats.last_us = record.at_us
-        return None if overdue is None else _lost(key, overdue)
+        node = self._watched(record.channel, frame.can_id & NODE_MASK)
+        if frame.can_id not in ERROR_CONTROL_IDS:
+            node.hear_sdo(record.at_us, frame.data, request=frame.can_id in REQUEST_IDS)
+        elif frame.remote:
+            node.asked = True
+        else:
+            return node.hear(record.at_us, frame.data)
+        return None
 
     def end(self, latest_us: Mapping[int, int], end_us: int, /) -> Iterable[str]:
-        """Name the nodes that fell silent."""
-        for key, beats in sorted(self._beats.items()):
-            if (overdue := beats.overdue(end_us)) is not None:
-                yield _lost(key, overdue)
+        """Name the nodes that fell silent, and those with an EDS that were never heard."""
+        for _, node in sorted(self._nodes.items()):
+            if (text := node.overdue(end_us)) is not None:
+                yield text
+        begin_us = end_us if self._begin_us is None else self._begin_us
+        for node_id, period_ms in sorted(self._periods_ms.items()):
+            if not self._heard(node_id) and end_us - begin_us > LOST_AFTER * period_ms * 1_000:
+                since = ms_text(end_us - begin_us)
+                yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say that no period was known, or none has passed."""
+        if evidence.untimed:
+            return ONE_TIME
+        doubts = self._doubts()
+        if any(node.judged for node in self._nodes.values()):
+            return ""
+        return "; ".join(doubts) or "no heartbeat came"
 
-def _lost(key: tuple[str, int], overdue: tuple[int, int]) -> str:
-    channel, node = key
-    since, period = map(ms_text, overdue)
-    return f"{channel} node {node}: no heartbeat for {since} ms, one each {period} ms before"
+    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+        """Name the nodes of which nothing was judged."""
+        return self._doubts()
+
+    def _watched(self, channel: str, node: int) -> Watched:
+        key = channel, node
+        if key not in self._nodes:
+            self._nodes[key] = Watched(channel, node, self._periods_ms.get(node, 0))
+        return self._nodes[key]
+
+    def _heard(self, node: int) -> bool:
+        found = (one for (_, other), one in self._nodes.items() if other == node)
+        return any(one.watched for one in found)
+
+    def _doubts(self) -> list[str]:
+        watched = (node for _, node in sorted(self._nodes.items()))
+        return [one.doubt for one in watched if one.heard and not one.judged]
 
 
 class MaxGap(Rule):
@@ -205,6 +324,14 @@ class MaxGap(Rule):
             yield f"{ident_text(self._ident)} never came"
         elif end_us - latest_us[self._ident] > self._most_us:
             yield self._said(end_us - latest_us[self._ident])
+
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say that it came once."""
+        if evidence.untimed:
+            return ONE_TIME
+        if any(seen.has_gaps for seen in evidence.on(self._ident)):
+            return ""
+        return f"{ident_text(self._ident)} came once"
 
     def _said(self, gap_us: int) -> str:
         limit = f"at most {ms_text(self._most_us)} is right"

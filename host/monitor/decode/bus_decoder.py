@@ -17,7 +17,7 @@ from tickrig.host.monitor.decode.node_memory import (
 )
 from tickrig.host.monitor.decode.object_text import ObjectText
 from tickrig.host.monitor.decode.pdos import PDO_OBJECTS, Pdo, PdoLayout, PdoTable, pdos_of
-from tickrig.host.monitor.decode.sdo.transfer import Direction, Outcome, Transfer, write_entry
+from tickrig.host.monitor.decode.sdo.transfer import Outcome, Transfer, write_entry
 from tickrig.host.monitor.decode.services import (
     decode_emcy,
     decode_error_control,
@@ -25,6 +25,7 @@ from tickrig.host.monitor.decode.services import (
     decode_sync,
     decode_time,
 )
+from tickrig.host.monitor.frames.ident import sender_of
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
@@ -55,7 +56,7 @@ class Effect(IntEnum):
 
     NONE = 0
     LATEST = 1
-    """The latest of each length, until one of `EACH` comes or a boot-up: a TPDO with a mapping."""
+    """The latest of each length, until one of `EACH` comes or a boot-up: a TPDO."""
     ALONE = 2
     """Each, but it changes nothing that a PDO does, unless it is a boot-up: error control, EMCY."""
     EACH = 3
@@ -98,9 +99,10 @@ class BusDecoder:
         """Say which frames with a CAN-ID can change what is known of nodes, as it is used now."""
         route = self._routes.get(can_id) or self._route(can_id)
         if isinstance(route, partial):
+            if route.func is _unmapped:
+                return Effect.NONE if sender_of(can_id) is None else Effect.LATEST
             alone = route.func in (self._error_control, _emcy)
-            each = Effect.ALONE if alone else Effect.EACH
-            return Effect.NONE if route.func is _unmapped else each
+            return Effect.ALONE if alone else Effect.EACH
         layout = getattr(route, "__self__", None)
         if isinstance(layout, PdoLayout):
             return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
@@ -189,15 +191,10 @@ class BusDecoder:
 
     def _learn(self, transfer: Transfer) -> None:
         """Take a transferred value as evidence."""
-        entry, data = transfer.entry, transfer.data
-        if entry is None or data is None or transfer.flaws or transfer.outcome is not Outcome.DONE:
-            return
         memory = self.memory(transfer.node)
-        was_drive = memory.is_drive
-        if transfer.direction is Direction.UPLOAD:
-            memory.read(entry, data)
-        else:
-            memory.written(entry, data)
+        was_drive, entry = memory.is_drive, transfer.entry
+        if not memory.learn(transfer) or entry is None:
+            return
         if entry[0] in PDO_OBJECTS:
             self._refresh(pdos_of(transfer.node, (entry[0],)))
         if memory.is_drive != was_drive or entry == DEVICE_TYPE:

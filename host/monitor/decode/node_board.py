@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_memory import HEARTBEAT_TIME, NodeMemory
+from tickrig.host.monitor.decode.node_memory import HEARTBEAT_TIME, Heartbeats, NodeMemory
 from tickrig.host.monitor.decode.object_text import drive_state
+from tickrig.host.monitor.decode.pdos import UNMAPPED
 from tickrig.host.monitor.decode.sdo.transfer import Outcome, Transfer
 from tickrig.host.monitor.decode.services import nmt_state_name
+from tickrig.host.monitor.frames.ident import ident_of, sender_of
 from tickrig.host.monitor.frames.record import Record
+from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 EMCY_KEPT: Final = 16
-GAPS_KEPT: Final = 9
-LATE: Final = 1.5
-"""A heartbeat is late after so many of its periods; the real limit is its consumer's (1016h)."""
 DEVICE_NAME: Final = (0x1008, 0)
 
 _TARGETS: Final = {
@@ -51,7 +51,6 @@ class NodeStatus:
     Attributes:
         state: NMT state as it told it, None while it told none.
         commanded: where the NMT master sent it since, None once it has told its state.
-        reported_us: when it last told its state.
         boots: boot-up messages.
         unrequested_boots: those that no NMT command had asked for, of a node that was heard before.
         late: gaps between heartbeats that were longer than `LATE` periods.
@@ -71,7 +70,6 @@ class NodeStatus:
     memory: NodeMemory
     state: int | None = None
     commanded: int | None = None
-    reported_us: int | None = None
     boots: int = 0
     unrequested_boots: int = 0
     late: int = 0
@@ -85,23 +83,26 @@ class NodeStatus:
     present: bool = False
     pdos: dict[str, Decoded] = field(default_factory=dict)
     _reset_requested: bool = False
-    _gaps: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
+    _heartbeats: Heartbeats = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Wait for its first heartbeat."""
+        self._heartbeats = Heartbeats(self.memory)
 
     @property
     def period_us(self) -> int | None:
-        """The heartbeat period: by 1017h, else as learnt from the gaps; None for none.
-
-        A 0 of an EDS is not believed: heartbeats that are heard count more.
-        """
-        told = self.memory.number(*HEARTBEAT_TIME)
-        if told or self.memory.was_received(HEARTBEAT_TIME):
-            return told * 1_000 if told else None
-        return _median(self._gaps) if self._gaps else None
+        """The heartbeat period, as `Heartbeats` knows it; None for none."""
+        return self._heartbeats.period_us
 
     @property
     def learnt(self) -> bool:
         """Whether the period is learnt from the gaps."""
-        return not self.memory.number(*HEARTBEAT_TIME)
+        return bool(self._heartbeats.gaps) and not self._heartbeats.told
+
+    @property
+    def reported_us(self) -> int | None:
+        """When it last told its state."""
+        return self._heartbeats.last_us
 
     def age_us(self, now_us: int) -> int | None:
         """Return how long ago it told its state."""
@@ -109,8 +110,7 @@ class NodeStatus:
 
     def is_late(self, now_us: int) -> bool:
         """Say whether a heartbeat is missing."""
-        age_us, period_us = self.age_us(now_us), self.period_us
-        return age_us is not None and period_us is not None and age_us > LATE * period_us
+        return self._heartbeats.is_late(now_us)
 
     @property
     def state_text(self) -> str:
@@ -131,19 +131,17 @@ class NodeStatus:
         self.boots += 1
         self.unrequested_boots += self.present and not self._reset_requested
         self._reset_requested, self.drive_state, self.error_code = False, "", 0
-        self._gaps.clear()
-        self._report(at_us, NmtState.PRE_OPERATIONAL)
+        self._heartbeats.boot(at_us)
+        self._report(NmtState.PRE_OPERATIONAL)
 
     def heartbeat(self, at_us: int, state: int) -> None:
         """Take a heartbeat, or the answer to a guarding request."""
-        if self.reported_us is not None:
-            self.late += self.is_late(at_us)
-            if at_us > self.reported_us:  # logs may have several frames of one time
-                self._gaps.append(at_us - self.reported_us)
-        self._report(at_us, state)
+        self.late += self.is_late(at_us)
+        self._heartbeats.beat(at_us)
+        self._report(state)
 
-    def _report(self, at_us: int, state: int) -> None:
-        self.state, self.commanded, self.reported_us, self.present = state, None, at_us, True
+    def _report(self, state: int) -> None:
+        self.state, self.commanded, self.present = state, None, True
 
     def emcy(self, at_us: int, decoded: Decoded) -> None:
         """Take an EMCY."""
@@ -156,20 +154,16 @@ class NodeStatus:
         self.error_code = code
         self.emcys.append(EmcyRecord(at_us, code, decoded.text))
 
-    def transfer(self, transfer: Transfer) -> None:
+    def transfer(self, at_us: int, transfer: Transfer) -> None:
         """Take an SDO transfer that ended."""
         self.present = self.present or transfer.outcome.answered
         if transfer.outcome is not Outcome.DONE:
             self.sdo_errors += 1
             self.sdo_error = str(transfer)
+        elif transfer.entry == HEARTBEAT_TIME:
+            self._heartbeats.learn(at_us, transfer)
         elif transfer.entry == DEVICE_NAME and isinstance(transfer.value, str):
             self.name = transfer.value
-
-
-def _median(gaps: Collection[int]) -> int:
-    """Return the median; statistics would take 5 ms to import."""
-    ordered = sorted(gaps)
-    return (ordered[(len(gaps) - 1) // 2] + ordered[len(gaps) // 2]) // 2
 
 
 STATUSWORD: Final = "statusword"
@@ -180,7 +174,8 @@ class NodeBoard:
     """Keeps the status of every node that was heard.
 
     A node is on the board once it has told its state, sent an EMCY, answered an SDO request
-    or sent a PDO that is known to be its own; and from the beginning where it has an EDS.
+    or sent a PDO that is known to be its own or has a CAN-ID of the pre-defined connection set
+    that nobody gave another meaning; and from the beginning where it has an EDS.
 
     Args:
         decoder: decodes what is taken here, too.
@@ -212,8 +207,11 @@ class NodeBoard:
         elif kind.startswith("rpdo"):
             if (status := self._nodes.get((record.channel, node))) is not None:
                 status.pdos[kind] = decoded
+        elif kind == UNMAPPED:
+            if isinstance(record.frame, CanFrame) and sender_of(ident_of(record.frame)):
+                self._status(record.channel, node).present = True
         elif kind == "sdo":
-            self._transfers(record.channel, node, decoded)
+            self._transfers(record, node, decoded)
         elif kind == "emcy":
             self._status(record.channel, node).emcy(record.at_us, decoded)
         elif kind == "boot-up":
@@ -251,10 +249,11 @@ class NodeBoard:
             if signal.name == STATUSWORD and isinstance(signal.value, int):
                 status.drive_state = drive_state(signal.value)
 
-    def _transfers(self, channel: str, node: int, decoded: Decoded) -> None:
+    def _transfers(self, record: Record, node: int, decoded: Decoded) -> None:
+        channel = record.channel
         for transfer in decoded.transfers:
             answered = transfer.outcome.answered
             if answered or (channel, node) in self._nodes:
-                self._status(channel, node).transfer(transfer)
+                self._status(channel, node).transfer(record.at_us, transfer)
             if transfer.name == STATUSWORD and isinstance(transfer.value, int):
                 self._status(channel, node).drive_state = drive_state(transfer.value)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -15,6 +16,7 @@ from tickrig.host.monitor.decode.object_text import (
     describe_standard,
     slug,
 )
+from tickrig.host.monitor.decode.sdo.transfer import Direction, Outcome, Transfer
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import Finding
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
@@ -39,6 +41,11 @@ class EdsObjects:
     name: str = ""
     findings: tuple[Finding, ...] = ()
     vendor: str = ""
+
+    @property
+    def heartbeat_ms(self) -> int:
+        """What it says of 1017h; 0 where it says nothing."""
+        return int.from_bytes(self.values.get(HEARTBEAT_TIME, b""), "little")
 
 
 def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
@@ -130,6 +137,17 @@ class NodeMemory:
         elif entry == STATUSWORD and len(data) == STATUSWORD_BYTES:
             self._has_statusword = True
 
+    def learn(self, transfer: Transfer) -> bool:
+        """Learn from a transfer that ended; return whether it tells anything."""
+        entry, data = transfer.entry, transfer.data
+        if entry is None or data is None or transfer.flaws or transfer.outcome is not Outcome.DONE:
+            return False
+        if transfer.direction is Direction.UPLOAD:
+            self.read(entry, data)
+        else:
+            self.written(entry, data)
+        return True
+
     def boot(self) -> bool:
         """Go back to power-on values; return whether that changes any."""
         changed = self._now != self._power_on
@@ -184,3 +202,73 @@ class NodeMemory:
             text = describe_drive(index, sub) or ObjectText()
             return text if told is None else text._replace(source=told.source)
         return told or ObjectText()
+
+
+LATE: Final = 1.5
+"""A heartbeat is late after so many of its periods; the real limit is its consumer's (1016h)."""
+GAPS_KEPT: Final = 9
+
+
+@dataclass(slots=True)
+class Heartbeats:
+    """When the heartbeats of a node come, and the period that they keep.
+
+    Args:
+        memory: what is known of its objects.
+
+    Attributes:
+        last_us: when it told its state last, None while it told none.
+        since_us: since when one is waited for; None for never.
+        gaps: between the latest heartbeats.
+    """
+
+    memory: NodeMemory = field(compare=False)
+    last_us: int | None = None
+    since_us: int | None = None
+    gaps: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
+    _booted: bool = False
+
+    @property
+    def told(self) -> bool:
+        """Whether SDO traffic says what 1017h is: that counts more than what is heard."""
+        return self.memory.was_received(HEARTBEAT_TIME)
+
+    @property
+    def period_us(self) -> int | None:
+        """The period: of 1017h where it was written or read, else as heard, else by the EDS."""
+        if self.gaps and not self.told:
+            return _median(self.gaps)
+        period_ms = self.memory.number(*HEARTBEAT_TIME)
+        return period_ms * 1_000 if period_ms else None
+
+    def is_late(self, now_us: int) -> bool:
+        """Say whether one is missing."""
+        period_us = self.period_us
+        if self.since_us is None or period_us is None:
+            return False
+        return now_us - self.since_us > LATE * period_us
+
+    def boot(self, at_us: int) -> None:
+        """Begin anew with a boot-up; the first heartbeat behind it comes when it likes."""
+        self.gaps.clear()
+        self._booted = True
+        self.last_us = self.since_us = at_us
+
+    def learn(self, at_us: int, transfer: Transfer) -> None:
+        """Take a transfer of 1017h that the memory has learnt: a new period begins anew."""
+        if transfer.direction is Direction.DOWNLOAD or self.since_us is None:
+            self.gaps.clear()
+            self.since_us = at_us
+
+    def beat(self, at_us: int, *, learns: bool = True) -> None:
+        """Take a heartbeat; the period is learnt from it, unless it may answer a request."""
+        learns = learns and not self._booted
+        if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time
+            self.gaps.append(at_us - self.last_us)
+        self.last_us = self.since_us = at_us
+        self._booted = False
+
+
+def _median(gaps: Collection[int]) -> int:
+    """Return the median, of two the higher one; statistics would take 5 ms to import."""
+    return sorted(gaps)[len(gaps) // 2]

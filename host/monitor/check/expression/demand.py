@@ -29,11 +29,17 @@ class Demand:
 
     Attributes:
         due_us: until when something must have come.
-        judged: a frame came that it counts; where it counts none, False.
+        came: a frame came that it counts; where it counts none, False.
+        judged: something was compared with what is demanded.
+        timed: it is about time: where all frames have one, nothing is judged.
+        doubt: why nothing was judged, where nothing was.
     """
 
     due_us: int = NEVER
+    came: bool = False
     judged: bool = False
+    timed: bool = False
+    doubt: str = "no frame came while it was in force"
 
     def begin(self, at_us: int) -> None:
         """Begin, or begin anew after a pause."""

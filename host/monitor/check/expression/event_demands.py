@@ -30,6 +30,7 @@ class Truth(Demand):
     def __init__(self, event: Event, wanted: bool) -> None:
         self._matches, self._carries, self._wanted = event.matches, event.carriers(), wanted
         self._wrong: set[Sender] = set()
+        self.doubt = f"nothing with {event.text} came while it was in force"
 
     def pause(self) -> None:
         """Tell it again."""
@@ -39,6 +40,7 @@ class Truth(Demand):
         """Compare the condition."""
         if not self._carries(decoded):
             return None
+        self.judged = True
         sender = sender_of(record)
         if self._matches(record, decoded) is self._wanted:
             self._wrong.discard(sender)
@@ -60,6 +62,7 @@ class Never(Demand):
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Tell it."""
+        self.judged = True
         return said(decoded) if self._matches(record, decoded) else None
 
 
@@ -77,9 +80,10 @@ class Count(Demand):
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Count a frame."""
+        self.judged = True
         if not self._event.matches(record, decoded):
             return None
-        self._count, self.judged = self._count + 1, True
+        self._count, self.came = self._count + 1, True
         if self._most is None or self._count != self._most + 1:
             return None
         return (
@@ -102,12 +106,15 @@ class Rate(Demand):
         span_us: the span.
     """
 
+    timed = True
+
     def __init__(self, event: Event, most: int, span_us: int) -> None:
         self._event, self._most, self._span_us = event, most, span_us
         self._times_us: deque[int] = deque(maxlen=most + 1)
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Look how long ago the frame was that must be out of the span; then count anew."""
+        self.judged = True
         if not self._event.matches(record, decoded):
             return None
         times_us = self._times_us

@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.monitor.check.expression.demand import Demand
 from tickrig.host.monitor.check.expression.scope import Scope
 from tickrig.host.monitor.check.expression.slice_parser import Slice, with_slices
-from tickrig.host.monitor.check.rule import Finding
+from tickrig.host.monitor.check.rule import ONE_TIME, Evidence, Finding
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.filter_terms import KINDS, MissingSignals, signal_place
 from tickrig.host.monitor.frames.record import Record
@@ -52,7 +52,7 @@ class ExpressionRule:
         self._missing = MissingSignals(paths)
         self._mapped, self._unmapped = mapped, False
         self._looks, self._names = mapped or bool(self._missing), set[str]()
-        self._running, self._began, self._found = False, False, False
+        self._running, self._began, self._found, self._forced = False, False, False, False
 
     @property
     def due_us(self) -> int:
@@ -89,8 +89,19 @@ class ExpressionRule:
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
             texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
-        hint = "" if self._demand.judged or not self._unmapped else NO_MAPPING
+        hint = "" if self._demand.came or not self._unmapped else NO_MAPPING
         return [Finding(end_us, self.name, text + hint) for text in texts]
+
+    def unjudged(self, evidence: Evidence) -> str:
+        """Say why it has judged nothing; empty if it has."""
+        if not self._forced:
+            return f"it was never in force: {' '.join(scope.text for scope in self._scopes)}"
+        if self._demand.timed and evidence.untimed:
+            return ONE_TIME
+        if self._demand.judged:
+            return ""
+        hint = "" if self._demand.came or not self._unmapped else NO_MAPPING
+        return self._demand.doubt + hint
 
     def _in_force(self, record: Record, decoded: Decoded) -> bool:
         self._began = True
@@ -99,6 +110,7 @@ class ExpressionRule:
         if running != self._running:
             self._running = running
             if running:
+                self._forced = True
                 self._demand.begin(record.at_us)
             else:
                 self._demand.pause()

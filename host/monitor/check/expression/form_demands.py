@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.monitor.check.expression.demand import Demand
@@ -24,6 +26,10 @@ LENGTHS: Final = {
 """Bytes of the data frames of a kind (CiA 301; CiA 305)."""
 
 
+Pair = tuple[str, int | None]
+"""A bus and a node."""
+
+
 class Dlc(Demand):
     """Frames are as long as CiA 301, or the mapping of a PDO, says; remote frames are free.
 
@@ -35,6 +41,7 @@ class Dlc(Demand):
 
     def __init__(self, event: Event) -> None:
         self._matches = event.matches
+        self.doubt = f"no frame of {event.text} came whose length is known"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Compare the length."""
@@ -44,15 +51,38 @@ class Dlc(Demand):
         size = decoded.size
         right = LENGTHS.get(decoded.kind, ()) if size is None else (size,)
         length = len(frame.data)
-        if not right or length in right or not self._matches(record, decoded):
+        if not right or (length in right and self.judged) or not self._matches(record, decoded):
+            return None
+        self.judged = True
+        if length in right:
             return None
         node = "" if decoded.node is None else f" of node {decoded.node}"
         wanted, why = " or ".join(map(str, right)), "" if size is None else " by its mapping"
         return f"{decoded.kind}{node} has {length} B, {wanted} is right{why}"
 
 
+UNASKED: Final = 2
+"""So many heartbeats without a request: the node produces them, and answers none."""
+
+
+@dataclass(slots=True)
+class _Guarding:
+    """What is known of the guarding of a node.
+
+    Attributes:
+        last: toggle bit of its latest answer; None before the first.
+        asked: a request waits for its answer; None where none was heard.
+    """
+
+    last: int | None = None
+    asked: bool | None = None
+
+
 class Toggle(Demand):
     """The toggle bit of guarding changes with each answer, from 0 after a boot-up on.
+
+    An answer follows a request. Where a log has no requests, what follows a frame with the bit
+    set is an answer. A node that produces heartbeats answers none.
 
     Args:
         event: the answers; those of a node that was guarded before belong to them.
@@ -60,23 +90,52 @@ class Toggle(Demand):
 
     def __init__(self, event: Event) -> None:
         self._matches = event.matches
-        self._last: dict[tuple[str, int | None], int | None] = {}
+        self._nodes: dict[Pair, _Guarding] = {}
+        self._unasked: Counter[Pair] = Counter()
+        self.doubt = f"no two answers of {event.text} to guarding came"
 
     def begin(self, at_us: int) -> None:
         """Forget what was before."""
-        self._last.clear()
+        self._nodes.clear()
+        self._unasked.clear()
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Compare the bit with the one before."""
         frame, key = record.frame, (record.channel, decoded.node)
-        if decoded.kind == "boot-up" and key in self._last:
-            self._last[key] = 1
+        if decoded.kind == "boot-up":
+            self._boot(key)
         if decoded.kind not in ("guard", "heartbeat") or not isinstance(frame, CanFrame):
             return None
-        if key not in self._last and not self._matches(record, decoded):
-            return None
-        last = self._last.setdefault(key, None)
-        if frame.remote or len(frame.data) != 1:
-            return None
-        toggle = self._last[key] = frame.data[0] >> 7
+        if key not in self._nodes and self._matches(record, decoded):
+            self._nodes[key] = _Guarding()
+        node = self._nodes.get(key)
+        if frame.remote:
+            if node is not None:
+                node.asked = True
+        elif len(frame.data) == 1 and self._is_answer(key, node, frame.data[0] >> 7):
+            return self._compare(self._nodes[key], frame.data[0] >> 7, decoded)
+        return None
+
+    def _boot(self, key: Pair) -> None:
+        self._unasked[key] = 0
+        if key in self._nodes:
+            asked = None if self._nodes[key].asked is None else False
+            self._nodes[key] = _Guarding(1, asked)
+
+    def _is_answer(self, key: Pair, node: _Guarding | None, toggle: int) -> bool:
+        """Say whether a frame with this bit answers a request; the request is gone then."""
+        asked = False if node is None else node.asked
+        if node is not None and asked:
+            node.asked = False
+        if toggle:
+            self._unasked[key] = 0
+        elif asked is False:
+            self._unasked[key] += 1
+        return node is not None and (
+            bool(toggle) or asked is None or (asked and self._unasked[key] < UNASKED)
+        )
+
+    def _compare(self, node: _Guarding, toggle: int, decoded: Decoded) -> str | None:
+        last, node.last = node.last, toggle
+        self.judged |= last is not None
         return f"{said(decoded)}: toggle {1 - toggle} is right" if toggle == last else None

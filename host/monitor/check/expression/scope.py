@@ -8,7 +8,13 @@ from tickrig.host.monitor.frames.record import Record
 
 
 class Scope:
-    """Says whether a rule is in force."""
+    """Says whether a rule is in force.
+
+    Attributes:
+        text: as it is written.
+    """
+
+    text = ""
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Take each frame; say whether it is judged."""
@@ -19,7 +25,7 @@ class After(Scope):
     """From the first frame after an event on."""
 
     def __init__(self, event: Event) -> None:
-        self._event, self._came = event, False
+        self._event, self._came, self.text = event, False, f"after {event.text}"
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Hold once it came; the event itself is not judged."""
@@ -33,7 +39,7 @@ class Before(Scope):
     """Until an event."""
 
     def __init__(self, event: Event) -> None:
-        self._event, self._came = event, False
+        self._event, self._came, self.text = event, False, f"before {event.text}"
 
     def holds(self, record: Record, decoded: Decoded) -> bool:
         """Hold until it comes; the event itself is not judged."""
@@ -46,7 +52,7 @@ class While(Scope):
     """While a condition on signals holds, by the latest frame of the bus that carries one."""
 
     def __init__(self, event: Event) -> None:
-        self._event, self._carries = event, event.carriers()
+        self._event, self._carries, self.text = event, event.carriers(), f"while {event.text}"
         self._true: dict[str, bool] = {}
 
     def holds(self, record: Record, decoded: Decoded) -> bool:

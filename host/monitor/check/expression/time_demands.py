@@ -22,8 +22,11 @@ class Every(Demand):
         high_us: no later; None for any time.
     """
 
+    timed = True
+
     def __init__(self, event: Event, low_us: int, high_us: int | None) -> None:
         self._event, self._low_us, self._high_us = event, low_us, high_us
+        self.doubt = f"{event.text} did not come twice from one sender while it was in force"
         self._last: dict[Sender, tuple[int, int | None]] = {}
 
     def begin(self, at_us: int) -> None:
@@ -36,12 +39,13 @@ class Every(Demand):
             self._forget(record.channel, decoded.node)
         if not self._event.matches(record, decoded):
             return None
-        self.judged = True
+        self.came = True
         sender = sender_of(record)
         before = self._last.get(sender)
         self._last[sender] = record.at_us, decoded.node
         if before is None:
             return None
+        self.judged = True
         gap_us = max(0, record.at_us - before[0])
         return self._wrong(gap_us, decoded.node, "after the one before")
 
@@ -49,7 +53,7 @@ class Every(Demand):
         """Say that it stopped or never came."""
         if not running or self._high_us is None:
             return
-        if not self.judged:
+        if not self.came:
             yield f"{self._event.text} never came"
         for at_us, node in self._last.values():
             if end_us - at_us > self._high_us:
@@ -77,8 +81,11 @@ class FirstWithin(Demand):
         most_us: how long it may take.
     """
 
+    timed = True
+
     def __init__(self, event: Event, most_us: int) -> None:
         self._event, self._most_us, self.due_us = event, most_us, NEVER
+        self.doubt = f"it ends before {ms_text(most_us)} ms have passed, without {event.text}"
 
     def begin(self, at_us: int) -> None:
         """Wait for it."""
@@ -91,12 +98,12 @@ class FirstWithin(Demand):
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """See whether it has come."""
         if self.due_us != NEVER and self._event.matches(record, decoded):
-            self.due_us = NEVER
+            self.due_us, self.judged = NEVER, True
         return None
 
     def expire(self) -> Iterable[Fault]:
         """Say that it has not."""
-        due_us, self.due_us = self.due_us, NEVER
+        due_us, self.due_us, self.judged = self.due_us, NEVER, True
         yield Fault(due_us, f"no {self._event.text} in {ms_text(self._most_us)} ms")
 
 
@@ -110,6 +117,8 @@ class Waiting(Demand):
     Args:
         most_us: how long it may take.
     """
+
+    timed = True
 
     def __init__(self, most_us: int) -> None:
         self._most_us, self.due_us = most_us, NEVER
@@ -125,7 +134,7 @@ class Waiting(Demand):
 
     def expire(self) -> Iterable[Fault]:
         """Say what has not come."""
-        due_us = self.due_us
+        due_us, self.judged = self.due_us, True
         late = [pair for pair, (record, _) in self._open.items() if self._due(record) <= due_us]
         for pair in late:
             record, text = self._open[pair]
@@ -139,6 +148,7 @@ class Waiting(Demand):
 
     def _close(self, pair: Pair) -> None:
         if self._open.pop(pair, None) is not None:
+            self.judged = True
             dues = (self._due(record) for record, _ in self._open.values())
             self.due_us = min(dues, default=NEVER)
 
@@ -166,6 +176,7 @@ class Latency(Waiting):
         super().__init__(most_us)
         self._first, self._second = first, second
         self._by_node = not (first.has_node or second.has_node)
+        self.doubt = f"no {first.text} came that has {ms_text(most_us)} ms behind it"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Close what has followed, then begin."""
@@ -191,6 +202,7 @@ class Answered(Waiting):
     def __init__(self, event: Event, most_us: int) -> None:
         super().__init__(most_us)
         self._event = event
+        self.doubt = f"no request of {event.text} came that has {ms_text(most_us)} ms behind it"
 
     def judge(self, record: Record, decoded: Decoded) -> str | None:
         """Close what is answered, or left for another request; then begin."""

@@ -42,6 +42,7 @@ class In(Demand):
     def __init__(self, event: Event, values: Values) -> None:
         self._event, self._value_of, self._values = event, event.value_of(), values
         self._once = event.is_signal
+        self.doubt = f"no value of {event.text} came while it was in force"
         self._wrong: set[Sender] = set()
 
     def pause(self) -> None:
@@ -53,6 +54,7 @@ class In(Demand):
         signal = self._value_of(record, decoded)
         if signal is None:
             return None
+        self.judged = True
         sender = sender_of(record)
         if self._values.holds(signal) or (decoded.kind == EMCY and not signal.value):
             self._wrong.discard(sender)
@@ -73,6 +75,7 @@ class Follow(Demand):
     def __init__(self, event: Event) -> None:
         self._value_of = event.value_of()
         self._last: dict[Sender, tuple[float, int | None]] = {}
+        self.doubt = f"no two values of {event.text} came from one sender while it was in force"
 
     def begin(self, at_us: int) -> None:
         """Forget what was before."""
@@ -92,6 +95,7 @@ class Follow(Demand):
         sender = sender_of(record)
         before = self._last.get(sender)
         self._last[sender] = signal.value, decoded.node
+        self.judged |= before is not None
         return None if before is None else self._compare(sender, before[0], signal)
 
     def _compare(self, sender: Sender, before: float, signal: Signal) -> str | None:
@@ -142,8 +146,11 @@ class Changes(Demand):
         most_us: how long it may stay the same.
     """
 
+    timed = True
+
     def __init__(self, event: Event, most_us: int) -> None:
         self._value_of, self._most_us = event.value_of(), most_us
+        self.doubt = f"no two values of {event.text} came from one sender while it was in force"
         self._since: dict[Sender, tuple[object, int, bool]] = {}
 
     def begin(self, at_us: int) -> None:
@@ -157,6 +164,7 @@ class Changes(Demand):
             return None
         sender, at_us = sender_of(record), record.at_us
         value, since_us, told = self._since.get(sender, (None, at_us, False))
+        self.judged |= sender in self._since
         if sender not in self._since or value != signal.value:
             self._since[sender] = signal.value, at_us, False
             return None

@@ -418,3 +418,127 @@ def test_sarif_does_not_say_that_an_empty_log_is_well(tmp_path: Path) -> None:
     assert check(log, "--rule", "dlc", "--sarif", "no/x").stderr == (
         "Error: --sarif no/x: No such file or directory\n"
     )
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+def test_a_rule_that_judged_nothing_is_said_and_none_at_all_ends_with_5(
+    log: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at_once: bool
+) -> None:
+    if at_once:
+        monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
+    report, other = tmp_path / "out.xml", tmp_path / "out.sarif"
+    words = ("--max-gap", "083=1s", "--junit", str(report), "--sarif", str(other))
+    result = check(log, "--no-sdo-abort", *words)
+    assert (result.exit_code, result.stdout) == (0, "")
+    assert result.stderr.splitlines() == [
+        "max-gap 083 judged nothing: 083 came once",
+        "1 rule held, 1 judged nothing",
+    ]
+    suite = ET.fromstring(report.read_bytes()).find("testsuite")
+    assert suite is not None
+    assert [suite.get(name) for name in ("tests", "failures", "errors", "skipped")] == list("2001")
+    assert [one.get("message") for one in suite.iter("skipped")] == ["083 came once"]
+    (run,) = json.loads(other.read_text("utf-8"))["runs"]
+    (note,) = run["invocations"][0]["toolExecutionNotifications"]
+    assert note == {
+        "level": "warning",
+        "message": {"text": "max-gap 083 judged nothing: 083 came once"},
+    }
+    alone = check(log, *words)
+    said = "nothing was judged: max-gap 083: 083 came once"
+    assert (alone.exit_code, alone.stderr) == (5, f"Error: {said}\n")
+    suite = ET.fromstring(report.read_bytes()).find("testsuite")
+    assert suite is not None
+    assert [error.get("message") for error in suite.iter("error")] == [said]
+
+
+def test_a_finding_goes_before_what_was_not_judged(log: str) -> None:
+    result = check(log, "--no-emcy", "--max-gap", "083=1s")
+    assert (result.exit_code, result.stdout) == (1, f"{EMCY}\n")
+    assert result.stderr.splitlines() == [
+        "max-gap 083 judged nothing: 083 came once",
+        "1 finding: no-emcy: 1",
+    ]
+
+
+PEAK = """\
+;$FILEVERSION=2.1
+;$STARTTIME=45000
+;$COLUMNS=N,O,T,B,I,d,R,L,D
+      1      1059.900 DT 1      0300 Rx -  2    00 00
+"""
+VECTOR = "base hex  timestamps absolute\n   0.1 1  300  Rx   d 2 00 00\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("x.trc", PEAK + "2 1334.2 ER 1 - Rx - 5 04 00 02 00 00\n", "protocol: bit stuffing"),
+        ("x.trc", PEAK + "2 1334.2 ST 1 - Rx - 4 00 00 00 08\n", "its warning limit (BUSHEAVY)"),
+        ("x.trc", PEAK + "2 1334.2 EC 1 - Rx - 2 02 02\n", "error counters are above 0: 1 time"),
+        ("y.trc", ";$FILEVERSION=1.1\n  1)  2.0  Error  0008  4  00 19 08 08\n", "no acknowledge"),
+        ("y.trc", " 1)  1  0300  0\n 2)  2  0008  4  ERROR 00 19 08 08\n", "no acknowledge"),
+        ("x.asc", VECTOR + "   0.2 CANFD   1 Rx        ErrorFrame\n", "bus error"),
+        ("x.asc", VECTOR + "   0.2 1  ErrorFrame\n", "bus error"),
+        ("x.asc", VECTOR + "   0.2 CAN 1 Status:chip status bus off\n", "is bus-off: 1 time"),
+    ],
+)
+@pytest.mark.parametrize("at_once", [False, True])
+def test_no_error_frames_sees_all_that_a_log_tells_of_errors(  # noqa: PLR0913, PLR0917 - cases
+    name: str,
+    text: str,
+    said: str,
+    at_once: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if at_once:
+        monkeypatch.setattr(block_log, "SMALL_BYTES", 0)
+    result = check(write(tmp_path / name, text), "--no-error-frames")
+    assert result.exit_code == 1
+    assert said in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        (
+            "run.csv",
+            "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8\n"
+            "1000,00000701,false,Rx,0,1,05,00,00,00,00,00,00,00,\n",
+        ),
+    ],
+)
+def test_a_log_that_has_no_error_frames_proves_none(name: str, text: str, tmp_path: Path) -> None:
+    log = write(tmp_path / name, text)
+    result = check(log, "--no-error-frames")
+    why = "a GVRET log holds no error frames"
+    said = f"Error: nothing was judged: no-error-frames: {why}\n"
+    assert (result.exit_code, result.stderr) == (5, said)
+    assert check(log, "--no-error-frames", "--no-emcy").exit_code == 0
+
+
+def test_a_screen_without_times_says_nothing_of_gaps(tmp_path: Path) -> None:
+    log = write(tmp_path / "run.txt", "  can0  703   [1]  05\n" * 3)
+    words = ("--max-gap", "703=1s", "--rule", "heartbeat of 3 every ..1s")
+    result = check(
+        log, *words, "--no-lost-heartbeat", *HEARTBEAT, "--max-load", "50", "-b", "1000000"
+    )
+    assert result.exit_code == 1  # three heartbeats at once are too early, if they were at once
+    assert check(log, *words, "--no-lost-heartbeat").exit_code == 5
+
+
+def test_an_eds_tells_how_often_a_heartbeat_comes(log: str, tmp_path: Path) -> None:
+    eds, text = tmp_path / "drive.eds", DRIVE_EDS.read_text("latin-1")
+    head, section, rest = text.partition("[1017]")
+    changed = rest.replace("DefaultValue=0x0000", "DefaultValue=0x0064", 1)
+    eds.write_text(head + section + changed, "latin-1")
+    quiet = write(tmp_path / "quiet.log", "(1.0) can0 705#05\n(9.0) can0 080#\n")
+    result = check(quiet, "--no-lost-heartbeat", "--eds", f"5={eds}")
+    assert result.stdout == (
+        "(9.000000) no-lost-heartbeat: can0 node 5: no heartbeat for 8000.0 ms,"
+        " its 1017h says 100.000 ms\n"
+    )
+    assert "LATE" in CliRunner().invoke(main, ["nodes", quiet, "--eds", f"5={eds}"]).stdout
+    assert check(quiet, "--no-lost-heartbeat").exit_code == 5
+    assert check(log, "--no-emcy", "--eds", "5=none.eds").exit_code == 2

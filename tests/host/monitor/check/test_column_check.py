@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tests.host.monitor.column_log import blocks
 from tests.host.monitor.strategies import traffic
-from tickrig.host.monitor.check.checker import Checker
+from tickrig.host.monitor.check.checker import Checker, Unjudged
 from tickrig.host.monitor.check.column_check import ColumnChecker
 from tickrig.host.monitor.check.rule import Finding
 from tickrig.host.monitor.check.rules import Rules
@@ -15,6 +15,8 @@ from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 BIT_RATE = 1_000
+WRITTEN = ("603#2B17100064000000", "583#6017100000000000", "083#3081", "583#8000100000")
+EDS = {3: 100, 9: 1_000}
 ALL = Rules(
     max_load=20,
     no_emcy=True,
@@ -30,16 +32,22 @@ ALL = Rules(
 )
 
 
-def one_by_one(records: list[Record], rules: Rules) -> list[Finding]:
-    checker = Checker(rules, BIT_RATE)
+Judged = tuple[list[Finding], Unjudged]
+
+
+def one_by_one(records: list[Record], rules: Rules) -> Judged:
+    checker = Checker(rules, BIT_RATE, eds_heartbeats=EDS)
     found = [finding for record in records for finding in checker.take(record)]
-    return found + checker.end(records[-1].at_us if records else 0, ["a line is none"])
+    end_us = records[-1].at_us if records else 0
+    found += checker.end(end_us, ["a line is none"], errors=["it says so"])
+    return found, checker.unjudged(end_us)
 
 
-def in_blocks(records: list[Record], rules: Rules, size: int) -> list[Finding]:
-    checker = ColumnChecker(rules, BIT_RATE)
+def in_blocks(records: list[Record], rules: Rules, size: int) -> Judged:
+    checker = ColumnChecker(rules, BIT_RATE, EDS)
     found = [finding for block in blocks(records, size) for finding in checker.take(block)]
-    return found + checker.end(["a line is none"])
+    found += checker.end(["a line is none"], ["it says so"])
+    return found, checker.unjudged()
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])
@@ -54,7 +62,9 @@ def test_a_log_in_blocks_has_the_same_findings_as_frame_by_frame(
     st.lists(
         st.tuples(
             st.sampled_from([0, 79_999, 100_000, 120_001]),
-            st.sampled_from(["703#00", "703#05", "000#8103", "000#8200"]),
+            st.sampled_from(
+                ["703#00", "703#05", "703#", "703#85", "703#R", "000#8103", "000#8200", *WRITTEN]
+            ),
         ),
         max_size=30,
     )

@@ -26,7 +26,25 @@ def test_an_emcy_is_found_and_its_end_is_not() -> None:
     ]
 
 
-@pytest.mark.parametrize("frame", ["083#", "083#308111", "080#3081110000000000", "083#R8"])
+@pytest.mark.parametrize(
+    ("frame", "said"),
+    [
+        ("083#3081", "8130h life guard error or heartbeat error (2 B, 8 are right)"),
+        ("083#308111", "8130h life guard error or heartbeat error (3 B, 8 are right)"),
+        ("083#30810000000000", "8130h life guard error or heartbeat error (7 B, 8 are right)"),
+    ],
+)
+def test_an_emcy_that_is_cut_short_is_one(frame: str, said: str) -> None:
+    assert broken(Rules(no_emcy=True), f"1 {frame}") == [f"1 node 3: EMCY {said}"]
+
+
+def test_frames_of_emcy_without_an_error_code_are_noted() -> None:
+    checker = Checker(Rules(no_emcy=True))
+    assert [one for record in hear("1 083#\n2 083#30") for one in checker.take(record)] == []
+    assert checker.unjudged(0).notes == ("no-emcy: 2 frames of EMCY without a whole error code",)
+
+
+@pytest.mark.parametrize("frame", ["083#", "083#30", "083#0000", "080#3081110000000000", "083#R8"])
 def test_what_is_no_emcy_is_not_found(frame: str) -> None:
     assert broken(Rules(no_emcy=True), f"1 {frame}") == []
 
@@ -49,6 +67,13 @@ def test_other_sdo_frames_are_not_found() -> None:
     assert broken(Rules(no_sdo_abort=True), "1 583#6040600000000000\n2 583#80") == []
 
 
+def test_an_abort_that_is_cut_short_is_one() -> None:
+    assert broken(Rules(no_sdo_abort=True), "1 583#80406000\n2 603#8040600000") == [
+        "1 node 3: server aborts 6040h:00, without a whole abort code (4 B, 8 are right)",
+        "2 node 3: client aborts 6040h:00, without a whole abort code (5 B, 8 are right)",
+    ]
+
+
 def test_error_frames_are_found() -> None:
     assert broken(Rules(no_error_frames=True), "1 20000020#0000000000000000") == [
         "1 no acknowledge"
@@ -59,6 +84,13 @@ def test_each_unknown_identifier_is_found_once() -> None:
     rules = parse_rules({"known": "181,280-282"})
     text = "1 181#\n2 281#\n3 183#\n4 183#\n5 00000181#\n6 20000020#0000000000000000"
     assert broken(rules, text) == ["3 183 is not expected", "5 00000181 is not expected"]
+
+
+def test_a_known_identifier_stands_for_its_remote_frames_too() -> None:
+    text = "1 714#R\n1 714#05\n2 715#R\n3 716#"
+    assert broken(parse_rules({"known": "714,715R"}), text) == ["3 716 is not expected"]
+    assert broken(parse_rules({"known": "714-716"}), text) == []
+    assert broken(parse_rules({"known": "715R"}), "1 715#05") == ["1 715 is not expected"]
 
 
 HEARTBEAT = parse_rules({"heartbeat": "3=100ms±20%"})
@@ -77,6 +109,16 @@ def test_a_late_and_an_early_heartbeat_are_found() -> None:
 
 def test_the_times_around_a_boot_up_are_free() -> None:
     assert broken(HEARTBEAT, "1 703#05\n1.5 703#00\n1.9 703#7F\n2.0 703#7F") == []
+
+
+def test_a_heartbeat_without_a_state_is_found() -> None:
+    assert broken(HEARTBEAT, "1 703#05\n1.1 703#") == ["1.1 node 3: heartbeat of 0 B, 1 is right"]
+
+
+def test_a_boot_up_may_be_longer_than_its_byte() -> None:
+    assert broken(Rules(no_reboot=True), "1 703#05\n2 703#0000000000000000") == [
+        "2 node 3 boots again without an NMT reset"
+    ]
 
 
 def test_the_second_heartbeat_after_a_boot_up_is_judged() -> None:
@@ -173,6 +215,144 @@ def test_a_heartbeat_that_is_lost_is_found_without_a_period() -> None:
 )
 def test_what_is_no_lost_heartbeat_is_not_found(text: str) -> None:
     assert broken(LOST, text) == []
+
+
+WRITE_1017 = "603#2B17100064000000\n1.01 583#6017100000000000"
+
+
+@pytest.mark.parametrize(
+    ("text", "end_s", "said"),
+    [
+        ("1 703#05\n1.1 703#05", 1.26, "160.000 ms, one each 100.000 ms before"),
+        (f"0.5 703#05\n1 {WRITE_1017}\n1.1 703#05", 1.26, "160.000 ms, its 1017h says 100.000 ms"),
+        (f"1 {WRITE_1017}", 1.2, "190.000 ms, its 1017h says 100.000 ms"),
+        ("1 603#4017100000000000\n1.01 583#4B17100064000000\n1.1 703#00", 1.26, "160.000 ms, its"),
+        (f"1 {WRITE_1017}\n1.1 703#05\n1.2 703#05\n1.36 703#05", 1.36, "160.000 ms, its 1017h"),
+    ],
+)
+def test_a_dead_node_whose_period_can_be_known_is_found(text: str, end_s: float, said: str) -> None:
+    (found,) = broken(LOST, text, end_s)
+    assert f"can0 node 3: no heartbeat for {said}" in found
+    assert broken(LOST, text if "1.36" not in text else f"1 {WRITE_1017}", 1.1) == []
+
+
+def test_a_period_that_is_written_begins_anew_and_0_ends_it() -> None:
+    slow = "0 703#05\n1 703#05\n2 703#05\n"
+    written = WRITE_1017.replace("1.01", "2.91")
+    assert broken(LOST, f"{slow}2.9 {written}\n3 703#05\n3.1 703#05", 3.2) == []
+    ended = written.replace("64", "00")
+    assert broken(LOST, f"{slow}2.9 {ended}", 20) == []
+
+
+def test_a_refused_write_tells_no_period() -> None:
+    refused = "1 603#2B17100064000000\n1.01 583#8017100002000106\n1.1 703#05"
+    assert broken(LOST, refused, 9) == []
+
+
+def test_an_eds_tells_the_period_of_a_node_until_it_is_heard() -> None:
+    def lost(text: str, end_s: float) -> list[str]:
+        checker, records = Checker(LOST, eds_heartbeats={3: 100}), hear(text)
+        found = [finding for record in records for finding in checker.take(record)]
+        return [one.text for one in found + checker.end(round(end_s * 1e6))]
+
+    assert lost("1 703#05", 1.16) == [
+        "can0 node 3: no heartbeat for 160.000 ms, its 1017h says 100.000 ms"
+    ]
+    assert lost("1 080#", 1.16) == ["node 3: no heartbeat for 160.000 ms, its EDS says 100 ms"]
+    assert lost("1 080#", 1.15) == []
+    assert lost("1 703#05\n2 703#05\n3 703#05", 4)[1:] == []  # heard: one a second
+    assert lost("1 703#R\n1.01 703#85", 9) == []  # guarded
+    assert lost(f"1 {WRITE_1017.replace('64', '00')}", 9) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1 703#05\n1.1 703#05\n1.15 703#R\n1.2 703#05\n1.3 703#05\n1.4 703#05",
+        "1 703#R\n1.01 703#05\n2 703#R\n2.01 703#85\n9 703#R\n9.01 703#05",
+    ],
+)
+def test_requests_of_guarding_lose_no_heartbeat(text: str) -> None:
+    assert broken(LOST, text) == []
+
+
+def unjudged(rules: Rules, text: str, end_s: float | None = None) -> dict[str, str]:
+    """Return which rules judge nothing, and why."""
+    checker, records = Checker(rules, 500_000), hear(text)
+    for record in records:
+        checker.take(record)
+    end_us = round(end_s * 1e6) if end_s else records[-1].at_us
+    checker.end(end_us)
+    return dict(checker.unjudged(end_us).rules)
+
+
+@pytest.mark.parametrize(
+    ("words", "text", "why"),
+    [
+        ({"heartbeat": "3=100ms±20%"}, "1 703#05", "1 frame of error control came, and no gap"),
+        ({"heartbeat": "3=100ms±20%"}, "1 703#00\n1.1 703#05", "2 frames of error control"),
+        ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1 703#05\n1 703#05", "all frames have one time"),
+        ({"max_gap": "181=20ms"}, "1 181#\n1.01 182#", "181 came once"),
+        ({"max_gap": "181=20ms"}, "1 181#\n1 181#", "all frames have one time"),
+        ({"max_load": 50}, "1 181#\n1 181#", "all frames have one time"),
+        ({"max_load": 50}, "1 20000080#0000000000000000", "no frame came"),
+        ({"no_lost_heartbeat": True}, "1 181#\n2 181#", "no heartbeat came"),
+        ({"no_lost_heartbeat": True}, "1 703#05\n2 181#", "of can0 node 3 no period is known"),
+        ({"no_lost_heartbeat": True}, "1 703#05\n2 703#05", "of can0 node 3 no period has passed"),
+        ({"no_lost_heartbeat": True}, "1 703#85\n2 703#05\n3 703#85", "can0 node 3 is guarded"),
+        ({"no_lost_heartbeat": True}, "1 703#05\n1 703#05\n1 703#05", "all frames have one time"),
+        ({"no_emcy": True}, "1 18FF1234#00", "no classic frame with an 11-bit CAN-ID came"),
+        ({"no_sdo_abort": True}, "1 18FF1234#R", "no classic frame with an 11-bit CAN-ID came"),
+        ({"no_reboot": True}, "1 18FF1234#00", "no classic frame with an 11-bit CAN-ID came"),
+    ],
+)
+def test_a_rule_that_judges_nothing_says_why(words: dict[str, object], text: str, why: str) -> None:
+    ((_, said),) = unjudged(parse_rules(words), text).items()
+    assert said.startswith(why)
+
+
+@pytest.mark.parametrize(
+    ("words", "text", "end_s"),
+    [
+        ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1.1 703#05", None),
+        ({"heartbeat": "3=100ms±20%"}, "1 703#00\n1.1 703#05\n1.2 703#05", None),
+        ({"heartbeat": "3=100ms±20%"}, "1 703#05\n1.1 703#05\n1.2 703#00\n1.3 703#00", None),
+        ({"max_gap": "181=20ms"}, "1 181#\n1.01 181#", None),
+        ({"max_load": 50}, "1 181#", 5.0),
+        ({"no_lost_heartbeat": True}, "1 703#05\n1.1 703#05", 1.2),
+        ({"no_lost_heartbeat": True}, "1 703#05\n1.1 703#05\n1.2 703#05\n1.3 703#05", None),
+        ({"no_emcy": True, "no_sdo_abort": True, "no_reboot": True}, "1 181#", None),
+        ({"no_error_frames": True, "known": "181", "nodes": 1}, "1 181#", None),
+    ],
+)
+def test_a_rule_that_judges_something_does_not(
+    words: dict[str, object], text: str, end_s: float | None
+) -> None:
+    assert unjudged(parse_rules(words), text, end_s) == {}
+
+
+def test_what_is_not_judged_of_a_node_is_noted_beside_the_others() -> None:
+    checker = Checker(LOST)
+    for record in hear("1 703#05\n1.1 703#05\n1.15 705#05\n1.2 703#05\n1.3 703#05"):
+        checker.take(record)
+    checker.end(1_300_000)
+    notes = ("no-lost-heartbeat: of can0 node 5 no period is known",)
+    assert checker.unjudged(1_300_000) == ({}, notes)
+
+
+def test_what_a_log_tells_of_errors_breaks_the_rule_against_error_frames_alone() -> None:
+    said = ["run.trc: it says that a controller is bus-off: 1 time"]
+    checker = Checker(Rules(no_error_frames=True, no_emcy=True))
+    found = checker.end(5_000_000, errors=said)
+    assert [(one.rule, one.text) for one in found] == [("no-error-frames", said[0])]
+
+
+def test_a_source_that_has_no_error_frames_proves_nothing() -> None:
+    checker = Checker(Rules(no_error_frames=True))
+    checker.take(hear("1 181#")[0])
+    assert checker.unjudged(0, "a trace holds none").rules == {
+        "no-error-frames": "a trace holds none"
+    }
 
 
 def test_a_second_that_is_too_busy_is_found_when_it_is_over() -> None:

@@ -54,6 +54,33 @@ def test_nothing_known_is_a_rule_and_nothing_said_is_none() -> None:
         ({"nodes": "x"}, "nodes 'x' is not like 3 or 3-7"),
         ({"nodes": "0-3"}, "nodes '0-3': node-IDs are 1 to 127"),
         ({"nodes": "5-3"}, "nodes '5-3': the lower node-ID stands first, as 3-5"),
+        *[
+            ({"nodes": text}, f"nodes {text!r} is not like 3 or 3-7")
+            for text in ("1-", "-5", "1-2-3", "", "-", "1-x", "\u0661", "1-\u0662", "0x3", "1 2")
+        ],
+        ({"nodes": ["1-"]}, "nodes '1-' is not like 3 or 3-7"),
+        ({"nodes": ["3", "1-2-3"]}, "nodes '1-2-3' is not like 3 or 3-7"),
+        ({"nodes": 128}, "nodes '128': node-IDs are 1 to 127"),
+        ({"nodes": [1, 999]}, "nodes '999': node-IDs are 1 to 127"),
+        ({"nodes": [True]}, "nodes 'True' is not like"),
+        ({"nodes": [1.0]}, "nodes '1.0' is not like"),
+        ({"nodes": []}, "nodes is empty: leave it out"),
+        ({"heartbeat": {}}, "heartbeat is empty: leave it out"),
+        ({"max_gap": []}, "max_gap is empty: leave it out"),
+        ({"rule": []}, "rule is empty: leave it out"),
+        *[
+            ({"known": text}, f"known {text!r} is not like 181 or 181-18F")
+            for text in ("181-", "-181", "181-182-183", "", "-")
+        ],
+        ({"known": "181-00000185"}, "known '181-00000185': write both ends alike"),
+        ({"known": "181-185R"}, "known '181-185R': write both ends alike"),
+        ({"known": "\u0661\u0662\u0663"}, "is not a CAN-ID"),
+        ({"known": "00000000-1FFFFFFF"}, "known '00000000-1FFFFFFF': "),
+        ({"heartbeat": "\u0663=100ms±20%"}, "is not like 3=100ms±20%"),
+        ({"heartbeat": "0=100ms±20%"}, "is not like 3=100ms±20%"),
+        ({"heartbeat": "3=-100ms±20%"}, "'-100ms' is not a time"),
+        ({"max_gap": "181=\u0662ms"}, "is not a time"),
+        ({"max_gap": "181=-2ms"}, "'-2ms' is not a time"),
         ({"max_gap": "181"}, "'' is not a time"),
         ({"max_gap": "18=1ms"}, "'18' is not a CAN-ID"),
         ({"known": "18F-181"}, "known '18F-181': 18F is not below the other end"),

@@ -110,4 +110,4 @@ def test_frames_that_change_nothing_are_not_decoded(monkeypatch: pytest.MonkeyPa
     frames = ["080#", *["185#270000000000", "186#00", "705#05"] * 100]
     records = [Record(n * 1_000, "can0", CanFrame.parse(text)) for n, text in enumerate(frames)]
     in_blocks(records, MAPPED, 1_000)
-    assert decoded == ["080#", *["705#05"] * 99, "185#270000000000", "705#05"]
+    assert decoded == ["080#", *["705#05"] * 99, "185#270000000000", "186#00", "705#05"]

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 from tests.host.monitor.decode import drive_trace
 from tests.host.monitor.decode.traces import STEP_US, trace
 from tickrig.host.monitor.decode.board_text import board_json, render_board
@@ -52,8 +54,17 @@ def test_the_board_of_a_drive_reads_like_this() -> None:
     assert "node 5  8210h PDO not processed" in history[2]
 
 
-def test_no_node_is_said_to_be_none() -> None:
-    assert render_board(board_of("181#00"), 0, WIDE, 10) == ["no node was heard"]
+@pytest.mark.parametrize("frame", ["080#", "201#00", "601#4000100000000000", "181#R", "7E5#00"])
+def test_no_node_is_said_to_be_none(frame: str) -> None:
+    assert render_board(board_of(frame), 0, WIDE, 10) == ["no node was heard"]
+
+
+@pytest.mark.parametrize("can_id", ["189", "289", "389", "489"])
+def test_a_pdo_at_its_pre_defined_can_id_is_hearing_its_node(can_id: str) -> None:
+    board = board_of(f"{can_id}#01")
+    (row,) = board.rows()
+    assert (row.node, row.present, row.state) == (9, True, None)
+    assert render_board(board, 0, WIDE, 10) == ["NODE  NMT STATE", "9     ?"]
 
 
 def test_the_period_of_a_heartbeat_is_learnt() -> None:

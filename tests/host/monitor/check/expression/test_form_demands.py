@@ -54,3 +54,18 @@ def test_the_toggle_bit_begins_with_0_after_a_boot_up() -> None:
     guarded = "1 703#R\n1.01 703#05\n2 703#00\n3 703#R\n3.01 703#7F"
     assert broken("guard toggle", guarded) == []
     assert len(broken("guard toggle", guarded.replace("703#7F", "703#FF"))) == 1
+
+
+def test_a_heartbeat_behind_a_single_request_is_no_answer_for_ever() -> None:
+    beats = "1 703#R\n1.1 703#05\n1.2 703#05\n1.3 703#05\n1.4 703#05"
+    assert broken("guard toggle", beats) == []
+    assert broken("guard toggle", f"{beats}\n2 703#R\n2.1 703#05\n2.2 703#05") == []
+
+
+def test_an_answer_stands_still_though_its_request_is_not_in_the_log() -> None:
+    assert len(broken("guard toggle", "1 703#05\n2 703#85\n3 703#85\n4 703#05")) == 1
+
+
+def test_a_first_answer_without_its_request_excuses_no_others() -> None:
+    text = "1 703#05\n2 703#R\n2.01 703#05\n3 703#R\n3.01 703#05"
+    assert len(broken("guard toggle", text)) == 1
