@@ -25,3 +25,12 @@ def broken(rule: str, text: str, end_s: float | None = None) -> list[str]:
     end_us = None if end_s is None else round(end_s * 1e6)
     found = findings(rule, hear(text), end_us)
     return [f"{one.at_us / 1e6:g} {one.text}" for one in found]
+
+
+def unjudged(rule: str, text: str, end_s: float | None = None) -> str:
+    """Return why a rule has judged nothing; empty if it has, or has found something."""
+    checker, decoder, records = Checker(parse_rules({"rule": [rule]})), Decoder(), hear(text)
+    found = [one for record in records for one in checker.take(record, decoder.take(record))]
+    end_us = records[-1].at_us if end_s is None else round(end_s * 1e6)
+    found += checker.end(end_us)
+    return "" if found else checker.unjudged(end_us).rules.get(rule, "")

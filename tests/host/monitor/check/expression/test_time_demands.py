@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.host.monitor.check.expression.held import MAPPED, broken, findings
+from tests.host.monitor.check.expression.held import MAPPED, broken, findings, unjudged
 from tests.host.monitor.record_log import hear
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can_fd import FdFrame
@@ -180,3 +180,61 @@ def test_nothing_is_waited_for_when_its_scope_is_over() -> None:
     assert (
         broken(rule, MAPPED + "1 703#05\n1.1 080#\n1.101 703#04\n2 080#\n3 703#05\n4 703#05") == []
     )
+
+
+BEATS = "1 703#05\n1.1 703#05\n1.2 703#05"
+
+
+@pytest.mark.parametrize(
+    ("rule", "text", "why"),
+    [
+        ("emcy never after boot-up of 3", BEATS, "it was never in force: after boot-up of 3"),
+        ("emcy never while node 3 stopped", BEATS, "it was never in force: while node 3 stopped"),
+        ("emcy never after boot-up of 3", "1 703#00", "it was never in force: after boot-up of 3"),
+        ("heartbeat of 3 every ..20ms", "1 703#05", "heartbeat of 3 did not come twice from one"),
+        ("tpdo1 of 3 every 5ms..", BEATS, "tpdo1 of 3 did not come twice from one sender"),
+        ("node 3 operational within 2s", "1 703#7F\n2 703#7F", "it ends before 2000.0 ms have"),
+        ("sync to tpdo1 of 3 under 2ms", BEATS, "no sync came that has 2.000 ms behind it"),
+        ("sync to emcy under 2ms", "1 703#05\n2 080#", "no sync came that has 2.000 ms behind it"),
+        ("sdo answered within 50ms", BEATS, "no request of sdo came that has 50.000 ms behind it"),
+        ("guard answered within 50ms", BEATS, "no request of guard came"),
+        ("emcy in {8130h}", BEATS, "no value of emcy came while it was in force"),
+        ("sync counts", "1 080#01\n2 703#05", "no two values of sync came from one sender"),
+        ("sync counts", "1 080#\n2 080#", "no two values of sync came from one sender"),
+        ("sync steps under 5", "1 080#01", "no two values of sync came from one sender"),
+        ("sync changes within 1s", "1 080#01", "no two values of sync came from one sender"),
+        ("tpdo1 dlc", "1 183#00", "no frame of tpdo1 came whose length is known; PDOs came that"),
+        ("emcy dlc", BEATS, "no frame of emcy came whose length is known"),
+        ("guard toggle", "1 703#R\n1.01 703#05", "no two answers of guard to guarding came"),
+        ("heartbeat every ..20ms", "1 703#05\n1 703#05", "all frames have one time"),
+        ("heartbeat at most 9 per 1s", "1 703#05\n1 703#05", "all frames have one time"),
+    ],
+)
+def test_a_rule_that_judges_nothing_says_why(rule: str, text: str, why: str) -> None:
+    assert unjudged(rule, text).startswith(why)
+
+
+@pytest.mark.parametrize(
+    ("rule", "text"),
+    [
+        ("emcy never", BEATS),
+        ("emcy of 4 never", BEATS),
+        ("emcy never after heartbeat of 3", BEATS),
+        ("emcy at most 3", BEATS),
+        ("emcy at most 3 per 1s", BEATS),
+        ("boot-up at least 0", BEATS),
+        ("heartbeat of 3 every 100ms ±10%", BEATS),
+        ("node 3 operational within 2s", BEATS),
+        ("sync to heartbeat under 2ms", "1 080#\n1.001 703#05"),
+        ("heartbeat of 3 in {operational}", BEATS),
+        ("heartbeat in {5}", BEATS),
+        ("sync counts", "1 080#01\n2 080#02"),
+        ("sync steps under 5", "1 080#01\n2 080#02"),
+        ("sync changes within 1s", "1 080#01\n1.5 080#02"),
+        ("dlc", BEATS),
+        ("guard toggle", "1 703#R\n1.01 703#05\n2 703#R\n2.01 703#85"),
+        ("guard answered within 50ms", "1 703#R\n1.01 703#05"),
+    ],
+)
+def test_a_rule_that_judges_something_does_not(rule: str, text: str) -> None:
+    assert unjudged(rule, text) == ""
