@@ -28,6 +28,7 @@ from tickrig.host.monitor.decode.services import (
 from tickrig.host.monitor.frames.ident import sender_of
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
+from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
 from tickrig.wire.canopen.nmt import NMT_COB_ID
 from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
@@ -184,10 +185,11 @@ class BusDecoder:
         """Return it with name and value of its object."""
         entry = transfer.entry
         text = ObjectText() if entry is None else self.memory(transfer.node).describe(*entry)
-        value, written = (None, "") if transfer.data is None else text.read(transfer.data)
-        return replace(
-            transfer, name=text.name, value=value, text=written, unit=text.unit, source=text.source
-        )
+        data, sized = transfer.data, transfer.sized
+        value, written = (None, "") if data is None else text.read(data, sized=sized)
+        named = replace(transfer, name=text.name, value=value, text=written)
+        length = "" if data is None else _odd_length(text.kind, data, sized=sized)
+        return replace(named, length=length, unit=text.unit, source=text.source)
 
     def _learn(self, transfer: Transfer) -> None:
         """Take a transferred value as evidence."""
@@ -236,6 +238,15 @@ class BusDecoder:
         self.changes += 1
         self._configured[can_id] = route
         self._routes.pop(can_id, None)
+
+
+def _odd_length(kind: DataType | None, data: bytes, *, sized: bool) -> str:
+    """Say that a number of bytes was not told, or is not that of the type."""
+    if not sized:
+        return "" if kind is not None and kind.size == len(data) else "size not told"
+    if kind is None or not kind.size or kind.size == len(data):
+        return ""
+    return f"{len(data)} B where {kind.name} has {kind.size}"
 
 
 def _signals(transfer: Transfer) -> tuple[Signal, ...]:

@@ -142,6 +142,7 @@ class NodeMemory:
         entry, data = transfer.entry, transfer.data
         if entry is None or data is None or transfer.flaws or transfer.outcome is not Outcome.DONE:
             return False
+        data = self.describe(*entry).fitted(data, sized=transfer.sized)
         if transfer.direction is Direction.UPLOAD:
             self.read(entry, data)
         else:

@@ -73,8 +73,28 @@ class ObjectText(NamedTuple):
     source: str = ""
     in_hex: bool = False
 
-    def read(self, data: bytes) -> tuple[Value, str]:
-        """Return value and text of some bytes; a type that does not fit them is not used."""
+    def fitted(self, data: bytes, *, sized: bool = True) -> bytes:
+        """Return the bytes that the type has, of more that an SDO carried.
+
+        Args:
+            data: as they were carried.
+            sized: their number was told. Where it was not, those behind mean nothing; where it
+                was, they are left out only if they fill the value up.
+        """
+        size = 0 if self.kind is None else self.kind.size
+        if not 0 < size < len(data):
+            return data
+        value, rest = data[:size], data[size:]
+        fill = b"\xff" if self.kind and self.kind.signed and value[-1] >> 7 else b"\0"
+        filled = self.kind is not None and self.kind.is_integer and rest == fill * len(rest)
+        return value if filled or not sized else data
+
+    def read(self, data: bytes, *, sized: bool = True) -> tuple[Value, str]:
+        """Return value and text of some bytes, as `fitted` has them.
+
+        A type that does not fit them is not used.
+        """
+        data = self.fitted(data, sized=sized)
         if self.kind is not None and not self.in_hex:
             try:
                 return self._scaled(self.kind.decode(data))

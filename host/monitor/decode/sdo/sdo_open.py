@@ -37,6 +37,7 @@ class OpenTransfer:
     Attributes:
         phase: what is expected next.
         size: number of bytes, None if it was not said.
+        sized: what came says how many bytes it has.
         crc: both sides can do the CRC.
         sent: the segment of a download that has no receipt yet.
         requested_toggle: toggle bit of the segment of an upload that was asked for.
@@ -55,6 +56,7 @@ class OpenTransfer:
     begun_by: bytes = b""
     phase: Phase = Phase.ASKED
     size: int | None = None
+    sized: bool = True
     retries: int = 0
     partial: bool = False
     crc: bool = False
@@ -130,4 +132,5 @@ class OpenTransfer:
             retries=self.retries,
             partial=self.partial,
             flaws=tuple(self.flaws),
+            sized=self.sized,
         )

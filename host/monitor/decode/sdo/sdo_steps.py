@@ -47,8 +47,9 @@ def begin(at_us: int, node: int, request: Initiate, data: bytes) -> OpenTransfer
     match request:
         case DownloadInitiateRequest(data=None, size=size):
             opened.mode, opened.size = Mode.SEGMENTED, size
-        case DownloadInitiateRequest(data=bytes(value)):
+        case DownloadInitiateRequest(data=bytes(value), size=size):
             opened.data += value
+            opened.sized = size is not None
         case BlockUploadInitiateRequest(crc=crc):
             opened.mode, opened.crc = Mode.BLOCK, crc
         case BlockDownloadInitiateRequest(crc=crc, size=size):
@@ -76,9 +77,11 @@ def take_answer(running: OpenTransfer, answer: Answer) -> str:
     if answer.data is not None:
         running.mode, running.done = Mode.EXPEDITED, True
         running.data += answer.data
+        running.sized = answer.size is not None
         return "upload"
     running.mode, running.phase, running.size = Mode.SEGMENTED, Phase.SEGMENTS, answer.size
-    return f"segments follow, {running.progress}"
+    size = "their size is not told" if answer.size is None else running.progress
+    return f"segments follow, {size}"
 
 
 def unheard(at_us: int, node: int, answer: Answer) -> OpenTransfer:

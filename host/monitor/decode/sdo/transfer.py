@@ -58,6 +58,8 @@ class Transfer:
         retries: frames, and segments of a block, that were sent again.
         partial: its beginning was not heard.
         flaws: what does not fit: a gap, a size, a CRC.
+        sized: the number of bytes was told; of an expedited transfer without it there are four.
+        length: what is odd about it, for people.
         name: of the object, empty where nobody named it.
         value: of the bytes; a number of up to 8 bytes where the type is not known.
         text: the value for people.
@@ -79,6 +81,8 @@ class Transfer:
     retries: int = 0
     partial: bool = False
     flaws: tuple[str, ...] = ()
+    sized: bool = True
+    length: str = ""
     name: str = ""
     value: Value | None = None
     text: str = ""
@@ -108,6 +112,7 @@ class Transfer:
             notes.append(self.outcome)
         notes += [f"{self.retries} sent again"] if self.retries else []
         notes += ["beginning not heard"] if self.partial else []
+        notes += [self.length] if self.length else []
         return [*notes, *self.flaws, f"{self.duration_us / 1_000:.1f} ms"]
 
 

@@ -14,7 +14,8 @@ from click.testing import CliRunner, Result
 from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.net import session
+from tickrig.host.canmon.net import session, values
+from tickrig.host.canmon.net.node_objects import NodeObjects
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 CANMON = "from tickrig.commands import canmon; canmon()"
@@ -248,3 +249,18 @@ def test_a_bus_may_stand_in_options() -> None:
     result = net("-i", "nosuch", "-c", "x", "scan")
     assert result.exit_code == 2
     assert "-i 'nosuch' is none of python-can" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("entry", "data", "said"),
+    [
+        ((0x1019, 0), "09000000", "9 (0x00000009)"),
+        ((0x1019, 0), "09", "9 (0x09)"),
+        ((0x1017, 0), "E8030000", "1000 (0x000003E8)"),
+        ((0x1019, 0), "090000AA", "0xAA000009 (0xAA000009)"),
+    ],
+)
+def test_a_value_that_is_longer_than_its_type_is_read(
+    entry: tuple[int, int], data: str, said: str
+) -> None:
+    assert values.shown(NodeObjects(5), entry, bytes.fromhex(data)) == said

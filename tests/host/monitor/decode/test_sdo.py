@@ -308,3 +308,46 @@ def test_frames_of_a_wrong_length_are_said_to_be() -> None:
 def test_an_unknown_command_is_said_to_be() -> None:
     assert last("605#E000000000000000").text == "client command E0h is not of CiA 301"
     assert last("585#E000000000000000").text == "server command E0h is not of CiA 301"
+
+
+@pytest.mark.parametrize(
+    ("answer", "text", "length"),
+    [
+        ("42191000090000AA", "9", "size not told"),  # what is behind means nothing
+        ("4219100009000000", "9", "size not told"),
+        ("42171000E80300AA", "1000", "size not told"),
+        ("42001000920102AA", "0xAA020192", ""),  # four bytes are what it has
+        ("4319100009000000", "9", "4 B where UNSIGNED8 has 1"),
+        ("4B19100009000000", "9", "2 B where UNSIGNED8 has 1"),
+        ("43191000090000AA", "0xAA000009", "4 B where UNSIGNED8 has 1"),
+        ("4F17100007000000", "0x07", "1 B where UNSIGNED16 has 2"),
+        ("42002000090000AA", "0xAA000009", "size not told"),
+        ("4F19100009000000", "9", ""),
+    ],
+)
+@pytest.mark.parametrize("write", [False, True])
+def test_a_value_is_read_whatever_length_is_told(
+    answer: str, text: str, length: str, write: bool
+) -> None:
+    if write:
+        command = {"42": "22", "43": "23", "4B": "2B", "4F": "2F"}[answer[:2]]
+        found = transfers(f"605#{command}{answer[2:]} 585#60{answer[2:8]}00000000")
+    else:
+        found = transfers(f"605#40{answer[2:8]}00000000 585#{answer}")
+    (transfer,) = found
+    assert (transfer.text, transfer.length) == (text, length)
+    assert (length in str(transfer)) is True
+
+
+def test_what_is_learnt_has_the_length_of_its_type() -> None:
+    decoder = Decoder()
+    for text in ("605#4017100000000000", "585#42171000E80300AA"):
+        decoder.take(Record(0, "can0", CanFrame.parse(text)))
+    assert decoder.memory("can0", 5).number(0x1017, 0) == 1_000
+
+
+def test_segments_of_an_unknown_number_are_said_to_be_so() -> None:
+    assert last("605#4008100000000000 585#4008100000000000").text == (
+        "segments follow, their size is not told"
+    )
+    assert last("605#4008100000000000 585#4108100005000000").text == ("segments follow, 0 of 5 B")
