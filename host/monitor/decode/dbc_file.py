@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,9 @@ from tickrig.wire.canopen.datatypes import Value
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
+    from cantools.database.can import Signal as SignalOfDbc
     from cantools.database.namedsignalvalue import NamedSignalValue
+    from cantools.typechecking import SignalDictType
 
 
 class DbcError(ValueError):
@@ -42,6 +45,7 @@ class DbcFile:
         except (Error, ValueError, KeyError) as error:
             raise DbcError(f"{path} is no DBC: {' '.join(str(error).split())}") from error
         self._failures = (Error, ValueError, KeyError)
+        self._alone: dict[tuple[int, bool], dict[str, Message]] = {}
         assert isinstance(database, Database)  # as the format says
         self._messages: dict[tuple[int, bool], Message] = {
             (message.frame_id, message.is_extended_frame): message for message in database.messages
@@ -62,13 +66,57 @@ class DbcFile:
             return None
         if frame.remote:
             return Decoded("dbc", None, f"{message.name} asked for by RTR", (), DBC)
+        note = list[str]()
         try:
             found = message.decode_simple(frame.data, allow_truncated=True)
         except self._failures as error:
-            return Decoded("dbc", None, f"{message.name}: {error}", (), DBC)
+            found, note = self._chosen(ident, message, frame.data), [f"({error})"]
+            if not found:
+                return Decoded("dbc", None, f"{message.name}: {error}", (), DBC)
         units = self._units[ident]  # DBCs made from EDS have several messages of one name
         signals = tuple(_signal(name, value, units[name]) for name, value in found.items())
-        return Decoded("dbc", None, " ".join([message.name, *map(str, signals)]), signals, DBC)
+        return Decoded(
+            "dbc", None, " ".join([message.name, *map(str, signals), *note]), signals, DBC
+        )
+
+    def _chosen(self, ident: tuple[int, bool], message: Message, data: bytes) -> SignalDictType:
+        """Return the signals of a frame whose multiplexer has a value that no signal has.
+
+        cantools gives none of them then. Here each is read by itself, and those are returned that
+        no multiplexer selects, or one does by its value.
+        """
+        if ident not in self._alone:
+            self._alone[ident] = {one.name: _alone(message, one) for one in message.signals}
+        raw: SignalDictType = {}
+        found: SignalDictType = {}
+        selectors: list[str | None] = [None]
+        for selector in selectors:
+            for signal in message.signals:
+                ids = signal.multiplexer_ids
+                if signal.multiplexer_signal != selector:
+                    continue
+                if selector is not None and ids is not None and raw.get(selector) not in ids:
+                    continue
+                alone = self._alone[ident][signal.name]
+                try:
+                    raw |= alone.decode_simple(data, False, False, allow_truncated=True)
+                    found |= alone.decode_simple(data, allow_truncated=True)
+                except self._failures:
+                    continue
+                selectors += [signal.name] if signal.is_multiplexer else []
+        return found
+
+
+def _alone(message: Message, signal: SignalOfDbc) -> Message:
+    """Return the message with one signal of it, that nothing selects."""
+    from cantools.database.can import Message as NewMessage  # noqa: PLC0415 - slow, and an extra
+
+    one = copy(signal)
+    one.is_multiplexer, one.multiplexer_ids, one.multiplexer_signal = False, None, None
+    extended = message.is_extended_frame
+    return NewMessage(
+        message.frame_id, message.name, message.length, [one], is_extended_frame=extended
+    )
 
 
 def _signal(name: str, value: Value | NamedSignalValue, unit: str) -> Signal:

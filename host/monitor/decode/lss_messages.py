@@ -46,7 +46,8 @@ def decode_lss(at_us: int, frame: CanFrame) -> Decoded:
     command = LssCommand(data[0])
     text = _master(command, data) if by_master else _slave(command, data)
     name = command.name.lower().replace("_", " ")
-    signals = (Signal("command", data[0]), Signal("number", number_of(data)))
+    word = Signal("command", data[0], "", name.replace(" ", "-"))
+    signals = (word, Signal("number", number_of(data)))
     return Decoded("lss", None, f"{who}: {name} {text}".rstrip(), signals)
 
 

@@ -45,8 +45,9 @@ def decode_error(frame: ErrorFrame) -> Decoded:
     words = [text for bit, text in enumerate(_CLASSES) if frame.error_class >> bit & 1]
     states = [text for bit, text in enumerate(_CONTROLLER) if frame.data[1] >> bit & 1]
     text = ", ".join(words) or f"class {frame.error_class:X}h"
+    word = text.replace(" ", "-")
     text += f": {', '.join(states)}" if states and "controller" in words else ""
-    return Decoded("error", None, text, (Signal("class", frame.error_class),))
+    return Decoded("error", None, text, (Signal("class", frame.error_class, "", word),))
 
 
 TOGGLE: Final = 0x80
@@ -69,7 +70,8 @@ def decode_nmt(at_us: int, frame: CanFrame) -> Decoded:
     command, node = NmtCommand(data[0]), data[1]
     whom = "all nodes" if node == ALL_NODES else f"node {node}"
     text = f"{_words(command.name)}, {whom}"
-    return Decoded("nmt", node or None, text, (Signal("command", data[0]),))
+    word = _words(command.name).replace(" ", "-")
+    return Decoded("nmt", node or None, text, (Signal("command", data[0], "", word),))
 
 
 def decode_sync(at_us: int, frame: CanFrame) -> Decoded:

@@ -28,12 +28,51 @@ def said(text: str) -> Decoded:
         ("123#E803", "Engine Speed=500.0rpm"),
         ("123#R", "Engine asked for by RTR"),
         ("18FF0001#05", "Wide Mux=0 Level=5%"),
-        ("18FF0001#25", "Wide: expected multiplexer id 0, but got 2"),
+        ("18FF0001#25", "Wide Mux=2 (expected multiplexer id 0, but got 2)"),
     ],
 )
 def test_a_dbc_file_names_signals(frame: str, text: str) -> None:
     decoded = said(frame)
     assert (decoded.kind, decoded.source, decoded.text) == ("dbc", "dbc", text)
+
+
+NESTED = """\
+VERSION ""
+BU_: A B
+BO_ 385 Mux: 8 A
+ SG_ Selector M : 0|8@1+ (1,0) [0|0] "" B
+ SG_ Always : 8|8@1+ (0.5,0) [0|0] "V" B
+ SG_ Sub m1M : 16|8@1+ (1,0) [0|0] "" B
+ SG_ Deep m4 : 24|8@1+ (1,0) [0|0] "" B
+ SG_ Other m2 : 16|8@1- (1,0) [0|0] "" B
+VAL_ 385 Selector 1 "one" 9 "nine" ;
+SG_MUL_VAL_ 385 Sub Selector 1-1;
+SG_MUL_VAL_ 385 Deep Sub 4-4;
+SG_MUL_VAL_ 385 Other Selector 2-2;
+"""
+
+
+@pytest.mark.parametrize(
+    ("frame", "text"),
+    [
+        ("181#0104040700000000", "Mux Selector=one Always=2.0V Sub=4 Deep=7"),
+        ("181#0204FF0700000000", "Mux Selector=2 Always=2.0V Other=-1"),
+        ("181#0904040700000000", "Mux Selector=nine Always=2.0V"),
+        ("181#0704040700000000", "Mux Selector=7 Always=2.0V (expected multiplexer id 1, 2 or 9"),
+        (
+            "181#0104050700000000",
+            "Mux Selector=one Always=2.0V Sub=5 (expected multiplexer id 4, but got 5",
+        ),
+        ("181#0704", "Mux Selector=7 Always=2.0V (expected multiplexer id 1, 2 or 9"),
+    ],
+)
+def test_a_multiplexer_is_told_though_no_signal_has_its_value(
+    frame: str, text: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mux.dbc"
+    path.write_text(NESTED)
+    (record,) = trace(frame)
+    assert Decoder(dbc=[path]).take(record).text.startswith(text)
 
 
 def test_messages_of_one_name_keep_their_own_signals(tmp_path: Path) -> None:

@@ -156,3 +156,22 @@ def test_all_bytes_of_a_can_fd_frame_are_values() -> None:
     records = [Record(at_us, "can0", frame) for at_us, frame in enumerate(frames, 1)]
     (found,) = findings("181[11] in {1}", records)
     assert found.text == "fd: no CANopen service 181[11]=2; 181[11] in {1} is right"
+
+
+@pytest.mark.parametrize(
+    ("rule", "right", "wrong"),
+    [
+        ("nmt in {start}", "000#0105", "000#0205"),
+        ("nmt in {stop, 0x81}", "000#0205\n2 000#8105", "000#0105"),
+        ("nmt in {enter-pre-operational, reset-communication}", "000#8000", "000#8100"),
+        ("nmt in {1}", "000#0105", "000#0205"),
+        ("command = start never", "000#0205", "000#0105"),
+        ("lss in {configure-node-id}", "7E5#1105000000000000", "7E5#1305000000000000"),
+        ("error in {no-acknowledge}", "20000020#0000000000000000", "20000004#0020000000000000"),
+        ("heartbeat in {operational}", "703#05", "703#04"),
+        ("guard in {stopped}", "703#84", "703#85"),
+    ],
+)
+def test_a_kind_has_its_values_by_name_and_by_number(rule: str, right: str, wrong: str) -> None:
+    assert broken(rule, f"1 {right}") == []
+    assert len(broken(rule, f"1 {wrong}")) == 1
