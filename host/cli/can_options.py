@@ -180,6 +180,32 @@ fd_options: Final[Decorator] = add_options(
 """Add the fields of `BusOptions` that are of CAN FD, beside `bus_options`."""
 
 
+def bus_and_rest(
+    words: Sequence[str], channel: str | None, rest: str, most: int | None = None
+) -> tuple[str | None, list[str]]:
+    """Tell the BUS of a command from what stands behind it; with -c there is no BUS.
+
+    Args:
+        words: the arguments.
+        channel: what -c says.
+        rest: what stands behind BUS, for messages.
+        most: how many of these there may be.
+
+    Returns:
+        The BUS, None where -c names it, and the rest.
+
+    Raises:
+        click.UsageError: one is missing, or there are too many.
+    """
+    bus, behind = (None, [*words]) if channel is not None else (words[0], [*words[1:]])
+    if not behind:
+        raise click.UsageError(f"Missing argument '{rest}'.")
+    if most is not None and len(behind) > most:
+        hint = f": -c {channel} names the bus" if channel is not None else ""
+        raise click.UsageError(f"Got unexpected extra argument ({' '.join(behind[most:])}){hint}")
+    return bus, behind
+
+
 def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, str | None]:
     """Open such a bus for somebody who takes it as python-can gives it.
 

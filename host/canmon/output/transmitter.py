@@ -29,7 +29,7 @@ class Transmitter:
     """An open bus.
 
     Args:
-        word: SOURCE word of a bus.
+        word: SOURCE word of a bus; None where the options name it.
         options: what the command line says of it.
         receives: read what comes in; else nothing is kept of it.
 
@@ -41,8 +41,8 @@ class Transmitter:
         SourceFailed: the bus cannot be opened.
     """
 
-    def __init__(self, word: str, options: BusOptions, *, receives: bool = False) -> None:
-        bus_word = parse_source(word)
+    def __init__(self, word: str | None, options: BusOptions, *, receives: bool = False) -> None:
+        bus_word = BusSpec() if word is None else parse_source(word)
         if not isinstance(bus_word, BusSpec):
             raise Refused(f"{word!r} is no bus; frames are sent on can0 or slcan:/dev/ttyACM0@500k")
         whole = merged(bus_word, options)
@@ -90,7 +90,7 @@ def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
 
 @contextmanager
 def transmitters(
-    words: Sequence[str], options: BusOptions, *, receives: bool = False
+    words: Sequence[str | None], options: BusOptions, *, receives: bool = False
 ) -> Iterator[list[Transmitter]]:
     """Open buses, and close them behind the block."""
     opened: list[Transmitter] = []

@@ -14,7 +14,7 @@ from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.socket_reader import SocketReader, let_fd
 from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
-from tickrig.host.cli.refused import BusUnavailable
+from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.links.can_link import receive
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
@@ -145,13 +145,24 @@ class OpenBus:
 
 
 def merged(word: BusSpec, options: BusOptions) -> BusOptions:
-    """Return the options of a bus: what its word says goes before them."""
+    """Return the options of a bus: what its word says goes before them.
+
+    Beside -i the word is the channel, colons and all, unless it begins with that interface.
+
+    Raises:
+        Refused: the word and -c name two channels.
+    """
+    interface, channel = word.interface, word.channel
+    if word.prefix and options.interface not in (None, interface):
+        interface, channel = options.interface, f"{word.prefix}:{channel or ''}"
+    if channel is not None and options.channel not in (None, channel):
+        raise Refused(f"BUS {channel} and -c {options.channel} name two channels; give one")
     return replace(
         options,
-        interface=word.interface or options.interface,
-        channel=word.channel or options.channel,
+        interface=interface or options.interface,
+        channel=channel or options.channel,
         bitrate=word.bitrate or options.bitrate,
-        bus_kwargs=(*local(word.interface), *options.bus_kwargs),
+        bus_kwargs=(*local(interface if word.interface else None), *options.bus_kwargs),
         fd=options.fd or word.data_bitrate is not None,
         data_bitrate=word.data_bitrate or options.data_bitrate,
     )

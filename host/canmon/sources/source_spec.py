@@ -13,7 +13,7 @@ True
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -54,6 +54,9 @@ class BusSpec:
     """A bus, and which frames of it are wanted; what is None the options say.
 
     One with a data bit rate is one of CAN FD.
+
+    Attributes:
+        prefix: what stood before the first colon: part of the channel where -i names the interface.
     """
 
     interface: str | None = None
@@ -61,6 +64,7 @@ class BusSpec:
     bitrate: int | None = None
     chosen: CandumpFilter | None = None
     data_bitrate: int | None = None
+    prefix: str = field(default="", repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +119,7 @@ def _bus(name: str, filters: str) -> BusSpec:
     if match is None or not name:
         raise Refused(f"SOURCE {name!r} is not a bus as can0 or slcan:/dev/ttyACM0@500k, nor a log")
     interface, channel, bitrate, fast = match.group("interface", "channel", "bitrate", "fast")
+    prefix = interface or ""
     if name in INTERFACES:
         interface, channel = name, ""
     if interface == "udp":
@@ -125,6 +130,7 @@ def _bus(name: str, filters: str) -> BusSpec:
         _bit_s(bitrate) if bitrate else None,
         _chosen(filters),
         _bit_s(fast) if fast else None,
+        prefix,
     )
 
 

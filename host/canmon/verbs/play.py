@@ -31,7 +31,7 @@ _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{3}|[0-9A-Fa-f]{8}")
 
 @click.command()
 @click.argument("log")
-@click.argument("buses", nargs=-1, required=True, metavar="BUS|BUS=RECORDED...")
+@click.argument("buses", nargs=-1, metavar="[BUS|BUS=RECORDED...]")
 @click.option("--speed", default="1", metavar="FACTOR", help="2 is twice as fast; max.")
 @click.option("--from", "from_", metavar="TIME", default="0s", help="Begin 3s after its start.")
 @click.option("--to", metavar="TIME", help="End 9s after its start.")
@@ -44,8 +44,8 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     """Send the frames of LOG again, with the gaps that were recorded.
 
     BUS takes all of it, BUS=RECORDED what was recorded on one bus; the frames
-    of others are left out. Error frames are not sent. At the end it says how
-    late the frames went out.
+    of others are left out. Without a BUS that of -c takes all of it. Error
+    frames are not sent. At the end it says how late the frames went out.
 
     \b
     canmon play run.log vcan0
@@ -55,19 +55,29 @@ def command(log: str, buses: Sequence[str], step: bool, **options: Any) -> None:
     from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
 
     wait_rx = _can_id(options.pop("wait_rx"))
-    words, route = _routes(buses)
+    words, route = _routes(buses, options["channel"])
     path = log_path(log)
     reader = read_log(path)
     plan = _plan(reader, route, options)
     receives = wait_rx is not None
     with transmitters(words, BusOptions(**options), receives=receives) as opened:
-        _play(plan, dict(zip(words, opened, strict=True)), step, wait_rx)
+        _play(
+            plan, {word or "": bus for word, bus in zip(words, opened, strict=True)}, step, wait_rx
+        )
     for word in reader.tally.messages(str(path)):
         click.echo(word, err=True)
 
 
-def _routes(words: Sequence[str]) -> tuple[list[str], Callable[[str], str | None]]:
-    """Return the buses to open, and where what was recorded goes."""
+def _routes(
+    words: Sequence[str], channel: str | None
+) -> tuple[list[str | None], Callable[[str], str | None]]:
+    """Return the buses to open, and where what was recorded goes; None is the bus of -c."""
+    if channel is not None:
+        if words:
+            raise Refused(f"-c {channel} names the bus: leave out {' '.join(words)}, or -c")
+        return [None], lambda recorded: ""
+    if not words:
+        raise click.UsageError("Missing argument 'BUS|BUS=RECORDED...'.")
     recorded: dict[str, str] = {}
     rest: str | None = None
     for word in words:

@@ -12,7 +12,7 @@ from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
-from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
+from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
 from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.transmit.frame_fields import (
     FrameFields,
@@ -33,8 +33,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("bus")
-@click.argument("frames", nargs=-1, required=True, metavar="FRAME...")
+@click.argument("words", nargs=-1, required=True, metavar="[BUS] FRAME...")
 @click.option("--every", metavar="TIME", help="Send again each 10ms, 1s, until Ctrl-C.")
 @click.option("--count", type=click.IntRange(1), metavar="N", help="Stop after N times.")
 @click.option("--counter", multiple=True, metavar="BYTE:LOW..HIGH", help="Count in 0:0..255.")
@@ -43,11 +42,12 @@ if TYPE_CHECKING:
 @click.option("-q", "--quiet", is_flag=True, help="Do not print what is sent.")
 @bus_options
 @fd_options
-def command(bus: str, frames: Sequence[str], eds: Sequence[str], **options: Any) -> None:
+def command(words: Sequence[str], eds: Sequence[str], **options: Any) -> None:
     """Send frames on BUS: by bytes as 123#DEADBEEF, or a PDO by the names of its objects.
 
-    123##1AABB is a CAN FD frame; the digit is 1 for BRS, 2 for ESI, 3 for both.
-    SocketCAN takes it as it is, other drivers want --fd.
+    Without a BUS they go to that of -c. 123##1AABB is a CAN FD frame; the
+    digit is 1 for BRS, 2 for ESI, 3 for both. SocketCAN takes it as it is,
+    other drivers want --fd.
 
     Objects that are not named have the value of the EDS, else 0. What is sent
     is printed as candump logs it. Bits of a byte are counted with
@@ -64,6 +64,9 @@ def command(bus: str, frames: Sequence[str], eds: Sequence[str], **options: Any)
 
     every, count, quiet = options.pop("every"), options.pop("count"), options.pop("quiet")
     fields = _fields(options.pop("counter"), options.pop("checksum"))
+    bus, frames = bus_and_rest(words, options["channel"], "FRAME...")
+    if bus is None and "#" not in frames[0] and "pdo" not in frames[0]:
+        raise Refused(f"-c {options['channel']} names the bus: leave out {frames[0]}, or -c")
     made = _frames(frames, eds)
     period_us = _period_us(every, count)
     cyclic = _cyclic(made, period_us, count or (0 if every else 1), fields)

@@ -14,8 +14,7 @@ from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_and_rest, bus_options
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.monitor.decode.node_memory import EdsObjects
 from tickrig.host.monitor.frames.record import Record
@@ -63,19 +62,19 @@ FAILED: Final = 1
 
 
 @click.command(cls=BusCommand)
-@click.argument("bus")
-@click.argument("file", type=PATH)
+@click.argument("words", nargs=-1, required=True, metavar="[BUS] FILE")
 @click.option("--var", "variables", multiple=True, metavar="NAME=NUMBER", help="Set id=3.")
 @eds_option
 @click.option("--dry-run", is_flag=True, help="Print the steps; open no bus.")
 @click.option("-q", "--quiet", is_flag=True, help="Print only what was missed.")
 @bus_options
 @click.pass_context
-def command(context: click.Context, /, bus: str, file: Path, **options: Any) -> None:
+def command(context: click.Context, /, words: Sequence[str], **options: Any) -> None:
     """Carry out the sequence FILE on BUS; exit status 1 if an expectation was missed.
 
-    A TOML file has steps that send, wait, expect and repeat; any other file has
-    lines as '+10 123#DEADBEEF': so many ms after the line above.
+    Without a BUS it is that of -c. A TOML file has steps that send, wait,
+    expect and repeat; any other file has lines as '+10 123#DEADBEEF': so many
+    ms after the line above.
 
     \b
     [vars]
@@ -93,6 +92,8 @@ def command(context: click.Context, /, bus: str, file: Path, **options: Any) -> 
     """  # noqa: D301 - click wants the backspace
     variables, eds = options.pop("variables"), options.pop("eds")
     dry_run, quiet = options.pop("dry_run"), options.pop("quiet")
+    bus, files = bus_and_rest(words, options["channel"], "FILE", most=1)
+    file = Path(files[0])
     watch = Watch(read_eds_files(eds))
     sequence = _read(file, variables, watch)
     if dry_run:
@@ -127,7 +128,9 @@ def _read(file: Path, words: Sequence[str], watch: Watch) -> Steps:
         raise Refused(str(error)) from None
 
 
-def _carry_out(run: SequenceRun, bus: str, options: BusOptions, watch: Watch, quiet: bool) -> None:
+def _carry_out(
+    run: SequenceRun, bus: str | None, options: BusOptions, watch: Watch, quiet: bool
+) -> None:
     from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
 
     with transmitters([bus], options, receives=True) as (out,), until_interrupted(), until_unread():

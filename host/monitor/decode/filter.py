@@ -35,18 +35,24 @@ from tickrig.host.monitor.decode.filter_terms import (
     COMPARISONS,
     EQUALITIES,
     FIELDS,
+    FREE,
     HIGHEST_NODE,
     KINDS,
+    KNOWN_WORDS,
     NMT_STATES,
+    RANGES,
     WORDS,
     Test,
     candump_test,
     error_test,
     field_test,
+    is_word,
     kind_test,
+    never_holds,
     number,
     object_test,
     range_test,
+    signal_place,
     signal_test,
     state_path,
     state_test,
@@ -54,6 +60,7 @@ from tickrig.host.monitor.decode.filter_terms import (
 )
 from tickrig.host.monitor.frames.ident import CandumpFilter
 from tickrig.host.monitor.frames.tokens import Token, tokens_of
+from tickrig.host.text.names import closest
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
 
 LONGEST: Final = 10_000
@@ -87,6 +94,7 @@ _ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
 _OBJECT: Final = re.compile(r"(?:0x)?([0-9A-Fa-f]{1,4})h?(?::(?:0x)?([0-9A-Fa-f]{1,2})h?)?")
 _ADDRESS: Final = re.compile(r"([0-9]{1,3}\.)?[0-9A-Fa-f]{4}h:[0-9A-Fa-f]{2}")
 _NAME: Final = re.compile(r"([0-9]{1,3}\.)?[A-Za-z_][\w.]*")
+_HEX_DIGITS: Final = re.compile(r"[0-9A-Fa-f]{1,16}")
 _NODES: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
 _RESERVED: Final = ("and", "or", "not")
 _ALIASES: Final = {"bootup": "boot-up", "ch": "channel"}
@@ -245,11 +253,22 @@ class FilterParser:
         if name in WORDS:
             if sign not in EQUALITIES:
                 raise self._error(f"{name} can be compared by = and != alone")
+            value = _ALIASES.get(value, value)
+            if not is_word(name, value):
+                words = KNOWN_WORDS[name]
+                meant = [f"; did you mean {word!r}?" for word in closest(value, words)]
+                if meant or name not in FREE:
+                    said = f"{name} is never {value!r}, but {', '.join(words)}"
+                    raise self._error(said + "".join(meant))
             del self._tokens[0]
-            return word_test(name, sign, _ALIASES.get(value, value))
+            return word_test(name, sign, value)
         wanted = _hexadecimal(value) if name == "id" else number(value)
         if wanted is None:
             raise self._error(f"{value!r} is no number")
+        if never_holds(name, sign, wanted):
+            low, high = RANGES[name][0], RANGES[name][-1]
+            ends = f"{low:X} to {high:X}" if name == "id" else f"{low} to {high}"
+            raise self._error(f"{name} is {ends}, never {sign.strip('=!')}{value}")
         del self._tokens[0]
         return field_test(name, COMPARISONS[sign], wanted)
 
@@ -266,6 +285,9 @@ class FilterParser:
     def _signal(self, word: str) -> Test:
         if not _ADDRESS.fullmatch(word) and not _NAME.fullmatch(word):
             raise self._error(f"{word!r} is neither a kind ({', '.join(KINDS)}) nor a signal")
+        node, _, _ = signal_place(word)
+        if node is not None and node not in RANGES["node"]:
+            raise self._error(f"{node} is no node-ID 1 to {HIGHEST_NODE}")
         del self._tokens[0]
         self._signals.add(word)
         if self._next.text not in COMPARISONS:
@@ -278,10 +300,8 @@ class FilterParser:
 
 
 def _hexadecimal(text: str) -> int | None:
-    try:
-        return int(text, 16)
-    except ValueError:
-        return None
+    digits = text.removeprefix("0x").removesuffix("h")
+    return int(digits, 16) if _HEX_DIGITS.fullmatch(digits) else None
 
 
 @dataclass(frozen=True, slots=True)

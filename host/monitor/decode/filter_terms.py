@@ -7,14 +7,14 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from tickrig.host.monitor.decode.decoded import Decoded, Signal
+from tickrig.host.monitor.decode.decoded import DBC, EDS, SEEN, Decoded, Signal
 from tickrig.host.monitor.decode.object_text import BITS
 from tickrig.host.monitor.decode.sdo.transfer import Outcome
 from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
 from tickrig.host.monitor.frames.record import AnyRecord, Record
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can import EXTENDED_MAX, CanFrame
 from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.wire.can_fd import MAX_FD_BYTES, FdFrame
 from tickrig.wire.canopen.nmt import NmtState
 
 Test = Callable[[AnyRecord, Decoded], bool]
@@ -58,6 +58,21 @@ WORDS: Final[dict[str, Callable[[AnyRecord, Decoded], str]]] = {
 }
 
 HIGHEST_NODE: Final = 127
+RANGES: Final = {
+    "node": range(1, HIGHEST_NODE + 1),
+    "id": range(EXTENDED_MAX + 1),
+    "dlc": range(16),
+    "bytes": range(MAX_FD_BYTES + 1),
+}
+"""What the numbers of `FIELDS` can be."""
+KNOWN_WORDS: Final = {
+    "kind": (*KINDS, "fd"),
+    "dir": ("rx", "tx"),
+    "src": (EDS, SEEN, DBC),
+}
+"""What the words of `WORDS` can be, beside PDOs by their numbers."""
+FREE: Final = ("kind", "src")
+"""Decoders of installed packages may say others."""
 ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
 NMT_STATES: Final = {state.name.lower().replace("_", "-"): int(state) for state in NmtState}
 
@@ -136,6 +151,20 @@ def error_test(mask: int) -> Test:
 def candump_test(chosen: CandumpFilter) -> Test:
     """Return the test of candump's rules."""
     return lambda record, decoded: isinstance(record, Record) and chosen.passes(flagged_id(record))
+
+
+def never_holds(name: str, sign: str, value: float) -> bool:
+    """Say whether a field can never be compared so: somebody must have meant something else."""
+    numbers, compare = RANGES[name], COMPARISONS[sign]
+    if sign in EQUALITIES:
+        return value not in numbers
+    return not (compare(numbers[0], value) or compare(numbers[-1], value))
+
+
+def is_word(name: str, value: str) -> bool:
+    """Say whether a field may have a word."""
+    is_pdo = name == "kind" and _PDO.fullmatch(value) is not None and value[-1:].isdecimal()
+    return name not in KNOWN_WORDS or value in KNOWN_WORDS[name] or is_pdo
 
 
 def field_test(name: str, compare: Compare, value: float) -> Test:
@@ -227,6 +256,8 @@ def number(text: str) -> float | None:
     match = _HEX.fullmatch(text)
     if match:
         return int(match[1] + match[2], 16)
+    if not text.isascii() or "_" in text:
+        return None
     for kind in (_whole, float):
         try:
             return kind(text)

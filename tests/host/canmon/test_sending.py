@@ -349,3 +349,44 @@ def test_sending_ends_quietly_when_nobody_reads_what_is_printed() -> None:
         assert re.fullmatch(
             rb"(\d+ periods passed whole and were left out\n)?", process.stderr.read()
         )
+
+
+def test_a_bus_is_named_by_its_channel(wire: Wire, log: str, tmp_path: Path) -> None:
+    named = ("-i", "virtual", "-c", wire.name)
+    steps = tmp_path / "steps.txt"
+    steps.write_text("+0 124#\n")
+    assert canmon("send", *named, "123#01", "123#02").exit_code == 0
+    assert canmon("seq", *named, str(steps)).exit_code == 0
+    assert canmon("play", log, *named, "--speed", "max").exit_code == 0
+    assert wire.all() == ["123#01", "123#02", "124#", "080#", "705#05", "181#0102", "182#R"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("send", "can0", "123#"), "-c other names the bus: leave out can0, or -c"),
+        (("send",), "Missing argument"),
+        (("seq", "can0", "steps.txt"), "-c other names the bus"),
+        (("seq",), "Missing argument"),
+        (("play", "run.log", "can0"), "-c other names the bus: leave out can0, or -c"),
+        (("dump", "virtual:one"), "BUS one and -c other name two channels"),
+        (("check", "virtual:one", "--no-emcy"), "BUS one and -c other name two channels"),
+        (("nodes", "one", "-i", "virtual"), "BUS one and -c other name two channels"),
+        (("net", "-c", "other", "virtual:one", "scan"), "BUS one and -c other name two channels"),
+    ],
+)
+def test_two_names_of_a_bus_are_refused(words: tuple[str, ...], said: str) -> None:
+    result = canmon(*words, *(() if "-c" in words else ("-c", "other")))
+    assert result.exit_code == 2
+    assert said in result.stderr
+
+
+@pytest.mark.parametrize("name", ["ff15:7079:7468", "tcp://host:3333", "udp:x"])
+def test_beside_an_interface_a_bus_may_have_colons(name: str) -> None:
+    with can.Bus(interface="virtual", channel=name) as far:
+        assert canmon("send", name, "-i", "virtual", "123#01").exit_code == 0
+        message = far.recv(1)
+        assert message is not None
+        assert message.arbitration_id == 0x123
+        assert canmon("send", f"virtual:{name}", "-i", "virtual", "124#01").exit_code == 0
+        assert far.recv(1) is not None

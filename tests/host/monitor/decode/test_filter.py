@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -146,3 +148,48 @@ def test_any_text_is_a_filter_or_refused(text: str) -> None:
     decoder = Decoder()
     for record in (*trace("185#00 605#4041600000000000"), ERROR):
         assert chosen.matches(record, decoder.take(record)) in (True, False)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("node=300", "column 6: node is 1 to 127, never 300"),
+        ("node = 0", "column 8: node is 1 to 127, never 0"),
+        ("node=3.5", "column 6: node is 1 to 127, never 3.5"),
+        ("emcy or node==-1", "node is 1 to 127, never -1"),
+        ("node!=300", "node is 1 to 127, never 300"),
+        ("node>127", "node is 1 to 127, never >127"),
+        ("node<1", "node is 1 to 127, never <1"),
+        ("dlc=16", "dlc is 0 to 15, never 16"),
+        ("bytes>64", "bytes is 0 to 64, never >64"),
+        ("id=20000000", "id is 0 to 1FFFFFFF, never 20000000"),
+        ("id=-5", "'-5' is no number"),
+        ("id=\u0661", "is no number"),
+        ("node=\u0663", "is no number"),
+        ("node=1_0", "'1_0' is no number"),
+        ("dir=up", "dir is never 'up', but rx, tx"),
+        ("kind=emcyy", "kind is never 'emcyy', but nmt, "),
+        ("kind=hartbeat", "did you mean 'heartbeat'?"),
+        ("src=edss", "did you mean 'eds'?"),
+        ("300.position > 5", "300 is no node-ID 1 to 127"),
+        ("node 3-", "'3-' is no node-ID 1 to 127"),
+        ("emcy of 3-2", "the lower one stands first"),
+        ("181-", "'181-' is neither a kind"),
+        ("-5", "a term is missing"),
+        ("181-182-183", "'181-182-183' is neither a kind"),
+    ],
+)
+def test_what_can_never_pass_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(FilterError, match=re.escape(reason)):
+        parse_filter(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("node<128", "node>=1", "node<=127", "id=7FF", "id<200", "dlc=15", "bytes=64", "dir=tx"),
+        *("kind=tpdo1", "kind=rpdo12", "kind=bootup", "kind=of-a-package", "src=seen", "node!=3"),
+    ],
+)
+def test_what_can_pass_is_taken(text: str) -> None:
+    assert parse_filter(text).text == text
