@@ -14,7 +14,14 @@ from typing import Final
 
 from tickrig.host.monitor.columns.candump_block import CandumpBlock
 from tickrig.host.monitor.columns.columns import ChannelNames, Columns, Rows
-from tickrig.host.monitor.logs.log_file import LogFormat, log_format, open_log, read_blocks
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.logs.log_file import (
+    LogError,
+    LogFormat,
+    log_format,
+    open_log,
+    read_blocks,
+)
 from tickrig.host.monitor.logs.log_reader import WholeLines, parse_log_line, read_log
 from tickrig.host.monitor.logs.screen_line import HEAD, ScreenClock
 from tickrig.host.monitor.logs.tally import Tally
@@ -61,11 +68,18 @@ class ColumnReader:
 
     def _of_frames(self) -> Iterator[Rows]:
         reader = read_log(self._path)
-        frames = iter(reader)
-        while batch := list(islice(frames, BATCH)):
-            self.tally = reader.tally
-            yield Rows.of(batch, self._channels)
-        self.tally = reader.tally
+        frames, failed, more = iter(reader), None, True
+        while more:
+            batch: list[Record] = []
+            try:
+                batch.extend(islice(frames, BATCH))
+            except LogError as error:  # all that was read before it counts
+                failed = error
+            self.tally, more = reader.tally, len(batch) == BATCH and failed is None
+            if batch:
+                yield Rows.of(batch, self._channels)
+        if failed is not None:
+            raise failed
 
     def _of_lines(self) -> Iterator[Rows]:
         whole, number, clock = WholeLines(), 0, None

@@ -16,9 +16,12 @@ from tickrig.host.monitor.columns.candump_block import CandumpBlock
 from tickrig.host.monitor.columns.column_reader import ColumnReader, read_columns
 from tickrig.host.monitor.columns.columns import ChannelNames, Columns, NoColumnsError, Rows
 from tickrig.host.monitor.frames.ident import flagged_id
+from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.log_file import LogError
 from tickrig.host.monitor.logs.log_reader import LogLines, LogReader, read_log
+from tickrig.host.monitor.logs.log_writer import write_log
 from tickrig.host.monitor.logs.tally import Tally
+from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 
 HEX = "0123456789abcdefABCDEF"
@@ -166,3 +169,18 @@ def test_other_formats_are_read_frame_by_frame(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_text('{"v":1,"t":1.5,"ch":"can0","id":1,"x":1,"dir":"rx","data":"0A"}\n')
     assert rows_of(read_columns(path)) == [(1_500_000, 0x8000_0001, 1, 10, "can0")]
+
+
+@pytest.mark.parametrize("name", ["run.blf", "run.asc.gz", "run.trc.gz", "run.pcapng"])
+def test_of_another_format_that_was_cut_all_comes_that_is_there(name: str, tmp_path: Path) -> None:
+    writer = write_log(tmp_path / name)
+    for n in range(20_000):
+        data = random.Random(n).randbytes(8)
+        writer.write(Record(1_700_000_000_000_000 + n, "can0", CanFrame(0x705, data)))
+    writer.close()
+    whole = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(whole[: len(whole) // 2])
+    frames, said = until_damaged(read_columns(tmp_path / name))
+    assert (frames, said) == until_damaged(read_log(tmp_path / name))
+    assert frames > 5_000
+    assert said
