@@ -30,7 +30,7 @@ from tickrig.host.monitor.logs.log_file import (
     open_log,
     read_blocks,
 )
-from tickrig.host.monitor.logs.mark import Mark, lost_frames, read_mark
+from tickrig.host.monitor.logs.mark import DROP_COUNT, Mark, lost_frames, read_mark
 from tickrig.host.monitor.logs.notation import (
     LONGEST_NAME,
     parse_csv_line,
@@ -206,8 +206,8 @@ class LogLines:
 
 def _mark(text: str) -> Mark | None:
     """Return the mark that a comment or an event is, without a time where it has none."""
-    if text.startswith("#"):
-        return read_mark(0, text[1:])
+    if text.startswith(("#", DROP_COUNT)):
+        return read_mark(0, text.removeprefix("#"))
     return parse_json_mark(text) if text.startswith("{") else None
 
 

@@ -18,13 +18,16 @@ GONE: Final = "gone"
 BACK: Final = "back"
 TRIGGER: Final = "trigger"
 VERSION: Final = 1
+DROP_COUNT: Final = "DROPCOUNT:"
 
 _SAID: Final = re.compile(
     r"(?P<lost>[0-9]{1,15}) frames were lost|trigger: (?P<trigger>.{1,400})"
     r"|(?P<gone>\S{1,32}) is gone: (?P<why>.{1,400})"
     r"|(?P<back>\S{1,32}) is back after (?P<s>[0-9]{1,12})\.(?P<us>[0-9]{6}) s"
+    rf"|{DROP_COUNT} dropped (?P<dropped>[0-9]{{1,15}}) CAN frames? on .{{1,100}}"
 )
-"""What the functions below write; others' comments are no marks."""
+"""What the functions below write, and candump of what its socket dropped; other comments are no
+marks."""
 
 
 class Mark(NamedTuple):
@@ -84,6 +87,8 @@ def lost_frames(comment: str) -> int:
 
     >>> lost_frames("# 12 frames were lost"), lost_frames("# a note")
     (12, 0)
+    >>> lost_frames("DROPCOUNT: dropped 1 CAN frame on 'can0' socket (total drops 1)")
+    1
     """
     mark = read_mark(0, comment.removeprefix("#"))
     return mark.frames if mark else 0
@@ -98,8 +103,8 @@ def read_mark(at_us: int, text: str) -> Mark | None:
     said = _SAID.fullmatch(text.strip())
     if said is None:
         return None
-    if said["lost"]:
-        return dropped(at_us, int(said["lost"]))
+    if lost := said["lost"] or said["dropped"]:
+        return dropped(at_us, int(lost))
     if said["trigger"]:
         return triggered(at_us, said["trigger"])
     if said["gone"]:

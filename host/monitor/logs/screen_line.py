@@ -1,4 +1,4 @@
-"""Lines that candump and `canmon dump` show on a screen, with or without time.
+"""Lines that candump, `canmon dump` and python-can show on a screen, with or without time.
 
 >>> tally, clock = Tally(), ScreenClock()
 >>> shown = "(000.000250)  can0  TX - -  705   [1]  7F   '.'"
@@ -14,8 +14,11 @@ from itertools import pairwise
 from typing import Final
 
 from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.notation import parse_frame
+from tickrig.host.monitor.logs.mark import DROP_COUNT, lost_frames
+from tickrig.host.monitor.logs.notation import UNNAMED, parse_frame
 from tickrig.host.monitor.logs.tally import CAN_XL, SERIAL_LINES, Tally
+from tickrig.wire.can import MAX_DATA_BYTES
+from tickrig.wire.can_error import ERROR_FLAG
 from tickrig.wire.can_fd import BRS, ESI
 from tickrig.wire.errors import WireError
 
@@ -31,9 +34,16 @@ _STAMP: Final = (
 )
 _FRAME: Final = re.compile(
     rf"(?:{_STAMP})?(\S{{1,32}})\s+(?:([RT])X ([-B]) ([-E])\s+)?"
-    r"([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})\s+\[([0-9]{1,4})\](?:\s+(.*))?",
+    r"([0-9A-Fa-f]{8}|[0-9A-Fa-f]{3})\s+(\[[0-9]{1,4}\]|\{[0-9A-F]\})(?:\s+(.*))?",
     re.ASCII,
 )
+_PRINTED: Final = re.compile(
+    r"Timestamp:\s+(-?)([0-9]{1,12})\.([0-9]{6})\s+ID:\s+([0-9a-f]{3,8})\s+"
+    r"([SX])(?: ([RT])x)? ([E ]) ([R ]) ([F ]) (BS|  ) (EI|  )\s+DLC?:\s+([0-9]{1,2})(?!\S)"
+    r"((?: {1,4}[0-9a-f]{2}(?!\S))*)(?:\s+'\w+')?(?:\s+Channel: (\S{1,32}))?",
+    re.ASCII,
+)
+"""What python-can prints, and its logger writes to a file with any other ending."""
 _SERIAL: Final = re.compile(rf"(?:{_STAMP})?\S+  [<>]  .*", re.ASCII)
 _WORDS: Final = re.compile(r"\t+[a-z]+-[a-z-]+(?:\{.*\})?\s*", re.ASCII)
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
@@ -41,6 +51,9 @@ _SPANS: Final = re.compile(
     r"^[ \t]*+\((-?)([0-9]{3,9})\.([0-9]{6})\)[ \t]++\S++\s.*\[[0-9]", re.ASCII | re.MULTILINE
 )
 _DIGITS: Final = re.compile(r"[0-9A-Fa-f]{2}")
+_BITS: Final = re.compile(r"[01]{8}")
+_SWAPPED: Final = "`"
+"""Between bytes that candump shows from the last to the first."""
 _ABSOLUTE: Final = 10
 """Digits of the seconds since the epoch; with fewer it is a span of time."""
 
@@ -109,15 +122,17 @@ def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | s
     text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
     match = _FRAME.fullmatch(text)
     if match is None:
-        return _beside(line, text, tally)
+        return _beside(line, text, tally, clock)
     sign, seconds, date, fraction, channel, direction, brs, esi, *data = match.groups()
-    ident, length, shown = data
-    if len(length) > len("08"):
+    ident, size, shown = data
+    digits = size[1:-1]
+    if len(digits) > len("08"):
         tally.passed_over[CAN_XL] += 1
         return CAN_XL
-    flags = f"#{BRS * (brs == 'B') | ESI * (esi == 'E')}" * (len(length) == len("08"))
+    length = int(digits) if size.startswith("[") else min(int(digits, 16), MAX_DATA_BYTES)
+    flags = f"#{BRS * (brs == 'B') | ESI * (esi == 'E')}" * (len(digits) == len("08"))
     try:
-        frame = parse_frame(f"{ident}#{flags}{_notation(int(length), shown or '')}")
+        frame = parse_frame(f"{ident}#{flags}{_notation(length, shown or '')}")
         at_us = clock.at_us(sign, seconds, date, fraction)
     except (WireError, ValueError, OverflowError, OSError):
         return None
@@ -125,19 +140,51 @@ def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | s
     return Record(at_us, channel, frame, direction == "T")
 
 
-def _beside(line: str, text: str, tally: Tally) -> str | None:
-    """Return what stands between frames: lines of serial ports, and error frames in words."""
+def _beside(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
+    """Return what other lines of a screen say.
+
+    These are lines of serial ports, error frames in words, frames that candump says were dropped,
+    and frames that python-can prints.
+    """
     if _SERIAL.fullmatch(text):
         tally.passed_over[SERIAL_LINES] += 1
         return SERIAL_LINES
+    if text.startswith(DROP_COUNT) and (lost := lost_frames(text)):
+        tally.lost += lost
+        return text
+    if match := _PRINTED.fullmatch(text):
+        return _printed(match, clock)
     return text if _WORDS.fullmatch(line) else None
+
+
+def _printed(match: re.Match[str], clock: ScreenClock) -> Record | None:
+    """Return the frame of a line that python-can printed."""
+    sign, seconds, fraction, ident, kind, direction, *flags, length, data, channel = match.groups()
+    error, remote, fd, brs, esi = (not flag.isspace() for flag in flags)
+    digits = "".join(data.split())
+    if error:
+        notation = f"{ERROR_FLAG | int(ident, 16):08X}#{digits}"
+    else:
+        shown = f"R{length}" if remote else f"#{BRS * brs | ESI * esi}{digits}" if fd else digits
+        notation = f"{int(ident, 16):0{8 if kind == 'X' else 3}X}#{shown}"
+    try:
+        frame = parse_frame(notation)
+    except WireError:
+        return None
+    if not (error or remote) and len(frame.data) != int(length):
+        return None
+    at_us = clock.at_us(sign, seconds, None, fraction)
+    return Record(at_us, channel or UNNAMED, frame, direction == "T")
 
 
 def _notation(length: int, shown: str) -> str:
     """Return data in the notation of a log; what stands behind them is passed over."""
     if shown.startswith("remote request"):
         return f"R{length}"
-    digits = shown.split()[:length]
+    words = shown.split()
+    if words and _SWAPPED in words[0]:
+        words = words[0].split(_SWAPPED)[::-1]
+    digits = [f"{int(word, 2):02X}" if _BITS.fullmatch(word) else word for word in words[:length]]
     if len(digits) < length or not all(map(_DIGITS.fullmatch, digits)):
         raise ValueError(f"{shown!r} is not {length} bytes")
     return "".join(digits)
