@@ -26,7 +26,7 @@ class DbcFile:
     """Decodes the CAN-IDs that a DBC file names; for these it counts more than anything else.
 
     Args:
-        path: the file.
+        path: the file, in UTF-8 or else in Windows-1252.
 
     Raises:
         OSError: the file cannot be read.
@@ -36,12 +36,13 @@ class DbcFile:
     def __init__(self, path: Path) -> None:
         try:
             from cantools import Error  # noqa: PLC0415 - slow, and an extra
-            from cantools.database import load_file  # noqa: PLC0415
+            from cantools.database import load_string  # noqa: PLC0415
             from cantools.database.can import Database  # noqa: PLC0415
         except ImportError as error:
             raise DbcError("DBC files need cantools: pip install 'tickrig[dbc]'") from error
+        text = _text(path.read_bytes())
         try:
-            database = load_file(path, database_format="dbc", strict=False)
+            database = load_string(text, "dbc", strict=False)
         except (Error, ValueError, KeyError) as error:
             raise DbcError(f"{path} is no DBC: {' '.join(str(error).split())}") from error
         self._failures = (Error, ValueError, KeyError)
@@ -70,8 +71,12 @@ class DbcFile:
         try:
             found = message.decode_simple(frame.data, allow_truncated=True)
         except self._failures as error:
-            found, note = self._chosen(ident, message, frame.data), [f"({error})"]
-            if not found:
+            found, failed = self._chosen(ident, message, frame.data)
+            if failed:
+                note = [f"(cannot be decoded: {', '.join(failed)})"]
+            elif message.is_multiplexed():
+                note = [f"({error})"]
+            if not found and not failed:
                 return Decoded("dbc", None, f"{message.name}: {error}", (), DBC)
         units = self._units[ident]  # DBCs made from EDS have several messages of one name
         signals = tuple(_signal(name, value, units[name]) for name, value in found.items())
@@ -79,12 +84,16 @@ class DbcFile:
             "dbc", None, " ".join([message.name, *map(str, signals), *note]), signals, DBC
         )
 
-    def _chosen(self, ident: tuple[int, bool], message: Message, data: bytes) -> SignalDictType:
-        """Return the signals of a frame whose multiplexer has a value that no signal has.
+    def _chosen(
+        self, ident: tuple[int, bool], message: Message, data: bytes
+    ) -> tuple[SignalDictType, list[str]]:
+        """Return the signals of a frame that cantools does not decode, and those that are in none.
 
-        cantools gives none of them then. Here each is read by itself, and those are returned that
-        no multiplexer selects, or one does by its value.
+        It gives no signal where a multiplexer has a value that no signal has, or where one signal
+        overlaps another or reaches beyond the message. Here each is read by itself, and those are
+        returned that no multiplexer selects, or one does by its value.
         """
+        failed: list[str] = []
         if ident not in self._alone:
             self._alone[ident] = {one.name: _alone(message, one) for one in message.signals}
         raw: SignalDictType = {}
@@ -102,9 +111,17 @@ class DbcFile:
                     raw |= alone.decode_simple(data, False, False, allow_truncated=True)
                     found |= alone.decode_simple(data, allow_truncated=True)
                 except self._failures:
+                    failed.append(signal.name)
                     continue
                 selectors += [signal.name] if signal.is_multiplexer else []
-        return found
+        return found, failed
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return data.decode("cp1252", "replace")
 
 
 def _alone(message: Message, signal: SignalOfDbc) -> Message:
@@ -113,9 +130,13 @@ def _alone(message: Message, signal: SignalOfDbc) -> Message:
 
     one = copy(signal)
     one.is_multiplexer, one.multiplexer_ids, one.multiplexer_signal = False, None, None
-    extended = message.is_extended_frame
     return NewMessage(
-        message.frame_id, message.name, message.length, [one], is_extended_frame=extended
+        message.frame_id,
+        message.name,
+        message.length,
+        [one],
+        is_extended_frame=message.is_extended_frame,
+        strict=False,
     )
 
 

@@ -75,6 +75,103 @@ def test_a_multiplexer_is_told_though_no_signal_has_its_value(
     assert Decoder(dbc=[path]).take(record).text.startswith(text)
 
 
+HEAD = 'VERSION ""\n\nNS_ :\n\nBS_:\n\nBU_: A B\n\n'
+
+
+def message(*signals: str, length: int = 8, more: str = "") -> str:
+    """Return a DBC file with one message; the signals are given from the start bit on."""
+    lines = "".join(f' SG_ {one} [0|0] "" B\n' for one in signals)
+    return f"{HEAD}BO_ 291 M: {length} A\n{lines}{more}"
+
+
+# Kinds of DBC files that people reported of other tools; the files are written for this test.
+REPORTED = {
+    "Motorola signals across bytes": (
+        message("S : 3|12@0+ (1,0)", "T : 23|16@0- (0.5,-10)"),
+        {"123#0ABCFFFE00000000": "S=2748 T=-11.0"},
+    ),
+    "a multiplexer behind what it selects": (
+        message("A0 m0 : 8|8@1+ (1,0)", "A1 m1 : 8|8@1+ (1,0)", "Mux M : 0|8@1+ (1,0)"),
+        {"123#0005": "Mux=0 A0=5", "123#0105": "Mux=1 A1=5"},
+    ),
+    "ranges of a multiplexer": (
+        message(
+            "Mux M : 0|8@1+ (1,0)",
+            "P m0 : 8|8@1+ (1,0)",
+            "Q m3 : 8|8@1+ (1,0)",
+            more="SG_MUL_VAL_ 291 P Mux 0-2, 5-5;\nSG_MUL_VAL_ 291 Q Mux 3-4;\n",
+        ),
+        {"123#0205": "Mux=2 P=5", "123#0405": "Mux=4 Q=5", "123#0505": "Mux=5 P=5"},
+    ),
+    "floating point with a factor": (
+        message(
+            "F : 0|32@1- (1,0)",
+            "G : 32|32@1- (2,1)",
+            more="SIG_VALTYPE_ 291 F : 1;\nSIG_VALTYPE_ 291 G : 1;\n",
+        ),
+        {"123#0000803F00000040": "F=1.0 G=5.0", "123#0000C07F0000807F": "F=nan G=inf"},
+    ),
+    "factors with an exponent": (
+        message("F : 0|8@1+ (1E-3,0)", "G : 8|8@1+ (1.0e+2,-1e1)"),
+        {"123#0102": "F=0.001 G=190"},
+    ),
+    "names of negative and of unscaled values": (
+        message(
+            "F : 0|8@1- (1,0)",
+            "G : 8|8@1+ (0.5,0)",
+            more='VAL_ 291 F -1 "none" 255 "odd" ;\nVAL_ 291 G 255 "error" ;\n',
+        ),
+        {"123#FFFF": "F=none G=error", "123#0564": "F=5 G=50.0"},
+    ),
+    "a signal beyond the message": (
+        message("F : 0|8@1+ (1,0)", "G : 8|16@1+ (1,0)", length=2),
+        {"123#0102": "F=1 (cannot be decoded: G)"},
+    ),
+    "signals one over the other": (
+        message("F : 0|8@1+ (1,0)", "G : 4|8@1+ (1,0)", length=2),
+        {"123#3412": "F=52 G=35"},
+    ),
+    "a frame of another length than the message": (
+        message("F : 0|8@1+ (1,0)", "G : 8|16@1+ (1,0)", length=3),
+        {"123#01": "F=1", "123#": "", "123#0102030405": "F=1 G=770"},
+    ),
+    "comments with quotes, and lines that are comments": (
+        "// a note\n"
+        + message("F : 0|8@1+ (1,0)", length=1, more='CM_ SG_ 291 F "it says \\"so\\"";\n'),
+        {"123#01": "F=1"},
+    ),
+    "signals of no message, and a message of no length": (
+        HEAD + "BO_ 3221225472 VECTOR__INDEPENDENT_SIG_MSG: 0 Vector__XXX\n"
+        ' SG_ X : 0|8@1+ (1,0) [0|0] "" Vector__XXX\n\nBO_ 291 M: 0 A\n',
+        {"123#": "", "123#05": ""},
+    ),
+    "CRLF, a mark of the byte order in front, and units in UTF-8": (
+        "\ufeff" + message("F : 0|8@1+ (1,0)").replace('"" B', '"°C" B').replace("\n", "\r\n"),
+        {"123#01": "F=1°C"},
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), REPORTED.values(), ids=REPORTED)
+def test_a_reported_kind_of_dbc_file_is_read_as_meant(
+    text: str, said: dict[str, str], tmp_path: Path
+) -> None:
+    path = tmp_path / "reported.dbc"
+    path.write_bytes(text.encode("utf-8"))
+    decoder = Decoder(dbc=[path])
+    read = {str(one.frame): decoder.take(one).text for one in trace(" ".join(said))}
+    assert read == {frame: f"M {text}".strip() for frame, text in said.items()}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252", "utf-8-sig"])
+def test_units_and_names_are_read_in_utf_8_and_windows_1252(encoding: str, tmp_path: Path) -> None:
+    text = message("F : 0|8@1- (1,-40)", more='VAL_ 291 F -1 "früh" ;\n').replace('""', '"°C"')
+    path = tmp_path / "units.dbc"
+    path.write_bytes(text.encode(encoding))
+    decoder = Decoder(dbc=[path])
+    assert [decoder.take(one).text for one in trace("123#05 123#FF")] == ["M F=-35°C", "M F=früh°C"]
+
+
 def test_messages_of_one_name_keep_their_own_signals(tmp_path: Path) -> None:
     path = tmp_path / "made_from.dbc"
     path.write_text(
