@@ -73,7 +73,7 @@ class ColumnReader:
             batch: list[Record] = []
             try:
                 batch.extend(islice(frames, BATCH))
-            except LogError as error:  # all that was read before it counts
+            except (LogError, OSError) as error:  # all that was read before it counts
                 failed = error
             self.tally, more = reader.tally, len(batch) == BATCH and failed is None
             if batch:

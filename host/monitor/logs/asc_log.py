@@ -117,7 +117,7 @@ class AscLines:
         except WireError:
             tally.passed_over[BAD_FRAMES] += 1
             return BAD_FRAMES
-        except ValueError:
+        except (ValueError, LookupError):
             return None
 
     def _head(self, text: str, tally: Tally) -> str:

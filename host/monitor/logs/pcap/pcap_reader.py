@@ -51,7 +51,9 @@ class PcapReader:
         try:
             with open_log(self._path) as file:
                 yield from self._frames(file, marks)
-        except (EOFError, zlib.error) as error:
+        except (EOFError, zlib.error, OSError) as error:
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
             raise LogError(f"{self._path}: {error}") from error
 
     def _frames(self, file: BinaryIO, marks: bool) -> Iterator[Item]:

@@ -33,13 +33,19 @@ RULES: Final = (
 """One of each kind at least."""
 FILE: Final = """\
 no_emcy = true
+no_lost_heartbeat = true
+no_error_frames = true
 max_load = 60
 bitrate = 500000
-nodes = [3, "16-18"]
+nodes = [3, "NODES"]
 heartbeat = {3 = "100ms±20%"}
 max_gap = {181 = "20ms"}
-known = "080,181-18F"
+known = "KNOWN"
 """
+RANGES: Final = (
+    *("16-18", "1", "1-", "-5", "1-2-3", "", "9-3", "3,3", "0", "128", "1-127", "\u0661", "4,,5"),
+    *("080,181-18F", "181-", "800", "1FFFFFFF", "00000080-000000FF", "20000000", "7ff", "70x"),
+)
 PIECES: Final = (
     *("", "never", "in", "{", "}", "..", "±", "+-", "10%", "1e400", "nan", "inf", "-1", "0x"),
     *(
@@ -73,10 +79,11 @@ def mutated(chance: Random) -> tuple[str, bytes]:
     rules = [_rule(chance) for _ in range(chance.randint(1, 3))]
     if chance.random() < 0.5:
         return "rule.txt", rules[0].encode("utf-8", "surrogatepass")
+    head = FILE.replace("NODES", chance.choice(RANGES)).replace("KNOWN", chance.choice(RANGES))
     if chance.random() < 0.5:
-        text = FILE + f"rule = {rules!r}\n"
+        text = head + f"rule = {rules!r}\n"
     else:
-        text = FILE + "[rule]\n" + "".join(f"r{n} = {rule!r}\n" for n, rule in enumerate(rules))
+        text = head + "[rule]\n" + "".join(f"r{n} = {rule!r}\n" for n, rule in enumerate(rules))
     data = text.encode("utf-8", "surrogatepass")
     return "rules.toml", spoilt(data, chance) if chance.random() < 0.7 else data
 
@@ -120,6 +127,11 @@ def judge(name: str, data: bytes) -> str:
         decoded = decoder.take(record)
         found += around.take(record, decoded, checker.take(record, decoded))
     found += around.flush(checker.end(5_000_000))
+    unjudged = checker.unjudged(5_000_000)
+    assert unjudged.rules.keys() <= set(rules.names())
+    for text in (*unjudged.rules.values(), *unjudged.notes):
+        assert text
+        one_line(text)
     for finding in found:
         assert str(finding)
         assert finding_json(finding)

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import struct
 from functools import lru_cache
-from gzip import BadGzipFile
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 from typing import Final
 from zlib import crc32
 
+from tests.host.monitor.columns.test_column_reader import rows_of, rows_of_records
+from tests.host.monitor.logs.test_reports import REPORTS
 from tests.mutated import mutated as spoilt
 from tickrig.host.canmon.output.printer import Output, printer_of
 from tickrig.host.monitor.check.checker import Checker
 from tickrig.host.monitor.check.rules import Rules
 from tickrig.host.monitor.columns.column_reader import read_columns
-from tickrig.host.monitor.columns.columns import NoColumnsError
+from tickrig.host.monitor.columns.columns import Columns, NoColumnsError
 from tickrig.host.monitor.decode.decoder import Decoder
 from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp
 from tickrig.host.monitor.frames.record import AnyFrame, Record
@@ -33,9 +34,12 @@ from tickrig.wire.can_fd import FD_LENGTHS, FdFrame
 
 NAMES: Final = (
     *("run.log", "run.jsonl", "run.csv", "run.asc", "run.trc", "run.blf", "run.pcapng"),
-    *("run.pcapng.gz", "run.txt", "run.pcap"),
+    *("run.pcapng.gz", "run.txt", "run.pcap", "run.gvret.csv"),
 )
-WRITTEN: Final = ("out.log", "out.jsonl", "out.csv", "out.asc", "out.trc", "out.blf", "out.pcapng")
+WRITTEN: Final = (
+    *("out.log", "out.jsonl", "out.csv", "out.asc", "out.trc", "out.blf", "out.pcapng"),
+    "out.gvret.csv",
+)
 EXACT_US: Final = 1 << 52
 """Times beyond, as mutated ones, are not held to the microsecond by a number of JSON."""
 IDS: Final = (0x000, 0x080, 0x083, 0x183, 0x583, 0x603, 0x703, 0x7E5)
@@ -101,9 +105,16 @@ def as_pcap(data: bytes) -> bytes:
 
 
 def mutated(chance: Random) -> tuple[str, bytes]:
-    """Return the name and the bytes of a log that somebody spoilt; one in eight is whole."""
-    name = chance.choice(NAMES)
-    data = whole_log(name, chance.randrange(100))
+    """Return the name and the bytes of a log that somebody spoilt; one in eight is whole.
+
+    One in four is of a kind that people reported of other tools.
+    """
+    if chance.random() < 1 / 4:
+        report = chance.choice(list(REPORTS.values()))
+        name, data = report.name, report.text.encode()
+    else:
+        name = chance.choice(NAMES)
+        data = whole_log(name, chance.randrange(100))
     return name, data if chance.random() < 1 / 8 else spoilt(data, chance)
 
 
@@ -122,11 +133,14 @@ def judge(name: str, data: bytes) -> str:
         records, ended = read(path)
         show(records)
         rewrite(Path(folder, WRITTEN[crc32(data) % len(WRITTEN)]), records)
+        rows: list[Columns] = []
         try:
-            for _ in read_columns(path):
-                pass
-        except (NoColumnsError, LogError, BadGzipFile):
-            pass
+            rows.extend(read_columns(path))
+        except NoColumnsError:
+            return ended
+        except LogError:
+            assert ended == "broken off"
+        assert rows_of(rows) == rows_of_records(records)
     return ended
 
 
@@ -137,7 +151,7 @@ def read(path: Path) -> tuple[list[Record], str]:
     said = ""
     try:
         found.extend(reader)
-    except (LogError, BadGzipFile) as error:
+    except LogError as error:
         said = str(error)
     assert all("\n" not in text for text in (said, *reader.tally.messages(path.name)))
     return found, "broken off" if said else "with bad lines" if reader.tally.unread else "whole"

@@ -191,6 +191,8 @@ def test_what_is_no_frame_of_can_is_counted(line: str, what: str, tmp_path: Path
         "0.1 1 XYZ Rx d 1 7F",
         "0.1 CANFD 1 Rx 123 1 0 9",
         "0.1 CANFD 1 Rx 123 1 0 2 2 AA",
+        "0.1 CANFD 1 Rx 123",
+        "0.1 CANXL 1 Rx CBFF 1 2 123 8 2",
         "0.1 CANXL 1 Rx CBFF",
         "0,1 1 705 Rx d 1 7F",
     ],
