@@ -143,6 +143,10 @@ class KnownIds(Rule):
         """Tell the first frame."""
         return None if gap_us is not None else f"{_text(record)} is not expected"
 
+    def unjudged(self, evidence: Evidence, /) -> str:
+        """Say that there was no identifier."""
+        return "" if evidence.seen else "no frame with a CAN-ID came"
+
 
 def _text(record: Record) -> str:
     assert not isinstance(record.frame, ErrorFrame)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tickrig.host.monitor.frames.ident import REMOTE
+from tickrig.host.monitor.frames.ident import ERROR, REMOTE
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import STANDARD_MAX
 
@@ -176,13 +176,19 @@ class Rule:
     def unjudged(self, evidence: Evidence, /) -> str:
         """Say why it has judged nothing, so that nobody takes it for one that holds.
 
+        A rule judges each frame that it wants, error frames also by their absence; one with an
+        `end` of its own judges what is missing.
+
         Args:
             evidence: at least one frame, or error frame.
 
         Returns:
             The reason; empty if it has judged something.
         """
-        return ""
+        by_absence = type(self).end is not Rule.end or self.wants(ERROR)
+        if by_absence or any(self.wants(ident) for _, ident in evidence.seen):
+            return ""
+        return "no frame that it is about came"
 
     def notes(self, evidence: Evidence, /) -> Iterable[str]:
         """Say what it could not judge beside what it has judged."""

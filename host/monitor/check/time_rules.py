@@ -142,9 +142,9 @@ class Watched:
         period_ms: what its EDS says of 1017h, 0 where none does.
 
     Attributes:
-        heard: it has sent a frame of error control.
+        has_sent: it has sent a frame of error control.
         guarded: it is guarded, and sends no heartbeats.
-        asked: a guarding request was not answered yet.
+        requested: a guarding request was not answered yet.
         judged: a gap was compared with a period that is known.
     """
 
@@ -161,9 +161,9 @@ class Watched:
         self._name, self._memory = f"{channel} node {node}", NodeMemory(EdsObjects(values=values))
         self._heartbeats, self._sdo = Heartbeats(self._memory), SdoChannel(node)
         self._heartbeat_time = HEARTBEAT_TIME
-        self.heard = self.guarded = self.asked = self.judged = False
+        self.has_sent = self.guarded = self.requested = self.judged = False
 
-    def hear_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
+    def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
         """Learn what SDO traffic says of its objects."""
         step = (self._sdo.request if request else self._sdo.response)(at_us, data)
         for transfer in step.ended:
@@ -172,18 +172,18 @@ class Watched:
 
     def hear(self, at_us: int, data: bytes) -> str | None:
         """Take a frame of error control; say that a heartbeat is lost before it."""
-        self.heard = True
+        self.has_sent = True
         if data[:1] == BOOT_UP:
             self._memory.boot()
             self._heartbeats.boot(at_us)
-            self.guarded = self.asked = False
+            self.guarded = self.requested = False
             return None
         self.guarded |= bool(data and data[0] & GUARD_TOGGLE)
-        sure = self._heartbeats.told or len(self._heartbeats.gaps) >= SURE_GAPS
+        sure = self._heartbeats.by_sdo or len(self._heartbeats.gaps) >= SURE_GAPS
         eds_alone = not self._heartbeats.gaps
         said = self.overdue(at_us) if sure or eds_alone else None
-        self._heartbeats.beat(at_us, learns=not self.asked)
-        self.asked = False
+        self._heartbeats.take(at_us, learns=not self.requested)
+        self.requested = False
         return said
 
     def overdue(self, at_us: int) -> str | None:
@@ -196,7 +196,7 @@ class Watched:
         self.judged |= since_us >= period_us
         if not beats.is_late(at_us):
             return None
-        learnt = beats.gaps and not beats.told
+        learnt = beats.gaps and not beats.by_sdo
         period = f"{ms_text(period_us)} ms"
         says = f"one each {period} before" if learnt else f"its 1017h says {period}"
         return f"{self._name}: no heartbeat for {ms_text(since_us)} ms, {says}"
@@ -204,7 +204,7 @@ class Watched:
     @property
     def watched(self) -> bool:
         """Whether it was heard, or SDO traffic says what its period is."""
-        return self.heard or self._heartbeats.told
+        return self.has_sent or self._heartbeats.by_sdo
 
     @property
     def doubt(self) -> str:
@@ -249,9 +249,9 @@ class NoLostHeartbeat(Rule):
         assert isinstance(frame, CanFrame)
         node = self._watched(record.channel, frame.can_id & NODE_MASK)
         if frame.can_id not in ERROR_CONTROL_IDS:
-            node.hear_sdo(record.at_us, frame.data, request=frame.can_id in REQUEST_IDS)
+            node.take_sdo(record.at_us, frame.data, request=frame.can_id in REQUEST_IDS)
         elif frame.remote:
-            node.asked = True
+            node.requested = True
         else:
             return node.hear(record.at_us, frame.data)
         return None
@@ -263,7 +263,7 @@ class NoLostHeartbeat(Rule):
                 yield text
         begin_us = end_us if self._begin_us is None else self._begin_us
         for node_id, period_ms in sorted(self._periods_ms.items()):
-            if not self._heard(node_id) and end_us - begin_us > LOST_AFTER * period_ms * 1_000:
+            if not self._is_watched(node_id) and end_us - begin_us > LOST_AFTER * period_ms * 1_000:
                 since = ms_text(end_us - begin_us)
                 yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 
@@ -286,13 +286,13 @@ class NoLostHeartbeat(Rule):
             self._nodes[key] = Watched(channel, node, self._periods_ms.get(node, 0))
         return self._nodes[key]
 
-    def _heard(self, node: int) -> bool:
+    def _is_watched(self, node: int) -> bool:
         found = (one for (_, other), one in self._nodes.items() if other == node)
         return any(one.watched for one in found)
 
     def _doubts(self) -> list[str]:
         watched = (node for _, node in sorted(self._nodes.items()))
-        return [one.doubt for one in watched if one.heard and not one.judged]
+        return [one.doubt for one in watched if one.has_sent and not one.judged]
 
 
 class MaxGap(Rule):

@@ -97,7 +97,7 @@ class NodeStatus:
     @property
     def learnt(self) -> bool:
         """Whether the period is learnt from the gaps."""
-        return bool(self._heartbeats.gaps) and not self._heartbeats.told
+        return bool(self._heartbeats.gaps) and not self._heartbeats.by_sdo
 
     @property
     def reported_us(self) -> int | None:
@@ -137,7 +137,7 @@ class NodeStatus:
     def heartbeat(self, at_us: int, state: int) -> None:
         """Take a heartbeat, or the answer to a guarding request."""
         self.late += self.is_late(at_us)
-        self._heartbeats.beat(at_us)
+        self._heartbeats.take(at_us)
         self._report(state)
 
     def _report(self, state: int) -> None:

@@ -230,14 +230,14 @@ class Heartbeats:
     _booted: bool = False
 
     @property
-    def told(self) -> bool:
+    def by_sdo(self) -> bool:
         """Whether SDO traffic says what 1017h is: that counts more than what is heard."""
         return self.memory.was_received(HEARTBEAT_TIME)
 
     @property
     def period_us(self) -> int | None:
         """The period: of 1017h where it was written or read, else as heard, else by the EDS."""
-        if self.gaps and not self.told:
+        if self.gaps and not self.by_sdo:
             return _median(self.gaps)
         period_ms = self.memory.number(*HEARTBEAT_TIME)
         return period_ms * 1_000 if period_ms else None
@@ -261,7 +261,7 @@ class Heartbeats:
             self.gaps.clear()
             self.since_us = at_us
 
-    def beat(self, at_us: int, *, learns: bool = True) -> None:
+    def take(self, at_us: int, *, learns: bool = True) -> None:
         """Take a heartbeat; the period is learnt from it, unless it may answer a request."""
         learns = learns and not self._booted
         if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time

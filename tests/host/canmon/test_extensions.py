@@ -125,6 +125,13 @@ def test_a_foreign_rule_is_held() -> None:
     )
 
 
+def test_a_foreign_rule_that_sees_no_frame_judges_nothing() -> None:
+    Path("other.log").write_text("(0000000001.000000) can0 124#00\n")
+    said = canmon("check", "other.log", "--rule", "max-weight")
+    why = "nothing was judged: max-weight: no frame that it is about came"
+    assert (said.exit_code, said.stderr) == (5, f"Error: {why}\n")
+
+
 def test_a_foreign_rule_is_held_by_a_file() -> None:
     Path("rules.toml").write_text('rule = ["max-weight"]\n')
     assert canmon("check", "run.log", "rules.toml").exit_code == 1

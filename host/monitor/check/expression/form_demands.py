@@ -71,11 +71,11 @@ class _Guarding:
 
     Attributes:
         last: toggle bit of its latest answer; None before the first.
-        asked: a request waits for its answer; None where none was heard.
+        requested: a request waits for its answer; None where none was heard.
     """
 
     last: int | None = None
-    asked: bool | None = None
+    requested: bool | None = None
 
 
 class Toggle(Demand):
@@ -111,7 +111,7 @@ class Toggle(Demand):
         node = self._nodes.get(key)
         if frame.remote:
             if node is not None:
-                node.asked = True
+                node.requested = True
         elif len(frame.data) == 1 and self._is_answer(key, node, frame.data[0] >> 7):
             return self._compare(self._nodes[key], frame.data[0] >> 7, decoded)
         return None
@@ -119,20 +119,20 @@ class Toggle(Demand):
     def _boot(self, key: Pair) -> None:
         self._unasked[key] = 0
         if key in self._nodes:
-            asked = None if self._nodes[key].asked is None else False
-            self._nodes[key] = _Guarding(1, asked)
+            requested = None if self._nodes[key].requested is None else False
+            self._nodes[key] = _Guarding(1, requested)
 
     def _is_answer(self, key: Pair, node: _Guarding | None, toggle: int) -> bool:
         """Say whether a frame with this bit answers a request; the request is gone then."""
-        asked = False if node is None else node.asked
-        if node is not None and asked:
-            node.asked = False
+        requested = False if node is None else node.requested
+        if node is not None and requested:
+            node.requested = False
         if toggle:
             self._unasked[key] = 0
-        elif asked is False:
+        elif requested is False:
             self._unasked[key] += 1
         return node is not None and (
-            bool(toggle) or asked is None or (asked and self._unasked[key] < UNASKED)
+            bool(toggle) or requested is None or (requested and self._unasked[key] < UNASKED)
         )
 
     def _compare(self, node: _Guarding, toggle: int, decoded: Decoded) -> str | None:

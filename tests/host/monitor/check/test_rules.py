@@ -304,6 +304,7 @@ def unjudged(rules: Rules, text: str, end_s: float | None = None) -> dict[str, s
         ({"no_emcy": True}, "1 18FF1234#00", "no classic frame with an 11-bit CAN-ID came"),
         ({"no_sdo_abort": True}, "1 18FF1234#R", "no classic frame with an 11-bit CAN-ID came"),
         ({"no_reboot": True}, "1 18FF1234#00", "no classic frame with an 11-bit CAN-ID came"),
+        ({"known": "181"}, "1 20000080#0000000000000000", "no frame with a CAN-ID came"),
     ],
 )
 def test_a_rule_that_judges_nothing_says_why(words: dict[str, object], text: str, why: str) -> None:

@@ -334,3 +334,24 @@ def test_what_python_can_prints_is_read_as_it_was_heard(tmp_path: Path) -> None:
         "4.5 can0 1FFFFFFF##1000000000000000000000000",
         "5.5 can0 20000004#0000000000000000",
     ]
+
+
+@pytest.mark.parametrize(
+    ("head", "whose"),
+    [
+        ("***BUSMASTER Ver 3.2.2***", "a log of BUSMASTER"),
+        ("Microchip Technology Inc.", "a log of Microchip's CAN BUS Analyzer"),
+        ("0.0 CXX GVRET-PC Reverse Engineering Tool Output", "a CRTD log"),
+        ("ID,Data Bytes", "a list of frames without times"),
+        ("@ TEXT @ 6 @ 0 @", "a trace of CARBUS Analyzer"),
+    ],
+)
+def test_a_log_of_another_program_is_named_in_one_line(
+    head: str, whose: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.log"
+    path.write_text(head + "\nsome line\n" * 9)
+    reader = read_log(path)
+    assert list(reader) == []
+    (said,) = reader.tally.messages("run.log")
+    assert said.startswith(f"run.log: {whose} is not read (10 lines); SavvyCAN saves it as GVRET")
