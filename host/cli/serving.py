@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Protocol
 
 from tickrig.host.cli.refused import refuse_path
-from tickrig.host.cli.start import TERMINATING
+from tickrig.host.cli.start import give_up_terminals, taking_signals
 
 if TYPE_CHECKING:
     from tickrig.host.control.requests import RequestDispatcher
@@ -33,13 +32,10 @@ def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
 
     def received(number: int, frame: FrameType | None) -> None:
         stop()
+        give_up_terminals()
 
-    before = {number: signal.signal(number, received) for number in (signal.SIGINT, *TERMINATING)}
-    try:
+    with taking_signals(received):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager

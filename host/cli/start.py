@@ -1,4 +1,7 @@
-"""Begin and end a command: no Ctrl-C and no full disk shows a traceback, no text obeys a stranger.
+"""Begin and end a command: what Ctrl-C, `kill`, a closed terminal and a full disk do to it.
+
+All commands start here. Until a command is loaded, a signal ends the process at once. Afterwards
+Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt (`Interrupter`), so that it can clean up.
 
 What files, buses and lines hold may carry characters that a terminal obeys. So whatever a command
 prints passes `HarmlessStream`, in one place for all of them; what a command itself paints, and what
@@ -7,15 +10,20 @@ programs read, goes through `paint`.
 
 from __future__ import annotations
 
+import _thread
 import errno
 import io
 import os
+import select
 import signal
+import stat
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from types import FrameType
 from typing import Any, Final, TextIO
 
 INTERRUPTED: Final = 128 + signal.SIGINT
@@ -24,14 +32,20 @@ INTERRUPTED: Final = 128 + signal.SIGINT
 FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 """What a full disk says, a terminal that is gone, and a file that was opened to be read alone."""
 
-if sys.platform == "win32":
-    TERMINATING: Final = (signal.SIGTERM,)
-else:
-    TERMINATING: Final = (signal.SIGTERM, signal.SIGHUP)
-"""Signals beside Ctrl-C that end a program, the latter when its terminal is closed."""
-
 UNWRITTEN: Final = 3
 """Exit status where standard output takes nothing more."""
+
+IMPORTER: Final = "<frozen importlib._bootstrap"
+"""How the file names of Python's own importer begin."""
+
+AGAIN_S: Final = 0.01
+MOST_REPEATS: Final = 200
+"""An import that takes longer than these is interrupted."""
+
+TERMINAL_MS: Final = 500
+"""A terminal that takes nothing for so long is given up when a signal ends the command."""
+
+Handler = Callable[[int, FrameType | None], None]
 
 
 def start(name: str, path: str) -> None:
@@ -41,23 +55,40 @@ def start(name: str, path: str) -> None:
         name: what people call it.
         path: where it is, as `MODULE:NAME`.
     """
-    command = load(path)
-    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # `tickrig.commands` has seen to it
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    command: Any = load(path)
+    status: Any = 0
+    from click import Abort, ClickException, echo  # noqa: PLC0415 - the command has loaded it
+
+    interrupter = Interrupter()
     try:
-        command(prog_name=name)
-    except KeyboardInterrupt:  # before or behind where click looks for it
-        sys.exit(INTERRUPTED)
+        with taking_signals(interrupter.received), interrupter.repeating():
+            status = command.main(prog_name=name, standalone_mode=False)
+    except KeyboardInterrupt as interrupt:  # before or behind where click looks for it
+        status = _status_of(interrupt)
+    except Abort as abort:
+        status = 1
+        if isinstance(abort.__context__, KeyboardInterrupt):
+            status = _status_of(abort.__context__)
+        else:
+            echo("Aborted!", err=True)
+    except ClickException as error:
+        with standard_streams():
+            error.show()
+        status = error.exit_code
     except OSError as error:  # of printing: whoever opens a file tells its name
         if error.filename is not None or error.errno not in FULL:
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _to_nowhere(sys.stdout.fileno())
         with suppress(OSError):  # standard error may be full as well
             print(f"Error: standard output: {error.strerror or error}", file=sys.stderr)
-        sys.exit(UNWRITTEN)
-    finally:
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to be tidied up
+        status = UNWRITTEN
+    if interrupter.pending:
+        status = 128 + interrupter.pending
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _status_of(interrupt: KeyboardInterrupt) -> int:
+    return 128 + int(interrupt.args[0]) if interrupt.args else INTERRUPTED
 
 
 def open_closed_streams() -> None:
@@ -164,17 +195,135 @@ def load(path: str) -> Any:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Let Ctrl-C end the process, as it ends a program that takes no notice of it.
+    """Let Ctrl-C end the process at once, as long as nothing has to be cleaned up.
 
-    A KeyboardInterrupt in the middle of an import would show where that was. Where
-    Ctrl-C is ignored, or somebody waits for it, that stays so; threads see none of it.
+    Where somebody else waits for Ctrl-C, that stays so; threads see none of it.
     """
-    waited_for = signal.getsignal(signal.SIGINT) is not signal.default_int_handler
-    if waited_for or threading.current_thread() is not threading.main_thread():
+    handler = signal.getsignal(signal.SIGINT)
+    owner = getattr(handler, "__self__", None)
+    plain = handler is signal.default_int_handler or type(owner) is Interrupter
+    if not plain or threading.current_thread() is not threading.main_thread():
         yield
         return
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGINT, handler)
+
+
+class Interrupter:
+    """Raises KeyboardInterrupt when a signal comes, but where that would not be lost.
+
+    An exception in the middle of an import may be lost in a callback of the importer, or leave
+    half a module: the signal is repeated until the import has ended, for two seconds at most.
+
+    Attributes:
+        pending: number of a signal that is being repeated, 0 if none is.
+    """
+
+    def __init__(self) -> None:
+        self.pending = self._repeats = 0
+
+    def received(self, number: int, frame: FrameType | None) -> None:
+        """Take a signal; the argument of the KeyboardInterrupt is its number."""
+        give_up_terminals()
+        if _is_importing(frame) and self._repeats < MOST_REPEATS:
+            self._repeat(number)
+            return
+        self.pending = self._repeats = 0
+        raise KeyboardInterrupt(number)
+
+    @contextmanager
+    def repeating(self) -> Iterator[None]:
+        """Repeat signals whose exception Python can only report, as one raised in a `__del__`."""
+        before = sys.unraisablehook
+
+        def unraisable(lost: sys.UnraisableHookArgs, /) -> None:
+            if isinstance(lost.exc_value, KeyboardInterrupt):
+                self._repeat(_status_of(lost.exc_value) - 128)
+            else:
+                before(lost)
+
+        sys.unraisablehook = unraisable
+        try:
+            yield
+        finally:
+            sys.unraisablehook = before
+
+    def _repeat(self, number: int) -> None:
+        self.pending, self._repeats = number, self._repeats + 1
+        _thread.start_new_thread(_send_later, (number,))  # takes no lock that may be held here
+
+
+def _send_later(number: int) -> None:
+    time.sleep(AGAIN_S)
+    if sys.platform == "win32":
+        signal.raise_signal(number)
+    else:  # to the main thread, so that it ends a wait of it
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename.startswith(IMPORTER):
+            return True
+        frame = frame.f_back
+    return False
+
+
+@contextmanager
+def taking_signals(received: Handler) -> Iterator[None]:
+    """Call `received` at Ctrl-C, SIGTERM and SIGHUP.
+
+    SIGINT is taken although a script has the shell ignore it for what stands before `&`. SIGHUP
+    that is ignored stays ignored, as nohup wants it.
+    """
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, received) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def give_up_terminals() -> None:
+    """Print into the void from now on if the terminal is gone, or takes nothing for half a second.
+
+    A stopped terminal would keep a command from its end. A `write` that waits for it goes on.
+    """
+    for descriptor in (1, 2):
+        if sys.platform != "win32" and _is_stuck(descriptor):
+            _to_nowhere(descriptor)
+
+
+def _is_stuck(descriptor: int) -> bool:
+    """Return whether it is a terminal that is gone, or takes nothing.
+
+    One with room for a single byte says that it can be written, and yet CR LF waits: a NUL, which
+    terminals pass over, takes that room.
+    """
+    try:
+        if not stat.S_ISCHR(os.fstat(descriptor).st_mode):
+            return False
+        if os.isatty(descriptor):
+            flags = os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK
+            probe = os.open(os.ttyname(descriptor), flags)
+            with suppress(BlockingIOError):
+                os.write(probe, b"\0")
+            os.close(probe)
+    except OSError:  # closed, or a terminal of another container
+        pass
+    poll = select.poll()
+    poll.register(descriptor, select.POLLOUT)
+    ready = poll.poll(TERMINAL_MS)
+    return not ready or bool(ready[0][1] & (select.POLLERR | select.POLLHUP))
+
+
+def _to_nowhere(descriptor: int) -> None:
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, descriptor)
+    os.close(null)

@@ -5,6 +5,7 @@ Ctrl-C must end them from the first moment: this module imports nothing before t
 
 from _signal import (  # type: ignore[import-not-found] # signal itself takes milliseconds
     SIG_DFL,
+    SIG_IGN,
     SIGINT,
     default_int_handler,
     getsignal,
@@ -13,7 +14,7 @@ from _signal import (  # type: ignore[import-not-found] # signal itself takes mi
 
 
 def _start(name: str, module: str) -> None:
-    if getsignal(SIGINT) is default_int_handler:
+    if getsignal(SIGINT) in (default_int_handler, SIG_IGN):  # ignored: a script has begun it by `&`
         signal(SIGINT, SIG_DFL)
     from tickrig.host.cli.start import start  # noqa: PLC0415
 

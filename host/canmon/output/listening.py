@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import TYPE_CHECKING, Final, ParamSpec, TypeVar
 
@@ -19,7 +18,7 @@ from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import time_option
-from tickrig.host.cli.start import TERMINATING
+from tickrig.host.cli.start import Interrupter, give_up_terminals, taking_signals
 from tickrig.host.monitor.traffic.bit_rates import BitRates
 from tickrig.host.text.values import counted
 
@@ -58,17 +57,20 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
         raise FramesLost(", ".join(missing))
 
 
-class Interruptions:
+class Interruptions(Interrupter):
     """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._held = self._came = False
 
     def received(self, number: int, frame: FrameType | None) -> None:
         """Take a signal."""
         self._came = True
-        if not self._held:
-            raise KeyboardInterrupt
+        if self._held:
+            give_up_terminals()
+        else:
+            super().received(number, frame)
 
     def behind(self, act: Callable[Given, Result]) -> Callable[Given, Result]:
         """Return what does the same, and is not cut short: an interruption ends it behind that."""
@@ -90,17 +92,8 @@ class Interruptions:
 def until_interrupted() -> Iterator[Interruptions]:
     """End the block at Ctrl-C, and at the signals that end a program, and go on behind it."""
     interruptions = Interruptions()
-    numbers = list(TERMINATING)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else somebody ignores it
-        numbers.append(signal.SIGINT)
-    before = {number: signal.signal(number, interruptions.received) for number in numbers}
-    try:
+    with suppress(KeyboardInterrupt), taking_signals(interruptions.received):
         yield interruptions
-    except KeyboardInterrupt:
-        pass
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 Item = TypeVar("Item", bound="AnyRecord")
@@ -231,7 +224,7 @@ def paint(
 
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with Screen() as screen:
-        while not (source.ended or is_over(begin_s, span_us)):
+        while not (source.ended or screen.is_gone or is_over(begin_s, span_us)):
             records = source.poll(POLL_US)
             take(records)
             watch.take(records)

@@ -34,14 +34,16 @@ CALL: Final = "from tickrig.commands import canmon; canmon()"
 
 @pytest.mark.realtime
 @pytest.mark.skipif(sys.platform == "win32", reason="no bash")
-def test_a_script_ends_a_recording(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", ["TERM", "INT"])
+def test_a_script_ends_a_recording(tmp_path: Path, number: str) -> None:
     command = tmp_path / "canmon"
     command.write_text(f"#!/bin/sh\nexec {shlex.quote(sys.executable)} -c '{CALL}' \"$@\"\n")
     command.chmod(0o755)
     (script,) = SCRIPT.findall(PAGE)
     script = script.replace("canmon dump can0 -l run.log &", "./canmon dump - -l run.log <fifo &")
-    feed = f"exec 3>fifo; printf '{FRAME}' >&3; until [ -s run.log ]; do :; done; kill -INT $!"
+    feed = f"exec 3>fifo; printf '{FRAME}' >&3; until [ -s run.log ]; do :; done"
     script = script.replace("# what is to be recorded", feed)
+    script = script.replace("kill $recorder", f"kill -{number} $recorder")
     words = ["bash", "-c", f"mkfifo fifo\n{script}"]
     result = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")
