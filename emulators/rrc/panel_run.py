@@ -33,11 +33,16 @@ def run_panel(emulator: Emulator) -> None:
         return await asyncio.wrap_future(inbox.post(requests))
 
     started: list[Future[None]] = []
+    panel = RrcPanel(send, lambda: started.append(pool.submit(run)))
     before_s = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_S)
     try:
-        with ThreadPoolExecutor(1, "rig") as pool, _ending(emulator, inbox):
-            RrcPanel(send, lambda: started.append(pool.submit(run))).run()
+        with (
+            panel.ended_by_signals(),
+            ThreadPoolExecutor(1, "rig") as pool,
+            _ending(emulator, inbox),
+        ):
+            panel.run()
     finally:
         sys.setswitchinterval(before_s)
     for rig in started:

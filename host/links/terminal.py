@@ -1,9 +1,12 @@
-"""A terminal as a source of keys, each of them at once and not shown."""
+"""A terminal: keys as they are pressed, and output that nobody waits for."""
 
 from __future__ import annotations
 
 import errno
+import os
+import select
 import sys
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
@@ -34,7 +37,8 @@ def take_keys(descriptor: int) -> Callable[[], None]:
 
         def give_back() -> None:
             with suppress(termios.error):  # it is gone
-                termios.tcsetattr(descriptor, termios.TCSAFLUSH, before)
+                termios.tcsetattr(descriptor, termios.TCSANOW, before)  # TCSAFLUSH waits for output
+                termios.tcflush(descriptor, termios.TCIFLUSH)
 
         try:
             before, modes = termios.tcgetattr(descriptor), termios.tcgetattr(descriptor)
@@ -46,3 +50,113 @@ def take_keys(descriptor: int) -> Callable[[], None]:
         except termios.error as error:
             raise OSError(*error.args) from error
         return give_back
+
+
+MOST_WAITING: Final = 131_072
+"""bytes"""
+
+CLOSING_S: Final = 0.5
+LOOK_S: Final = 0.5
+
+
+class TerminalOutput:
+    """Writes to a terminal from a thread of its own, so that a stuck terminal blocks nobody else.
+
+    A terminal is stuck while its program is stopped, or its connection hangs. Text that does not
+    fit into the queue is dropped.
+
+    Args:
+        descriptor: of the terminal; a duplicate of it is written to.
+        caught_up: called from that thread when all is written and some text was dropped before.
+        lost: called from that thread when the terminal is gone.
+
+    Attributes:
+        gone: the terminal is gone.
+    """
+
+    def __init__(
+        self,
+        descriptor: int,
+        caught_up: Callable[[], object] = lambda: None,
+        lost: Callable[[], object] = lambda: None,
+    ) -> None:
+        self.gone = False
+        self._caught_up, self._lost = caught_up, lost
+        self._waiting, self._writing = bytearray(), False
+        self._dropped = self._closing = False
+        self._changed = threading.Condition()
+        self._descriptor = os.dup(descriptor)
+        self._thread = threading.Thread(target=self._run, name="terminal-output", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether the terminal has not taken all yet."""
+        return bool(self._waiting) or self._writing
+
+    def catches_up(self, within_s: float) -> bool:
+        """Wait until the terminal has taken all; return False if it has not so soon."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self.is_behind, within_s)
+
+    def write(self, text: str, *, last: bool = False) -> None:
+        """Queue a text; the last ones are never dropped."""
+        data = text.encode("utf-8", "replace")
+        with self._changed:
+            if self.gone:
+                return
+            if len(self._waiting) + len(data) > MOST_WAITING and self.is_behind and not last:
+                self._dropped = True
+                return
+            self._waiting += data
+            self._changed.notify_all()
+
+    def close(self) -> bool:
+        """End the thread; return False if the terminal does not take what is left."""
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join(CLOSING_S)
+        return not (self._thread.is_alive() or self.gone)
+
+    def _run(self) -> None:
+        """Write until all is written behind `close`, or the terminal is gone."""
+        try:
+            while not self._ends():
+                with self._changed:
+                    data, self._waiting = bytes(self._waiting), bytearray()
+                    self._writing = True
+                while data:
+                    data = data[os.write(self._descriptor, data) :]
+                self._note_written()
+        except OSError:
+            with self._changed:
+                self.gone, self._writing = True, False
+                self._waiting.clear()
+            self._lost()
+        os.close(self._descriptor)
+
+    def _ends(self) -> bool:
+        """Wait for text; return True at the end, and raise OSError if the terminal is gone."""
+        with self._changed:
+            while not self._waiting and not self._closing:
+                if not self._changed.wait(LOOK_S) and _is_hung_up(self._descriptor):
+                    raise OSError(errno.EIO, os.strerror(errno.EIO))
+            return not self._waiting
+
+    def _note_written(self) -> None:
+        with self._changed:
+            self._writing = False
+            caught_up = self._dropped and not self._waiting
+            self._dropped = self._dropped and not caught_up
+            self._changed.notify_all()
+        if caught_up:
+            self._caught_up()
+
+
+def _is_hung_up(descriptor: int) -> bool:
+    if sys.platform == "win32":
+        return False
+    poll = select.poll()
+    poll.register(descriptor, 0)
+    return bool(poll.poll(0))

@@ -9,8 +9,9 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Final, Self
 
+from tickrig.host.cli.start import give_up_terminals
 from tickrig.host.links.ready import ready
-from tickrig.host.links.terminal import take_keys
+from tickrig.host.links.terminal import TerminalOutput, take_keys
 from tickrig.host.text.page_text import in_cells
 
 ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
@@ -25,12 +26,14 @@ ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
 _KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
 _COLOUR: Final = re.compile(r"(\x1b\[(?:[07]|3[1-6])m)")
 TERMINAL: Final = "/dev/tty"
+PATIENCE_S: Final = 0.02
 
 
 class Screen:
     """The controlling terminal, also where standard input is a pipe.
 
-    On leaving, however that comes about, the terminal is as it was before.
+    On leaving, however that comes about, the terminal is as it was before. One that is stuck
+    holds nobody up: nothing is painted until it has taken the last picture.
 
     Raises:
         OSError: there is no terminal.
@@ -38,13 +41,14 @@ class Screen:
 
     def __init__(self) -> None:
         self._terminal = os.open(TERMINAL, os.O_RDWR)
+        self._output = TerminalOutput(self._terminal)
         self._painted: list[str] = []
         self._size = (0, 0)
 
     def __enter__(self) -> Self:
         """Take the terminal."""
         self._give_back = take_keys(self._terminal)
-        self._write(ENTER)
+        self._output.write(ENTER)
         return self
 
     def __exit__(
@@ -54,34 +58,43 @@ class Screen:
         trace: TracebackType | None,
     ) -> None:
         """Give it back."""
-        with suppress(OSError):  # it is gone
-            self._write(LEAVE)
+        self._output.write(LEAVE, last=True)
+        if not self._output.close():
+            give_up_terminals()
         self._give_back()
         os.close(self._terminal)
 
+    @property
+    def is_gone(self) -> bool:
+        """Whether the terminal was closed."""
+        return self._output.gone
+
     def size(self) -> tuple[int, int]:
-        """Return its columns and lines."""
-        return os.get_terminal_size(self._terminal)
+        """Return its columns and lines; 80 x 24 if it is gone."""
+        with suppress(OSError):
+            return os.get_terminal_size(self._terminal)
+        return (80, 24)
 
     def keys(self) -> list[str]:
-        """Return the keys that were pressed."""
-        if not ready([self._terminal], wait_s=0)[0]:
-            return []
-        text = os.read(self._terminal, 1_024).decode("utf-8", "replace")
+        """Return the keys that were pressed; none if it is gone."""
+        text = ""
+        with suppress(OSError):
+            if ready([self._terminal], wait_s=0)[0]:
+                text = os.read(self._terminal, 1_024).decode("utf-8", "replace")
         return [ARROWS.get(key, key) for key in _KEY.findall(text)]
 
     def paint(self, lines: Sequence[str]) -> None:
-        """Show lines; the only codes in them that the terminal obeys are those of colours."""
+        """Show lines, if the terminal has taken those of before.
+
+        The only codes in them that the terminal obeys are those of colours.
+        """
+        if not self._output.catches_up(PATIENCE_S):
+            return
         lines, size = list(map(_painted, lines)), self.size()
         before = self._painted if size == self._size else []
         text = difference(before, lines)
-        self._write(text if size == self._size else CLEAR + text)
+        self._output.write(text if size == self._size else CLEAR + text)
         self._painted, self._size = lines, size
-
-    def _write(self, text: str) -> None:
-        data = text.encode()
-        while data:
-            data = data[os.write(self._terminal, data) :]
 
 
 def _painted(line: str) -> str:

@@ -128,23 +128,30 @@ class Monitor(FramedApp):
 
     def run_session(self) -> None:
         """Read the source in a thread and show the panels until they are left."""
-        before_s = sys.getswitchinterval()
+        before_s, said = sys.getswitchinterval(), []
         sys.setswitchinterval(SWITCH_S)
-        self.session.start()
-        try:
-            self.run()
-        finally:
-            self.session.close()
-            sys.setswitchinterval(before_s)
+        with self.ended_by_signals():
+            self.session.start()
+            try:
+                self.run()
+            finally:
+                self.session.close()
+                said += self.recorder.end()
+                if trouble := self.panel_settings.save():
+                    said.append(trouble)
+                sys.setswitchinterval(before_s)
         self.session.check()
-        for word in self.recorder.end():
+        for word in said:
             click.echo(word, err=True)
-        if trouble := self.panel_settings.save():
-            click.echo(trouble, err=True)
         if self.return_code:
             raise SystemExit(self.return_code)
         if self.recorder.failed:
             raise SourceFailed(self.recorder.failed)
+
+    def end(self) -> None:
+        """Send nothing more at once, then end the app."""
+        self.session.armed = False
+        super().end()
 
     def save(self) -> None:
         """Keep the settings."""

@@ -111,12 +111,13 @@ class SystemEditor(FramedApp):
         """
         before_s = sys.getswitchinterval()
         sys.setswitchinterval(SWITCH_S)
-        self.session.start()
-        try:
-            self.run()
-        finally:
-            sys.setswitchinterval(before_s)
-            self.session.close()
+        with self.ended_by_signals():
+            self.session.start()
+            try:
+                self.run()
+            finally:
+                sys.setswitchinterval(before_s)
+                self.session.close()
 
     def look(self) -> None:
         """Show how things are now; called ten times a second, and after each command."""

@@ -1,0 +1,238 @@
+"""Commands whose terminal takes nothing any more, or is gone: each of them ends, and cleans up."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import ClassVar
+
+import can
+import pytest
+
+from tests.host.canmon.terminal import Terminal
+from tests.interop.buses import GROUP, PORT
+from tickrig.host.links.terminal import MOST_WAITING
+
+pytestmark = pytest.mark.realtime
+
+BUS = (f"udp:{GROUP}", "--bus-kwargs", f"port={PORT}")
+EDS = Path(__file__).parents[1] / "examples" / "eds"
+RESET_COMMUNICATION = (0x000, b"\x82\x10")
+F8 = "\x1b[19~"
+MORE = 60
+"""So many recorded frames, each in a picture of its own, fill the queue of Textual: it has 30."""
+
+
+def command(name: str) -> str:
+    """Return a program that runs a console command as its script does."""
+    return f"from tickrig.commands import {name}; {name}()"
+
+
+@pytest.fixture
+def bus() -> Iterator[can.BusABC]:
+    with can.Bus(interface="udp_multicast", channel=GROUP, port=PORT, hop_limit=0) as bus:
+        yield bus
+
+
+def tell(bus: can.BusABC, number: int) -> None:
+    data = number.to_bytes(4, "big")
+    bus.send(can.Message(arbitration_id=0x181 + number % 25, data=data, is_extended_id=False))
+
+
+class Stuck:
+    """A command in a terminal that is full, and from which nobody reads."""
+
+    running: ClassVar[set[int]] = set()
+
+    def __init__(self, terminal: Terminal) -> None:
+        self.terminal, self.pid = terminal, terminal.child.pid or 0
+        self.running.add(self.pid)
+        self._slave = os.open(f"/proc/{self.pid}/fd/1", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        with suppress(BlockingIOError):
+            while True:
+                os.write(self._slave, b"\0")
+
+    @property
+    def runs(self) -> bool:
+        return os.waitpid(self.pid, os.WNOHANG) == (0, 0)
+
+    def close(self) -> None:
+        """Close the terminal, as an emulator of terminals does that ends."""
+        os.close(self._slave)
+        self._slave = -1
+        os.close(self.terminal.child.child_fd)
+
+    def end(self) -> int:
+        """Wait for the end of the command and return its exit status."""
+        _, status = os.waitpid(self.pid, 0)
+        self.running.remove(self.pid)
+        self.terminal.child.closed = True
+        if self._slave >= 0:
+            os.close(self._slave)
+        return os.waitstatus_to_exitcode(status)
+
+
+@pytest.fixture(autouse=True)
+def none_left() -> Iterator[None]:
+    yield
+    while Stuck.running:
+        os.kill(Stuck.running.pop(), signal.SIGKILL)
+
+
+ENDINGS: dict[str, Callable[[Stuck], object]] = {
+    "close": Stuck.close,
+    "q": lambda stuck: stuck.terminal.child.send("q"),
+    "SIGTERM": lambda stuck: os.kill(stuck.pid, signal.SIGTERM),
+}
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_monitor_ends_what_it_does_though_its_terminal_is_stuck(
+    bus: can.BusABC, ending: str, tmp_path: Path
+) -> None:
+    settings, part = tmp_path / "bench.toml", tmp_path / "run-00001.log"
+    words = ("tui", *BUS, "-w", str(settings))
+    terminal = Terminal(*words, program=command("canmon"))
+    terminal.wait_for("LISTEN-ONLY")
+    terminal.child.send(F8)
+    terminal.wait_for("record into")
+    terminal.child.send("\x15")  # all that stands in the field goes
+    terminal.child.send(f"{tmp_path}/run.log\r")
+    terminal.wait_for("REC")
+    terminal.child.send("ob")  # settings that are saved
+    terminal.wait_for("frames CAN-ID")
+    tell(bus, 0)
+    terminal.wait_for("1 frame ")
+    stuck = Stuck(terminal)
+
+    def record(number: int) -> None:
+        before = part.stat().st_size
+        tell(bus, number)
+        while part.stat().st_size == before:
+            assert stuck.runs
+
+    for number in range(1, MORE):
+        record(number)
+    ENDINGS[ending](stuck)
+    assert stuck.end() == 0
+    assert len(part.read_text("ascii").splitlines()) == MORE
+    assert '"ev":"end"' in (tmp_path / "run.index.jsonl").read_text("ascii")
+    assert "overwrite = true" in settings.read_text("utf-8")
+
+
+def test_what_a_stuck_terminal_missed_is_painted_when_it_reads_on(bus: can.BusABC) -> None:
+    terminal = Terminal("tui", *BUS, columns=200, lines=60, program=command("canmon"))
+    terminal.wait_for("LISTEN-ONLY")
+    Stuck.running.discard(Stuck(terminal).pid)
+    for number in range(4 * MOST_WAITING // (200 * 60)):
+        terminal.resize(200 - number % 2, 60)  # each time all of the screen
+        tell(bus, number)
+    terminal.child.send("3")
+    terminal.wait_for("identifiers by id")
+    terminal.child.send("q")
+    assert terminal.end() == 0
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_a_table_on_the_screen_is_left_though_the_terminal_is_stuck(
+    bus: can.BusABC, ending: str
+) -> None:
+    terminal = Terminal("top", *BUS, program=command("canmon"))
+    terminal.wait_for("0 identifiers")
+    stuck = Stuck(terminal)
+    tell(bus, 1)
+    ENDINGS[ending](stuck)
+    assert stuck.end() == 0
+
+
+@pytest.mark.parametrize("ending", ["close", "SIGTERM"])
+def test_the_operator_panel_gives_back_what_it_has_though_its_terminal_is_stuck(
+    ending: str, tmp_path: Path
+) -> None:
+    words = ("--link", str(tmp_path / "tty"), "--panel")
+    terminal = Terminal(*words, program=command("rrc_emu"))
+    terminal.wait_for("WaitPowerOn")
+    ENDINGS[ending](stuck := Stuck(terminal))
+    assert stuck.end() == 0
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_the_editor_leaves_its_nodes_though_its_terminal_is_stuck(
+    bus: can.BusABC, ending: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "robot.yaml"
+    file.write_text(
+        f"nodes:\n- {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}\n", "utf-8"
+    )
+    words = (str(file), "-i", "udp_multicast", "-c", GROUP, "--bus-kwargs", f"port={PORT}")
+    terminal = Terminal(*words, program=command("rtc_canopen_editor"))
+    terminal.wait_for("Palette0")
+    while bus.recv(0):
+        pass
+    ENDINGS[ending](stuck := Stuck(terminal))
+    assert stuck.end() == 0
+    assert RESET_COMMUNICATION in list(sent(bus))
+
+
+def sent(bus: can.BusABC) -> Iterator[tuple[int, bytes]]:
+    while message := bus.recv(0):
+        yield message.arbitration_id, bytes(message.data)
+
+
+@pytest.mark.parametrize("ending", ["close", "SIGTERM"])
+def test_a_dump_ends_though_its_terminal_is_stuck(ending: str, tmp_path: Path) -> None:
+    source = tmp_path / "in.log"
+    source.write_text("".join(f"({n}.000000) can0 181#{n:08X}\n" for n in range(20_000)), "ascii")
+    terminal = Terminal("dump", str(source), program=command("canmon"))
+    terminal.wait_until(lambda: bool(terminal.written))
+    ENDINGS[ending](stuck := Stuck(terminal))
+    assert stuck.end() == 0
+
+
+@pytest.mark.parametrize("ending", ["close", "SIGTERM"])
+def test_an_emulator_writes_its_trace_to_the_end_though_its_terminal_is_stuck(
+    ending: str, tmp_path: Path
+) -> None:
+    link, trace = tmp_path / "tty", tmp_path / "run.trace"
+    words = ("--link", str(link), "--trace", str(trace), "-vv")
+    terminal = Terminal(*words, program=command("rrc_emu"))
+    terminal.wait_for("Ctrl-C ends")
+    stuck = Stuck(terminal)
+    link.write_bytes(b"output1e00\n" * 10)
+    ENDINGS[ending](stuck)
+    assert stuck.end() == 0
+    assert trace.read_text("ascii").splitlines()[-1].endswith(" .")
+
+
+SCRIPT = '"$@" & echo $!; wait $!; echo status $?'
+BACKGROUND: dict[str, tuple[str, tuple[str, ...], int]] = {
+    "rrc-emu": ("rrc_emu", (), 0),
+    "canmon dump": ("canmon", ("dump", *BUS), 0),
+    "tickrig demo rtc-lite": ("tickrig", ("demo", "rtc-lite"), 130),
+}
+
+
+@pytest.mark.parametrize("name", BACKGROUND)
+def test_sigint_ends_what_a_script_has_begun_in_the_background(bus: can.BusABC, name: str) -> None:
+    point, words, status = BACKGROUND[name]
+    told = subprocess.Popen(
+        ["sh", "-c", SCRIPT, "sh", sys.executable, "-u", "-c", command(point), *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    assert told.stdout is not None
+    pid = int(told.stdout.readline())
+    while not select.select([told.stdout], [], [], 0.01)[0]:
+        tell(bus, 1)
+    told.stdout.readline()
+    os.kill(pid, signal.SIGINT)
+    with told:
+        assert told.stdout.read().splitlines()[-1] == f"status {status}"
