@@ -7,8 +7,9 @@ import os
 import socket
 import stat
 import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def listen_at(path: Path) -> socket.socket:
 
     Raises:
         FileExistsError: a live process listens there, or it is not a socket.
+        BlockingIOError: another program holds a lock on the folder for more than a second.
         OSError: no socket can be made there.
     """
     listener = unix_socket()
@@ -53,18 +55,35 @@ def listen_at(path: Path) -> socket.socket:
     return listener
 
 
+LOCK_TRIES: Final = 100
+LOCK_AGAIN_S: Final = 0.01
+
+
 @contextmanager
 def _alone_in(folder: Path) -> Iterator[None]:
-    """Let two that begin at once do so one after the other."""
+    """Let two that begin at once do so one after the other; each takes milliseconds."""
     held = os.open(folder, os.O_RDONLY)
     try:
         if sys.platform != "win32":
-            import fcntl  # noqa: PLC0415 - not on Windows
-
-            fcntl.flock(held, fcntl.LOCK_EX)
+            _lock(held, folder)
         yield
     finally:
         os.close(held)
+
+
+if sys.platform != "win32":
+
+    def _lock(held: int, folder: Path) -> None:
+        """Lock a folder; BlockingIOError if another program does not let go of it."""
+        import fcntl  # noqa: PLC0415 - not on Windows
+
+        for _ in range(LOCK_TRIES):
+            with suppress(BlockingIOError):
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return
+            time.sleep(LOCK_AGAIN_S)
+        why = f"another program holds a lock on the folder {folder}; name a file in another folder"
+        raise BlockingIOError(errno.EWOULDBLOCK, why)
 
 
 def _check(path: Path) -> None:

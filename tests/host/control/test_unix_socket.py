@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import fcntl
+import os
 import socket
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -40,3 +42,14 @@ def test_the_socket_of_a_killed_process_is_replaced(tmp_path: Path) -> None:
     listen_at(path).close()
     with listen_at(path), socket.socket(socket.AF_UNIX) as client:
         client.connect(str(path))
+
+
+def test_a_folder_that_another_program_has_locked_is_refused(tmp_path: Path) -> None:
+    folder = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(folder, fcntl.LOCK_EX)
+    why = f"another program holds a lock on the folder {tmp_path}"
+    with pytest.raises(BlockingIOError, match=why) as refused:
+        listen_at(tmp_path / "control")
+    assert refused.value.filename == str(tmp_path / "control")
+    os.close(folder)
+    listen_at(tmp_path / "control").close()
