@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,7 +13,7 @@ from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.host.cli.extensions import ExtensionGroup
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.trace import Config, Header
-from tickrig.host.text.user_file import explain_error
+from tickrig.host.text.user_file import SUFFIX, explain_error
 
 if TYPE_CHECKING:
     import click
@@ -143,16 +143,32 @@ DEVICES: Final = ExtensionGroup[DeviceType](
 """The device types that there are."""
 
 
-def build_recorded(header: Header) -> Emulated[bytes]:
+def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]:
     """Build the device that a trace was recorded on.
+
+    Args:
+        header: of the trace.
+        run_code: whether to run a Python file that it names.
 
     Raises:
         ValueError: there is none of this name, or its configuration cannot be.
     """
+    check_no_code(header.config.values(), run_code=run_code)
     if header.device not in DEVICES.built_in and header.device not in DEVICES.names():
         known = ", ".join(DEVICES.names())
         raise ValueError(f"recorded on {header.device!r}; this program knows {known}")
     return DEVICES.load(header.device).of_trace(header.config)
+
+
+def check_no_code(named: Iterable[object], *, run_code: bool) -> None:
+    """Refuse Python files that a trace names: who replays a trace does not expect to run a program.
+
+    Raises:
+        ValueError: there is a `FILE.py:Class`, and `run_code` does not allow it.
+    """
+    for name in named:
+        if isinstance(name, str) and f"{SUFFIX}:" in name and not run_code:
+            raise ValueError(f"it names Python code, {name!r:.80}; --run-code runs it")
 
 
 def check_config(config: Config, defaults: Config, owner: str, *, typed: bool = True) -> None:

@@ -104,3 +104,9 @@ def time_option(option: str, name: str, **attributes: Any) -> Decorator:
             raise Refused(f"{option} {error}") from None
 
     return click.option(option, name, metavar="TIME", callback=parsed, **attributes)
+
+
+run_code_option: Final[Decorator] = click.option(
+    "--run-code", is_flag=True, help="Run the Python files that the trace names (FILE.py:Class)."
+)
+"""Of commands that make devices again of a trace."""

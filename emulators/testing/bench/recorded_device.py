@@ -18,7 +18,7 @@ from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.canopen.node.store_file import drop_misfits, memory_values, parse_memory
-from tickrig.emulators.commands.device_type import build_recorded
+from tickrig.emulators.commands.device_type import build_recorded, check_no_code
 from tickrig.host.cli.refused import Refused
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry
 from tickrig.host.text.trace import Header
@@ -61,7 +61,9 @@ def node_entry(
     )
 
 
-def make_recorded(header: BenchHeader, name: str, folder: Path, cache: EdsCache) -> Any:
+def make_recorded(
+    header: BenchHeader, name: str, folder: Path, cache: EdsCache, *, run_code: bool = False
+) -> Any:
     """Make the device that was recorded, as it was when the recording began.
 
     Args:
@@ -69,6 +71,7 @@ def make_recorded(header: BenchHeader, name: str, folder: Path, cache: EdsCache)
         name: of the device.
         folder: of the trace; its files are looked for here too.
         cache: of EDS files.
+        run_code: whether to run a Python file that the trace names.
 
     Raises:
         ValueError: it cannot be made; the text is for people.
@@ -77,10 +80,11 @@ def make_recorded(header: BenchHeader, name: str, folder: Path, cache: EdsCache)
     try:
         if not entry.type:
             raise ValueError("it was made by a program, not of a type")
+        check_no_code(user_code([entry]), run_code=run_code)
         if on_can is (entry.node_id is None):
             raise ValueError(f"{entry.type} cannot be on wire {entry.wire}")
         if entry.node_id is None:
-            return build_recorded(Header(entry.type, entry.config))
+            return build_recorded(Header(entry.type, entry.config), run_code=run_code)
         return _node(name, entry, folder, cache)
     except Refused as refused:
         raise ValueError(f"device {name}: {refused}") from None

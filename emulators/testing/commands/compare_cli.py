@@ -10,7 +10,7 @@ import click
 
 from tickrig.emulators.testing.commands.type_option import type_option
 from tickrig.host.cli.messages import say
-from tickrig.host.cli.options import PATH, add_options, time_option
+from tickrig.host.cli.options import PATH, add_options, run_code_option, time_option
 from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.cli.start import loading
 
@@ -56,6 +56,7 @@ _tolerance: Final = add_options(
 @click.argument("file", type=PATH)
 @_device
 @_tolerance
+@run_code_option
 @click.option("-v", "--verbose", is_flag=True, help="All that was said, the same too.")
 @click.pass_context
 def compare_command(
@@ -142,7 +143,7 @@ def _ticked(
     entry, on_can = header.devices[name], header.on_can(name)
     if options["type_name"] and not on_can:
         return compare_ticks(recording, name, _configured(options, ""))
-    device = make_recorded(header, name, file.parent, EdsCache())
+    device = make_recorded(header, name, file.parent, EdsCache(), run_code=options["run_code"])
     if on_can:
         return compare_node_ticks(recording, name, device)
     configured = ConfiguredDevice(DEVICES.load(entry.type), device, entry.config)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from tickrig.host.cli.options import PATH
+from tickrig.host.cli.options import PATH, run_code_option
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
 from tickrig.host.text.byte_text import escape
@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     metavar="FILE.py:Class",
     help="FILE is a scenario that a search has found: do it with this BenchMachine.",
 )
+@run_code_option
 @click.pass_context
 def replay_command(
-    context: click.Context, /, file: Path, *, verbose: bool, host: str | None
+    context: click.Context, /, file: Path, *, verbose: bool, host: str | None, run_code: bool
 ) -> None:
     """Replay the trace FILE on fresh devices; exit status 1 if one says anything else.
 
@@ -50,7 +51,7 @@ def replay_command(
         if any(line.startswith(b"+") for line in data.splitlines()[:2]):
             raise Refused(f"{file} is a scenario of check_host: --host FILE.py:Class replays it")
         play = _replay_bench if data.startswith(PREFIX.encode()) else _replay
-        played = play(file, data)
+        played = play(file, data, run_code)
     except OSError as error:
         refuse_path("trace", error)
     except ValueError as error:
@@ -103,7 +104,7 @@ class _Played(NamedTuple):
     difference: Difference[Any] | None
 
 
-def _replay(file: Path, data: bytes) -> list[_Played]:
+def _replay(file: Path, data: bytes, run_code: bool) -> list[_Played]:
     """Replay a trace of one device on a serial line."""
     with loading():
         from tickrig.emulators.commands.device_type import build_recorded  # noqa: PLC0415 - slow
@@ -112,12 +113,12 @@ def _replay(file: Path, data: bytes) -> list[_Played]:
 
     recording = read_recording(data)
     with mistakes_in(recording.header.config.values()):
-        difference = replay(recording, build_recorded(recording.header))
+        difference = replay(recording, build_recorded(recording.header, run_code=run_code))
     _warn(file, ended=recording.ended)
     return [_Played("", recording.header.device, recording.ticks, difference)]
 
 
-def _replay_bench(file: Path, data: bytes) -> list[_Played]:
+def _replay_bench(file: Path, data: bytes, run_code: bool) -> list[_Played]:
     """Replay each device of a bench."""
     with loading():
         from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
@@ -125,7 +126,7 @@ def _replay_bench(file: Path, data: bytes) -> list[_Played]:
     recording = read_bench_recording(data)
     if recording.at_port:
         raise ValueError("it was recorded at a host's port, without ticks: use tickrig compare")
-    found = _differences(file, recording)
+    found = _differences(file, recording, run_code)
     _warn(file, ended=recording.ended)
     return [
         _Played(
@@ -135,7 +136,9 @@ def _replay_bench(file: Path, data: bytes) -> list[_Played]:
     ]
 
 
-def _differences(file: Path, recording: BenchRecording) -> list[tuple[str, Difference[Any] | None]]:
+def _differences(
+    file: Path, recording: BenchRecording, run_code: bool
+) -> list[tuple[str, Difference[Any] | None]]:
     from tickrig.emulators.canopen.eds import EdsCache  # noqa: PLC0415 - slow
     from tickrig.emulators.record.bench_replay import replay_device  # noqa: PLC0415
     from tickrig.emulators.testing.bench.recorded_device import (  # noqa: PLC0415
@@ -150,15 +153,10 @@ def _differences(file: Path, recording: BenchRecording) -> list[tuple[str, Diffe
     for name in devices:
         if name not in typed:
             click.echo(f"{file}: {name} was made by a program, not of a type: left out", err=True)
-    return [
-        (
-            name,
-            replay_device(
-                recording, name, make_recorded(recording.header, name, file.parent, cache)
-            ),
-        )
-        for name, entry in typed.items()
-    ]
+    made = {
+        name: make_recorded(header, name, file.parent, cache, run_code=run_code) for name in typed
+    }
+    return [(name, replay_device(recording, name, device)) for name, device in made.items()]
 
 
 def _warn(file: Path, *, ended: bool) -> None:

@@ -71,10 +71,19 @@ def test_a_recorded_scenario_replays_identically(folder: Path) -> None:
     assert re.fullmatch(r"identical: \d+ ticks\n", result.stdout)
 
 
-def test_a_node_of_a_file_replays_too(folder: Path) -> None:
+def test_a_node_of_a_file_replays_if_its_code_may_run(folder: Path) -> None:
     words = ("--node", "mine.py:Divider", "--timer", "100", "--trace", "run.trace")
     assert emu(*words, "--scenario", "-", text="0 send CI\n1 end").exit_code == 0
-    assert CliRunner().invoke(tickrig, ["replay", "run.trace"]).exit_code == 0
+    assert CliRunner().invoke(tickrig, ["replay", "run.trace", "--run-code"]).exit_code == 0
+    mine = Path("mine.py")
+    mine.write_text(f"open('run', 'w').close()\n{mine.read_text('utf-8')}", "utf-8")
+    for command in ("replay", "compare"):
+        refused = CliRunner().invoke(tickrig, [command, "run.trace"])
+        why = "it names Python code, 'mine.py:Divider'; --run-code runs it"
+        assert refused.exit_code == 2
+        assert refused.stderr.startswith("Error: trace run.trace: ")
+        assert why in refused.stderr
+    assert not Path("run").exists()
 
 
 @pytest.mark.parametrize(

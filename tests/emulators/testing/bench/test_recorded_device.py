@@ -18,9 +18,9 @@ EDS = Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds"
 EXAMPLES = Path(__file__).parents[4] / "examples"
 
 
-def replayed(bench: Bench, path: Path) -> str:
+def replayed(bench: Bench, path: Path, *words: str) -> str:
     bench.save_trace(path)
-    return CliRunner().invoke(main, ["replay", str(path)]).output
+    return CliRunner().invoke(main, ["replay", str(path), *words]).output
 
 
 def test_the_bench_of_a_rig_file_replays_with_what_it_began_with(tmp_path: Path) -> None:
@@ -69,9 +69,16 @@ def test_a_device_rtc_of_a_file_replays_while_the_file_is_the_same(tmp_path: Pat
     )
     with Bench.of_plan(plan_of(device, wires=(BUS,))) as bench:
         bench.run_for("100ms")
-        assert replayed(bench, tmp_path / "run.trace").startswith("identical: ")
+        assert replayed(bench, tmp_path / "run.trace", "--run-code").startswith("identical: ")
+    for command in ("replay", "compare"):
+        refused = CliRunner().invoke(main, [command, str(tmp_path / "run.trace")])
+        assert refused.exit_code == 2
+        assert refused.stderr == (
+            f"Error: trace {tmp_path}/run.trace: device t: it names Python code,"
+            f" {f'{file}:Gripper'!r:.80}; --run-code runs it\n"
+        )
     file.write_text(file.read_text() + "# changed\n")
-    result = CliRunner().invoke(main, ["replay", str(tmp_path / "run.trace")])
+    result = CliRunner().invoke(main, ["replay", str(tmp_path / "run.trace"), "--run-code"])
     assert result.exit_code == 2
     assert result.stderr.endswith(
         f"device t: {file} is another file than the one that was recorded\n"

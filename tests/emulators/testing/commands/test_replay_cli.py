@@ -184,6 +184,6 @@ def test_what_a_file_of_a_user_raises_is_said_in_a_line(tmp_path: Path, verb: st
         rig.run_for(100_000)
     trace.close(rig.now_us)
     file.write_text(COMPONENT.format(body="raise KeyError('oh')"))
-    result = CliRunner().invoke(main, [verb, str(path)])
+    result = CliRunner().invoke(main, [verb, str(path), "--run-code"])
     assert result.exit_code == 2
     assert result.stderr == f"Error: {file}:Mine: line 9: KeyError: 'oh'\n"
