@@ -27,23 +27,24 @@ class RestartCounter:
     Attributes:
         pending: it was lost, and nothing was done about it yet.
         to_activate: it was Active, and is to be again once it is Inactive.
+        was_active: it was Active when it was lost.
     """
 
     def __init__(self, most: int) -> None:
         self._most, self._made, self._last_us = most, 0, -WELL_US
-        self.pending = self.to_activate = self._active = False
+        self.pending = self.to_activate = self.was_active = False
 
     def lose(self, now_us: int, *, active: bool) -> None:
         """Take note that a node was lost, without anybody's will."""
         if now_us - self._last_us >= WELL_US:
             self._made = 0
-        self.pending = self._most > 0
-        self._active |= active or self.to_activate
+        self.pending = True
+        self.was_active |= active or self.to_activate
         self.to_activate = False
 
     def forget(self) -> None:
         """Leave it to a person."""
-        self.pending = self.to_activate = self._active = False
+        self.pending = self.to_activate = self.was_active = False
 
     def leave(self) -> None:
         """Do nothing about it if somebody was faster; a restart that has begun goes on."""
@@ -52,19 +53,23 @@ class RestartCounter:
 
     def by_hand(self) -> bool:
         """Leave it to a person who restarts it now; return whether it was lost while Active."""
-        active = self._active or self.to_activate
+        active = self.was_active or self.to_activate
         self.forget()
         return active
 
     def take(self, now_us: int) -> str:
         """Begin a restart; return which, as `1 of 3`, or nothing if none is left."""
-        active = self._active
-        self.forget()
         if self._made >= self._most:
+            self.pending = False
             return ""
+        active = self.was_active
+        self.forget()
         self._made, self._last_us, self.to_activate = self._made + 1, now_us, active
         return f"{self._made} of {self._most}"
 
+
+AUTOMATIC: Final = "'restart: 3' of the node"
+"""The key of a System Definition with which a person has nothing to do."""
 
 STATES: Final = {
     NmtState.PRE_OPERATIONAL: LifeCycleState.INACTIVE,
@@ -174,12 +179,28 @@ class NodeOperations:
         if self.restart.pending and proxy.state is LifeCycleState.ERROR and self.begin_restart():
             proxy.contexts[0].reset_component(proxy)
 
-    def begin_restart(self) -> bool:
-        """Take a restart, and tell; False if none is left."""
-        which = self.restart.take(self.now_us)
-        kind = ServerEventType.RESTARTED if which else ServerEventType.NOT_RESTARTED
-        self._notify(kind, self._entry.id, which or "no restart is left")
+    def begin_restart(self, *, to_start: bool = False) -> bool:
+        """Take a restart and report it; return False if none is left.
+
+        Args:
+            to_start: it is activated without a restart.
+        """
+        if which := self.restart.take(self.now_us):
+            self._notify(ServerEventType.RESTARTED, self._entry.id, which)
+        elif not to_start and (text := self._left_to_do()):
+            self._notify(ServerEventType.NOT_RESTARTED, self._entry.id, text)
         return bool(which)
+
+    def _left_to_do(self) -> str:
+        """Say what a person has to do, as it is not restarted; nothing if it is as it was."""
+        entry, was_active = self._entry, self.restart.was_active
+        hint = "no restart is left" if entry.restart else f"{AUTOMATIC} does so by itself"
+        if self.proxy is not None and self.proxy.state is LifeCycleState.ERROR:
+            then = " and activate" * was_active
+            return f"{entry.name} is in Error: reset{then} it; {hint}"
+        if was_active:
+            return f"{entry.name} was Active and is Inactive now: activate it; {hint}"
+        return ""
 
     def fail(self, failure: Failure) -> None:
         """Note what failed, and let the proxy go to Error."""

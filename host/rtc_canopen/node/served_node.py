@@ -299,7 +299,7 @@ class ServedNode:
         self.operations.booted()
         self._server.booted(self)
         if self.operations.restart.pending:
-            self.operations.begin_restart()
+            self.operations.begin_restart(to_start=self.to_start)
 
     def _not_booted(self, failure: Failure) -> None:
         self.operations.resetting, self.problem = False, str(failure)

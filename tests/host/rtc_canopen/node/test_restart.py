@@ -66,7 +66,7 @@ def test_after_its_last_restart_it_waits_for_somebody_who_resets_it() -> None:
     assert bench.events(*TOLD) == [
         "Restarted 16 1 of 2",
         "Restarted 16 2 of 2",
-        "NotRestarted 16 no restart is left",
+        "NotRestarted 16 Palette0 is in Error: reset and activate it; no restart is left",
     ]
     assert bench.state(16) is ERROR
     bench.server.manager.reset("Palette0")
@@ -82,13 +82,6 @@ def test_after_a_minute_all_restarts_are_there_again() -> None:
     lose(bench, 600)
     assert bench.events(*TOLD)[2:] == ["Restarted 16 1 of 2"]
     assert bench.state(16) is ACTIVE
-
-
-def test_without_restarts_it_stays_in_error() -> None:
-    bench = running(PALETTE_AND_MOTOR)
-    lose(bench, 600)
-    assert bench.events(*TOLD) == []
-    assert bench.state(16) is ERROR
 
 
 def test_who_resets_it_before_it_is_back_finds_it_inactive() -> None:
@@ -123,3 +116,39 @@ def test_those_before_it_in_the_start_order_come_first() -> None:
     starts = [str(heard) for _, heard in bench.log.heard[before:] if str(heard)[:6] == "000#01"]
     assert starts == ["000#0120", "000#0110"]
     assert (bench.state(16), bench.state(32)) == (ACTIVE, ACTIVE)
+
+
+def test_a_node_without_restarts_is_left_to_a_person_and_it_is_told_what_to_do() -> None:
+    bench = running(PALETTE_AND_MOTOR)
+    lose(bench, 3_000)
+    assert bench.state(16) is INACTIVE
+    assert bench.events(*TOLD) == [
+        "NotRestarted 16 Palette0 was Active and is Inactive now: activate it; 'restart: 3' of the"
+        " node does so by itself"
+    ]
+    bench.activate(16)
+    lose(bench, 600)
+    assert bench.state(16) is ERROR
+    assert bench.events(*TOLD)[1:] == [
+        "NotRestarted 16 Palette0 is in Error: reset and activate it; 'restart: 3' of the node does"
+        " so by itself"
+    ]
+
+
+def test_what_was_not_active_is_not_missed() -> None:
+    bench = running(PALETTE_AND_MOTOR)
+    bench.server.manager.deactivate("Palette0")
+    bench.run_ms(200)
+    lose(bench, 3_000)
+    assert bench.state(16) is INACTIVE
+    assert bench.events(*TOLD) == []
+
+
+def test_a_node_that_is_activated_by_itself_is_not_told_of() -> None:
+    bench = Bench(PALETTE_AND_MOTOR + "start: {autoactivate: true, order: [16, 32]}\n")
+    bench.boot()
+    bench.run_ms(500)
+    assert bench.state(16) is ACTIVE
+    lose(bench, 3_000)
+    assert bench.state(16) is ACTIVE
+    assert bench.events(*TOLD) == []
