@@ -47,7 +47,8 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: OnProgress) 
         SdoTimeout: it does not answer.
     """
     request = BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
-    begun = yield from _request(request, index, sub, BlockDownloadInitiateResponse)
+    first = SdoRequest(request, index, sub)
+    begun = yield from _request(first, BlockDownloadInitiateResponse)
     block_size, total, taken, idle = begun.block_size, max(1, -(-len(data) // SEGMENT_BYTES)), 0, 0
     while taken < total:
         if not 1 <= block_size <= MAX_BLOCK_SIZE:
@@ -60,7 +61,7 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: OnProgress) 
         taken, block_size = taken + receipt.ackseq, receipt.block_size
         on_progress(min(taken * SEGMENT_BYTES, len(data)))
     end = BlockEnd(total * SEGMENT_BYTES - len(data), crc16(data) if begun.crc else 0)
-    yield from _request(end.encode(), index, sub, BlockEnded)
+    yield from _request(SdoRequest(end.encode(), index, sub, goes_on=True), BlockEnded)
 
 
 def _send_block(
@@ -72,17 +73,18 @@ def _send_block(
         yield SdoFrame(bytes((seqno,)) + data[at : at + SEGMENT_BYTES])
         at += SEGMENT_BYTES
     last = BlockSegment(count, data[at : at + SEGMENT_BYTES], at + SEGMENT_BYTES >= len(data))
-    return (yield from _request(last.encode(), index, sub, BlockAcknowledge))
+    request = SdoRequest(last.encode(), index, sub, goes_on=True)
+    return (yield from _request(request, BlockAcknowledge))
 
 
-def _request(request: bytes, index: int, sub: int, kind: type[Answer]) -> Script[Answer]:
+def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
     """Send, and return the answer; what is no such answer ends the transfer."""
-    answer = yield SdoRequest(request, index, sub)
+    answer = yield request
     if isinstance(answer, kind):
         return answer
     if isinstance(answer, Abort):
-        raise SdoAborted(index, sub, answer.code)
-    return (yield from _abort(index, sub, AbortCode.COMMAND_SPECIFIER))
+        raise SdoAborted(request.index, request.sub, answer.code)
+    return (yield from _abort(request.index, request.sub, AbortCode.COMMAND_SPECIFIER))
 
 
 def _abort(index: int, sub: int, code: AbortCode) -> Script[NoReturn]:

@@ -3,6 +3,19 @@
 A script is a generator. It yields steps, is given what came of each, and returns
 its result; what goes wrong is raised in it. It waits for nothing: a `Dialogue`
 goes on with it when there is an answer, or when a time has passed.
+
+Late answers. An SDO answer names its object, never its question: after a time-out, an answer
+that comes late looks like the answer to the next question about the same object. All that helps
+is order: a server answers one question after the other, and CAN keeps the order of its answers.
+So an answer that names an object is also the proof that no answer to an earlier question can
+follow. `Unanswered` keeps the objects whose questions may still be answered, in their order. Before
+the dialogue asks about one of them again it reads another object, a fence (1000h, else 1001h and
+so on), and waits for its answer. Nothing here depends on how late an answer is.
+
+Answers that come twice. CAN repeats a frame whose sender saw its last bit wrong, and a request that
+is repeated is answered twice. Such a copy is sent right after its original. So the dialogue waits
+before it asks about the object that was answered last: as long as that answer took, but at least
+`LEAST_COPY_US` and at most `MOST_COPY_US`.
 """
 
 from __future__ import annotations
@@ -24,23 +37,51 @@ from tickrig.wire.canopen.sdo.sdo import (
     Abort,
     DownloadInitiateResponse,
     Response,
+    UploadInitiateRequest,
     UploadInitiateResponse,
     parse_response,
 )
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.sdo.sdo_block import (
+    BlockAcknowledge,
+    BlockDownloadInitiateResponse,
+    BlockUploadInitiateResponse,
+)
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, ClientCommand
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 
 SDO_TIMEOUT_US: Final = 500_000
 
+LEAST_COPY_US: Final = 2_000
+"""How long a copy of an answer may take: an error frame and the frame again, at 125 kbit/s."""
+MOST_COPY_US: Final = 20_000
+
+Object = tuple[int, int]
+"""Index and sub-index."""
+
+NONE_NAMED: Final = (0, 0)
+"""In the abort of a server that could not read a request."""
+
+FENCES: Final[tuple[Object, ...]] = (
+    *((index, 0) for index in (0x1000, 0x1001, 0x1018)),
+    *((0x1018, sub) for sub in range(1, 5)),
+    *((0x1000, sub) for sub in range(1, 0xFF)),
+)
+"""Objects that may be read at any time; every server answers, and be it with an abort."""
+
 
 @dataclass(frozen=True, slots=True)
 class SdoRequest:
-    """Send an SDO request; gives the response, raises SdoTimeout without one."""
+    """Send an SDO request; gives the response, raises SdoTimeout without one.
+
+    Attributes:
+        goes_on: it belongs to a transfer that the server has begun; else it begins one.
+    """
 
     request: bytes
     index: int
     sub: int
+    goes_on: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,8 +172,56 @@ class QueuedScript:
     moves: bool = True
 
 
+class Unanswered:
+    """The objects whose questions the server may still answer, the earliest question first."""
+
+    def __init__(self) -> None:
+        self._objects: list[Object] = []
+
+    def __contains__(self, at: Object) -> bool:
+        """Whether an answer about the object may still come."""
+        return at in self._objects
+
+    def __len__(self) -> int:
+        """How many questions are open; one that was repeated counts once."""
+        return len(self._objects)
+
+    def ask(self, at: Object) -> None:
+        """Add a question."""
+        if self._objects[-1:] != [at]:
+            self._objects.append(at)
+
+    def hear(self, at: Object) -> None:
+        """Drop the questions before those about the object: the server is past them."""
+        if at in self._objects:
+            del self._objects[: self._objects.index(at)]
+
+    def clear(self) -> None:
+        """Drop all: the latest question was answered, and it was the only one about its object."""
+        self._objects.clear()
+
+    def fence(self, at: Object) -> Object:
+        """Return an object whose answer shows that no answer about `at` can follow.
+
+        The latest question serves, so a node that is gone is asked for one fence again and
+        again. If all fences are open, the oldest question is forgotten: a server that answers
+        now has left more than 250 questions unanswered.
+        """
+        last = self._objects[-1]
+        if last in FENCES and last != at:
+            return last
+        while True:
+            for fence in FENCES:
+                if fence != at and fence not in self._objects:
+                    return fence
+            del self._objects[0]
+
+
 class Dialogue:
     """What is said with one node; it sends, and never waits.
+
+    It lasts as long as its holder talks to the node: only the dialogue knows which questions the
+    server may still answer.
 
     Args:
         node_id: the node.
@@ -141,6 +230,7 @@ class Dialogue:
         sdo_timeout_us: how long to wait for an SDO response.
 
     Attributes:
+        sdo_timeout_us: as given; a new one counts from the next request on.
         due_us: when a time-out or a pause ends, `NEVER` if there is none.
         job: what is under way.
     """
@@ -153,12 +243,16 @@ class Dialogue:
         sdo_timeout_us: int = SDO_TIMEOUT_US,
     ) -> None:
         self._node_id, self._send, self._guard = node_id, send, guard
-        self._sdo_timeout_us = sdo_timeout_us
+        self.sdo_timeout_us = sdo_timeout_us
         self._now_us, self.due_us = 0, NEVER
         self.job: QueuedScript | None = None
         self._step: Step | None = None
-        self._transfer: tuple[int, int] | None = None
         self._jobs: deque[QueuedScript] = deque()
+        self._unanswered = Unanswered()
+        self._transfer: Object | None = None
+        self._asked: Object | None = None  # which answer the step waits for: its own, or a fence's
+        self._asked_us = self._settled_us = 0
+        self._answer = b""
 
     @property
     def moves(self) -> bool:
@@ -181,7 +275,7 @@ class Dialogue:
         """Forget all jobs."""
         dropped = [self.job, *self._jobs] if self.job is not None else []
         self._jobs.clear()
-        self.job, self._step, self.due_us = None, None, NEVER
+        self.job, self._step, self._asked, self.due_us = None, None, None, NEVER
         for job in dropped:
             job.script.close()
             job.dropped()
@@ -192,16 +286,51 @@ class Dialogue:
             self._say(Abort(*self._transfer, code).encode())
         self.clear()
 
+    def remember(self, at: Object) -> None:
+        """Take note that somebody else has asked the server about an object, and got no answer."""
+        self._unanswered.ask(at)
+
     def receive_sdo(self, now_us: int, data: bytes) -> None:
-        """Take a response; one that nobody asked for, or too late, is passed over."""
+        """Take a response; the answer to another question, or a copy, is ignored."""
         self._now_us = now_us
-        if isinstance(self._step, SdoRequest):
-            try:
-                answer = parse_response(data)
-            except WireError:
-                return
-            if _answers(self._step, answer):
-                self._go_on(answer)
+        try:
+            answer = parse_response(data)
+        except WireError:
+            return
+        named = _named(answer)
+        if named is not None:
+            self._unanswered.hear(named)
+        step = self._step
+        if not isinstance(step, SdoRequest) or self._asked is None:
+            return
+        if self._asked != (step.index, step.sub):
+            if named == self._asked:
+                self._pass_fence(step, answer)
+        elif self._is_answer(step, answer, data):
+            self._unanswered.clear()
+            took_us = max(LEAST_COPY_US, now_us - self._asked_us)
+            self._answer, self._settled_us = data, now_us + min(took_us, MOST_COPY_US)
+            self._go_on(answer)
+
+    def _is_answer(self, step: SdoRequest, answer: Response, data: bytes) -> bool:
+        """Say whether a response can be the answer to a step, and to nothing else.
+
+        A segment and an abort of 0000h:00 name no object. While other questions are open they may
+        be answers to those.
+        """
+        named = _named(answer)
+        if named is not None and named != NONE_NAMED:
+            mine = named == (step.index, step.sub)
+        else:
+            mine = len(self._unanswered) == 1
+        may_repeat = isinstance(answer, BlockAcknowledge)
+        return mine and (may_repeat or not step.goes_on or data != self._answer)
+
+    def _pass_fence(self, step: SdoRequest, fence: Response) -> None:
+        """Ask at last what the script asks: all earlier questions are settled."""
+        if isinstance(fence, UploadInitiateResponse) and fence.data is None:
+            self._say(Abort(fence.index, fence.sub, AbortCode.GENERAL).encode())
+        self._ask((step.index, step.sub), step.request)
 
     def receive_state(self, now_us: int, state: NmtState) -> None:
         """Take what a heartbeat or a boot-up says."""
@@ -220,9 +349,12 @@ class Dialogue:
         if now_us < self.due_us:
             return
         match self._step:
-            case SdoRequest() as request:
-                self._say(Abort(request.index, request.sub, AbortCode.TIMEOUT).encode())
-                self._go_on(SdoTimeout(request.index, request.sub, self._sdo_timeout_us))
+            case SdoRequest() as step:
+                if self._asked is None:
+                    self._ask((step.index, step.sub), step.request)
+                    return
+                self._say(Abort(*self._asked, AbortCode.TIMEOUT).encode())
+                self._go_on(SdoTimeout(step.index, step.sub, self.sdo_timeout_us))
             case AwaitState() as wait:
                 self._go_on(StateTimeout(f"{wait.state.name} was not reported"))
             case _:
@@ -237,7 +369,7 @@ class Dialogue:
         """Give a script what came of its step, and take the steps up to one that waits."""
         job = self.job
         assert job is not None
-        self._step, self.due_us = None, NEVER
+        self._step, self._asked, self.due_us = None, None, NEVER
         try:
             step = _resume(job.script, value)
             while not self._take(step):
@@ -258,36 +390,57 @@ class Dialogue:
         """Take a step; True if it waits."""
         match step:
             case SdoRequest():
-                self._transfer = step.index, step.sub
-                self._say(step.request)
-                self._step, self.due_us = step, self._now_us + self._sdo_timeout_us
+                self._step = step
+                self._request(step)
             case AwaitState() | AwaitReport():
                 self._step, self.due_us = step, self._now_us + step.timeout_us
             case Pause():
                 self._step, self.due_us = step, self._now_us + step.duration_us
             case SdoFrame():
                 self._say(step.request)
+                if self._transfer is not None and step.request[0] == ClientCommand.ABORT:
+                    self._unanswered.ask(self._transfer)
             case Guard():
                 self._guard(ERROR_CONTROL_COB_ID + self._node_id)
             case Command():
                 self._send(NMT_COB_ID, bytes((step.command, self._node_id)))
         return self._step is not None
 
+    def _request(self, step: SdoRequest) -> None:
+        """Ask what a step asks, or first what has to be asked before; or wait with it."""
+        at = step.index, step.sub
+        if step.goes_on:
+            self._ask(at, step.request)
+        elif at in self._unanswered:
+            fence = self._unanswered.fence(at)
+            self._ask(fence, UploadInitiateRequest(*fence).encode())
+        elif at == self._transfer and self._now_us < self._settled_us:
+            self.due_us = self._settled_us
+        else:
+            self._ask(at, step.request)
+
+    def _ask(self, at: Object, request: bytes) -> None:
+        self._transfer = self._asked = at
+        self._unanswered.ask(at)
+        self._say(request)
+        self._asked_us, self.due_us = self._now_us, self._now_us + self.sdo_timeout_us
+
     def _say(self, data: bytes) -> None:
         self._send(REQUEST_COB_ID + self._node_id, data)
 
 
-def _answers(request: SdoRequest, answer: Response) -> bool:
-    """Say whether a response is of the object that was asked for, as far as it says so.
-
-    An abort of 0000h:00 is of whatever is under way: the server could not read the request.
-    """
+def _named(answer: Response) -> Object | None:
+    """Return the object that a response names, None if it names none."""
     match answer:
-        case Abort(index=0, sub=0):
-            return True
-        case Abort() | DownloadInitiateResponse() | UploadInitiateResponse():
-            return (answer.index, answer.sub) == (request.index, request.sub)
-    return True
+        case (
+            Abort()
+            | DownloadInitiateResponse()
+            | UploadInitiateResponse()
+            | BlockDownloadInitiateResponse()
+            | BlockUploadInitiateResponse()
+        ):
+            return answer.index, answer.sub
+    return None
 
 
 def _resume(script: Script[Any], value: object) -> Step:

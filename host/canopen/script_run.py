@@ -22,6 +22,8 @@ Listen = Callable[[int], tuple[int, StampedFrames]]
 def run_script(talk: Dialogue, node_id: int, script: Script[T], now_us: int, listen: Listen) -> T:
     """Run a script, and return or raise what it does.
 
+    What came before is read first: an answer in the queue of the driver is not one to this script.
+
     Args:
         talk: says it; it has nothing else to say.
         node_id: whose answers and states count, 1..127; other frames are passed over.
@@ -33,16 +35,22 @@ def run_script(talk: Dialogue, node_id: int, script: Script[T], now_us: int, lis
         LinkClosed: the bus is gone.
     """
     ended: list[T | Exception] = []
+    now_us = _take(talk, node_id, listen(now_us))
     talk.start(now_us, QueuedScript("", script, ended.append, ended.append))
     while not ended:
-        now_us, frames = listen(talk.due_us)
-        for _, frame in frames:
-            if not (frame.remote or frame.extended):
-                _hand_over(talk, node_id, now_us, frame)
-        talk.tick(now_us)
+        talk.tick(_take(talk, node_id, listen(talk.due_us)))
     if isinstance(ended[0], Exception):
         raise ended[0]
     return ended[0]
+
+
+def _take(talk: Dialogue, node_id: int, received: tuple[int, StampedFrames]) -> int:
+    """Hand over what was received; return the time of it."""
+    now_us, frames = received
+    for _, frame in frames:
+        if not (frame.remote or frame.extended):
+            _hand_over(talk, node_id, now_us, frame)
+    return now_us
 
 
 def _hand_over(talk: Dialogue, node_id: int, now_us: int, frame: CanFrame) -> None:

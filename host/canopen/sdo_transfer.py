@@ -73,7 +73,8 @@ def download_number(index: int, sub: int, value: int, size: int) -> Script[None]
 def _upload_segments(index: int, sub: int) -> Script[bytes]:
     data, toggle = b"", False
     while True:
-        answer = yield SdoRequest(UploadSegmentRequest(toggle).encode(), index, sub)
+        request = UploadSegmentRequest(toggle).encode()
+        answer = yield SdoRequest(request, index, sub, goes_on=True)
         match answer:
             case Segment() if answer.toggle == toggle:
                 data += answer.data
@@ -88,7 +89,8 @@ def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
     toggle = False
     for start in range(0, max(1, len(data)), SEGMENT_BYTES):
         part, last = data[start : start + SEGMENT_BYTES], start + SEGMENT_BYTES >= len(data)
-        answer = yield SdoRequest(Segment(toggle, part, last).encode(), index, sub)
+        request = Segment(toggle, part, last).encode()
+        answer = yield SdoRequest(request, index, sub, goes_on=True)
         if not isinstance(answer, DownloadSegmentResponse) or answer.toggle != toggle:
             yield from _fail(index, sub, answer)
         toggle = not toggle

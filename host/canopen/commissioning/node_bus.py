@@ -34,6 +34,7 @@ class NodeBus:
 
     def __init__(self, link: StampedLink, timeout_us: int = SDO_TIMEOUT_US) -> None:
         self._link, self._timeout_us = link, timeout_us
+        self._talks: dict[int, Dialogue] = {}
         self.states: dict[int, NmtState] = {}
 
     @property
@@ -91,8 +92,10 @@ class NodeBus:
         Raises:
             LinkClosed: the bus is gone.
         """
-        wait_us = max(timeout_us, self._timeout_us)
-        talk = Dialogue(node_id, self.send, self._guard, sdo_timeout_us=wait_us)
+        if node_id not in self._talks:
+            self._talks[node_id] = Dialogue(node_id, self.send, self._guard)
+        talk = self._talks[node_id]
+        talk.sdo_timeout_us = max(timeout_us, self._timeout_us)
         try:
             return run_script(talk, node_id, script, self.now_us, self.listen)
         except BaseException:

@@ -9,6 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canopen.dialogue import (
+    FENCES,
+    LEAST_COPY_US,
     SDO_TIMEOUT_US,
     AwaitReport,
     AwaitState,
@@ -16,10 +18,13 @@ from tickrig.host.canopen.dialogue import (
     Dialogue,
     Failure,
     Guard,
+    Object,
     Pause,
     QueuedScript,
     Script,
+    Unanswered,
 )
+from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.instant import NEVER
@@ -170,6 +175,120 @@ def test_without_an_answer_the_transfer_is_aborted() -> None:
     talk.dialogue.tick(SDO_TIMEOUT_US)
     assert str(talk.failure) == "1000h:00 was not answered"
     assert talk.sent[-1] == "605#8000100000000405"
+
+
+def reading(times: int) -> Script[list[bytes | str]]:
+    """Read 2000h so often; what came of each."""
+    found: list[bytes | str] = []
+    for _ in range(times):
+        try:
+            found.append((yield from upload(0x2000, 0)))
+        except SdoFailed as error:
+            found.append(str(error))
+    return found
+
+
+def late(times: int = 2) -> Talk:
+    """A talk in which 2000h was not answered in time, and is to be read again."""
+    talk = Talk(reading(times))
+    talk.dialogue.tick(SDO_TIMEOUT_US)
+    assert talk.sent == [
+        *("605#4000200000000000", "605#8000200000000405"),
+        "605#4000100000000000",
+    ]
+    return talk
+
+
+def test_what_was_not_answered_is_asked_again_when_another_object_was_answered() -> None:
+    talk = late()
+    talk.answer(600_000, "4300200001000000")
+    talk.answer(600_100, "4300100000000000")
+    assert talk.sent[3:] == ["605#4000200000000000"]
+    talk.answer(600_200, "4300200002000000")
+    assert talk.result == ["2000h:00 was not answered", b"\2\0\0\0"]
+
+
+def test_an_abort_is_an_answer_that_names_its_object() -> None:
+    talk = late()
+    talk.answer(600_100, "8000100000000206")
+    assert talk.sent[3:] == ["605#4000200000000000"]
+
+
+def test_a_fence_that_comes_in_segments_is_aborted() -> None:
+    talk = late()
+    talk.answer(600_100, "4100100008000000")
+    assert talk.sent[3:] == ["605#8000100000000008", "605#4000200000000000"]
+
+
+def test_while_a_fence_is_not_answered_the_object_is_not_asked_for() -> None:
+    talk = late(4)
+    for number in (2, 3, 4):
+        talk.dialogue.tick(number * SDO_TIMEOUT_US)
+    assert talk.sent[3:] == [
+        *("605#8000100000000405", "605#4000100000000000") * 2,
+        "605#8000100000000405",
+    ]
+    assert talk.result == ["2000h:00 was not answered"] * 4
+
+
+@pytest.mark.parametrize("stray", ["8000000001000405", "0011223344556677", "2000000000000000"])
+def test_what_names_no_object_may_answer_what_was_asked_before(stray: str) -> None:
+    def script() -> Script[list[bytes | str]]:
+        yield from reading(1)
+        return [(yield from upload(0x2001, 0))]
+
+    talk = Talk(script())
+    talk.dialogue.tick(SDO_TIMEOUT_US)
+    talk.answer(600_000, stray)
+    assert (talk.result, talk.failure) == (None, None)
+    talk.answer(600_100, "4301200002000000")
+    assert talk.result == [b"\2\0\0\0"]
+
+
+@pytest.mark.parametrize("asked", FENCES[:8])
+def test_a_fence_is_another_object_than_all_that_were_asked_for_in_vain(asked: Object) -> None:
+    unanswered = Unanswered()
+    for at in (*FENCES[:8], asked):
+        unanswered.ask(at)
+    fence = unanswered.fence(asked)
+    assert fence not in unanswered
+    unanswered.ask(fence)
+    unanswered.hear(fence)
+    assert asked not in unanswered
+
+
+def test_where_all_fences_were_asked_for_in_vain_the_oldest_question_is_forgotten() -> None:
+    unanswered, asked = Unanswered(), (0x2000, 0)
+    for at in (*FENCES, asked):
+        unanswered.ask(at)
+    assert unanswered.fence(asked) == FENCES[0]
+    assert (FENCES[0] in unanswered, FENCES[1] in unanswered) == (False, True)
+
+
+def test_a_copy_of_an_answer_within_a_transfer_is_ignored() -> None:
+    talk = Talk(upload(0x1008, 0))
+    for text in ("4108100009000000", "00662D70616C6574", "1B74650000000000"):
+        assert talk.result is None
+        talk.answer(0, text)
+        talk.answer(0, text)
+    assert (talk.result, talk.failure) == (b"f-palette", None)
+
+
+def test_an_object_is_read_again_when_no_copy_of_its_answer_can_come_any_more() -> None:
+    talk = Talk(reading(2))
+    talk.answer(500, "4300200001000000")
+    talk.answer(600, "4300200001000000")
+    assert (len(talk.sent), talk.dialogue.due_us) == (1, 500 + LEAST_COPY_US)
+    talk.dialogue.tick(talk.dialogue.due_us)
+    talk.answer(40_000, "4300200002000000")
+    assert talk.result == [b"\1\0\0\0", b"\2\0\0\0"]
+
+
+def test_a_job_that_is_forgotten_leaves_its_question_open() -> None:
+    talk = Talk(upload(0x2000, 0))
+    talk.dialogue.clear()
+    talk.dialogue.start(0, QueuedScript("again", upload(0x2000, 0), talk._done, talk._failed))
+    assert talk.sent == ["605#4000200000000000", "605#4000100000000000"]
 
 
 def test_jobs_run_one_after_the_other() -> None:

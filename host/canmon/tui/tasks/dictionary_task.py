@@ -48,6 +48,7 @@ class DictionaryTask(Task):
         self._out: list[CanFrame] = []
         self._node: Node | None = None
         self._dialogue = Dialogue(1, self._send)
+        self._dialogues: dict[Node, Dialogue] = {}
         self.watched: set[Entry] = set()
         self._watch_us = NEVER
 
@@ -68,7 +69,9 @@ class DictionaryTask(Task):
         if node != self._node:
             self.stop()
             self._node, self.channel = node, node[0]
-            self._dialogue = Dialogue(node[1], self._send)
+            if node not in self._dialogues:
+                self._dialogues[node] = Dialogue(node[1], self._send)
+            self._dialogue = self._dialogues[node]
 
     def read(self, now_us: int, entry: Entry) -> None:
         """Read an object of the chosen node."""

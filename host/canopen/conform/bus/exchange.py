@@ -17,7 +17,13 @@ from tickrig.host.canopen.conform.verdict import Direction
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID, index_sub
+from tickrig.wire.canopen.sdo.sdo_command import (
+    REQUEST_COB_ID,
+    RESPONSE_COB_ID,
+    SPECIFIER,
+    ClientCommand,
+    index_sub,
+)
 from tickrig.wire.instant import NEVER
 
 SLICE_US: Final = 20_000
@@ -36,6 +42,14 @@ NODE_ID_MASK: Final = 0x7F
 HEARTBEATS: Final[tuple[range, ...]] = (range(0x701, 0x780),)
 NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
 """CAN-IDs of the pre-defined connection set that belong to a node."""
+
+BEGINNING: Final = (
+    ClientCommand.DOWNLOAD,
+    ClientCommand.UPLOAD,
+    ClientCommand.BLOCK_UPLOAD,
+    ClientCommand.BLOCK_DOWNLOAD,
+)
+"""Requests that name an object; some others of a block look like them, and do no harm."""
 
 UNREAD_FRAMES: Final = 2_000
 """So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""
@@ -60,6 +74,7 @@ class Exchange:
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
         transfer: index and sub-index of the last SDO transfer that the node has answered.
+        unanswered: objects that the node was asked about and has not answered, the first one first.
     """
 
     def __init__(  # noqa: PLR0913 - a bus, by keyword
@@ -80,6 +95,7 @@ class Exchange:
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
         self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
         self._multiplexer, self.transfer = b"", (0, 0)
+        self.unanswered: list[tuple[int, int]] = []
         self._answers, self._others_by = Answers(), NODES
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
@@ -146,6 +162,8 @@ class Exchange:
         if frame.can_id == self._request:
             self._multiplexer = frame.data[MULTIPLEXER]
             self._answers.count_request(frame.data)
+            if len(frame.data) >= MULTIPLEXER.stop and frame.data[0] & SPECIFIER in BEGINNING:
+                self.unanswered.append(index_sub(frame.data))
         self._link.send((frame,))
 
     def expect(self, patterns: list[str], within_ms: int) -> str:
@@ -280,6 +298,8 @@ class Exchange:
             answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
             if answered and frame.data[MULTIPLEXER] == self._multiplexer:
                 self.transfer = index_sub(frame.data)
+            if answered and index_sub(frame.data) in self.unanswered:  # and those asked before it
+                del self.unanswered[: self.unanswered.index(index_sub(frame.data)) + 1]
             return
         if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
             self.others.add(frame.can_id & NODE_ID_MASK)

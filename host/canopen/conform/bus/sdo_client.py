@@ -36,6 +36,7 @@ class SdoClient:
 
     def __init__(self, exchange: Exchange, node_id: int) -> None:
         self._exchange, self._node_id = exchange, node_id
+        self._talk = Dialogue(node_id, self._send)
         self.size_of: SizeOf = lambda index, sub: 0
 
     def upload(self, index: int, sub: int) -> bytes:
@@ -66,8 +67,14 @@ class SdoClient:
 
     def run(self, script: Script[T]) -> T:
         """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
-        talk = Dialogue(self._node_id, self._send)
-        return run_script(talk, self._node_id, script, self._exchange.now_us, self._exchange.listen)
+        exchange, talk = self._exchange, self._talk
+        for at in exchange.unanswered:  # by the check, which talks for itself
+            talk.remember(at)
+        try:
+            return run_script(talk, self._node_id, script, exchange.now_us, exchange.listen)
+        finally:
+            talk.clear()
+            exchange.unanswered.clear()
 
     def _send(self, can_id: int, data: bytes) -> None:
         self._exchange.send(data_frame(can_id, data))

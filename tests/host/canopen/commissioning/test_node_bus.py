@@ -30,15 +30,15 @@ def test_a_state_is_waited_for() -> None:
 
 
 class Interrupted(NetBench):
-    """Somebody presses Ctrl-C when so many answers have come."""
+    """Somebody presses Ctrl-C when the bus was looked at so often."""
 
-    def press_after(self, answers: int) -> None:
+    def press_after(self, looks: int) -> None:
         receive = self.host.receive_stamped
 
         def receive_stamped(timeout_us: int) -> tuple[int, StampedFrames]:
-            nonlocal answers
-            answers -= 1
-            if answers < 0:
+            nonlocal looks
+            looks -= 1
+            if looks < 0:
                 raise KeyboardInterrupt
             return receive(timeout_us)
 
@@ -47,7 +47,7 @@ class Interrupted(NetBench):
 
 def test_a_transfer_that_was_interrupted_is_aborted() -> None:
     bench = Interrupted(make_epos(5))
-    bench.press_after(0)
+    bench.press_after(1)
     with pytest.raises(KeyboardInterrupt):
         bench.bus.read(5, 0x1008, 0x00)
     del bench.host.receive_stamped

@@ -253,7 +253,7 @@ def test_a_boot_time_is_over_when_it_is_over() -> None:
     desk = Desk(SlaveAssignment(2, mandatory=True), boot_time_us=400_000)
     desk.at(0)
     for now_us in (100_000, 200_000, 300_000):
-        assert desk.at(now_us)[-1] == "602#4000100000000000"
+        assert desk.at(now_us)[-1] == "602#4001100000000000"
     assert not desk.nmt.halted
     desk.at(400_000)
     assert desk.nmt.halted
@@ -268,4 +268,5 @@ def test_a_boot_up_that_all_are_reset_in_is_forgotten() -> None:
     assert desk.at(2_000, "703#00") == ["603#4000100000000000"]
     assert desk.at(51_000) == ["000#8100"]
     desk.at(51_000)
-    assert desk.at(52_000, "703#00") == ["603#4000100000000000"]
+    assert desk.at(52_000, "703#00") == ["603#4001100000000000"]
+    assert desk.at(53_000, "583#4F01100000000000") == ["603#4000100000000000"]

@@ -21,7 +21,8 @@ ONE = {16: "f-palette"}
 
 BOOT = """
     710#00 77F#00 610#4000100000000000
-    610#4000100000000000 590#4300100091010700 590#4300100091010700
+    610#4001100000000000 590#4300100091010700 590#4F01100000000000
+    610#4000100000000000 590#4300100091010700
     610#4018100100000000 590#4318100100000000
     610#4018100200000000 590#4318100201000000
     610#4018100300000000 590#4318100300000100
@@ -123,7 +124,7 @@ def test_a_refused_value_ends_the_boot_of_that_node_alone() -> None:
 
 def test_a_node_that_falls_silent_while_it_boots_is_looked_for_again() -> None:
     bench = Bench(PALETTE, ONE)
-    bench.run_ms(3)
+    bench.run_ms(4)
     bench.devices[16].physical["unplugged"].write(1)
     event = bench.run_until(ServerEventType.SDO_TIMEOUT)
     assert event.text == "1018h:02 was not answered"
