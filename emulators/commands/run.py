@@ -20,9 +20,10 @@ from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.scenario.player import Player
 from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
 from tickrig.host.cli.messages import say, warnings_shown
-from tickrig.host.cli.refused import Refused, refuse_path, refused_at
+from tickrig.host.cli.refused import BusFailed, Refused, refuse_path, refused_at
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
 from tickrig.host.control.clock import ServingClock
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.text.user_file import explain_error
 
 RECORDING_ENDED: Final = 3
@@ -60,6 +61,7 @@ class EmulatorRun(ABC):
 
         Raises:
             Refused: the command line asks for something that cannot be done.
+            BusFailed: its CAN bus cannot be read any more.
         """
         faults, scenario = self._checked()
         with ExitStack() as stack:
@@ -79,10 +81,17 @@ class EmulatorRun(ABC):
                 bench.operator.fault(0, spec)
             if self._in_real_time:
                 stack.enter_context(keeping_time())
-            self._go_on(bench)
+            gone = ""
+            try:
+                self._go_on(bench)
+            except LinkClosed as error:
+                gone = str(error)
             if player:
                 player.finish(bench.rig.now_us)
-        return self._sum_up(bench, player)
+        status = self._sum_up(bench, player)
+        if gone:
+            raise BusFailed(gone)
+        return status
 
     @property
     def _shows_warnings(self) -> bool:

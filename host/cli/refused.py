@@ -21,6 +21,12 @@ class BusUnavailable(Refused):
     """A bus that is named well and cannot be opened."""
 
 
+class BusFailed(click.ClickException):
+    """One line on standard error, and exit status 3: a bus that was open is gone."""
+
+    exit_code = 3
+
+
 @contextmanager
 def refused_at(option: str) -> Iterator[None]:
     """Raise Refused, with the name of the option, in place of a ValueError."""

@@ -7,16 +7,17 @@ import os
 import socket
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Any, Final
 
 import can
 
 from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.errors import LinkClosed, LinkError
 from tickrig.host.links.link import StampedFrames
 from tickrig.host.links.ready import let_wait
+from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import (
     CONTROLLER_BYTE,
@@ -136,6 +137,149 @@ def _keep_to_group(sock: socket.socket) -> None:
             sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
 
 
+MOST_FAULTS: Final = 100
+FAULTY_S: Final = 1.0
+"""A bus is given up when so many reads in a row have failed, and for so long at least."""
+
+TRIES: Final = 16
+"""So many reads that fail make one that gives nothing, so that nobody is kept by them."""
+
+GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
+"""What the kernel says of an adapter that was pulled out, or switched off."""
+
+_log = log_of(__name__)
+
+
+class BusReceiver:
+    """Reads a bus of python-can whose driver may raise anything, and goes on.
+
+    The driver of a serial adapter raises IndexError for a line of which a byte was lost, and takes
+    a line with too few data for a frame; others raise errors of their own. All of this is counted,
+    and told for the 1st, the 10th, the 100th fault and so on.
+
+    Args:
+        bus: an open bus; nobody else may read from it.
+        name: what people call it.
+        ends: an OSError or CanError with one of these codes ends it at once.
+        gone: makes what is raised at its end of a text.
+        raises: errors that are raised as they came.
+        read: what reads it, `recv` of the bus unless given.
+
+    Attributes:
+        faults: reads that failed so far, and frames that were cut.
+        last: what the last of them was, empty if a read was well since.
+        closed: whoever reads it has closed the bus.
+        on_fault: called with what is to be told, in a line; it is logged as a warning.
+    """
+
+    def __init__(  # noqa: PLR0913 - how a bus is read, by keyword
+        self,
+        bus: can.BusABC,
+        name: str,
+        *,
+        ends: Collection[int] = GONE,
+        gone: Callable[[str], Exception] = LinkClosed,
+        raises: tuple[type[Exception], ...] = (),
+        read: Callable[[float | None], can.Message | None] | None = None,
+    ) -> None:
+        self._bus, self._name, self._ends, self._gone = bus, name, ends, gone
+        self._raises, self._read = raises, read or bus.recv
+        self.faults, self.last, self.closed = 0, "", False
+        self.on_fault: Callable[[str], object] = _warn
+        self._row, self._since_s = 0, 0.0
+
+    def receive(self, timeout_s: float | None) -> can.Message | None:
+        """Return the next message, None if none came in time or what came cannot be read.
+
+        Args:
+            timeout_s: how long to wait, None for ever.
+
+        Raises:
+            LinkClosed: the bus is gone, or 100 reads in a row have failed for 1 s.
+        """
+        begun_s, wait_s = time.monotonic(), timeout_s
+        for _ in range(TRIES):
+            try:
+                message = self._read(None) if wait_s is None else receive(self._read, wait_s)
+            except Exception as error:  # drivers raise what they like
+                self._fail(error)
+            else:
+                if message is None:
+                    self.last = ""
+                    return None
+                if not (odd := _odd(message)):
+                    self._row, self.last = 0, ""
+                    return message
+                self._fail(ValueError(odd))
+            if timeout_s is not None:
+                wait_s = max(0.0, begun_s + timeout_s - time.monotonic())
+        time.sleep(AGAIN_S if wait_s is None else min(wait_s, AGAIN_S))
+        return None
+
+    def _fail(self, error: Exception) -> None:
+        """Count a read; end the reading if there is no hope."""
+        if isinstance(error, self._raises):
+            raise error
+        now_s = time.monotonic()
+        if not self._row:
+            self._since_s = now_s
+        self._row, self.faults = self._row + 1, self.faults + 1
+        self.last = reason_of(error)
+        ends = self.closed or isinstance(error.__cause__, LinkError)
+        if ends or error_code(error) in self._ends:
+            raise self._gone(f"{self._name}: {self.last}") from error
+        if self._row >= MOST_FAULTS and now_s - self._since_s >= FAULTY_S:
+            text = f"the last {self._row} reads have failed: {self.last}"
+            self.faults -= self._row  # these were no frames
+            raise self._gone(f"{self._name}: {text}") from error
+        if self.faults in _TOLD:
+            many = "a read has" if self.faults == 1 else f"{self.faults} reads have"
+            self.on_fault(f"{self._name}: {many} failed: {self.last}; what came is lost")
+        if isinstance(error.__cause__ or error, UnicodeError) and hasattr(self._bus, "flush"):
+            with suppress(can.CanError):
+                self._bus.flush()  # slcan keeps a line that is no text, and reads no other one
+
+
+def _warn(text: str) -> None:
+    _log.warning("%s", text)
+
+
+_TOLD: Final = frozenset(10**power for power in range(10))
+
+
+def _odd(message: can.Message) -> str:
+    """Say why a message can be no frame of a bus, empty if it can."""
+    if message.is_error_frame:
+        return ""
+    if message.arbitration_id >> (29 if message.is_extended_id else 11):
+        return f"{message.arbitration_id:X}h is no CAN-ID"
+    most, size = 64 if message.is_fd else 8, len(message.data)
+    whole = message.is_remote_frame or min(message.dlc, most) <= size <= most
+    return "" if whole else f"{size} of {message.dlc} bytes came"
+
+
+def reason_of(error: Exception) -> str:
+    """Return in a line what a driver raised, with its type if it is no error of a bus."""
+    text = " ".join(str(error).split())
+    if isinstance(error, can.CanError | OSError) and text:
+        return text
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def error_code(error: Exception) -> int | None:
+    """Return the errno of a CanError or an OSError, None if it has none."""
+    code = getattr(error, "error_code", None) or getattr(error, "errno", None)
+    return code if isinstance(code, int) else None
+
+
+def close_bus(bus: can.BusABC) -> None:
+    """Close a bus; what the driver of one that is gone raises is logged."""
+    try:
+        bus.shutdown()
+    except Exception as error:  # drivers raise what they like
+        _log.info("closing %s: %s", bus.channel_info, reason_of(error))
+
+
 SEND_TIMEOUT_US: Final = 1_000_000
 AGAIN_S: Final = 0.001
 """A queue without room is tried again so soon: that of SocketCAN has ten places."""
@@ -155,12 +299,16 @@ class CanLink:
 
     Attributes:
         lost: frames that the bus did not take.
+        reads: reads the bus, and counts the frames that its driver could not read.
         on_error_frame: called with each error frame that the driver tells of.
         on_error_state: called with the error state of the controller, where the driver says it.
     """
 
     def __init__(self, bus: can.BusABC, name: str, *, drops: bool = False) -> None:
         self._bus, self._name, self._drops, self.lost = bus, name, drops, 0
+        self.reads = BusReceiver(
+            bus, name, gone=lambda text: LinkClosed(f"cannot read from {text}")
+        )
         self.on_error_frame: Callable[[ErrorFrame], object] = lambda frame: None
         self.on_error_state: Callable[[ErrorState], None] | None = None
         self._stamps, self._polled_us = StampClock(), self.now_us
@@ -209,7 +357,7 @@ class CanLink:
         """Send a frame; False if the queue of its driver has no room for now."""
         try:
             self._bus.send(to_message(frame), 0 if self._drops else SEND_TIMEOUT_US / 1e6)
-        except (can.CanError, OSError, ValueError) as error:
+        except Exception as error:  # drivers raise what they like
             if self._drops and _is_full(error):
                 self.lost += 1
             elif _has_no_room(error) and self.now_us < deadline_us:
@@ -252,7 +400,7 @@ class CanLink:
         while True:
             now_us = self.now_us
             wait_us = 0 if received else max(0, deadline_us - now_us)
-            message = self._read(wait_us)
+            message = self.reads.receive(wait_us / 1e6)
             if message is not None:
                 received += self._take(message)
             elif not wait_us:
@@ -261,14 +409,8 @@ class CanLink:
 
     def close(self) -> None:
         """Close the bus."""
-        self._bus.shutdown()
-
-    def _read(self, wait_us: int) -> can.Message | None:
-        try:
-            return receive(self._bus.recv, wait_us / 1e6)
-        except Exception as error:  # drivers raise what they like
-            text = str(error) or type(error).__name__
-            raise LinkClosed(f"cannot read from {self._name}: {text}") from error
+        self.reads.closed = True
+        close_bus(self._bus)
 
     def _take(self, message: can.Message) -> StampedFrames:
         if (error := to_error_frame(message)) is not None:
@@ -297,8 +439,7 @@ def _is_full(error: Exception) -> bool:
 
 def _has_no_room(error: Exception) -> bool:
     """Say whether the queue of the driver is full; each of its frames that leaves makes room."""
-    code = getattr(error, "error_code", None) or getattr(error, "errno", None)
-    return code in (errno.ENOBUFS, errno.EAGAIN)
+    return error_code(error) in (errno.ENOBUFS, errno.EAGAIN)
 
 
 def _error_state(message: can.Message) -> ErrorState | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Final, NamedTuple
 
@@ -11,9 +12,10 @@ import can
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.can.outside.bridge import CountingPort, WithoutEcho
 from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.links.can_link import receive
+from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.echo import ECHOING
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
@@ -32,21 +34,35 @@ class CanBusPort(NonCopyable):
 
     Args:
         bus: an open bus. Nobody else may read from it.
+        name: what people call it.
         queue_frames: frames kept for an adapter that takes none.
+        gone: makes what is raised of a text when the bus cannot be read any more.
 
     Attributes:
         lost: frames dropped because the adapter took none.
         errors: error frames that came in.
-        failed: why the adapter last took or gave nothing, empty while all is well.
+        reads: reads the bus, and counts what its driver could not read.
     """
 
     why_not_copied = "it is a bus of this machine"
 
-    def __init__(self, bus: can.BusABC, queue_frames: int = 4_096) -> None:
-        self._bus, self._queue_frames = bus, queue_frames
+    def __init__(
+        self,
+        bus: can.BusABC,
+        name: str = "CAN bus",
+        queue_frames: int = 4_096,
+        gone: Callable[[str], Exception] = LinkClosed,
+    ) -> None:
+        self._bus, self._name, self._queue_frames = bus, name, queue_frames
+        self.reads = BusReceiver(bus, name, ends=(), gone=gone)
         self._unsent: deque[CanFrame] = deque()
         self.lost = self.errors = 0
-        self.failed = ""
+        self._failed = ""
+
+    @property
+    def failed(self) -> str:
+        """Why the adapter last took or gave nothing, empty while all is well."""
+        return self.reads.last or self._failed
 
     @property
     def due_us(self) -> int:
@@ -54,11 +70,15 @@ class CanBusPort(NonCopyable):
         return NEVER
 
     def poll(self, now_us: int, /) -> Frames:
-        """Read without waiting."""
+        """Read without waiting.
+
+        Raises:
+            LinkClosed: 100 reads in a row have failed for 1 s.
+        """
         self._flush()
         frames = []
         for _ in range(FRAMES_A_POLL):
-            message = self._read()
+            message = self.reads.receive(0)
             if message is None:
                 break
             frame = to_frame(message)
@@ -77,14 +97,7 @@ class CanBusPort(NonCopyable):
 
     def close(self) -> None:
         """Close the bus."""
-        self._bus.shutdown()
-
-    def _read(self) -> can.Message | None:
-        try:
-            return receive(self._bus.recv, 0)
-        except (can.CanError, OSError) as error:
-            self._note(str(error))
-            return None
+        close_bus(self._bus)
 
     def _flush(self) -> None:
         try:
@@ -92,14 +105,14 @@ class CanBusPort(NonCopyable):
                 self._bus.send(to_message(self._unsent[0]), timeout=0)
                 self._unsent.popleft()
             self._note("")
-        except (can.CanError, OSError) as error:
-            self._note(str(error))
+        except Exception as error:  # drivers raise what they like
+            self._note(reason_of(error))
 
     def _note(self, failed: str) -> None:
         """Warn once, not in every tick."""
-        if failed and not self.failed:
-            _logger.warning("CAN bus: %s; what it does not take is kept", failed)
-        self.failed = failed
+        if failed and not self._failed:
+            _logger.warning("%s: %s; what it does not take is kept", self._name, failed)
+        self._failed = failed
 
 
 class OpenBus(NamedTuple):
@@ -124,13 +137,18 @@ def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
     """
     instead = "give --scenario FILE, which runs in virtual time"
     bus, interface, channel = open_raw(options, instead)
-    stack.callback(bus.shutdown)
+    stack.callback(close_bus, bus)
     name = interface if channel is None else f"{interface} {channel}"
     label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return OpenBus(port_on(bus, interface), name, label)
+    return OpenBus(port_on(bus, interface, f"CAN bus {name}"), name, label)
 
 
-def port_on(bus: can.BusABC, interface: str) -> CountingPort:
+def port_on(
+    bus: can.BusABC,
+    interface: str,
+    name: str = "CAN bus",
+    gone: Callable[[str], Exception] = LinkClosed,
+) -> CountingPort:
     """Return the port on an open bus, without the echo that some interfaces give."""
-    port = CanBusPort(bus)
+    port = CanBusPort(bus, name, gone=gone)
     return WithoutEcho(port) if interface in ECHOING else port

@@ -18,6 +18,7 @@ from tickrig.host.canmon.sources.source_spec import (
 from tickrig.host.canopen.conform.plan import Stimulus
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.links.errors import LinkClosed
 
@@ -130,7 +131,7 @@ def _open_rig(path: Path, node_id: int | None) -> ConformSource:
 
 def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
     from tickrig.host.canmon.sources import bus_source  # noqa: PLC0415 - python-can is slow
-    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.can_link import CanLink, close_bus  # noqa: PLC0415 - slow
     from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
 
     given = bus_source.merged(spec, options)
@@ -138,8 +139,9 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
     try:
         link = CanLink(bus, name)
     except LinkClosed as error:
-        bus.shutdown()
+        close_bus(bus)
         raise SourceFailed(str(error)) from None
+    link.reads.on_fault = say
     return ConformSource(
         free_of_echo(link, interface),
         name,
@@ -151,4 +153,9 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
 
 
 def _watch_errors(link: CanLink, node_id: int, run: ConformRun) -> None:
+    def disturb(text: str) -> None:
+        say(text)
+        run.disturb("the driver could not read a frame")
+
     link.on_error_frame = lambda error: run.disturb("error frames on the bus")
+    link.reads.on_fault = disturb

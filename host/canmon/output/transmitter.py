@@ -13,6 +13,7 @@ from tickrig.host.canmon.sources.bus_source import BusSource, merged, open_bus, 
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
+from tickrig.host.links.can_link import close_bus
 from tickrig.host.links.can_message import to_message
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
@@ -74,7 +75,7 @@ class Transmitter:
     def close(self) -> None:
         """Close the bus."""
         if self._source is None:
-            self._bus.shutdown()
+            close_bus(self._bus)
         else:
             self._source.close()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import replace
 from typing import Final
 
@@ -15,7 +14,7 @@ from tickrig.host.canmon.sources.socket_reader import SocketReader, let_fd
 from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
 from tickrig.host.cli.refused import BusUnavailable, Refused
-from tickrig.host.links.can_link import receive
+from tickrig.host.links.can_link import BusReceiver, close_bus
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
 from tickrig.host.monitor.logs.can_log import channel_name
@@ -27,6 +26,8 @@ BATCH: Final = 1_024
 
 DEFAULT: Final = "socketcan"
 """The interface where neither the command line nor a configuration names one."""
+
+UNREADABLE: Final = "frames that the driver could not read"
 
 STEPPED: Final = ("tickrig",)
 """Interfaces whose time passes while they are read."""
@@ -70,6 +71,7 @@ class BusReader:
         name: what it is called in what is heard.
 
     Attributes:
+        reads: reads the bus, and counts what its driver could not read.
         lost: 0, for python-can does not tell.
         tally: what was no frame.
         stepped: its time passes while it is read.
@@ -78,26 +80,31 @@ class BusReader:
     def __init__(self, bus: can.BusABC, interface: str, name: str) -> None:
         self._bus, self.name, self.stepped = bus, name, interface in STEPPED
         self.lost, self.tally = 0, Tally()
+        self.reads = BusReceiver(bus, name)
 
     def read(self, timeout_us: int, /) -> list[Record]:
         """Wait for a first frame; LinkClosed if the bus is gone."""
         records: list[Record] = []
+        faults, wait_us = self.reads.faults, timeout_us
         try:
-            message = receive(self._bus.recv, timeout_us / 1e6)
-            while message is not None:
+            while (message := self.reads.receive(wait_us / 1e6)) is not None:
                 one = to_record(message, self.name, self.tally)
                 records += (one,) if one else ()
-                message = receive(self._bus.recv, 0) if len(records) < BATCH else None
-        except Exception as error:  # drivers raise what they like
+                if len(records) >= BATCH:
+                    break
+                wait_us = 0
+        except LinkClosed:
             if not records:
-                text = " ".join(str(error).split()) or type(error).__name__
-                raise LinkClosed(f"{self.name}: {text}") from error
+                raise
+        finally:
+            if self.reads.faults != faults:
+                self.tally.passed_over[UNREADABLE] += self.reads.faults - faults
         return records
 
     def close(self) -> None:
-        """Close the bus; one that is gone cannot be told."""
-        with suppress(can.CanError, OSError, ValueError):
-            self._bus.shutdown()
+        """Close the bus."""
+        self.reads.closed = True
+        close_bus(self._bus)
 
 
 BusSource = LiveSource[Record]
@@ -140,7 +147,7 @@ class OpenBus:
         try:
             return self.reader
         except OSError:
-            self.bus.shutdown()
+            close_bus(self.bus)
             raise
 
 

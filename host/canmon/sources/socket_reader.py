@@ -13,6 +13,7 @@ import struct
 from contextlib import suppress
 from typing import Any, Final
 
+from tickrig.host.links.can_link import close_bus
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.ready import ready
 from tickrig.host.monitor.frames.record import Record
@@ -86,7 +87,7 @@ class SocketReader:
 
     def close(self) -> None:
         """Close the bus."""
-        self._bus.shutdown()
+        close_bus(self._bus)
 
     def _records(
         self, data: bytes, ancillary: list[tuple[int, int, bytes]], flags: int, address: Any

@@ -131,5 +131,5 @@ class Tally:
         return [
             f"{name}: {count} {what} passed over"
             for what, count in self.passed_over.items()
-            if (what in NO_FRAMES) is no_frames
+            if count and (what in NO_FRAMES) is no_frames
         ]

@@ -12,12 +12,11 @@ import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, version_option
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.refused import BusFailed, Refused
 from tickrig.host.cli.start import loading
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.rtc_canopen.commands.opening import (
     STANDARD_OUTPUT,
-    BusFailed,
     add_components,
     bus_of,
     component_option,

@@ -38,12 +38,6 @@ component_option: Final[Decorator] = click.option(
 )
 
 
-class BusFailed(click.ClickException):
-    """One line on standard error, and exit status 3."""
-
-    exit_code = 3
-
-
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
     """Make the server of a System Definition, with components; Refused if one cannot be used.
 
@@ -140,4 +134,6 @@ def _write(file: TextIO, event: ServerEvent) -> None:
 def _close(link: CanLink) -> None:
     if link.lost:
         click.echo(f"{link.lost} frames were lost: the bus took none", err=True)
+    if link.reads.faults:
+        click.echo(f"the driver could not read {link.reads.faults} frames", err=True)
     link.close()

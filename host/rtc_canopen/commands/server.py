@@ -18,12 +18,11 @@ from tickrig.host.cli.engine_options import (
 )
 from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.options import PATH, version_option
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.refused import BusFailed, Refused
 from tickrig.host.cli.serving import serving_control, stopped_by_signals
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc_canopen.commands.opening import (
-    BusFailed,
     bus_of,
     component_option,
     log_listener,

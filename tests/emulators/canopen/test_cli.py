@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.host.links.slcan_adapter import Adapter
 from tests.wire.canopen.eds.xdd_text import XDD
 from tickrig.emulators.canopen.cli import main
 
@@ -42,6 +43,27 @@ def test_the_example_of_the_page_prints_what_it_says(tmp_path: Path) -> None:
     (tmp_path / "start.txt").write_text(scenario)
     result = run("--eds", EDS, "--node-id", "5", "--scenario", tmp_path / "start.txt")
     assert (result.exit_code, result.stdout) == (0, log)
+
+
+@pytest.mark.realtime
+def test_a_bus_whose_adapter_is_unplugged_ends_the_emulator_with_a_line() -> None:
+    adapter = Adapter()
+    words = ["--eds", EDS, "--node-id", "5", "-i", "slcan", "-c", adapter.name, "-b", "500k"]
+    words += ["--bus-kwargs", "sleep_after_open=0", "timeout=0.01"]
+    program = [sys.executable, "-c", PROGRAM, *words]
+    with subprocess.Popen(program, stderr=subprocess.PIPE, text=True) as child:
+        assert child.stderr is not None
+        child.stderr.readline()
+        adapter.send(b"t12\r")
+        told = child.stderr.readline(), child.stderr.readline()
+        adapter.unplug()
+        rest = child.stderr.read().splitlines()
+    assert child.returncode == 3
+    failed = (
+        f"CAN bus slcan {adapter.name}: a read has failed: IndexError: string index out of range"
+    )
+    assert told[1] == f"{failed}; what came is lost\n"
+    assert rest[-1].startswith(f"Error: CAN bus slcan {adapter.name}: the last ")
 
 
 def test_the_log_does_not_depend_on_the_process() -> None:

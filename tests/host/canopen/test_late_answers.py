@@ -187,19 +187,18 @@ def test_a_bus_that_repeats_frames_gives_no_old_value() -> None:
         late.clock()
 
 
-PASSAGES = st.builds(
-    Passage,
-    st.sampled_from([0, 0, 0, 1, 7, 90, 99, 101, 130, 199, 250, 600]).map(lambda ms: ms * MS_US),
-    st.sampled_from([1, 1, 1, 1, 0, 2]),
-)
+LATENESS = st.sampled_from([0, 0, 0, 1, 7, 90, 99, 101, 130, 199, 250, 600])
+LATENESS_US = LATENESS.map(lambda ms: ms * MS_US)
+ANSWERS = st.builds(Passage, LATENESS_US, st.sampled_from([1, 1, 1, 1, 0, 2]))
+REQUESTS = st.builds(Passage, LATENESS_US, st.sampled_from([1, 1, 1, 1, 0]))
 STEPS = st.tuples(st.sampled_from("crtTnNdb"), st.sampled_from([0, 0, 0, 1, 50, 150, 800]))
 
 
 @settings(max_examples=examples(60), deadline=None)
 @given(
     st.lists(STEPS, min_size=2, max_size=12),
-    st.lists(PASSAGES, min_size=1, max_size=9),
-    st.lists(PASSAGES, min_size=1, max_size=7),
+    st.lists(ANSWERS, min_size=1, max_size=9),
+    st.lists(REQUESTS, min_size=1, max_size=7),
 )
 def test_however_late_frames_are_a_value_is_of_after_its_question(
     steps: list[tuple[str, int]], answers: list[Passage], requests: list[Passage]

@@ -5,16 +5,20 @@ from __future__ import annotations
 import errno
 import os
 import socket
+import struct
 import sys
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 
 import can
 import pytest
 
 from tests.emulators.can.can_bench import frames
+from tests.host.links.slcan_adapter import Adapter
 from tickrig.emulators.can.outside.bus_port import CanBusPort
 from tickrig.host.canmon.sources.bus_source import BusReader
-from tickrig.host.links.can_link import CanLink, prepare_bus
+from tickrig.host.links.can_link import MOST_FAULTS, CanLink, prepare_bus
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
 from tickrig.wire.can_error import ErrorState
@@ -77,13 +81,158 @@ class BadDriver(can.BusABC):
         raise AssertionError
 
 
-def test_a_fault_of_a_driver_is_told_as_one_of_the_bus() -> None:
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give a bus up when enough reads have failed, however short that lasted."""
+    monkeypatch.setattr("tickrig.host.links.can_link.FAULTY_S", 0.0)
+
+
+def until_gone(read: Callable[[], object]) -> str:
+    try:
+        for _ in range(MOST_FAULTS):
+            read()
+    except LinkClosed as error:
+        return str(error)
+    raise AssertionError("it is read for ever")
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_driver_that_fails_each_time_ends_what_reads_it() -> None:
+    why = "bad:0: the last 100 reads have failed: AttributeError"
     link = CanLink(BadDriver("bad"), "bad:0")
-    with pytest.raises(LinkClosed, match="cannot read from bad:0: AttributeError"):
-        link.receive(0)
+    assert until_gone(lambda: link.receive(0)) == f"cannot read from {why}"
+    assert link.reads.faults == 0
     reader = BusReader(BadDriver("bad"), "bad", "bad:0")
-    with pytest.raises(LinkClosed, match="bad:0: AttributeError"):
-        reader.read(0)
+    assert until_gone(lambda: reader.read(1_000)) == why
+    assert reader.tally.messages("bad:0") == []
+    port = CanBusPort(BadDriver("bad"), "bad:0")
+    assert until_gone(lambda: port.poll(0)) == why
+
+
+ERRORS = (
+    IndexError("string index out of range"),
+    ValueError("non-hexadecimal number found in fromhex()"),
+    struct.error("unpack requires a buffer of 16 bytes"),
+    TypeError("'NoneType' object is not subscriptable"),
+    can.CanOperationError("the driver has lost its place"),
+    OSError("an overrun"),
+    ZeroDivisionError(),
+)
+
+
+class Hiccups(BadDriver):
+    """A driver that raises something else before each frame."""
+
+    def __init__(self) -> None:
+        super().__init__("hiccups")
+        came = ((error, to_message(frames("080#")[0])) for error in ERRORS)
+        self._came = iter([one for pair in came for one in pair])
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        one = next(self._came, None)
+        if isinstance(one, Exception):
+            raise one
+        return one, False
+
+
+def test_a_driver_that_fails_now_and_then_is_read_on(caplog: pytest.LogCaptureFixture) -> None:
+    link = CanLink(Hiccups(), "bad:0")
+    assert link.receive(0) == frames("080#") * len(ERRORS)
+    assert link.reads.faults == len(ERRORS)
+    first = "bad:0: a read has failed: IndexError: string index out of range; what came is lost"
+    assert caplog.messages == [first]
+    reader = BusReader(Hiccups(), "bad", "bad:0")
+    assert len(reader.read(0)) == len(ERRORS)
+    said = "bad:0: 7 frames that the driver could not read passed over"
+    assert reader.tally.messages("bad:0") == [said]
+    port = CanBusPort(Hiccups(), "bad:0")
+    assert port.poll(0) == frames("080#") * len(ERRORS)
+    assert port.failed == ""
+
+
+@pytest.mark.parametrize("code", [errno.ENODEV, errno.ENETDOWN])
+def test_an_adapter_that_the_kernel_calls_gone_is_gone_at_once(code: int) -> None:
+    class Gone(BadDriver):
+        def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+            raise can.CanOperationError("it is gone", code)
+
+    with pytest.raises(LinkClosed, match="cannot read from bad:0: it is gone"):
+        CanLink(Gone("gone"), "bad:0").receive(0)
+
+
+CUT = (b"t12", b"tXYZ1AA", b"t1234AABB", b"tF051AA", b"t1239001122334455667788")
+"""Lines of which something was lost, or changed."""
+BINARY = (b"\xff\xfe", b"t1\xe92")
+"""After a line that is no text all that waits is dropped."""
+
+
+@pytest.fixture
+def adapter() -> Iterator[tuple[Adapter, can.BusABC]]:
+    adapter = Adapter()
+    bus = adapter.open()
+    yield adapter, bus
+    with suppress(can.CanError, OSError):
+        bus.shutdown()
+
+
+def heard_of(adapter: Adapter, read: Callable[[], Iterable[object]]) -> list[object]:
+    """Return what is read of two good frames with bad lines between them."""
+    for line in (b"t70517F", *CUT, *BINARY):
+        adapter.send(line + b"\r")
+    heard: list[object] = []
+    deadline = time.monotonic() + 10
+    while "706#05" not in map(str, heard):
+        adapter.send(b"t706105\r")  # what comes behind a line that is no text may be lost with it
+        heard += read()
+        assert time.monotonic() < deadline, heard
+    return heard[:2]
+
+
+@pytest.mark.realtime
+def test_cut_lines_of_an_adapter_are_counted_and_the_rest_is_read(
+    adapter: tuple[Adapter, can.BusABC],
+) -> None:
+    port, bus = adapter
+    link = CanLink(bus, port.name)
+    heard = heard_of(port, lambda: link.receive(10_000))
+    assert list(map(str, heard)) == ["705#7F", "706#05"]
+    assert link.reads.faults > len(CUT)
+
+
+@pytest.mark.realtime
+def test_cut_lines_of_an_adapter_do_not_end_canmon(adapter: tuple[Adapter, can.BusABC]) -> None:
+    port, bus = adapter
+    reader = BusReader(bus, "slcan", port.name)
+    heard_of(port, lambda: (record.frame for record in reader.read(10_000)))
+    (said,) = reader.tally.messages(port.name)
+    assert said.endswith(" frames that the driver could not read passed over")
+
+
+@pytest.mark.realtime
+def test_cut_lines_of_an_adapter_do_not_end_an_emulator(
+    adapter: tuple[Adapter, can.BusABC],
+) -> None:
+    port, bus = adapter
+    outside = CanBusPort(bus, port.name)
+    assert list(map(str, heard_of(port, lambda: outside.poll(0)))) == ["705#7F", "706#05"]
+    assert outside.reads.faults > len(CUT)
+
+
+@pytest.mark.realtime
+def test_an_adapter_that_is_unplugged_ends_what_reads_it(
+    adapter: tuple[Adapter, can.BusABC],
+) -> None:
+    port, bus = adapter
+    link = CanLink(bus, port.name)
+    port.unplug()
+    deadline = time.monotonic() + 30
+    why = ""
+    while not why and time.monotonic() < deadline:
+        try:
+            link.receive(10_000)
+        except LinkClosed as error:
+            why = str(error)
+    assert why.startswith(f"cannot read from {port.name}: the last ")
 
 
 class Silent(can.BusABC):

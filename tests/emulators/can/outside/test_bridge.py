@@ -110,7 +110,11 @@ def test_what_an_adapter_does_not_take_is_kept_in_order(caplog: pytest.LogCaptur
     port.send(0, frames("001# 002#"))
     port.send(0, frames("003# 004# 005#"))
     assert (port.poll(0), port.lost, port.failed) == ((), 2, "gone")
-    assert len(caplog.records) == 1
+    assert caplog.messages == [
+        "CAN bus: transmit buffer full; what it does not take is kept",
+        "CAN bus: a read has failed: gone; what came is lost",
+        "CAN bus: 10 reads have failed: gone; what came is lost",
+    ]
     bus.stuck = False
     assert (port.poll(0), port.failed) == ((), "")
     assert tuple(to_frame(message) for message in bus.sent) == frames("001# 002# 003#")

@@ -91,9 +91,10 @@ class Doors:
         from tickrig.emulators.testing.bench.modes.real.watched_bus import (  # noqa: PLC0415 - slow
             open_watched,
         )
+        from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
 
         bus = open_watched(self._bus(wire), self._watch_of(wire), options)
-        self._opened.callback(bus.shutdown)
+        self._opened.callback(close_bus, bus)
         return bus
 
     def canopen_network(self, wire: str) -> canopen.Network:

@@ -93,11 +93,17 @@ class Outside:
     def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
         from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow
         from tickrig.emulators.can.outside.bus_port import port_on  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.bench.modes.real.watched_bus import open_bus  # noqa: PLC0415
+        from tickrig.emulators.testing.bench.modes.real.watched_bus import (  # noqa: PLC0415
+            name_of,
+            open_bus,
+        )
+        from tickrig.emulators.testing.bench.modes.real.watched_link import LinkGone  # noqa: PLC0415
+        from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
 
         bus = open_bus(plan, {})
-        self._stack.callback(bus.shutdown)
-        self.bridges.append(CanBridge(mount.open_end(), port_on(bus, plan.interface)))
+        self._stack.callback(close_bus, bus)
+        port = port_on(bus, plan.interface, name_of(plan), LinkGone)
+        self.bridges.append(CanBridge(mount.open_end(), port))
         self.places[mount.name] = plan
 
     def close(self) -> None:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from time import monotonic_ns
-from typing import Any, Final
+from typing import Any
 
 import can
 
@@ -14,13 +14,10 @@ from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.real.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.cli.can_options import bus_reason
-from tickrig.host.links.can_link import prepare_bus, receive
+from tickrig.host.links.can_link import GONE, BusReceiver, prepare_bus
 from tickrig.host.links.can_message import to_error_frame, to_frame
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
-
-GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
-"""What the kernel says of an adapter that was pulled out, or switched off."""
 
 
 class BusGone(PortGone, can.CanOperationError):
@@ -31,12 +28,15 @@ class _Watched(can.BusABC):
     """What a watched bus does beside what its class does."""
 
     _watch: DoorWatch
+    _reads: BusReceiver
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         self._watch.used()
         begun_ns = monotonic_ns()
         with self._told_if_gone():
-            message = super().recv() if timeout is None else receive(super().recv, timeout)
+            message = self._reads.receive(timeout)
+            while message is None and timeout is None:
+                message = self._reads.receive(timeout)
         if message is not None:
             error = to_error_frame(message)
             self._pass_on(Mark.FROM_DEVICE, _frames_of(message) if error is None else (error,))
@@ -93,7 +93,14 @@ def open_watched(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -> ca
     """Open a bus with a watch at it; see `open_bus`."""
     bus = open_bus(plan, options)
     kind = type(bus)
-    bus.__class__ = type(kind.__name__, (_Watched, kind), {"_watch": watch})
+    reads = BusReceiver(
+        bus,
+        name_of(plan),
+        gone=BusGone,
+        raises=(can.CanError, OSError),
+        read=partial(kind.recv, bus),
+    )
+    bus.__class__ = type(kind.__name__, (_Watched, kind), {"_watch": watch, "_reads": reads})
     return bus
 
 

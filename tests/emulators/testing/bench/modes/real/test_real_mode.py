@@ -9,10 +9,16 @@ import can
 import pytest
 import serial
 
+from tests.host.links.slcan_adapter import OPTIONS, Adapter
 from tickrig import Bench, InputBank
 from tickrig.device import Rrc, make_epos
 from tickrig.device.twin import Copyable
-from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError, NotOnThisBench
+from tickrig.emulators.testing.bench.errors import (
+    BenchBlocked,
+    BenchError,
+    NotOnThisBench,
+    PortGone,
+)
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DeviceKind,
@@ -219,6 +225,17 @@ def test_a_plan_says_where_hosts_come_in(tmp_path: Path) -> None:
         port.close()
         bus.shutdown()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_test_is_blocked_if_the_adapter_of_its_bus_is_unplugged() -> None:
+    adapter = Adapter()
+    bus = BusPlan(interface="slcan", channel=adapter.name, options=OPTIONS)
+    with Bench.of_plan(plan(RealPlan(doors={"can": DoorPlan(bus=bus)})), "real") as bench:
+        adapter.send(b"t12\r")
+        bench.run_for("50ms")
+        adapter.unplug()
+        with pytest.raises(PortGone, match=f"slcan {adapter.name}: the last [0-9]+ reads have"):
+            bench.run_for("60s")
 
 
 def test_what_cannot_be_opened_leaves_nothing_behind(tmp_path: Path) -> None:

@@ -53,6 +53,35 @@ def test_an_adapter_that_is_pulled_out_is_gone(code: int, monkeypatch: pytest.Mo
             bus.recv(0)
 
 
+def test_what_a_driver_cannot_read_is_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    came = iter([IndexError("string index out of range"), MESSAGE, TypeError(), MESSAGE])
+
+    def receive(bus: can.BusABC, timeout: float | None) -> tuple[can.Message | None, bool]:
+        one = next(came, None)
+        if isinstance(one, Exception):
+            raise one
+        assert one is None or isinstance(one, can.Message)
+        return one, False
+
+    monkeypatch.setattr(VirtualBus, "_recv_internal", receive)
+    watch = Watch()
+    with open_watched(PLAN, watch, {}) as bus:
+        assert bus.recv(None) is not None
+        assert bus.recv(0) is not None
+        assert bus.recv(0) is None
+    assert watch.heard == ["< 701#05"] * 2
+
+
+def test_a_driver_that_always_fails_is_a_bus_that_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object, **options: object) -> None:
+        raise TypeError("'NoneType' object is not subscriptable")
+
+    monkeypatch.setattr(VirtualBus, "_recv_internal", fail)
+    monkeypatch.setattr("tickrig.host.links.can_link.FAULTY_S", 0.0)
+    with open_watched(PLAN, Watch(), {}) as bus, pytest.raises(PortGone, match="100 reads"):
+        bus.recv(None)
+
+
 def test_a_bus_that_takes_nothing_is_there_still(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*arguments: object, **options: object) -> None:
         raise can.CanOperationError("the buffer is full", errno.ENOBUFS)
