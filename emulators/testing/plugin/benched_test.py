@@ -33,7 +33,7 @@ from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
 from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
-from tickrig.emulators.testing.plugin.verdict import blocked, make_error
+from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make_error
 from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
 from tickrig.host.cli.refused import Refused
 
@@ -77,6 +77,7 @@ class BenchedTest:
         self._allowed: tuple[str, ...] = ()
         self._passed, self._stack, self._others = False, ExitStack(), threading.enumerate()
         self.unheard: list[str] = []
+        self._is_misused = False
         self.kept: list[Path] = []
         self.not_kept: list[str] = []
 
@@ -111,7 +112,11 @@ class BenchedTest:
         """Hear of what goes wrong where no assert looks, from before the bench is open."""
         if THREADS not in self._allowed:
             self._stack.enter_context(dead_threads(self.unheard.append))
-        self._stack.enter_context(never_awaited(self.unheard.append))
+        self._stack.enter_context(never_awaited(self._misused))
+
+    def _misused(self, text: str) -> None:
+        self.unheard.append(text)
+        self._is_misused = True
 
     def close(self) -> None:
         """Give everything back; a test that has passed fails of what went wrong since."""
@@ -171,7 +176,8 @@ class BenchedTest:
         """Fail a test that has passed so far."""
         bench.check_tasks()
         if unheard := self.take_unheard():
-            pytest.fail("\n".join(unheard), pytrace=False)
+            fail = MisusedError if self._is_misused else pytest.fail.Exception
+            raise fail("\n".join(unheard), pytrace=False)
         found = list(self._health.complaints(self._allowed)) if self._health else []
         try:
             found += unsafe(bench, self._safe)
@@ -185,15 +191,25 @@ class BenchedTest:
             pytest.fail("\n".join([text, *found]), pytrace=False)
         self._passed = True
 
-    def judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
-        """Say what blocked a phase of the test, and tell with a failure what there is to know."""
+    def judge(
+        self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool
+    ) -> None:
+        """Say what blocked a phase of the test, and tell with a failure what there is to know.
+
+        Args:
+            report: of the phase.
+            call: what it did.
+            mistaken: the test has made a mistake.
+        """
         try:
-            self._judge(report, call)
+            self._judge(report, call, mistaken=mistaken)
         except Exception as error:  # whatever broke the bench: the report of the test is made
             report.sections.append(("bench", f"it is broken: {error!r}"))
 
-    def _judge(self, report: pytest.TestReport, call: pytest.CallInfo[None]) -> None:
-        if reason := blocked(report, call, self.bench):
+    def _judge(
+        self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool
+    ) -> None:
+        if reason := blocked(report, call, self.bench, mistaken=mistaken):
             self.blocked = reason
             make_error(report, reason)
         if report.failed:

@@ -199,12 +199,18 @@ def pytest_runtest_makereport(
 
             make_error(report, blocked(report, call, None))
         return report
-    if call.excinfo is not None and not item.config.getoption("fulltrace", False):
-        from tickrig.emulators.testing.plugin.traceback_end import end_at_caller  # noqa: PLC0415
+    mistaken = False
+    if call.excinfo is not None:
+        from tickrig.emulators.testing.plugin.verdict import (  # noqa: PLC0415 - it is loaded
+            end_at_caller,
+            is_mistake,
+        )
 
-        end_at_caller(call.excinfo.value)
+        mistaken = is_mistake(call.excinfo.value)
+        if not item.config.getoption("fulltrace", False):
+            end_at_caller(call.excinfo.value)
     report = yield
-    test.judge(report, call)
+    test.judge(report, call, mistaken=mistaken)
     return report
 
 

@@ -1,26 +1,112 @@
-"""No failure of a device is what the bench is to blame for."""
+"""What the bench is to blame for is no failure of a device; a mistake in a test is no lateness."""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from traceback import walk_tb
+from types import TracebackType
 from typing import Final
 
 import pytest
 
 import tickrig
 from tickrig.emulators.testing.bench.bench import Bench
-from tickrig.emulators.testing.bench.errors import BenchBlocked
+from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError
 
 PACKAGE: Final = Path(tickrig.__file__).parent
 
+MISTAKES: Final = (TypeError, AttributeError, NameError, ImportError, SyntaxError)
+"""What is wrong with a program, however late it runs."""
 
-def blocked(report: pytest.TestReport, call: pytest.CallInfo[None], bench: Bench | None) -> str:
-    """Say why a phase of a test came to no verdict about the device; empty if it did."""
-    if call.excinfo is not None and isinstance(call.excinfo.value, BenchBlocked):
-        return str(call.excinfo.value) or type(call.excinfo.value).__name__
-    if bench is None or not report.failed or report.when == "teardown":
+REFUSALS: Final = (ValueError, LookupError, BenchError)
+"""How the bench refuses what it is asked for."""
+
+OF_STATE: Final = ("WireError", "RtcRefused", "ServerRefused")
+"""Refusals that depend on what has come, or on the state of a component."""
+
+CHECKS: Final = tuple(
+    f"tickrig.emulators.testing.{room}" for room in ("properties", "machine", "fuzz", "conformance")
+)
+"""What judges devices and hosts by AssertionError."""
+
+LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
+"""What raises for whoever has called it."""
+
+
+class MisusedError(pytest.fail.Exception):
+    """A test that uses its bench wrongly: it calls an async function and does not await it."""
+
+
+def blocked(
+    report: pytest.TestReport,
+    call: pytest.CallInfo[None],
+    bench: Bench | None,
+    *,
+    mistaken: bool = False,
+) -> str:
+    """Say why a phase of a test came to no verdict about the device; empty if it did.
+
+    Args:
+        report: of the phase.
+        call: what it did.
+        bench: of the test, None if it was not opened.
+        mistaken: the test has made a mistake; see `is_mistake`.
+    """
+    error = None if call.excinfo is None else call.excinfo.value
+    if isinstance(error, BenchBlocked):
+        return str(error) or type(error).__name__
+    if bench is None or not report.failed or report.when == "teardown" or mistaken:
         return ""
     return bench._mode.too_slow()
+
+
+def is_mistake(error: BaseException) -> bool:
+    """Say whether a test would have raised this on a fast machine too.
+
+    A misspelt name is a mistake, and so is all that the bench refuses. A test that takes None
+    for a message, as there was none in time, is not: nor what the host raises of its own.
+    """
+    if isinstance(error, BaseExceptionGroup):
+        return any(map(is_mistake, error.exceptions))
+    raiser = _raiser(error)
+    ours, of_pytest = (raiser.partition(".")[0] == name for name in ("tickrig", "_pytest"))
+    if isinstance(error, MISTAKES):
+        return ours or "NoneType" not in str(error)
+    if isinstance(error, (RuntimeError, *REFUSALS)) and ours:
+        return not any(kind.__name__ in OF_STATE for kind in type(error).__mro__)
+    if type(error) is AssertionError and ours:
+        return not raiser.startswith(CHECKS)
+    return isinstance(error, MisusedError | pytest.FixtureLookupError) or of_pytest
+
+
+def _raiser(error: BaseException) -> str:
+    """Return the module that has raised an error, or has called the library that did."""
+    names = [frame.f_globals.get("__name__") or "" for frame, _ in walk_tb(error.__traceback__)]
+    named = [name for name in names if name != "_pytest.outcomes"]
+    own = (name for name in reversed(named) if name.partition(".")[0] not in LIBRARIES)
+    return next(own, "")
+
+
+def end_at_caller(error: BaseException) -> None:
+    """Cut our frames from the end of a traceback, if a call of ours refused something.
+
+    Args:
+        error: what a test raised.
+    """
+    entry, last = error.__traceback__, None
+    while entry is not None:
+        if _package_of(entry) not in ("tickrig", "contextlib"):
+            last = entry
+        entry = entry.tb_next
+    refused = isinstance(error, (TypeError, *REFUSALS))
+    if refused and last and _package_of(last) not in ("_pytest", "pluggy"):
+        last.tb_next = None
+
+
+def _package_of(entry: TracebackType) -> str:
+    """Return the package at the top of a module."""
+    return str(entry.tb_frame.f_globals.get("__name__")).partition(".")[0]
 
 
 def make_error(report: pytest.TestReport, reason: str) -> None:

@@ -368,6 +368,103 @@ def test_a_failure_on_a_machine_that_stood_still_is_none_of_the_device(
     assert (suite.get("errors"), suite.get("failures")) == ("1", "0")
 
 
+STANDING_STILL = """
+    import asyncio
+    import os
+    import signal
+    import subprocess
+    import pytest
+    from tickrig.host import RrcClient
+
+    @pytest.fixture
+    def late(bench):
+        bench.run_for("20ms")
+        wake = f"sleep 0.2; kill -CONT {os.getpid()}"
+        with subprocess.Popen(["sh", "-c", wake]):
+            os.kill(os.getpid(), signal.SIGSTOP)
+        bench.run_for("20ms")
+        return bench
+"""
+
+
+@pytest.mark.realtime
+def test_a_mistake_in_a_test_is_a_failure_on_a_slow_machine_too(
+    pytester: pytest.Pytester, run_apart: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        STANDING_STILL
+        + """
+    async def forgotten():
+        pass
+
+    @pytest.mark.parametrize("mistake", [
+        lambda bench: bench.pres("power_button"),
+        lambda bench: bench.set("stik", 1, 1),
+        lambda bench: bench.set("gauge", "a lot"),
+        lambda bench: bench.get("staet"),
+        lambda bench: bench.get(),
+        lambda bench: bench.wait_until(lambda: bench.get("staet") == "Lost", within="20ms"),
+        lambda bench: bench.wait_until(lambda: True, within="20 fortnights"),
+        lambda bench: bench.run_for("5"),
+        lambda bench: bench.run_for(None),
+        lambda bench: bench.fault("cutt"),
+        lambda bench: bench.fault("cut@2s-1s"),
+        lambda bench: bench.serial(bytesize=99),
+        lambda bench: bench.serial(nonsense=1),
+        lambda bench: bench.can_bus(),
+        lambda bench: bench["nobody"],
+        lambda bench: bench.run(asyncio.sleep(1)),
+        lambda bench: forgotten(),
+        lambda bench: benhc,
+        lambda bench: __import__("tickrig.hosts"),
+        lambda bench: exec("from tickrig import Bensh"),
+        lambda bench: RrcClient(bench.link).outptu(),
+        lambda bench: RrcClient(bench.link, "more", "and more"),
+    ])
+    def test_mistake(late, mistake):
+        mistake(late)
+
+    def test_no_such_fixture(late, bench_tiem):
+        pass
+    """
+    )
+    result = run_apart("--bench-mode", "real")
+    result.stdout.no_fnmatch_line("*too slow*")
+    result.assert_outcomes(failed=22, errors=1)
+
+
+@pytest.mark.realtime
+def test_what_a_host_makes_of_silence_is_no_failure_on_a_slow_machine(
+    pytester: pytest.Pytester, run_apart: Run
+) -> None:
+    pytester.makeconftest(RRC)
+    pytester.makepyfile(
+        STANDING_STILL
+        + """
+    @pytest.mark.parametrize("symptom", [
+        lambda: None.data,
+        lambda: None["state"],
+        lambda: int(""),
+        lambda: [][0],
+        lambda: {}["state"],
+        lambda: pytest.fail("nothing came"),
+    ])
+    def test_symptom(late, symptom):
+        symptom()
+
+    def test_assertion(late):
+        assert late.get("state") == "Lost"
+
+    def test_host(late):
+        with RrcClient(late.link, timeout_us=1) as client:
+            client.device()
+    """
+    )
+    result = run_apart("--bench-mode", "real")
+    result.assert_outcomes(errors=8)
+
+
 @pytest.mark.realtime
 def test_a_bench_that_broke_down_is_told(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makepyfile(
