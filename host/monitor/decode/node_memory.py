@@ -220,13 +220,16 @@ class Heartbeats:
     Attributes:
         last_us: when it told its state last, None while it told none.
         since_us: since when one is waited for; None for never.
-        gaps: between the latest heartbeats.
+        gaps: between the latest heartbeats, in us. A node that stood still sends all heartbeats
+            of that time at once: a gap shorter than half of the one before makes one with it,
+            their mean, which a burst after a silence brings back to the period.
     """
 
     memory: NodeMemory = field(compare=False)
     last_us: int | None = None
     since_us: int | None = None
-    gaps: deque[int] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
+    gaps: deque[float] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
+    _merged: int = 0  # gaps that the latest of them is the mean of
     _booted: bool = False
 
     @property
@@ -265,11 +268,19 @@ class Heartbeats:
         """Take a heartbeat; the period is learnt from it, unless it may answer a request."""
         learns = learns and not self._booted
         if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time
-            self.gaps.append(at_us - self.last_us)
+            self._take_gap(at_us - self.last_us)
         self.last_us = self.since_us = at_us
         self._booted = False
 
+    def _take_gap(self, gap_us: int) -> None:
+        if self.gaps and 2 * gap_us < self.gaps[-1]:
+            self.gaps[-1] += (gap_us - self.gaps[-1]) / (self._merged + 1)
+            self._merged += 1
+        else:
+            self.gaps.append(gap_us)
+            self._merged = 1
 
-def _median(gaps: Collection[int]) -> int:
+
+def _median(gaps: Collection[float]) -> int:
     """Return the median, of two the higher one; statistics would take 5 ms to import."""
-    return sorted(gaps)[len(gaps) // 2]
+    return round(sorted(gaps)[len(gaps) // 2])

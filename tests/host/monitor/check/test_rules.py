@@ -356,6 +356,47 @@ def test_a_source_that_has_no_error_frames_proves_nothing() -> None:
     }
 
 
+def beats(*spans: tuple[float, int, float]) -> str:
+    """Return heartbeats of node 3: for each span when it begins, how many, and their gap."""
+    times = [at + n * gap for at, count, gap in spans for n in range(count)]
+    return "\n".join(f"{time:.6f} 703#05" for time in times)
+
+
+BURST = (4.0, 31, 0.0002)
+"""What a node sends that stood still for 3.1 s: all at once."""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        beats((0.5, 5, 0.1), BURST, (4.1, 20, 0.1)),
+        beats((0.5, 5, 0.1), (4.0, 31, 0.0), (4.1, 20, 0.1)),  # all with one time
+        beats((0.5, 5, 0.1), (4.0, 31, 0.003), (4.1, 20, 0.1)),  # on a slow bus
+        beats((0.5, 20, 0.1), (5.5, 31, 0.0002), (5.6, 5, 0.1), (8.0, 20, 0.0002), (8.1, 9, 0.1)),
+    ],
+)
+def test_heartbeats_that_a_node_makes_up_for_are_no_period(text: str) -> None:
+    found = broken(LOST, text)
+    assert len(found) == text.count("\n") // 40
+    assert all("one each 100.000 ms before" in line for line in found)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        beats((0.8, 2, 0.1), BURST, (4.1, 20, 0.1)),  # after one gap
+        beats((0.9, 1, 0.1), BURST, (4.1, 20, 0.1)),  # after none: the log begins with it
+    ],
+)
+def test_a_burst_before_the_period_is_known_is_no_period(text: str) -> None:
+    assert broken(LOST, text) == []
+
+
+def test_a_shorter_period_is_learnt() -> None:
+    found = broken(LOST, beats((1.0, 9, 1.0), (9.1, 30, 0.1)), end_s=12.2)
+    assert found == ["12.2 can0 node 3: no heartbeat for 200.000 ms, one each 100.000 ms before"]
+
+
 def test_a_second_that_is_too_busy_is_found_when_it_is_over() -> None:
     busy = "\n".join(f"{n / 100:.2f} 181#" for n in range(100))
     assert broken(Rules(max_load=49.5), f"{busy}\n1.5 181#", bit_rate=10_000) == [
