@@ -300,27 +300,29 @@ def give_up_terminals() -> None:
             _to_nowhere(descriptor)
 
 
-def _is_stuck(descriptor: int) -> bool:
-    """Return whether it is a terminal that is gone, or takes nothing.
+if sys.platform != "win32":
 
-    One with room for a single byte says that it can be written, and yet CR LF waits: a NUL, which
-    terminals pass over, takes that room.
-    """
-    try:
-        if not stat.S_ISCHR(os.fstat(descriptor).st_mode):
-            return False
-        if os.isatty(descriptor):
-            flags = os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK
-            probe = os.open(os.ttyname(descriptor), flags)
-            with suppress(BlockingIOError):
-                os.write(probe, b"\0")
-            os.close(probe)
-    except OSError:  # closed, or a terminal of another container
-        pass
-    poll = select.poll()
-    poll.register(descriptor, select.POLLOUT)
-    ready = poll.poll(TERMINAL_MS)
-    return not ready or bool(ready[0][1] & (select.POLLERR | select.POLLHUP))
+    def _is_stuck(descriptor: int) -> bool:
+        """Return whether it is a terminal that is gone, or takes nothing.
+
+        One with room for a single byte says that it can be written, and yet CR LF waits: a NUL,
+        which terminals pass over, takes that room.
+        """
+        try:
+            if not stat.S_ISCHR(os.fstat(descriptor).st_mode):
+                return False
+            if os.isatty(descriptor):
+                flags = os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK
+                probe = os.open(os.ttyname(descriptor), flags)
+                with suppress(BlockingIOError):
+                    os.write(probe, b"\0")
+                os.close(probe)
+        except OSError:  # closed, or a terminal of another container
+            pass
+        poll = select.poll()
+        poll.register(descriptor, select.POLLOUT)
+        ready = poll.poll(TERMINAL_MS)
+        return not ready or bool(ready[0][1] & (select.POLLERR | select.POLLHUP))
 
 
 def _to_nowhere(descriptor: int) -> None:

@@ -60,35 +60,38 @@ def ready(
         OSError: a descriptor is closed.
     """
     readers, writers = list(readers), list(writers)
-    if max(map(_number, (*readers, *writers)), default=0) < SELECTABLE or sys.platform == "win32":
-        can_be_read, can_be_written, _ = select.select(readers, writers, [], wait_s)
-        return can_be_read, can_be_written
-    return _polled(readers, writers, wait_s)
+    if sys.platform != "win32":
+        if max(map(_number, (*readers, *writers)), default=0) >= SELECTABLE:
+            return _polled(readers, writers, wait_s)
+    can_be_read, can_be_written, _ = select.select(readers, writers, [], wait_s)
+    return can_be_read, can_be_written
 
 
-def _polled(
-    readers: Sequence[Read], writers: Sequence[Written], wait_s: float | None
-) -> tuple[list[Read], list[Written]]:
-    """Do the same with `poll`, which counts in whole milliseconds."""
-    wanted: dict[int, int] = {}
-    for sources, event in ((readers, select.POLLIN), (writers, select.POLLOUT)):
-        for source in sources:
-            wanted[_number(source)] = wanted.get(_number(source), 0) | event
-    poll = select.poll()
-    for number, events in wanted.items():
-        poll.register(number, events)
-    whole_ms = None if wait_s is None else math.floor(max(0.0, wait_s) * 1e3)
-    came = dict(poll.poll(whole_ms))
-    if not came and wait_s is not None and (rest_s := wait_s - (whole_ms or 0) / 1e3) > 0:
-        time.sleep(rest_s)
-        came = dict(poll.poll(0))
-    if any(events & select.POLLNVAL for events in came.values()):
-        raise OSError(errno.EBADF, os.strerror(errno.EBADF))
-    broken = select.POLLERR | select.POLLHUP
-    return (
-        [one for one in readers if came.get(_number(one), 0) & (select.POLLIN | broken)],
-        [one for one in writers if came.get(_number(one), 0) & (select.POLLOUT | broken)],
-    )
+if sys.platform != "win32":
+
+    def _polled(
+        readers: Sequence[Read], writers: Sequence[Written], wait_s: float | None
+    ) -> tuple[list[Read], list[Written]]:
+        """Do the same with `poll`, which counts in whole milliseconds."""
+        wanted: dict[int, int] = {}
+        for sources, event in ((readers, select.POLLIN), (writers, select.POLLOUT)):
+            for source in sources:
+                wanted[_number(source)] = wanted.get(_number(source), 0) | event
+        poll = select.poll()
+        for number, events in wanted.items():
+            poll.register(number, events)
+        whole_ms = None if wait_s is None else math.floor(max(0.0, wait_s) * 1e3)
+        came = dict(poll.poll(whole_ms))
+        if not came and wait_s is not None and (rest_s := wait_s - (whole_ms or 0) / 1e3) > 0:
+            time.sleep(rest_s)
+            came = dict(poll.poll(0))
+        if any(events & select.POLLNVAL for events in came.values()):
+            raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        broken = select.POLLERR | select.POLLHUP
+        return (
+            [one for one in readers if came.get(_number(one), 0) & (select.POLLIN | broken)],
+            [one for one in writers if came.get(_number(one), 0) & (select.POLLOUT | broken)],
+        )
 
 
 def _number(source: int | HasDescriptor) -> int:
@@ -101,12 +104,11 @@ def let_wait(opened: HasDescriptor) -> None:
         number = opened.fileno()
     except (OSError, AttributeError, NotImplementedError):  # it has none
         return
-    if number < SELECTABLE - SPARE or sys.platform == "win32":
-        return
-    for name in FOREIGN:
-        module: Any = sys.modules.get(name)
-        if getattr(module, "select", None) is select:
-            module.select = SimpleNamespace(**{**vars(select), "select": _select})
+    if sys.platform != "win32" and number >= SELECTABLE - SPARE:
+        for name in FOREIGN:
+            module: Any = sys.modules.get(name)
+            if getattr(module, "select", None) is select:
+                module.select = SimpleNamespace(**{**vars(select), "select": _select})
 
 
 def _select(

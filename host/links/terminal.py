@@ -157,6 +157,7 @@ class TerminalOutput:
 def _is_hung_up(descriptor: int) -> bool:
     if sys.platform == "win32":
         return False
-    poll = select.poll()
-    poll.register(descriptor, 0)
-    return bool(poll.poll(0))
+    else:
+        poll = select.poll()
+        poll.register(descriptor, 0)
+        return bool(poll.poll(0))
