@@ -155,9 +155,9 @@ class TerminalOutput:
 
 
 def _is_hung_up(descriptor: int) -> bool:
-    if sys.platform == "win32":
-        return False
-    else:
+    hung_up = False
+    if sys.platform != "win32":
         poll = select.poll()
         poll.register(descriptor, 0)
-        return bool(poll.poll(0))
+        hung_up = bool(poll.poll(0))
+    return hung_up
