@@ -148,7 +148,8 @@ class NameServer:
         for path, reference in gone.items():
             name = name_of(path)
             try:
-                if root.resolve(name)._is_equivalent(reference):
+                found = root.resolve(name)
+                if found is not None and found._is_equivalent(reference):
                     root.unbind(name)
             except CORBA.UserException:
                 pass  # it has no such name

@@ -14,6 +14,7 @@ from omniORB import CORBA, PortableServer
 from omniORB import any as omni_any
 
 from tickrig.host.cli.openrtm_options import Endpoint
+from tickrig.host.rtc.remote.peer_thread import calls_run
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.text.log import log_of
 
@@ -129,14 +130,29 @@ class Orb:
         return ior
 
     def close(self) -> None:
-        """Answer the calls that run, refuse all others, and free the port."""
+        """Answer the calls that run, refuse all others, and free the port.
+
+        omniORB repeats a call for as long as the peer closes the connection in place of an
+        answer. Such a call does not end; then the ORB is left as it is, with a line in the log.
+        """
         for poa, name in self._named:  # they would outlive this ORB
             poa.deactivate_object(name)
-        self._orb.shutdown(True)
+        ending = threading.Thread(target=self._orb.shutdown, args=(True,), daemon=True)
+        ending.start()
+        ending.join(_CLOSE_S)
+        _wait_while(calls_run)
+        if ending.is_alive() or calls_run():
+            _LOG.warning("OpenRTM: a call into a peer does not end")
+            return
         self._orb.destroy()
-        end_s = time.monotonic() + _CLOSE_S
-        while _serves() and time.monotonic() < end_s:  # else the process could abort at its end
-            time.sleep(_POLL_S)
+        _wait_while(_serves)
+
+
+def _wait_while(is_busy: Callable[[], bool]) -> None:
+    """Wait for threads that are about to end: in the middle of a call the process could abort."""
+    end_s = time.monotonic() + _CLOSE_S
+    while is_busy() and time.monotonic() < end_s:
+        time.sleep(_POLL_S)
 
 
 def _serves() -> bool:

@@ -182,7 +182,7 @@ def parse_path(path: str) -> tuple[Endpoint, str]:
 def _port_of(component: Reference, name: str) -> Reference:
     """Return the port of a component, by its name without that of the component."""
     known: list[str] = []
-    for port in component.get_ports():
+    for port in filter(None, component.get_ports()):
         profile: Any = port.get_port_profile()
         known.append(str(profile.name).rpartition(".")[2])
         if known[-1] == name:

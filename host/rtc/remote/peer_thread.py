@@ -21,6 +21,25 @@ RETRY_US: Final = 1_000_000
 _LOG: Final = log_of(__name__)
 
 
+class CallingThread(threading.Thread):
+    """The thread of a `PeerThread`; it does not keep the process alive.
+
+    Attributes:
+        ending: it was told to end, and does after its present call.
+    """
+
+    ending = False
+
+
+def calls_run() -> bool:
+    """Return whether a thread that was told to end still makes a call.
+
+    A process that ends in the middle of one may abort, or never end: the call is in code of C++.
+    """
+    threads = threading.enumerate()
+    return any(isinstance(thread, CallingThread) and thread.ending for thread in threads)
+
+
 class PeerThread:
     """Makes calls into a peer, one after the other, in a thread of its own.
 
@@ -39,7 +58,7 @@ class PeerThread:
         self.retry_s, self._order = retry_us / 1e6, count()
         self._calls: WaitingQueue[PeerCall | None] = WaitingQueue()
         self._repeated: list[tuple[float, int, PeerCall]] = []
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread = CallingThread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def submit(self, call: PeerCall) -> None:
@@ -48,6 +67,7 @@ class PeerThread:
 
     def close(self, wait_us: int = 0) -> None:
         """End after the present call; wait for that, but not longer than `wait_us`."""
+        self._thread.ending = True
         self._calls.put(None)
         self._thread.join(wait_us / 1e6)
 

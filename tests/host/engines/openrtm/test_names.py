@@ -171,3 +171,31 @@ def test_a_name_that_cannot_be_is_told_once(
         eventually(lambda: resolve(orb, omni_names, "First0.rtc") is not None, "it has no name")
         eventually(lambda: bool(caplog.messages), "nothing was told")
     assert caplog.messages == [f"name server {omni_names.address} refuses {NAME}: NotFound"]
+
+
+class Nothing:
+    """A name server that takes each name, and has nothing under it."""
+
+    def __init__(self) -> None:
+        self.bound: list[str] = []
+
+    def rebind(self, name: Any, reference: Reference) -> None:
+        self.bound.append(URI.nameToString(name))
+
+    def resolve(self, name: Any) -> None:
+        return None
+
+
+def test_a_name_server_that_answers_with_nothing_costs_no_other_name(
+    orb: Orb, caplog: pytest.LogCaptureFixture
+) -> None:
+    server = Nothing()
+    orb.serve_as("NameService", CosNaming__POA.NamingContext, server)
+    names = NameServer(orb, orb.endpoint, SOON_US, SOON_US)
+    names.bind(NAME, serve(orb))
+    eventually(lambda: NAME in server.bound, "it was not bound")
+    names.unbind(NAME)
+    names.bind("other.rtc", serve(orb))
+    eventually(lambda: "other.rtc" in server.bound, "the other name was not bound")
+    names.close()
+    assert caplog.text == ""

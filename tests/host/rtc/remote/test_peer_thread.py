@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.remote.peer_thread import PeerThread, calls_run
 
 DEADLINE_S = 30.0
 
@@ -85,3 +85,20 @@ def test_after_its_end_nothing_is_called() -> None:
     thread.close(10_000_000)
     thread.submit(lambda: seen.append(1))
     assert seen == []
+
+
+def test_a_call_that_runs_when_its_thread_is_to_end_is_known(thread: PeerThread) -> None:
+    begun, end = threading.Event(), threading.Event()
+
+    def call() -> None:
+        begun.set()
+        end.wait(DEADLINE_S)
+
+    thread.submit(call)
+    assert begun.wait(DEADLINE_S)
+    assert not calls_run()
+    thread.close()
+    assert calls_run()
+    end.set()
+    thread.close(10_000_000)
+    assert not calls_run()

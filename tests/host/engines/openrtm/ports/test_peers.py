@@ -10,7 +10,10 @@ import pytest
 
 from tests.host.engines.openrtm.name_server import OmniNames
 from tests.host.engines.openrtm.ports.foreign import Peer, Served
+from tickrig.host.cli.openrtm_options import parse_endpoint
+from tickrig.host.engines.openrtm.names import NameServer
 from tickrig.host.engines.openrtm.peers import Peers, parse_path
+from tickrig.host.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.system import describe, restore
 from tickrig.host.rtc.system.system_toml import parse_toml, write_toml
@@ -148,6 +151,28 @@ def test_a_port_that_is_not_there_or_does_not_fit_costs_a_line(
     known = "known: out, in, provides, requires"
     expected = f"Far0.none: it has no port 'none'; {known}; asked again every second"
     assert record.getMessage() == expected
+
+
+class NoPorts:
+    """A component that gives nothing for a port."""
+
+    def get_ports(self) -> list[None]:
+        return [None]
+
+
+def test_a_peer_that_gives_nothing_for_a_port_costs_a_line(
+    kept: Kept, omni_names: OmniNames, caplog: pytest.LogCaptureFixture
+) -> None:
+    orb = kept.system.orb
+    names = NameServer(orb, parse_endpoint(omni_names.address))
+    names.bind("peer.host_cxt/Peer0.rtc", orb.serve(stubs().skeleton("RTC.RTObject"), NoPorts()))
+    kept.keep("ConsoleIn0.out", "in")
+    reason = "Far0.in: it has no port 'in'; known: none; asked again every second"
+    kept.system.until(lambda: reason in caplog.messages)
+    names.close()
+    assert "a call raised" not in caplog.text
+    kept.start()  # under the same name, and it is still asked for
+    kept.system.until(lambda: "Far0.in: connected" in caplog.messages)
 
 
 def test_a_name_server_that_is_not_there_costs_a_line(
