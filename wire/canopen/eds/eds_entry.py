@@ -265,7 +265,8 @@ def _check_form(  # noqa: PLR0913, PLR0917 - a place, its text and what it is
         reason = f"{key}={shorten(text)} is no hexadecimal bytes: {what} is taken"
         file.warn(section, reason, "byte-form", key)
     elif kind.is_integer and kind is not DataType.BOOLEAN and isinstance(value, int):
-        number = parse_sum(text)[0]
+        may_differ = (value < 0) is not ("-" in text)
+        number = parse_sum(text)[0] if may_differ else value
         if number != value and number >> kind.bits:
             taken = str(value) if kind.signed else f"0x{value:0{2 * kind.size}X}"
             reason = f"{key}={shorten(text)} is no {kind.name}: {taken} is taken"

@@ -14,7 +14,12 @@ from tickrig.wire.canopen.eds.eds_lines import (
     object_section,
     read_lines,
 )
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers, without_comment
+from tickrig.wire.canopen.eds.eds_value import (
+    is_plain_number,
+    parse_number,
+    plain_numbers,
+    without_comment,
+)
 from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
 LONGEST: Final = 40
@@ -162,6 +167,9 @@ class EdsFile:
 
     def numeric(self, section: str, key: str) -> str:
         """Return the text of a number as CiA 306 writes it; a warning if the file does not."""
+        text = self.value(section, key)
+        if is_plain_number(text):
+            return text
         text = self.word(section, key)
         plain = plain_numbers(text)
         if plain != text:

@@ -43,6 +43,8 @@ def without_comment(text: str) -> str:
     >>> without_comment("0x07 # VAR"), without_comment("7//VAR"), without_comment("$NODEID+8;x")
     ('0x07', '7', '$NODEID+8')
     """
+    if "#" not in text and ";" not in text and "//" not in text:  # most are such
+        return text
     return _COMMENT.sub("", text, count=1)
 
 
@@ -93,12 +95,14 @@ def twos_complement(kind: DataType, number: int) -> int:
     >>> twos_complement(DataType.INTEGER16, 0xFFFF_8000), twos_complement(DataType.INTEGER16, 65536)
     (-32768, 65536)
     """
+    bits = kind.bits
+    half = 1 << bits - 1
     if not kind.signed:
-        half = 1 << kind.bits - 1
-        return number + 2 * half if kind.bits > 1 and -half <= number < 0 else number
-    lowest, highest = kind.limits
-    for width in (kind.bits, *C_WIDTHS):
-        if highest < number and lowest <= number - (1 << width) < 0:
+        return number + 2 * half if bits > 1 and -half <= number < 0 else number
+    if number < half:
+        return number
+    for width in (bits, *C_WIDTHS):
+        if -half <= number - (1 << width) < 0:
             return number - (1 << width)
     return number
 
@@ -114,6 +118,11 @@ def parse_number(text: str) -> int:
     return int(text, 8) if _OCTAL.fullmatch(text) else int(text, 0)
 
 
+def is_plain_number(text: str) -> bool:
+    """Return whether a text is a number as CiA 306 writes it, or empty, as nearly all are."""
+    return _PLAIN.fullmatch(text) is not None
+
+
 def plain_numbers(text: str) -> str:
     """Return numbers as CiA 306 writes them.
 
@@ -126,7 +135,7 @@ def plain_numbers(text: str) -> str:
     >>> plain_numbers("0x 12 34"), plain_numbers("1Ah"), plain_numbers("1_000")
     ('0x1234', '0x1A', '1000')
     """
-    if _PLAIN.fullmatch(text):  # most are such: a third of the time of a file
+    if is_plain_number(text):  # a third of the time of a file
         return text
     plain = _NO_OCTAL.sub(r"\1", _C_SUFFIX.sub(r"\1", without_comment(text)))
     if assembler := _ASSEMBLER_HEX.fullmatch(plain):

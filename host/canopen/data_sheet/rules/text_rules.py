@@ -17,6 +17,7 @@ from tickrig.host.canopen.data_sheet.rules.known_keys import (
 from tickrig.host.canopen.data_sheet.rules.value_rules import kind_of
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_lines import KNOWN_SECTIONS, EdsLine
+from tickrig.wire.canopen.eds.eds_value import without_comment
 
 _CONTROLS: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 _PLAIN: Final = re.compile(
@@ -116,7 +117,8 @@ def comments(document: Document) -> Iterator[RuleFinding]:
             yield document.found("hash-comment", what, line.section, line.number)
             continue
         match = _INLINE.search(raw) if line.content and text != line.content else None
-        if match is None and line.is_keyword and _is_word(document, line):
+        behind = without_comment(line.value) != line.value
+        if match is None and behind and line.is_keyword and _is_word(document, line):
             match = _BEHIND_WORD.search(raw, raw.index("=") + 1)
         if match is not None:
             remark = match[0].strip().lstrip("#/;").strip()

@@ -27,6 +27,7 @@ from tickrig.wire.canopen.eds.eds_value import (
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectCode
 
 OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
+_CANDIDATE: Final = re.compile(r"\b0[0-9]|nodeid", re.IGNORECASE)
 NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
 NUMBERS: Final = frozenset(
     kind for kind in DataType if kind.is_integer or kind in (*FLOATS, *TIMES)
@@ -41,6 +42,8 @@ OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
 def numbers(document: Document) -> Iterator[RuleFinding]:
     """Find numbers that are octal for some readers and decimal for others, and odd node-IDs."""
     for line in document.file.lines:
+        if not _CANDIDATE.search(line.value):  # most lines are none
+            continue
         if not line.is_keyword or document.keyword(line.section, line.key) is not line:
             continue
         kind = kind_of(document, line)

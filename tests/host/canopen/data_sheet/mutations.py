@@ -9,7 +9,7 @@ from typing import Final
 
 from tests.host.canopen.data_sheet.corpus import CORPUS, ROOT
 from tests.mutators import damaged, with_line, with_piece
-from tests.wire.canopen.eds.xdd_text import XDD
+from tests.wire.canopen.eds.xdd_text import EDITOR, XDD
 from tickrig.emulators.canopen.eds import describe
 from tickrig.host.canopen.data_sheet.check import check, failing
 from tickrig.host.canopen.data_sheet.diff import diff
@@ -49,10 +49,17 @@ LISTS: Final = (
     "[OptionalObjects]\nSupportedObjects=2\n1=0x1400\n2=0x1600\n",
     "[ManufacturerObjects]\nSupportedObjects=3\n1=0x2000\n2=0x2001\n3=0x2002\n",
 )
+MODULES: Final = (
+    "[SupportedModules]\nNrOfEntries=1\n[M1ModuleInfo]\nProductName=x\n[M1FixedObjects]\n"
+    "NrOfEntries=1\n1=0x6423\n[M1Fixed6423]\nParameterName=x\nDataType=1\nAccessType=rw\n"
+    "[M1SubExtends]\nNrOfEntries=1\n1=0x6000\n[M1SubExt6000]\nParameterName=x\nDataType=5\n"
+    "AccessType=ro\nCount=0;4\nObjExtend=3\n[ConnectedModules]\nNrOfEntries=2\n1=1\n2=1\n"
+)
 PARTS: Final = (LISTS[0] + IDENTITY, LISTS[1] + PDO, LISTS[2] + OWN)
 SMALL: Final = HEAD + "".join((*LISTS, IDENTITY, PDO, OWN))
 SMALL_ONES: Final = tuple(
-    text.encode() for text in (SMALL, XDD, *PARTS, *PARTS, PARTS[0] + PARTS[2], HEAD)
+    text.encode()
+    for text in (SMALL, XDD, EDITOR, PARTS[0] + MODULES, *PARTS, *PARTS, PARTS[0] + PARTS[2], HEAD)
 )
 LARGE: Final = (
     (ROOT / "examples" / "io_module.eds").read_bytes(),
@@ -70,18 +77,22 @@ VALUES: Final = (
     *("$NODEID", "$NODEID+0x180", "0x180+$NODEID", "$NODEID+$NODEID", "NODEID+", "+", "yes", "ro"),
     *("rw", "wo", "rwr", "const", "R", "€", "µ", "9" * 5_000, "0x" + "F" * 5_000, "x" * 300),
     *("20000010", "0x20000108", "0x00050008", "254", "٣", "²", "x ; y", "0x60400010"),
+    *("0x07 # VAR", "7//x", "7;x", "#", "0x0102FF", "0x0", "-128", "0;4", "007", "0x6000", "50000"),
 )
 KEYS: Final = (
     *("ParameterName", "ObjectType", "DataType", "AccessType", "PDOMapping", "DefaultValue"),
     *("LowLimit", "HighLimit", "SubNumber", "CompactSubObj", "ParameterValue", "DefaultBytes"),
     *("MaxBytes", "Factor", "Unit", "SupportedObjects", "Lines", "NodeID", "Baudrate", "1", "2"),
-    *("NrOfEntries", "CompactPDO", "NrOfTXPDO", "Granularity", "٣", "²", ""),
+    *("NrOfEntries", "CompactPDO", "NrOfTXPDO", "Granularity", "٣", "²", "", "01", "Line02"),
+    *("Count", "ObjExtend"),
 )
 TITLES: Final = (
     *("1000", "1000sub0", "1018sub1", "1600", "1600sub1", "1600Value", "1A00", "1A00sub0", "2000"),
     *("2000sub1", "2000subFF", "2000SUB0A", "FFFF", "0005", "A0", "A0sub1", "DeviceInfo"),
     *("DeviceComissioning", "devicecommissioning", "FileInfo", "Comments", "DummyUsage", "Tools"),
     *("MandatoryObjects", "OptionalObjects", "ManufacturerObjects", "M1Comments", "x", " ", "1003"),
+    *("SupportedModules", "ConnectedModules", "M1FixedObjects", "M1Fixed6000", "M1SubExtends"),
+    *("M1SubExt6000", "M1Fixed6000sub1", "A0sub2", "1027", "1018sub0001"),
 )
 _VALUE: Final = re.compile(r"""(=)([^\n\r]*)|(")([^"]*)(?=")""")
 _TITLE: Final = re.compile(r"\[[^\]\n]*\]|<[A-Za-z:]+")
