@@ -73,6 +73,7 @@ class Bench:
         stations = Station(self.node, self.node.port), Station(master, wire.end())
         self.rig = Rig(*stations, dense=dense)
         self.end = wire.end(frozenset())
+        self.rig.run_for(2_000)  # it boots, and hears nothing before
         self.send("000#0101")
         for controlword in (0x06, 0x07, 0x0F):
             master.controlword = controlword

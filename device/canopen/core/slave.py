@@ -143,6 +143,7 @@ class CanopenSlave(Copyable):
         self.now_us = now_us
         if not self._powered:
             self._power_on()
+            rx = ()  # it was off, or initialised, when these came
         for frame in rx:
             if frame[2] or frame[3]:
                 self._receive_special(frame)

@@ -31,6 +31,19 @@ def test_the_first_tick_boots_up() -> None:
 
 
 @pytest.mark.parametrize(
+    "command", ["000#8100", "000#8205", "000#0105", "000#0200", "605#4000100000000000", "705#R1"]
+)
+def test_a_node_that_initialises_hears_nothing(command: str) -> None:
+    bus = make_bus()
+    assert bus.step(command) == ["705#00"]
+    assert bus.slave.state is NmtState.PRE_OPERATIONAL
+    bus.slave.reset()
+    assert bus.step(command, command) == ["705#00"]
+    assert bus.slave.state is NmtState.PRE_OPERATIONAL
+    assert bus.run(20) == []
+
+
+@pytest.mark.parametrize(
     ("command", "state"),
     [
         ("000#0105", NmtState.OPERATIONAL),

@@ -45,6 +45,14 @@ def test_the_example_of_the_page_prints_what_it_says(tmp_path: Path) -> None:
     assert (result.exit_code, result.stdout) == (0, log)
 
 
+@pytest.mark.parametrize("command", ["000#8100", "000#8205", "000#0105", "605#4000100000000000"])
+def test_a_node_that_is_off_or_initialises_hears_nothing(command: str) -> None:
+    scenario = f"0ms send {command}\n10ms end\n"
+    assert frames(play(scenario)) == [command, "705#00"]
+    scenario = f"9ms set power_off 1\n20200us set power_off 0\n+0s send {command}\n30ms end\n"
+    assert frames(play(scenario)) == ["705#00", command, "705#00"]
+
+
 @pytest.mark.realtime
 def test_a_bus_whose_adapter_is_unplugged_ends_the_emulator_with_a_line() -> None:
     adapter = Adapter()
