@@ -17,6 +17,7 @@ from click.shell_completion import CompletionItem
 from tickrig.host.cli.options import Decorator, Program, add_options
 from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.cli.start import loading
+from tickrig.host.links.errors import first_line
 from tickrig.host.text.values import parse_setting
 
 if TYPE_CHECKING:
@@ -232,10 +233,10 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     except can.CanInterfaceNotImplementedError as error:
         unnamed = UNNAMED in str(error)
         raise Refused(
-            _nothing_named(instead) if unnamed else f"CAN bus: {_one_line(error)}"
+            _nothing_named(instead) if unnamed else f"CAN bus: {first_line(error)}"
         ) from None
     except (ValueError, TypeError) as error:
-        raise Refused(f"CAN bus: {_one_line(error)}") from None
+        raise Refused(f"CAN bus: {first_line(error)}") from None
     interface, channel = str(config["interface"]), config["channel"]
     try:
         bus = can.Bus(**{"single_handle": True, **given})
@@ -295,7 +296,7 @@ def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
     try:
         return can.BitTiming(**pairs)
     except (TypeError, ValueError) as error:
-        raise Refused(f"--timing: {_one_line(error)}") from None
+        raise Refused(f"--timing: {first_line(error)}") from None
 
 
 def _nothing_named(instead: str) -> str:
@@ -313,8 +314,4 @@ def bus_reason(error: BaseException) -> str:
     hint = HINTS.get(number) if isinstance(number, int) else None
     if NO_MSGPACK in str(error):
         hint = "pip install 'python-can[multicast]'"
-    return f"{_one_line(error)} ({hint})" if hint else _one_line(error)
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+    return f"{first_line(error)} ({hint})" if hint else first_line(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import socket
 import sys
@@ -14,7 +15,7 @@ from typing import Any, Final
 import can
 
 from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
-from tickrig.host.links.errors import LinkClosed, LinkError
+from tickrig.host.links.errors import TRACEBACK, LinkClosed, LinkError, first_line
 from tickrig.host.links.link import StampedFrames
 from tickrig.host.links.ready import let_wait
 from tickrig.host.text.log import log_of
@@ -116,9 +117,12 @@ def prepare_bus(bus: can.BusABC, interface: str) -> None:
 
     python-can binds the socket of `udp_multicast` to a port alone. Linux then gives it what
     comes on that port for any group that any program of this machine has joined (ip(7),
-    IP_MULTICAST_ALL). Elsewhere there is no such option, and no need.
+    IP_MULTICAST_ALL). Elsewhere there is no such option, and no need. What the driver of
+    socketcand raises it logs too, with its traceback: who reads the bus reports it.
     """
     let_wait(bus)
+    if interface == "socketcand":
+        logging.getLogger("can.interfaces.socketcand.socketcand").addFilter(_has_no_traceback)
     if sys.platform == "linux" and interface in (INTERFACE, "socketcan"):
         with socket.socket(fileno=os.dup(bus.fileno())) as sock:
             _enlarge_queue(sock)
@@ -127,6 +131,10 @@ def prepare_bus(bus: can.BusABC, interface: str) -> None:
                 with suppress(BlockingIOError):
                     while True:  # what came before
                         sock.recv(1, socket.MSG_DONTWAIT)
+
+
+def _has_no_traceback(record: logging.LogRecord) -> bool:
+    return TRACEBACK not in record.getMessage()
 
 
 def _keep_to_group(sock: socket.socket) -> None:
@@ -146,6 +154,9 @@ TRIES: Final = 16
 
 GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
 """What the kernel says of an adapter that was pulled out, or switched off."""
+
+SOCKETCAND_BUFFER: Final = "_SocketCanDaemonBus__receive_buffer"
+"""python-can's socketcand leaves a frame that it cannot read in it, and those before."""
 
 _log = log_of(__name__)
 
@@ -235,9 +246,15 @@ class BusReceiver:
         if self.faults in _TOLD:
             many = "a read has" if self.faults == 1 else f"{self.faults} reads have"
             self.on_fault(f"{self._name}: {many} failed: {self.last}; what came is lost")
+        self._recover(error)
+
+    def _recover(self, error: Exception) -> None:
+        """Have a driver drop what it could not read, and would read again with what comes next."""
         if isinstance(error.__cause__ or error, UnicodeError) and hasattr(self._bus, "flush"):
             with suppress(can.CanError):
-                self._bus.flush()  # slcan keeps a line that is no text, and reads no other one
+                self._bus.flush()  # of slcan
+        if hasattr(self._bus, SOCKETCAND_BUFFER):
+            setattr(self._bus, SOCKETCAND_BUFFER, "")
 
 
 def _warn(text: str) -> None:
@@ -260,10 +277,8 @@ def _odd(message: can.Message) -> str:
 
 def reason_of(error: Exception) -> str:
     """Return in a line what a driver raised, with its type if it is no error of a bus."""
-    text = " ".join(str(error).split())
-    if isinstance(error, can.CanError | OSError) and text:
-        return text
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+    text, kind = first_line(error), type(error).__name__
+    return text if isinstance(error, can.CanError | OSError) or text == kind else f"{kind}: {text}"
 
 
 def error_code(error: Exception) -> int | None:
@@ -332,7 +347,7 @@ class CanLink:
         try:
             return cls(_open(channel, interface, bit_rate), name)
         except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
-            raise LinkClosed(f"cannot open {name}: {error}") from error
+            raise LinkClosed(f"cannot open {name}: {first_line(error)}") from error
 
     @property
     def now_us(self) -> int:
@@ -363,7 +378,7 @@ class CanLink:
             elif _has_no_room(error) and self.now_us < deadline_us:
                 return False
             else:
-                raise LinkClosed(f"cannot send on {self._name}: {error}") from error
+                raise LinkClosed(f"cannot send on {self._name}: {reason_of(error)}") from error
         return True
 
     def receive(self, timeout_us: int, /) -> Frames:

@@ -8,6 +8,23 @@ DeviceRefused                        the device answered, and said no
 
 from __future__ import annotations
 
+from typing import Final
+
+TRACEBACK: Final = "Traceback (most recent call last)"
+"""Some drivers put one into the text of what they raise."""
+
+
+def first_line(error: BaseException) -> str:
+    r"""Return the text of an error in a line, without a traceback; its type if there is none.
+
+    >>> first_line(ValueError("bad frame\nTraceback (most recent call last):\n  File x"))
+    'bad frame'
+    >>> first_line(OSError())
+    'OSError'
+    """
+    text = " ".join(str(error).partition(TRACEBACK)[0].split())
+    return text or type(error).__name__
+
 
 class LinkError(Exception):
     """The link to a device failed."""

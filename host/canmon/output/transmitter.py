@@ -13,7 +13,7 @@ from tickrig.host.canmon.sources.bus_source import BusSource, merged, open_bus, 
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
-from tickrig.host.links.can_link import close_bus
+from tickrig.host.links.can_link import close_bus, reason_of
 from tickrig.host.links.can_message import to_message
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
@@ -84,9 +84,8 @@ def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
     """Send a frame on a bus that is called so; SourceFailed if it is gone or takes none for 1 s."""
     try:
         bus.send(to_message(frame), SEND_TIMEOUT_S)
-    except (can.CanError, OSError, ValueError) as error:
-        reason = " ".join(str(error).split())
-        raise SourceFailed(f"cannot send on {name}: {reason}") from error
+    except Exception as error:  # drivers raise what they like
+        raise SourceFailed(f"cannot send on {name}: {reason_of(error)}") from error
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The canopen library's own profile for drives, unchanged, at an EPOS-like drive on a rig."""
+"""The canopen library's own profile for drives at an EPOS-like drive on a rig."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ RIGHT_WHEEL = 2
 
 
 class Bench:
-    """A drive as the library sees it, with K21's PDOs and an event timer."""
+    """A drive as the library sees it, with K21's PDOs and an event timer, unless that is 0."""
 
-    def __init__(self) -> None:
+    def __init__(self, event_timer_ms: int = 20, *, starts_first: bool = False) -> None:
         wire = CanWire()
         self.slave = epos.make_epos(RIGHT_WHEEL)
         self.emulated = epos.Epos.of(self.slave)
@@ -33,11 +33,14 @@ class Bench:
         self.network.add_node(self.node)
         self.run_ms(10)
         self.node.tpdo[1].read()
-        self.node.tpdo[1].event_timer = 20
+        self.node.tpdo[1].event_timer = event_timer_ms
         self.node.tpdo[1].save()
-        self.node.setup_402_state_machine()
+        if not starts_first:
+            self.node.setup_402_state_machine()
         self.node.nmt.state = "OPERATIONAL"
         self.run_ms(50)
+        if starts_first:
+            self.node.setup_402_state_machine()
 
     def run_ms(self, milliseconds: int) -> None:
         self.network.run_for(1_000 * milliseconds)
@@ -107,13 +110,32 @@ def test_the_library_chooses_each_mode(bench: Bench, mode: str) -> None:
     assert bench.node.op_mode == mode
 
 
-def test_the_library_homes(bench: Bench) -> None:
-    bench.node.sdo[0x6098].raw = 35
+@pytest.mark.parametrize("method", [35, 37])
+@pytest.mark.parametrize("starts_first", [False, True])
+def test_the_library_homes(method: int, starts_first: bool) -> None:
+    bench = Bench(starts_first=starts_first)
+    bench.node.sdo[0x6098].raw = method
     bench.node.sdo[0x607C].raw = 1_234
     assert bench.node.homing()
     bench.run_ms(50)
     assert bench.node.tpdo_values[0x6064] == 1_234
     assert bench.node.is_homed()
+
+
+@pytest.mark.parametrize("method", [35, 37])
+def test_without_an_event_timer_the_library_does_not_see_that_the_drive_has_homed(
+    method: int,
+) -> None:
+    bench = Bench(event_timer_ms=0)
+    bench.node.sdo[0x6098].raw = method
+    assert not bench.node.homing()
+    assert bench.node.sdo[0x6041].raw & 0x3400 == 0x1400
+
+
+def test_without_an_event_timer_the_library_has_to_be_set_up_before_nmt_start() -> None:
+    bench = Bench(event_timer_ms=0, starts_first=True)
+    with pytest.raises(RuntimeError, match="Timeout when trying to change state"):
+        bench.node.state = "OPERATION ENABLED"
 
 
 def test_the_library_homes_by_a_switch_and_an_index_pulse(bench: Bench) -> None:

@@ -7,6 +7,7 @@ import os
 import socket
 import struct
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -21,6 +22,7 @@ from tickrig.host.canmon.sources.bus_source import BusReader
 from tickrig.host.links.can_link import MOST_FAULTS, CanLink, prepare_bus
 from tickrig.host.links.can_message import to_frame, to_message
 from tickrig.host.links.errors import LinkClosed
+from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorState
 
 
@@ -273,6 +275,79 @@ def test_a_wall_clock_that_is_set_back_prolongs_no_wait(
     monkeypatch.setattr("can.bus.time", lambda: -3_600 * bus.waits)
     read(bus)
     assert bus.waits
+
+
+class Daemon:
+    """A socketcand of one client."""
+
+    def __init__(self) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self._thread = threading.Thread(target=self._greet, daemon=True)
+        self._thread.start()
+
+    def _greet(self) -> None:
+        self._client, _ = self._server.accept()
+        for said in ("< hi >", "< ok >", "< ok >"):
+            self._client.sendall(said.encode())
+            if said != "< hi >":
+                continue
+            self._client.recv(100)
+
+    def open(self) -> can.BusABC:
+        port = self._server.getsockname()[1]
+        bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="can0")
+        prepare_bus(bus, "socketcand")
+        self._thread.join()
+        return bus
+
+    def send(self, text: str) -> None:
+        self._client.sendall(text.encode())
+
+    def close(self) -> None:
+        self._client.close()
+        self._server.close()
+
+
+@pytest.mark.realtime
+def test_a_bad_frame_of_socketcand_is_told_in_a_line_and_what_follows_is_read(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    daemon = Daemon()
+    link = CanLink(daemon.open(), "socketcand:can0")
+    daemon.send("< frame 705 1.0 7F >< frame 123 1.0 XY >")
+    heard: list[CanFrame] = []
+    deadline = time.monotonic() + 10
+    while not link.reads.faults and time.monotonic() < deadline:
+        heard += link.receive(1_000)
+    daemon.send("< frame 706 1.0 05 >")
+    while len(heard) < 2 and time.monotonic() < deadline:
+        heard += link.receive(1_000)
+    assert list(map(str, heard)) == ["705#7F", "706#05"]
+    said = [text for text in caplog.messages if text.startswith("socketcand:can0")]
+    assert len(said) == 1
+    assert said[0].startswith(
+        "socketcand:can0: a read has failed: Failed to receive: non-hexadecimal"
+    )
+    assert "Traceback" not in caplog.text
+    link.close()
+    daemon.close()
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_traceback_in_the_text_of_an_error_is_not_told() -> None:
+    class Chatty(BadDriver):
+        def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+            raise can.CanError(
+                "it\nfailed:  Traceback (most recent call last):\n  File x\nKeyError"
+            )
+
+        def send(self, msg: can.Message, timeout: float | None = None) -> None:
+            self._recv_internal(None)
+
+    link = CanLink(Chatty("chatty"), "bad:0")
+    assert until_gone(lambda: link.receive(0)).endswith("reads have failed: it failed:")
+    with pytest.raises(LinkClosed, match=r"cannot send on bad:0: it failed:$"):
+        link.send(frames("080#"))
 
 
 def test_a_bus_that_cannot_be_opened_is_told() -> None:

@@ -16,6 +16,7 @@ from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.cli.can_options import bus_reason
 from tickrig.host.links.can_link import GONE, BusReceiver, prepare_bus
 from tickrig.host.links.can_message import to_error_frame, to_frame
+from tickrig.host.links.errors import first_line
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
 
@@ -58,7 +59,7 @@ class _Watched(can.BusABC):
             code = error.error_code if isinstance(error, can.CanError) else error.errno
             if code not in GONE:
                 raise
-            raise BusGone(f"{self.channel_info}: {error}", code) from error
+            raise BusGone(f"{self.channel_info}: {first_line(error)}", code) from error
 
     def _pass_on(self, mark: Mark, frames: Seen) -> None:
         if frames:
