@@ -11,6 +11,7 @@ from tickrig.emulators.rig.sim_waits import Looks, OneThread
 from tickrig.host.links.errors import LinkClosed, LinkError, LinkTimeout
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.instant import NEVER
 
 CHUNK_US: Final = 1_000_000
@@ -56,10 +57,16 @@ class CanHost:
         rig: the rig that is stepped meanwhile.
         end: an end of one of its buses that no station has.
         thread: in which it is used; that which makes it.
+        hears_own: it receives what it has sent itself, too, when that has been on the bus.
     """
 
-    def __init__(self, rig: Rig, end: CanEnd, thread: OneThread | None = None) -> None:
+    def __init__(
+        self, rig: Rig, end: CanEnd, thread: OneThread | None = None, *, hears_own: bool = False
+    ) -> None:
         self._rig, self._end, self._closed = rig, end, False
+        self._hears_own, self._unsent, self._own = hears_own, deque[CanFrame](), set[int]()
+        if hears_own:
+            end.wire.observers.append(self._observe)
         self._thread, self._looks = thread or OneThread(), Looks()
         rig.move_on(end.wire)
         self._inbox: deque[tuple[int, CanFrame]] = deque()
@@ -73,7 +80,13 @@ class CanHost:
     def send(self, traffic: Frames, /) -> None:
         """Queue frames; no time passes."""
         self._check_usable()
-        self._end.send(self.now_us, traffic)
+        self._put(self.now_us, traffic)
+
+    def is_own(self, at_us: int) -> bool:
+        """Whether the frame that ended at a time was sent here; it is asked once for each."""
+        own = at_us in self._own
+        self._own.discard(at_us)
+        return own
 
     def repeat(self, frames: Frames, period_us: int) -> Repeat:
         """Send a frame now and one in each period, in turn, until it is stopped.
@@ -127,6 +140,26 @@ class CanHost:
         if self._repeats:
             self._rig.watchers.remove(self._send_due)
         self._repeats.clear()
+        if self._hears_own:
+            self._end.wire.observers.remove(self._observe)
+            self._hears_own = False
+
+    def _put(self, now_us: int, traffic: Frames) -> None:
+        """Queue frames, and note those that fit if they are to be received."""
+        lost = self._end.lost
+        self._end.send(now_us, traffic)
+        if self._hears_own:
+            self._unsent += traffic[: len(traffic) - (self._end.lost - lost)]
+
+    def _observe(self, at_us: int, frame: CanFrame | ErrorFrame) -> None:
+        """Receive a frame that has just left the queue."""
+        waiting = self._end.waiting
+        while len(self._unsent) > waiting + 1:  # lost, as by a controller that was bus-off
+            self._unsent.popleft()
+        if len(self._unsent) > waiting and isinstance(frame, CanFrame) and self._unsent[0] == frame:
+            self._unsent.popleft()
+            self._own.add(at_us)
+            self._end.receive(at_us, frame, (frame,))
 
     def _look(self, timeout_us: int | None) -> None:
         """Count a look that found nothing; a wait that is over was none."""
@@ -156,7 +189,7 @@ class CanHost:
         """Send what is due; called after each step of the rig."""
         due = [repeat for repeat in self._repeats if repeat.due_us <= now_us]
         for repeat in due:
-            self._end.send(now_us, repeat.take())
+            self._put(now_us, repeat.take())
         if due or all(repeat.due_us == NEVER for repeat in self._repeats):
             self._wake()
 

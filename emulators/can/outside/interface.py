@@ -59,14 +59,18 @@ class CanChannels:
         finally:
             del self._channels[name]
 
-    def open(self, name: str) -> CanHost:
+    def open(self, name: str, *, hears_own: bool = False) -> CanHost:
         """Connect one more host to a bus.
+
+        Args:
+            name: of the bus.
+            hears_own: the host receives what it sends, too.
 
         Raises:
             KeyError: no bus is offered under this name.
         """
         rig, wire, thread = self._channels[name]
-        return CanHost(rig, wire.end(), thread)
+        return CanHost(rig, wire.end(), thread, hears_own=hears_own)
 
 
 CHANNELS: Final = CanChannels()
@@ -85,17 +89,27 @@ class TickrigBus(can.BusABC):
     Args:
         channel: a name that `CHANNELS` offers.
         can_filters: as for any bus.
-        options: what other interfaces take (bitrate, ...) is ignored.
+        receive_own_messages: messages that it sends are received too when they have been on the
+            bus, with `is_rx` False.
+        listen_only: must be False.
+        options: what else other interfaces take (bitrate, ...) is ignored.
 
     Raises:
-        can.CanInitializationError: no rig has this name.
+        can.CanInitializationError: no rig has this name, or it is to listen only.
     """
 
     def __init__(
-        self, channel: Channel, can_filters: CanFilters | None = None, **options: object
+        self,
+        channel: Channel,
+        can_filters: CanFilters | None = None,
+        receive_own_messages: bool = False,
+        listen_only: bool = False,
+        **options: object,
     ) -> None:
+        if listen_only:
+            raise can.CanInitializationError("tickrig: listen_only is not emulated; leave it out")
         try:
-            self._host: CanHost = CHANNELS.open(str(channel))
+            self._host: CanHost = CHANNELS.open(str(channel), hears_own=receive_own_messages)
         except KeyError:
             hint = near(str(channel), CHANNELS.names)
             raise can.CanInitializationError(f"no rig offers channel {channel!r}; {hint}") from None
@@ -119,7 +133,7 @@ class TickrigBus(can.BusABC):
             if taken is None:
                 return None
             message = to_message(taken[1], taken[0])
-            message.channel = self.channel_info
+            message.channel, message.is_rx = self.channel_info, not self._host.is_own(taken[0])
             if self._matches_filters(message):
                 return message
 

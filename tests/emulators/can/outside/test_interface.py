@@ -55,6 +55,48 @@ def test_time_passes_while_a_message_is_waited_for(log: Log) -> None:
         assert bus.recv(0) is None
 
 
+def test_own_messages_are_received_when_they_have_been_on_the_bus(log: Log) -> None:
+    with can.Bus("robot", "tickrig", receive_own_messages=True) as bus, open_bus() as other:
+        for frame in frames("181#01 180#02"):
+            bus.send(to_message(frame))
+        other.send(to_message(frames("100#")[0]))
+        heard = [bus.recv(1) for _ in range(4)]
+        assert [(str(to_frame(one)), one.is_rx) for one in heard if one] == [
+            *(("100#", True), ("181#01", False), ("180#02", False), ("101#01", True)),
+        ]
+        times = [one.timestamp for one in heard if one]
+        assert times == sorted(times)
+        assert [str(to_frame(one)) for one in iter(lambda: other.recv(0), None) if one] == [
+            *("181#01", "180#02", "101#01"),
+        ]
+
+
+def test_a_bus_without_the_option_does_not_receive_its_own_messages(log: Log) -> None:
+    with can.Bus("robot", "tickrig", receive_own_messages=False) as bus:
+        bus.send(to_message(frames("181#01")[0]))
+        assert bus.recv(0.001) is None
+
+
+def test_own_messages_that_are_filtered_or_lost_are_not_received(log: Log) -> None:
+    filters: CanFilters = [{"can_id": 0x180, "can_mask": 0x7FF}]
+    with TickrigBus("robot", filters, receive_own_messages=True) as bus:
+        bus.send(to_message(frames("181#01")[0]))
+        assert bus.recv(0.001) is None
+        faults = bus._host._end.wire.faults
+        faults.arm("drop", 1.0)
+        bus.send(to_message(frames("180#02")[0]))
+        assert bus.recv(0.001) is not None  # it was sent well, and taken by nobody
+        faults.clear("drop")
+        faults.arm("short")
+        bus.send(to_message(frames("180#03")[0]))
+        assert bus.recv(0.001) is None
+
+
+def test_a_bus_that_is_to_listen_only_is_refused(log: Log) -> None:
+    with pytest.raises(can.CanInitializationError, match="listen_only is not emulated"):
+        can.Bus("robot", "tickrig", listen_only=True)
+
+
 def test_filters_count_and_the_timeout_is_that_of_the_rig(log: Log) -> None:
     with open_bus(can_filters=[{"can_id": 0x201, "can_mask": 0x7FF}]) as bus:
         assert (bus.recv(1), bus.now_us) == (None, 1_000_000)
