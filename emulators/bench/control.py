@@ -98,7 +98,8 @@ class EmulatorControl(RequestDispatcher):
 
     def _fault(self, request: Object) -> Object:
         emulator = self._emulator
-        emulator.operator.fault(emulator.effective_us, parse_fault_spec(text_of(request, "spec")))
+        spec = parse_fault_spec(text_of(request, "spec"), emulator.operator.check_clear)
+        emulator.operator.fault(emulator.effective_us, spec)
         return {}
 
     def _clear(self, request: Object) -> Object:

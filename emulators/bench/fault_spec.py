@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -34,11 +35,20 @@ class FaultSpec:
             raise ValueError(f"fault {self.name} ends before it begins")
 
 
-def parse_fault_spec(text: str) -> FaultSpec:
+def _any_name(name: str) -> None:
+    """Take any name."""
+
+
+def parse_fault_spec(text: str, check_name: Callable[[str], object] = _any_name) -> FaultSpec:
     """Read a fault.
 
+    Args:
+        text: as `flip=0.001@5s-7s`.
+        check_name: called with the name before rate and times are read; raises ValueError unless
+            there is such a fault.
+
     Raises:
-        ValueError: not of the form.
+        ValueError: not of the form, or not a name.
 
     >>> parse_fault_spec("flip=0.001@5s-7s")
     FaultSpec(name='flip', rate=0.001, from_us=5000000, to_us=7000000)
@@ -47,19 +57,31 @@ def parse_fault_spec(text: str) -> FaultSpec:
     if match is None:
         raise ValueError(f"{text!r} is not a fault: write NAME[=RATE][@FROM[-TO]], as cut@5s-7s")
     name, rate, start, stop = match.groups()
+    try:
+        check_name(name)
+    except ValueError:
+        if rate is not None and any(_is_named(x, check_name) for x in (rate, f"{name}/{rate}")):
+            text = f"{rate!r} is not a rate; the fault {rate} of {name} is {name}/{rate}"
+            raise ValueError(text) from None
+        raise
     return FaultSpec(
         name,
-        None if rate is None else _parse_rate(name, rate),
+        None if rate is None else _parse_rate(rate),
         parse_time_us(start) if start is not None else 0,
         parse_time_us(stop) if stop is not None else NEVER,
     )
 
 
-def _parse_rate(name: str, text: str) -> float:
+def _is_named(name: str, check_name: Callable[[str], object]) -> bool:
+    try:
+        check_name(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _parse_rate(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        of_device = f"; the fault {text} of {name} is {name}/{text}" if text.isidentifier() else ""
-        raise ValueError(
-            f"{text!r} is not a rate: write a number up to 1, as 0.001{of_device}"
-        ) from None
+        raise ValueError(f"{text!r} is not a rate: write a number up to 1, as 0.001") from None

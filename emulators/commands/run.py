@@ -118,9 +118,10 @@ class EmulatorRun(ABC):
         """Read all that can be wrong before anything is opened."""
         bench, parser = self._dry_run()
         with refused_at("--fault"):
-            faults = [parse_fault_spec(text) for text in self._shared.faults]
+            hands = bench.operator
+            faults = [parse_fault_spec(text, hands.check_clear) for text in self._shared.faults]
             for spec in faults:
-                bench.operator.check_fault(spec)
+                hands.check_fault(spec)
         try:
             return faults, parser.parse(*_read(self._shared.scenario))
         except ValueError as error:

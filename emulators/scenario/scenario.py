@@ -170,6 +170,7 @@ class ScenarioParser:
         match = _PRESS.fullmatch(rest)
         if match is None:
             raise ValueError(f"press takes NAME or NAME for DURATION, got {rest!r}")
+        self._operator.check_press(match[1])
         press = Press(match[1], parse_time_us(match[2]) if match[2] else PRESS_US)
         self._operator.check_press(press.name, press.duration_us)
         return press
@@ -179,7 +180,7 @@ class ScenarioParser:
         return Release(rest)
 
     def _parse_fault(self, rest: str) -> FaultSpec:
-        spec = parse_fault_spec(rest)
+        spec = parse_fault_spec(rest, self._operator.check_clear)
         self._operator.check_fault(spec)
         return spec
 

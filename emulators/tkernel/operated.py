@@ -134,7 +134,8 @@ class Operated(RequestDispatcher):
         return {}
 
     def _fault(self, request: Object) -> Object:
-        self.operator.fault(self.now_us, parse_fault_spec(text_of(request, "spec")))
+        spec = parse_fault_spec(text_of(request, "spec"), self.operator.check_clear)
+        self.operator.fault(self.now_us, spec)
         return {}
 
     def _clear(self, request: Object) -> Object:

@@ -101,8 +101,8 @@ class SdoServer(Part):
     """
 
     def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
-        self.node, self._wake, self._memory_bytes = node, wake, limits.memory_bytes
-        self._timeout_us = limits.timeout_us
+        self.node, self._wake = node, wake
+        self.limit(limits)
         self.request_id: int
         self.response_id: int
         self.block_size = MAX_BLOCK_SIZE
@@ -111,6 +111,10 @@ class SdoServer(Part):
         self._idle: State = self._without_transfer
         self._state: State
         self.due_us: int
+
+    def limit(self, limits: SdoLimits) -> None:
+        """Put up with other limits, from the next request on."""
+        self._memory_bytes, self._timeout_us = limits.memory_bytes, limits.timeout_us
 
     def receive(self, frame: CanFrame) -> None:
         """Take a request, or the next segment."""

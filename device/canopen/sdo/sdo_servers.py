@@ -59,11 +59,12 @@ class SdoServers(Service):
 
     Attributes:
         default: the server of 1200h.
+        limits: what all its servers put up with.
     """
 
     def __init__(self, node: CanopenSlave, slot: int, limits: SdoLimits = USUAL) -> None:
         super().__init__(node, slot)
-        self._due_us = NEVER
+        self._due_us, self.limits = NEVER, limits
         self.default = SdoServer(node, self._wake, limits)
         self._additional = [
             _Additional(SdoServer(node, self._wake, limits), request, response)
@@ -76,6 +77,16 @@ class SdoServers(Service):
                 entry.guard = check_sdo_cob_id
                 entry.written = self._configure
         self.servers = [self.default, *(additional.server for additional in self._additional)]
+
+    def limit(self, limits: SdoLimits) -> None:
+        """Put up with other limits, from the next request on.
+
+        Args:
+            limits: the new ones.
+        """
+        self.limits = limits
+        for server in self.servers:
+            server.limit(limits)
 
     def start(self) -> None:
         """Take the power-on values into service."""

@@ -23,7 +23,6 @@ from tickrig.emulators.testing.bench.tasks import Task, Wait, run_body
 from tickrig.emulators.testing.bench.triggers import Condition, check_condition
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.host.control.requests import Object
 from tickrig.host.links.closing import Closing
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting, us_of
@@ -52,10 +51,12 @@ class Bench(BenchDevice, Closing):
         seed: of all chance.
         line: what the serial lines are like, if the type of the device does not say it.
         mode: `virtual` time, or `real` time with hosts at ptys and buses.
+        sdo_timeout: silence of an SDO client after which CANopen nodes abort a transfer; 5 s, or
+            what a slave was made with, unless given.
         devices: several, by name; CANopen slaves share a bus.
 
     Raises:
-        ValueError: no device, or a name that is no device.
+        ValueError: no device, or a name that is no device; an SDO time-out of 0, or without a node.
 
     >>> from tickrig.device.rrc.machine import Rrc
     >>> with Bench(Rrc(), seed=1) as bench:
@@ -73,12 +74,14 @@ class Bench(BenchDevice, Closing):
         seed: int = 0,
         line: LineSettings | None = None,
         mode: str = VIRTUAL,
+        sdo_timeout: Duration | None = None,
         **devices: BenchedDevice,
     ) -> None:
         named = {**({} if device is None else {name_of(device): device}), **devices}
         if not named:
             raise ValueError("a bench has at least one device")
-        parts = Parts(mounts=mounts_of(named, seed, line), seed=seed)
+        sdo_timeout_us = None if sdo_timeout is None else us_of(sdo_timeout)
+        parts = Parts(mounts=mounts_of(named, seed, line, sdo_timeout_us), seed=seed)
         self._start(_emulated(mode, parts, RigPlan()))
 
     def _start(self, mode: BenchMode) -> None:
@@ -163,10 +166,6 @@ class Bench(BenchDevice, Closing):
         """
         check_condition(done)
         return self._mode.wait_until(done, us_of(within))
-
-    def describe(self) -> Object:
-        """Return what there is to set, to read and to break, as `tickrig ctl SOCKET describe`."""
-        return self._mode.request("describe")
 
     async def sleep(self, duration: Duration) -> None:
         """Wait in an async body; other tasks go on meanwhile.

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.testing.bench.bench_rig import BenchDescription
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.triggers import Condition, LineTrigger, check_condition
 from tickrig.host.text.values import Setting, us_of
@@ -27,7 +29,7 @@ SOON: Final = "100ms"
 class BenchDevice:
     """A device of a bench: hands at it, eyes on it, and the doors for its host.
 
-    Inputs, outputs, buttons and faults have the names that `tickrig ctl SOCKET describe` shows.
+    Inputs, outputs, buttons and faults have the names that `describe` gives.
 
     Args:
         mode: of the bench.
@@ -39,6 +41,17 @@ class BenchDevice:
 
     def __init__(self, mode: BenchMode, name: str = "") -> None:
         self._mode, self.name = mode, name
+
+    def describe(self) -> BenchDescription:
+        """Return what there is to set, to read and to break; printed, it is a list for people.
+
+        >>> from tickrig import Bench
+        >>> with Bench("rrc") as bench:
+        ...     about = bench.describe()
+        >>> about.inputs["gauge"].unit, about.outputs["state"].text, about.faults["flip"].rated
+        ('', 'state of the controller', True)
+        """
+        return self._mode.describe(self.name)
 
     def set(self, name: str, *values: Setting | Sequence[Setting]) -> None:
         """Set an input, or all inputs of a group.
@@ -92,7 +105,8 @@ class BenchDevice:
             ValueError: there is no such fault, or it cannot be like this.
             NotOnThisBench: it cannot be made here.
         """
-        for_us, wanted = None if for_ is None else us_of(for_), parse_fault_spec(spec)
+        wanted = parse_fault_spec(spec, partial(self._mode.check_fault, self.name))
+        for_us = None if for_ is None else us_of(for_)
         if when is not None:
             check_condition(when)
             if "@" in spec:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
@@ -18,6 +19,7 @@ from tickrig.emulators.canopen.node.nodes import Nodes
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.record.trace_recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
+from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
@@ -163,14 +165,48 @@ class RigState(Copyable):
         for number, chance in enumerate(self.chances):
             chance.seed = seed * len(self.chances) + number
 
-    def fault_name(self, owner: str, fault: str) -> str:
-        """Return the full name of a fault of a device, or of its wire, or of a wire.
+    def full_fault_name(self, owner: str, fault: str) -> str:
+        """Return the full name of a fault.
 
-        Where there is none, it is what it would be called.
+        Args:
+            owner: the device that has it, or whose wire has it; a wire; empty for any.
+            fault: as people name it there.
+
+        Raises:
+            ValueError: there is none.
         """
+        faults, hands = self.faults_of(owner), self.operator
+        if fault in faults:
+            return faults[fault]
+        full = hands.full_name_of(fault)
+        if full not in hands.faults:
+            of_owner = f" of {owner}" if owner else ""
+            raise ValueError(f"no fault {fault!r}{of_owner}; {near(fault, faults)}")
+        return full
+
+    def faults_of(self, owner: str) -> dict[str, str]:
+        """Return the full names of all faults of a device and its wire, or of a wire, or of all.
+
+        Args:
+            owner: the device or wire; empty for all.
+
+        Returns:
+            Full names, by those that people use there.
+        """
+        everything = self.operator.faults
+        if not owner:
+            return {name: name for name in everything}
         wire = owner if owner in self.mounts else self.wire_of(owner)
-        full = self.assembly.full_name(owner, fault), f"{wire}/{fault}", fault
-        return next((name for name in full if name in self.operator.faults), full[0])
+        prefixes = [f"{wire}/"] if len(self.mounts) > 1 else [""]
+        faults = {
+            name.removeprefix(prefixes[0]): name
+            for name in self.faults.fault_types
+            if name.startswith(prefixes[0])
+        }
+        if (part := self.assembly.parts.get(owner)) is not None:
+            full = self.assembly.full_name
+            faults |= {name: full(owner, name) for name in part.inputs.names(SignalType.FAULT)}
+        return faults
 
     def wire_of(self, device: str) -> str:
         """Return the name of the wire that a device is on; ValueError if there is none."""
@@ -184,6 +220,66 @@ def header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:
     """Return what a trace says of a bench."""
     entries = {name: entry for mount in mounts for name, entry in mount.entries.items()}
     return BenchHeader(entries, {mount.name: mount.wire_entry for mount in mounts}, seed)
+
+
+class FaultDescription(NamedTuple):
+    """A fault that can be ordered.
+
+    Attributes:
+        text: what it does.
+        rated: it wants a rate, as `flip=0.001`.
+    """
+
+    text: str
+    rated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BenchDescription:
+    """What there is to set, to read and to break at a device, or at all devices of a bench.
+
+    Names are as the device, or the bench, takes them.
+
+    Attributes:
+        name: of the device, or of the bench.
+        inputs: what can be set; buttons and physical faults are among them.
+        groups: inputs that are set together.
+        outputs: what can be read, beside the inputs.
+        faults: what can go wrong: physical faults, and those of the wire.
+    """
+
+    name: str
+    inputs: Mapping[str, InputSignal]
+    groups: Mapping[str, tuple[str, ...]]
+    outputs: Mapping[str, OutputSignal]
+    faults: Mapping[str, FaultDescription]
+
+    @property
+    def buttons(self) -> tuple[str, ...]:
+        """What can be pressed."""
+        return tuple(n for n, each in self.inputs.items() if each.type is SignalType.BUTTON)
+
+    def __str__(self) -> str:
+        """Return a list for people, without the objects of CANopen nodes: these are many."""
+        inputs = {
+            name: f"{one.type.value} {one.low:g}..{one.high:g} {one.unit}".rstrip()
+            for name, one in self.inputs.items()
+            if one.type is not SignalType.FAULT
+        }
+        outputs = {name: one.unit for name, one in self.outputs.items()}
+        faults = {name + "=RATE" * one.rated: "" for name, one in self.faults.items()}
+        texts = {name + "=RATE" * one.rated: one.text for name, one in self.faults.items()}
+        texts |= {name: one.text for name, one in self.inputs.items()}
+        texts |= {name: one.text for name, one in self.outputs.items()}
+        lines = [self.name]
+        for title, shown in (("inputs", inputs), ("outputs", outputs), ("faults", faults)):
+            lines.append(title)
+            for name, value in shown.items():
+                if not name.rpartition("/")[2].startswith("0x"):
+                    lines.append(f"  {name:<24} {value:<16} {texts[name]}".rstrip())
+        lines += ["groups"] * bool(self.groups)
+        lines += [f"  {name:<24} {' '.join(group)}" for name, group in self.groups.items()]
+        return "\n".join(lines)
 
 
 class BenchRig(RunningEmulator):
@@ -229,6 +325,26 @@ class BenchRig(RunningEmulator):
         if of_wire and self.state.recorder:
             self.state.recorder.wire_fault(self.effective_us, source, what)
         self.journal.add(self.effective_us, Mark.PHYSICAL, what.encode(), source)
+
+    def describe(self, owner: str) -> BenchDescription:
+        """Return what there is at a device, at all of them if it is empty."""
+        part: HasSignals = self.device
+        if owner:
+            part = self.state.assembly.parts[owner]
+        types, physical = self.state.faults.fault_types, self.state.assembly.inputs.table
+        faults = {}
+        for name, full in self.state.faults_of(owner).items():
+            if full in types:
+                faults[name] = FaultDescription(types[full].text, types[full].rated)
+            else:
+                faults[name] = FaultDescription(physical[full].text, rated=False)
+        return BenchDescription(
+            owner or self.name,
+            dict(part.inputs.table),
+            dict(part.inputs.groups),
+            dict(part.outputs),
+            faults,
+        )
 
     def drop_unheard(self) -> None:
         """Forget what has come on serial lines and no host has taken."""

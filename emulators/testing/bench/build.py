@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.emulators.commands.device_config import configure
 from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.emulated import Emulated
@@ -34,7 +36,10 @@ _NODE: Final = re.compile(r"[0-9]+=")
 
 
 def mounts_of(
-    devices: Mapping[str, BenchedDevice], seed: int, line: LineSettings | None = None
+    devices: Mapping[str, BenchedDevice],
+    seed: int,
+    line: LineSettings | None = None,
+    sdo_timeout_us: int | None = None,
 ) -> list[Mount]:
     """Put each serial device on a line of its own, and all nodes on one CAN bus.
 
@@ -42,9 +47,10 @@ def mounts_of(
         devices: by name.
         seed: of all chance.
         line: what the serial lines are like; that of their type, or 115 200 8N1, unless given.
+        sdo_timeout_us: of the SDO servers of all nodes; as it is unless given.
 
     Raises:
-        ValueError: something is no device, and no type of one.
+        ValueError: something is no device, and no type of one; a time-out of 0, or without a node.
     """
     mounts: dict[str, Mount] = {}
     for name, device in devices.items():
@@ -54,8 +60,11 @@ def mounts_of(
             mount = mounts.setdefault(BUS, BusMount(BUS, seed=seed))
             assert isinstance(mount, BusMount)
             if isinstance(device, CanopenSlave):
+                _set_timeout(device, sdo_timeout_us)
                 mount.add(name, device, node_entry(BUS, device))
             elif plan is not None:
+                if sdo_timeout_us is not None:
+                    plan = replace(plan, sdo=replace(plan.sdo, timeout_us=sdo_timeout_us))
                 mount.add(name, *_slave(mount, plan))
             continue
         if not isinstance(device, str | DeviceType):
@@ -64,7 +73,15 @@ def mounts_of(
         mounts[name] = lone = LineMount(name, line or made.line)
         entry = DeviceEntry(name, made.type, made.config)
         lone.add(name, made.device, entry, seed_of(seed, name, alone=len(devices) == 1))
+    if sdo_timeout_us is not None and BUS not in mounts:
+        raise ValueError("sdo_timeout is of CANopen nodes, and none is on this bench")
     return list(mounts.values())
+
+
+def _set_timeout(slave: CanopenSlave, sdo_timeout_us: int | None) -> None:
+    if sdo_timeout_us is not None:
+        servers = SdoServers.of(slave)
+        servers.limit(replace(servers.limits, timeout_us=sdo_timeout_us))
 
 
 def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:

@@ -91,7 +91,7 @@ def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
 def begin_faults(plan: RigPlan, rig: BenchRig) -> None:
     """Let the faults come in their time; ValueError if there is none, or it cannot be like this."""
     for fault in plan.faults:
-        name = rig.state.fault_name(fault.owner, fault.spec.name)
+        name = rig.state.full_fault_name(fault.owner, fault.spec.name)
         order = FaultOrder(replace(fault.spec, name=name), 0)
         rig.operator.fault(0, order.begin(0))
         rig.orders.append(order)
@@ -159,7 +159,7 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
         if device.store not in stores:
             stores[device.store] = StoreFile(device.store)
         memory = stores[device.store].nonvolatile(device.name, dictionary)
-    slave = make_slave(dictionary, node_id, memory, description.application)
+    slave = make_slave(dictionary, node_id, memory, description.application, device.sdo)
     profile, files = device.profile or AUTO, description.files
     return slave, node_entry(device.wire, slave, kind, profile, files)
 

@@ -10,6 +10,8 @@ from typing import Any, Final
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe
@@ -25,6 +27,8 @@ from tickrig.host.text.trace import Header
 from tickrig.host.text.user_file import SUFFIX
 
 PROFILE: Final = "profile"
+SDO_TIMEOUT: Final = "sdo_timeout_us"
+SDO_MEMORY: Final = "sdo_memory_bytes"
 
 
 def node_entry(
@@ -48,12 +52,16 @@ def node_entry(
         OSError: a file cannot be read.
     """
     file = _file_of(str(device)) if isinstance(device, str) else device
+    sdo = next((x.limits for x in slave.services if isinstance(x, SdoServers)), USUAL)
+    config: dict[str, str | int] = {PROFILE: profile} if isinstance(device, Path) else {}
+    if sdo != USUAL:
+        config |= {SDO_TIMEOUT: sdo.timeout_us, SDO_MEMORY: sdo.memory_bytes}
     memory = slave.nonvolatile
     stored = memory.parameters or memory.node_id or memory.bit_rate_index is not None
     return DeviceEntry(
         wire,
         str(device) or slave.model,
-        {PROFILE: profile} if isinstance(device, Path) else {},
+        config,
         slave.configured_id,
         _hash(file) if file else "",
         {each.name: _hash(each) for each in files},
@@ -107,7 +115,11 @@ def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
         _check_same(file, entry.files.get(file.name))
     dictionary = description.make_dictionary()
     memory = _memory(entry, dictionary) if entry.stored else None
-    slave = make_slave(dictionary, entry.node_id or 0, memory, description.application)
+    sdo = SdoLimits(
+        int(entry.config.get(SDO_TIMEOUT) or USUAL.timeout_us),
+        int(entry.config.get(SDO_MEMORY, USUAL.memory_bytes) or 0),
+    )
+    slave = make_slave(dictionary, entry.node_id or 0, memory, description.application, sdo)
     return Node(name, slave, CanWire())
 
 

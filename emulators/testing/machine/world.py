@@ -48,18 +48,17 @@ class World:
         faults: Sequence[str] | None = None,
         inputs: Sequence[str] | None = None,
     ) -> None:
-        self._bench, described = bench, _Described(bench.describe())
-        rated = {str(item["name"]): bool(item["rated"]) for item in described["wire_faults"]}
+        self._bench, described = bench, bench.describe()
+        rated = {name: fault.rated for name, fault in described.faults.items()}
         table = [
-            WorldInput(str(item["name"]), str(item["kind"]), item["low"], item["high"])
-            for item in described["inputs"]
+            WorldInput(name, item.type.value, item.low, item.high)
+            for name, item in described.inputs.items()
         ]
-        rated |= {item.name: False for item in table if item.type == "fault"}
         movable = {item.name: item for item in table if item.type in ("level", "button")}
         usual = [name for name in movable if not name.rpartition("/")[2].startswith("0x")]
         self.faults = {name: rated[name] for name in _known(faults, rated, rated, "fault")}
         self.inputs = [movable[name] for name in _known(inputs, usual, movable, "input")]
-        self._wire_faults = [str(item["name"]) for item in described["wire_faults"]]
+        self._wire_faults = [name for name in rated if name not in described.inputs]
         self._watched = [*usual, *(item.name for item in table if item.type == "fault")]
         self._before: Mapping[str, Setting] = {}
 
@@ -74,18 +73,6 @@ class World:
         for name, value in self._before.items():
             if self._bench.get(name) != value:
                 self._bench.set(name, value)
-
-
-class _Described:
-    """Lists of what a bench describes."""
-
-    def __init__(self, described: Mapping[str, object]) -> None:
-        self._described = described
-
-    def __getitem__(self, name: str) -> list[dict[str, Any]]:
-        found = self._described[name]
-        assert isinstance(found, list)
-        return found
 
 
 def _known(

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import pytest
 
@@ -91,7 +91,7 @@ def _lack(choice: str, bench: Bench) -> str:
     if choice in MODES:
         return "" if choice == bench.mode else f"this bench is {bench.mode}"
     if choice == HAND:
-        return "" if _described(bench).get("inputs") else "nobody can set anything here"
+        return "" if bench.describe().inputs else "nobody can set anything here"
     kind, _, name = choice.partition(":")
     there = [each.rpartition("/")[2] for each in KINDS[kind](bench)]  # of any device
     if name in there or name in KINDS[kind](bench):
@@ -128,28 +128,10 @@ def _names_anywhere() -> dict[str, set[str]]:
     return names
 
 
-def _described(bench: Bench) -> Mapping[str, Any]:  # an answer of the control socket
-    try:
-        return bench.describe()
-    except NotOnThisBench:
-        return {"inputs": [], "groups": {}, "outputs": [], "wire_faults": []}
-
-
-def _inputs(bench: Bench) -> list[str]:
-    described = _described(bench)
-    return [*(item["name"] for item in described["inputs"]), *described["groups"]]
-
-
-def _faults(bench: Bench) -> list[str]:
-    described = _described(bench)
-    of_devices = [item["name"] for item in described["inputs"] if item["kind"] == "fault"]
-    return [*of_devices, *(item["name"] for item in described["wire_faults"])]
-
-
 KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {
-    "fault": _faults,
-    "input": _inputs,
-    "output": lambda bench: [item["name"] for item in _described(bench)["outputs"]],
+    "fault": lambda bench: bench.describe().faults,
+    "input": lambda bench: [*bench.describe().inputs, *bench.describe().groups],
+    "output": lambda bench: bench.describe().outputs,
     "device": lambda bench: bench.devices,
 }
 """What can be needed by name: how a bench tells what it has."""

@@ -34,7 +34,7 @@ LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
 """What raises for whoever has called it."""
 
 
-class MisusedError(pytest.fail.Exception):  # type: ignore[name-defined,misc] # it is there
+class MisusedError(pytest.fail.Exception):  # type: ignore[name-defined,misc]  # pytest has it
     """A test that uses its bench wrongly: it calls an async function and does not await it."""
 
 

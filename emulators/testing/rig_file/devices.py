@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.emulators.canopen.choices import MODELS, is_bus_node
 from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
@@ -115,6 +116,10 @@ class DeviceReader:
             node_id=values.get("node_id"),
             profile=values.get("profile"),
             store=self._folder / values["store"] if "store" in values else None,
+            sdo=SdoLimits(
+                values.get("sdo_timeout", USUAL.timeout_us),
+                values.get("sdo_memory", USUAL.memory_bytes),
+            ),
         )
 
     def _wire_of(self, section: Section, plan: DevicePlan) -> str | None:

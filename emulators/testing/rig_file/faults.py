@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
+from functools import partial
 
+from tickrig.device.chance import check_rate
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.testing.rig_file.fields import texts
 from tickrig.emulators.testing.rig_file.plan import FaultPlan
 from tickrig.emulators.testing.rig_file.section import Section, is_broken
 from tickrig.host.text.names import near
 
-CheckFault = Callable[[str, float | None], None]
-"""Raises ValueError unless there is a fault of this name, with this rate."""
+FaultRates = Mapping[str, bool]
+"""Whether each fault of a device or wire wants a rate."""
 
 
-def read_faults(section: Section, owners: dict[str, CheckFault | None]) -> Iterator[FaultPlan]:
+def read_faults(section: Section, owners: Mapping[str, FaultRates | None]) -> Iterator[FaultPlan]:
     """Yield the faults that can be.
 
     Args:
@@ -29,7 +31,7 @@ def read_faults(section: Section, owners: dict[str, CheckFault | None]) -> Itera
 
 
 def _read(
-    section: Section, owner: str, value: object, check: CheckFault | None
+    section: Section, owner: str, value: object, faults: FaultRates | None
 ) -> Iterator[FaultPlan]:
     try:
         specs = texts(value)
@@ -38,10 +40,17 @@ def _read(
         return
     for at, text in enumerate(specs):
         try:
-            spec = parse_fault_spec(text)
-            if check is not None:
-                check(spec.name, spec.rate)
+            if faults is None:
+                spec = parse_fault_spec(text)
+            else:
+                spec = parse_fault_spec(text, partial(_check_name, faults))
+                check_rate(spec.name, spec.rate, rated=faults[spec.name])
         except ValueError as error:
             section.wrong(str(error), owner, *([at] if isinstance(value, list) else []))
         else:
             yield FaultPlan(owner, spec)
+
+
+def _check_name(faults: FaultRates, name: str) -> None:
+    if name not in faults:
+        raise ValueError(f"no fault {name!r}; {near(name, faults)}")

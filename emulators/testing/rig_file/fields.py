@@ -16,6 +16,7 @@ from typing import Any, Final
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.emulators.canopen.node.node_spec import LSS
 from tickrig.host.text.names import closest
+from tickrig.host.text.values import parse_size, us_of
 
 Field = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
@@ -144,6 +145,22 @@ def node_id(value: object) -> int:
     if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 127:
         return value
     raise ValueError(f"it takes 1..127, or {LSS} for a node that waits for LSS, not {shown(value)}")
+
+
+def duration(value: object) -> int:
+    """Take a time as a text, of 1 us at least; in microseconds."""
+    if isinstance(value, str) and (duration_us := us_of(value)):
+        return duration_us
+    raise ValueError(f'it takes a time as "500ms", above 0, not {shown(value)}')
+
+
+def size(value: object) -> int:
+    """Take a number of bytes, or a text as `64k`."""
+    if isinstance(value, int) and not isinstance(value, bool) and value >= 0:
+        return value
+    if isinstance(value, str):
+        return parse_size(value)
+    raise ValueError(f'it takes bytes as 4096 or "64k", not {shown(value)}')
 
 
 def check_name(name: str) -> None:

@@ -12,6 +12,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Final
 
+from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
 from tickrig.host.text.values import Setting
@@ -89,6 +90,7 @@ class DevicePlan:
         node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
         profile: of a file: `choices.PROFILES`; None for `auto`.
         store: file in which a CANopen node keeps what 1010h and LSS store.
+        sdo: what the SDO servers of a CANopen node put up with.
         start: inputs at the start by name, members of groups each for itself: a value, or the
             signal that drives it.
     """
@@ -101,6 +103,7 @@ class DevicePlan:
     node_id: int | None = None
     profile: str | None = None
     store: Path | None = None
+    sdo: SdoLimits = USUAL
     start: Mapping[str, Setting | SignalSpec] = field(default_factory=dict)
 
 

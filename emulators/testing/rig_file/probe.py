@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.chance import check_rate
 from tickrig.device.physical import SignalType
 from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
@@ -53,22 +52,11 @@ class Probe:
     bit_rate: int | None = None
     start: Mapping[str, Setting] = field(default_factory=dict)
 
-    def check_fault(self, name: str, rate: float | None) -> None:
-        """Raise ValueError unless the device, or its wire, can have this fault."""
-        own = self.physical.inputs.names(SignalType.FAULT)
-        if name in own:
-            check_rate(name, rate, rated=False)
-        else:
-            check_wire_fault(self.wire_faults, name, rate, [*own, *self.wire_faults])
-
-
-def check_wire_fault(
-    faults: Mapping[str, WireFault], name: str, rate: float | None, names: list[str]
-) -> None:
-    """Raise ValueError unless a wire can have this fault; `names` are those to name then."""
-    if name not in faults:
-        raise ValueError(f"no fault {name!r}; {near(name, names)}")
-    check_rate(name, rate, rated=faults[name].rated)
+    @property
+    def faults(self) -> dict[str, bool]:
+        """Whether each fault of the device and of its wire wants a rate."""
+        own = dict.fromkeys(self.physical.inputs.names(SignalType.FAULT), False)
+        return {name: kind.rated for name, kind in self.wire_faults.items()} | own
 
 
 @cache

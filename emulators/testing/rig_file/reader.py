@@ -15,7 +15,7 @@ from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.body import read_body
 from tickrig.emulators.testing.rig_file.devices import DeviceReader, kind_of
 from tickrig.emulators.testing.rig_file.doors import DoorReader
-from tickrig.emulators.testing.rig_file.faults import CheckFault, read_faults
+from tickrig.emulators.testing.rig_file.faults import FaultRates, read_faults
 from tickrig.emulators.testing.rig_file.formats.bus_yml import bus_as_rig, is_bus_yml, with_nodes
 from tickrig.emulators.testing.rig_file.formats.old_formats import in_new_words, no_rig_file
 from tickrig.emulators.testing.rig_file.plan import (
@@ -25,7 +25,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     WirePlan,
     WireType,
 )
-from tickrig.emulators.testing.rig_file.probe import Probe, Wrong, check_wire_fault, probe
+from tickrig.emulators.testing.rig_file.probe import Probe, Wrong, probe
 from tickrig.emulators.testing.rig_file.schema import TOP
 from tickrig.emulators.testing.rig_file.section import Notes, RigFileError, Section
 from tickrig.emulators.testing.rig_file.starts import Start, StartReader, read_safe
@@ -208,8 +208,8 @@ class _Reader:
         probes = [found for node in nodes if (found := self._probes[node.name])]
         return replace(wire, bit_rate=next((x.bit_rate for x in probes if x.bit_rate), None))
 
-    def _wire_faults(self, wire: WirePlan | None) -> CheckFault | None:
-        """Return what judges faults of a wire, None if nobody can."""
+    def _wire_faults(self, wire: WirePlan | None) -> FaultRates | None:
+        """Return the faults of a wire, None if they are not known."""
         if wire is None:
             return None
         faults: Mapping[str, WireFault] = CAN_FAULTS
@@ -219,12 +219,12 @@ class _Reader:
             if first is None:
                 return None
             faults = first.wire_faults
-        return lambda name, rate: check_wire_fault(faults, name, rate, list(faults))
+        return {name: kind.rated for name, kind in faults.items()}
 
-    def _fault_owners(self) -> dict[str, CheckFault | None]:
-        owners: dict[str, CheckFault | None] = {
+    def _fault_owners(self) -> dict[str, FaultRates | None]:
+        owners: dict[str, FaultRates | None] = {
             name: self._wire_faults(wire) for name, wire in self._wires.items()
         }
         for name, each in self._probes.items():
-            owners[name] = each.check_fault if each else None
+            owners[name] = each.faults if each else None
         return owners

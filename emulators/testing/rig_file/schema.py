@@ -9,12 +9,14 @@ from tickrig.device.body.wheeled_body import SIDES
 from tickrig.emulators.canopen.choices import AUTO, PROFILES
 from tickrig.emulators.testing.rig_file.fields import (
     command,
+    duration,
     flag,
     framing,
     node_id,
     number,
     one_of,
     path,
+    size,
     table,
     text,
     texts,
@@ -86,6 +88,10 @@ CANOPEN_DEVICE: Final[Schema] = _DEVICE | {
         f'"{AUTO}"',
     ),
     "store": Key(path, "a file", "where it keeps what 1010h and LSS store", NONE),
+    "sdo_timeout": Key(
+        duration, '"500ms"', "silence of a client after which an SDO transfer is aborted", '"5s"'
+    ),
+    "sdo_memory": Key(size, '"64k"', "what its strings and domains hold together", '"64M"'),
 }
 
 BODY: Final[Schema] = {

@@ -12,7 +12,7 @@ from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.triggers import Condition, text_of, when
 from tickrig.emulators.testing.rig_file.plan import Tolerances
@@ -71,7 +71,12 @@ class EmulatedMode(ABC):
         self.act(
             lambda rig: _arm(
                 rig,
-                FaultOrder(_named(rig, owner, spec), rig.effective_us, for_us, text),
+                FaultOrder(
+                    replace(spec, name=rig.state.full_fault_name(owner, spec.name)),
+                    rig.effective_us,
+                    for_us,
+                    text,
+                ),
                 condition,
             )
         )
@@ -81,10 +86,17 @@ class EmulatedMode(ABC):
         """The faults that were ordered, by the rig file too."""
         return self._rig.orders
 
+    def check_fault(self, owner: str, name: str) -> None:
+        """Raise ValueError unless there is a fault of this name."""
+        self.act(lambda rig: rig.state.full_fault_name(owner, name))
+
+    def describe(self, owner: str) -> BenchDescription:
+        """Return what there is at a device, at all of them if it is empty."""
+        return self.act(lambda rig: rig.describe(owner))
+
     def clear(self, owner: str, fault: str) -> None:
         """Let a fault go, and its future too."""
-        spec = FaultSpec(fault)
-        self.act(lambda rig: rig.operator.clear(_named(rig, owner, spec).name))
+        self.act(lambda rig: rig.operator.clear(rig.state.full_fault_name(owner, fault)))
 
     def hear(self, listener: Callable[[WireLine], None]) -> None:
         """Tell of each line and frame from now on."""
@@ -133,12 +145,6 @@ def answer_of(answer: Object) -> Object:
     if not answer["ok"]:
         raise ValueError(str(answer["error"]))
     return answer
-
-
-def _named(rig: BenchRig, owner: str, spec: FaultSpec) -> FaultSpec:
-    """Return a fault under its full name."""
-    name = rig.state.fault_name(owner, spec.name) if owner else spec.name
-    return replace(spec, name=rig.state.operator.full_name_of(name))
 
 
 def _arm(rig: BenchRig, order: FaultOrder, condition: Condition | None) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig
 from tickrig.emulators.testing.bench.triggers import Condition
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.host.control.requests import Object
@@ -78,6 +78,13 @@ class BenchMode(Protocol):
     @property
     def orders(self) -> Sequence[FaultOrder]:
         """The faults that were ordered, in this order."""
+        ...
+
+    def check_fault(self, owner: str, name: str) -> None:
+        """Raise ValueError unless a device, a wire or (empty) any has a fault of this name."""
+
+    def describe(self, owner: str) -> BenchDescription:
+        """Return what there is at a device, at all of them if it is empty."""
         ...
 
     def clear(self, owner: str, fault: str) -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
-from typing import Any
 
-from tickrig.device.physical import SignalType
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.host.text.values import Setting
 
 OBJECT = "0x"
@@ -33,14 +30,6 @@ def signals_of(rig: BenchRig) -> dict[str, Callable[[], Setting]]:
 
 def fault_names(bench: Bench) -> tuple[set[str], set[str]]:
     """Return the names of the faults of all wires, and of those of all devices."""
-    try:
-        return bench._mode.act(_names_on)
-    except NotOnThisBench:
-        signals: Mapping[str, Any] = bench.describe()
-        physical = {one["name"] for one in signals["inputs"] if one["kind"] == "fault"}
-        return {fault["name"] for fault in signals["wire_faults"]}, physical
-
-
-def _names_on(rig: BenchRig) -> tuple[set[str], set[str]]:
-    inputs = rig.state.assembly.inputs
-    return set(rig.wire.fault_types), set(inputs.names(SignalType.FAULT))
+    described = bench.describe()
+    physical = {name for name in described.faults if name in described.inputs}
+    return described.faults.keys() - physical, physical

@@ -7,6 +7,7 @@ from tests.device.canopen.sdo_client import Client
 from tests.device.canopen.slave_bench import Bus
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
+from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
@@ -87,6 +88,17 @@ def test_what_all_strings_and_domains_hold_is_bounded() -> None:
 
 def test_a_silent_client_is_waited_for_as_long_as_was_said() -> None:
     bus = booted(SdoLimits(timeout_us=20_000))
+    bus.step("605#2100200005000000")
+    assert bus.run(19) == []
+    assert bus.run(1) == ["585#8000200000000405"]
+
+
+def test_limits_may_be_changed_before_a_transfer() -> None:
+    bus = booted()
+    servers = SdoServers.of(bus.slave)
+    assert servers.limits == USUAL
+    servers.limit(SdoLimits(timeout_us=20_000))
+    assert servers.limits.timeout_us == 20_000
     bus.step("605#2100200005000000")
     assert bus.run(19) == []
     assert bus.run(1) == ["585#8000200000000405"]

@@ -1,16 +1,22 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import can
 import pytest
 import serial
+from click.testing import CliRunner
 
-from tickrig import Bench, BenchError, NotOnThisBench
+from tickrig import Bench, BenchError, NotOnThisBench, open_bench
 from tickrig.device import Rrc, make_epos, make_f_palette
+from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.rrc.config import RrcConfig
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
+from tickrig.emulators.testing.commands.replay_cli import replay_command
 from tickrig.host import RrcClient
+from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.wire.can import CanFrame
 
 
 def test_a_host_and_hands_share_one_time() -> None:
@@ -20,6 +26,89 @@ def test_a_host_and_hands_share_one_time() -> None:
         assert bench.wait_until(lambda: bench.get("state") == "Standby", within="2s")
         client.output(30, 0, confirm=True)
         assert (bench.get("out_v_pct"), bench.now_us) == (30, client.now_us)
+
+
+UPLOAD = to_message(CanFrame.parse("610#4008100000000000"))
+TIMED_OUT = "590#8008100000000405"
+
+
+def times_out_after(bench: Bench) -> int:
+    """Return after how many ms of silence a transfer is aborted."""
+    bus = bench.can_bus()
+    bench.run_for("10ms")
+    bus.send(UPLOAD)
+    begun_us = bench.now_us
+    while (message := bus.recv(10)) is not None:
+        if str(to_frame(message)) == TIMED_OUT:
+            return (bench.now_us - begun_us) // 1_000
+    raise AssertionError("it is never aborted")
+
+
+@pytest.mark.parametrize("device", ["f-palette", make_f_palette])
+def test_a_bench_says_the_sdo_time_out_of_its_nodes(
+    device: str | Callable[[int], CanopenSlave], tmp_path: Path
+) -> None:
+    with Bench(device if isinstance(device, str) else device(16), sdo_timeout="50ms") as bench:
+        assert 50 <= times_out_after(bench) <= 52
+        bench.save_trace(tmp_path / "trace")
+    assert (
+        CliRunner().invoke(replay_command, [str(tmp_path / "trace")]).output.startswith("identical")
+    )
+    with Bench(device if isinstance(device, str) else device(16)) as bench:
+        assert 5_000 <= times_out_after(bench) <= 5_002
+
+
+def test_a_rig_file_says_the_sdo_time_out_of_a_node(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[device.drive]\ntype = "f-palette"\nsdo_timeout = "20ms"\nsdo_memory = "1k"\n')
+    with open_bench(rig) as bench:
+        assert 20 <= times_out_after(bench) <= 22
+
+
+def test_an_sdo_time_out_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="an SDO time-out of 0 us is less than 1 us"):
+        Bench("epos", sdo_timeout=0)
+    with pytest.raises(ValueError, match="'5' has no unit"):
+        Bench("epos", sdo_timeout="5")
+    with pytest.raises(ValueError, match="sdo_timeout is of CANopen nodes, and none is on this"):
+        Bench("rrc", sdo_timeout="1s")
+
+
+def test_a_bench_says_what_there_is_to_set_to_read_and_to_break() -> None:
+    with Bench(drive="epos", chair="rrc") as bench:
+        drive, chair, everything = (
+            bench["drive"].describe(),
+            bench["chair"].describe(),
+            bench.describe(),
+        )
+        assert (drive.name, chair.name) == ("drive", "chair")
+        assert chair.inputs["gauge"].high == 10
+        assert chair.groups["stick"] == ("stick_v_pct", "stick_w_pct")
+        assert chair.outputs["out_v_pct"].unit == "%"
+        assert "power_button" in chair.buttons
+        assert everything.buttons == tuple(f"chair/{name}" for name in chair.buttons)
+        head, title, first, *_ = str(chair).splitlines()
+        assert (head, title) == ("chair", "inputs")
+        assert first.split()[:5] == ["rrc_power", "level", "0..1", "supply", "of"]
+        assert "  flip=RATE                                 each bit" in str(chair)
+        assert "0x6040" in drive.inputs
+        assert "0x6040" not in str(drive)
+        for name, one in (*drive.faults.items(), *chair.faults.items()):
+            device = bench["drive" if name in drive.faults else "chair"]
+            device.fault(f"{name}=0.5" if one.rated else name)
+            device.clear(name)
+        for name, one in everything.faults.items():
+            bench.fault(f"{name}=0.5" if one.rated else name)
+            bench.clear(name)
+
+
+def test_known_are_all_faults_that_are_accepted() -> None:
+    with Bench(drive="epos", chair="rrc") as bench:
+        for device in (bench["drive"], bench["chair"], bench):
+            with pytest.raises(ValueError, match="no fault 'x'") as caught:
+                device.fault("x")
+            known = str(caught.value).partition("known: ")[2].split(", ")
+            assert known == list(device.describe().faults)
 
 
 def test_what_is_so_for_one_look_ends_a_wait() -> None:

@@ -95,10 +95,12 @@ def test_the_name_of_a_device_is_no_rig_file() -> None:
         (lambda bench: bench.press("stick"), "no button 'stick'; known: power_button"),
         (lambda bench: bench.fault("cutt"), "no fault 'cutt'; did you mean 'cut'?"),
         (lambda bench: bench.clear("CUT"), "no fault 'CUT'; did you mean 'cut'?"),
+        (lambda bench: bench.fault("cutt=x@2s-1s"), "no fault 'cutt'; did you mean 'cut'?"),
+        (lambda bench: bench.fault("cutt", for_="soon"), "no fault 'cutt'; did you mean 'cut'?"),
+        (lambda bench: bench.fault("cutt@2s", when=bool), "no fault 'cutt'; did you mean 'cut'?"),
         (
             lambda bench: bench.fault("chair=cut"),
-            "'cut' is not a rate: write a number up to 1, as 0.001; "
-            "the fault cut of chair is chair/cut",
+            "'cut' is not a rate; the fault cut of chair is chair/cut",
         ),
         (lambda bench: bench["rcr"], "no device 'rcr'; did you mean 'rrc'?"),
     ],
@@ -116,7 +118,7 @@ def test_a_misspelt_name_is_guessed_among_several_devices() -> None:
             (lambda: bench["left"].press("power_buton"), "did you mean 'left/power_button'?"),
             (lambda: bench.press("power_button"), "did you mean 'left/power_button'?"),
             (lambda: bench["right"].get("stete"), "did you mean 'right/state'?"),
-            (lambda: bench["right"].fault("unpluged"), "did you mean 'right/unplugged'?"),
+            (lambda: bench["right"].fault("unpluged"), "of right; did you mean 'unplugged'?"),
         ):
             with pytest.raises(ValueError, match=re.escape(text)):
                 act()

@@ -13,7 +13,7 @@ from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.keeping_time import keeping_time
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.testing.bench.bench_rig import BenchRig, RigState
+from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig, RigState
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.modes.hardware.door_journal import DoorJournal
 from tickrig.emulators.testing.bench.modes.hardware.operators import Operators
@@ -127,6 +127,14 @@ class HardwareMode:
         else:
             self._pending.append((condition, begin))
             self._look()
+
+    def check_fault(self, owner: str, name: str) -> None:
+        """Raise ValueError unless the devices that these are like have a fault of this name."""
+        self._like.state.full_fault_name(owner, name)
+
+    def describe(self, owner: str) -> BenchDescription:
+        """Return what there is at the devices that these are like."""
+        return self._like.describe(owner)
 
     def clear(self, owner: str, fault: str) -> None:
         """Have a fault mended."""

@@ -7,11 +7,9 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_order import FaultOrder
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.modes.emulated_mode import answer_of
 from tickrig.emulators.testing.bench.modes.hardware.device_operator import DeviceOperator
 from tickrig.emulators.testing.bench.modes.hardware.door_journal import DoorJournal
 from tickrig.emulators.testing.bench.modes.hardware.emulator_operator import EmulatorOperator
@@ -20,7 +18,7 @@ from tickrig.emulators.testing.bench.modes.hardware.power_switch import PowerSwi
 from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
 from tickrig.emulators.testing.rig_file.plan import HardwarePlan, RigPlan
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
-from tickrig.host.control.requests import VERSION, Object
+from tickrig.host.control.requests import Object
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -92,9 +90,6 @@ class Operators:
                 self._press(fields["name"], fields["duration_us"])
             case "get":
                 return {"values": {name: self._get(name) for name in fields["names"]}}
-            case "describe":
-                request: Object = {"v": VERSION, "do": do}
-                return answer_of(EmulatorControl(self._like).answer(request))
             case _:
                 raise NotOnThisBench(f"real devices do not answer {do!r}")
         return {}
@@ -124,7 +119,7 @@ class Operators:
             owner: a device or wire, empty for any.
             order: the fault, which gets its full name; one that waits is no good a moment later.
         """
-        name = self._like.state.operator.full_name_of(self._fault_name(owner, order.spec.name))
+        name = self._like.state.full_fault_name(owner, order.spec.name)
         spec = order.spec = replace(order.spec, name=name)
         self._like.operator.check_fault(spec)
         device, fault = self._fault_owner(name)
@@ -144,8 +139,7 @@ class Operators:
 
     def clear(self, owner: str, fault: str) -> None:
         """Have a fault mended."""
-        name = self._fault_name(owner, fault)
-        self._like.operator.check_clear(name)
+        name = self._like.state.full_fault_name(owner, fault)
         device, bare = self._fault_owner(name)
         self._operator_at(device).clear(bare)
         is_input = name in self._like.state.assembly.inputs.table
@@ -206,9 +200,6 @@ class Operators:
         alone = len(assembly.parts) == 1
         device = next(iter(self._plan.devices)) if alone else name.partition("/")[0]
         return device, name.removeprefix(f"{device}/")
-
-    def _fault_name(self, owner: str, fault: str) -> str:
-        return self._like.state.fault_name(owner, fault) if owner else fault
 
     def _fault_owner(self, name: str) -> tuple[str, str]:
         """Return who can make a fault, and its name there."""
