@@ -39,6 +39,7 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.values import counted, parse_size, parse_time_us
+from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import CanFrame
 from tickrig.wire.candump import LogLine
 from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
@@ -257,7 +258,7 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
         click.echo(text, nl=False)
         return
     try:
-        path.write_text(text, "utf-8", newline="\n")
+        write_whole(path, text)
     except OSError as error:
         refuse_path("EDS", error)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import keyword
 import re
+import shutil
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -13,6 +15,7 @@ import click
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
+from tickrig.host.text.whole_file import write_whole
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -53,11 +56,20 @@ def device(name: str, folder: Path) -> None:
     place = folder / name
     try:
         place.mkdir()
-        for path, text in files(name, module).items():
-            file = place / path
-            file.parent.mkdir(exist_ok=True)
-            file.write_text(text, "utf-8")
+        _write(place, files(name, module))
     except OSError as error:
         refuse_path("folder", error)
     for path in files(name, module):
         click.echo(place / path)
+
+
+def _write(place: Path, texts: Mapping[str, str]) -> None:
+    """Write the files of a package into its folder, which goes again if they cannot be written."""
+    try:
+        for path, text in texts.items():
+            file = place / path
+            file.parent.mkdir(exist_ok=True)
+            write_whole(file, text)
+    except OSError:
+        shutil.rmtree(place, ignore_errors=True)
+        raise

@@ -39,10 +39,14 @@ def write_figure(figure: Figure, title: str, path: Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
+    from tickrig.host.text.whole_file import write_whole  # noqa: PLC0415 - a TAB needs none
+
     if path.suffix.lower() == ".html":
-        path.write_text(_page(figure, title), "utf-8")
+        write_whole(path, _page(figure, title))
     else:
-        figure.savefig(path, format=path.suffix.lower().removeprefix("."))
+        picture = io.BytesIO()
+        figure.savefig(picture, format=path.suffix.lower().removeprefix("."))
+        write_whole(path, picture.getvalue())
 
 
 def _page(figure: Figure, title: str) -> str:

@@ -14,6 +14,7 @@ from tickrig.host.text.bench_header import BenchHeader
 from tickrig.host.text.bench_record import BenchRecord
 from tickrig.host.text.line_file import LineFile
 from tickrig.host.text.trace import Mark
+from tickrig.host.text.whole_file import write_whole
 
 
 class Tick(NamedTuple):
@@ -148,7 +149,7 @@ class TraceRecorder(Copyable):
         """
         if self._forgetful:
             raise ValueError("the run is recorded in a file already")
-        path.write_text("".join(f"{line}\n" for line in self.lines(now_us)), "ascii", newline="\n")
+        write_whole(path, "".join(f"{line}\n" for line in self.lines(now_us)))
 
     def close(self, now_us: int) -> None:
         """Write into its file how long the run lasted, and close it."""

@@ -7,21 +7,17 @@ that somebody else has changed meanwhile is left alone.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from tempfile import NamedTemporaryFile
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from tickrig.host.text.toml_reader import read_toml
+from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
     from tomlkit.container import Container
     from tomlkit.items import Table
-
-
-NEW_MODE: Final = 0o644
 
 
 class SettingError(ValueError):
@@ -129,7 +125,7 @@ class Workspace:
         try:
             if not over and self._differs(path):
                 raise WorkspaceError(f"{path} was changed by somebody else: not saved")
-            _replace(path.resolve(), text)
+            write_whole(path, text)
         except OSError as error:
             raise WorkspaceError(f"{path}: {error.strerror}: not saved") from None
         self._text = text
@@ -185,19 +181,3 @@ def _are_tables(value: object) -> bool:
         and bool(value)
         and all(isinstance(item, Mapping) for item in value)
     )
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write a file beside it and put that in its place."""
-    mode = path.stat().st_mode & 0o777 if path.exists() else NEW_MODE
-    with NamedTemporaryFile("wb", dir=path.parent, prefix=f".{path.name}.", delete=False) as file:
-        beside = Path(file.name)
-        try:
-            file.write(text.encode())
-            file.flush()
-            os.fsync(file.fileno())
-            beside.chmod(mode)
-            beside.replace(path)
-        except BaseException:
-            beside.unlink(missing_ok=True)
-            raise

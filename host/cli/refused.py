@@ -38,7 +38,9 @@ def refused_at(option: str) -> Iterator[None]:
 
 def refuse_path(what: str, error: OSError) -> NoReturn:
     """Say that a path cannot be used, and why."""
-    raise Refused(f"{what} {error.filename2 or error.filename}: {error.strerror}") from error
+    path = error.filename2 or error.filename
+    named = what if path is None else f"{what} {path}"
+    raise Refused(f"{named}: {error.strerror or error}") from error
 
 
 def time_us(option: str, word: str) -> int:

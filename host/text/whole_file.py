@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
-from collections.abc import Iterable
-from contextlib import suppress
+import sys
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from shutil import rmtree
 
 
 def check_file(path: Path, what: str) -> None:
@@ -76,27 +79,59 @@ def write_whole(path: Path, content: str | bytes) -> None:
     """Replace a file when its content is on the disk; what is no file, as a pipe, is written to.
 
     Raises:
-        OSError: the file cannot be written; its `filename` is `path`.
+        OSError: the file cannot be written; its `filename` is `path`, and the file is as it was.
     """
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    with replacing(path) as beside:
+        beside.write_bytes(data)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give the path of a new file, which takes the place of a file when the block is done.
+
+    It has the same name, in a folder beside that file. What is no file, as a pipe, is given itself.
+
+    Raises:
+        OSError: the file cannot be written; its `filename` is `path`, and the file is as it was.
+            An OSError of the block is raised so, too.
+    """
+    from tempfile import mkdtemp  # noqa: PLC0415 - slow, and a TAB needs none
+
+    folder: Path | None = None
     try:
         place = path.resolve()
-        if place.exists() and not place.is_file():
-            place.write_bytes(data)
-        else:
-            _replace(place, data)
+        if is_special(place):
+            yield place
+            return
+        _check_place(place)
+        folder = Path(mkdtemp(prefix=".tickrig.", dir=place.parent))
+        beside = folder / place.name
+        yield beside
+        _sync(beside)
+        if place.exists():
+            beside.chmod(place.stat().st_mode & 0o7777)
+        beside.replace(place)
     except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
-
-
-def _replace(path: Path, data: bytes) -> None:
-    beside = path.with_name(f".{path.name[:200]}.{os.getpid()}")
-    try:
-        beside.unlink(missing_ok=True)  # of a run that was killed
-        with beside.open("xb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(path)
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     finally:
-        beside.unlink(missing_ok=True)
+        if folder is not None:
+            rmtree(folder, ignore_errors=True)
+
+
+def _check_place(place: Path) -> None:
+    """Refuse what a new file would replace though it is a folder, or not to be written."""
+    if place.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    if place.exists() and not os.access(place, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+def _sync(path: Path) -> None:
+    """Let a file be on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        if sys.platform != "win32":  # there only what is open for writing can be
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

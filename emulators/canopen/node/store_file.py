@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Container, Mapping
-from contextlib import suppress
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import Any, Final
 
 from tickrig.device.canopen.core.dictionary import Dictionary
@@ -15,6 +12,7 @@ from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.core.slave import UNCONFIGURED
 from tickrig.host.text.log import log_of
+from tickrig.host.text.whole_file import write_whole
 
 NODE_IDS: Final = (*range(1, 128), UNCONFIGURED)
 FORMAT: Final = "tickrig CANopen store 1"
@@ -64,7 +62,7 @@ class StoreFile:
         versions = self._versions()
         if versions == self._written:
             return False
-        _replace(self.path, _format(self._nodes))
+        write_whole(self.path, _format(self._nodes))
         self._written = versions
         return True
 
@@ -153,17 +151,3 @@ def _format(nodes: dict[str, Nonvolatile]) -> str:
         "nodes": {name: memory_values(memory) for name, memory in sorted(nodes.items())},
     }
     return json.dumps(content, indent=1) + "\n"
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write beside the file and put it in its place."""
-    with NamedTemporaryFile("w", dir=path.parent, prefix=path.name, delete=False) as file:
-        try:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-            os.replace(file.name, path)
-        except OSError:
-            with suppress(OSError):
-                os.unlink(file.name)
-            raise

@@ -13,6 +13,7 @@ from tickrig.host.cli.refused import refuse_path
 from tickrig.host.motion.drive import BaseConnection, stop
 from tickrig.host.motion.geometry import Pose, Wheels
 from tickrig.host.motion.umbmark import Umbmark, run_umbmark, square
+from tickrig.host.text.whole_file import write_whole
 
 
 class SquarePlan(NamedTuple):
@@ -100,7 +101,7 @@ def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> 
     click.echo(text, nl=False)
     if save is not None:
         try:
-            save.write_text(text, "utf-8")
+            write_whole(save, text)
         except OSError as error:
             refuse_path("save", error)
 

@@ -60,12 +60,13 @@ def init(types: tuple[str, ...], file: Path) -> None:
     if on_output:
         click.echo(text, nl=False)
         return
+    from tickrig.host.text.whole_file import write_whole  # noqa: PLC0415 - a TAB needs none
+
+    if file.exists():
+        why = "is there already, and is left alone: -o FILE writes another one"
+        raise Refused(f"file {file} {why}")
     try:
-        with file.open("x", encoding="utf-8", newline="\n") as out:
-            out.write(text)
-    except FileExistsError:
-        text = f"file {file} is there already, and is left alone: -o FILE writes another one"
-        raise Refused(text) from None
+        write_whole(file, text)
     except FileNotFoundError:
         why = "cannot be made there" if file.parent.is_dir() else f"no directory {file.parent}"
         raise Refused(f"file {file}: {why}") from None

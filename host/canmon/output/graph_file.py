@@ -16,6 +16,7 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.monitor.graph.chart import Chart, Curve, chart
 from tickrig.host.monitor.graph.series import Series, View
 from tickrig.host.monitor.graph.svg import COLOURS, html_page, svg
+from tickrig.host.text.whole_file import replacing, write_whole
 
 
 def write_csv(file: TextIO, series: Sequence[Series], view: View) -> None:
@@ -130,13 +131,13 @@ def write_graph(path: Path, series: Sequence[Series], view: View, size: tuple[in
 def _write(path: Path, series: Sequence[Series], view: View, size: tuple[int, int]) -> None:
     match path.suffix.lower():
         case ".svg":
-            path.write_text(svg(series, view, *size), "utf-8")
+            write_whole(path, svg(series, view, *size))
         case ".html":
-            path.write_text(html_page(series, view, *size, title=path.stem), "utf-8")
+            write_whole(path, html_page(series, view, *size, title=path.stem))
         case ".csv":
-            with path.open("w", encoding="utf-8", newline="") as file:
+            with replacing(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
                 write_csv(file, series, view)
         case _:
             picture = BytesIO()
             write_png(picture, series, view, *size)
-            path.write_bytes(picture.getvalue())
+            write_whole(path, picture.getvalue())

@@ -58,15 +58,19 @@ def report(source: AnySource[object], strict: bool, more: Iterable[str] = ()) ->
 
 
 class Interruptions(Interrupter):
-    """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it."""
+    """Ctrl-C and the signals that end a program: they end what goes on, at once or behind it.
+
+    Attributes:
+        came: one has come.
+    """
 
     def __init__(self) -> None:
         super().__init__()
-        self._held = self._came = False
+        self._held = self.came = False
 
     def received(self, number: int, frame: FrameType | None) -> None:
         """Take a signal."""
-        self._came = True
+        self.came = True
         if self._held:
             give_up_terminals()
         else:
@@ -81,7 +85,7 @@ class Interruptions(Interrupter):
                 result = act(*arguments, **named)
             finally:
                 self._held = False
-            if self._came:
+            if self.came:
                 raise KeyboardInterrupt
             return result
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from contextlib import closing, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from tickrig.host.monitor.logs.mark import Mark
 from tickrig.host.monitor.recorder.plan import Plan
 from tickrig.host.monitor.recorder.recorder import Recorder
 from tickrig.host.text.values import counted
+from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.frames.record import AnyRecord
@@ -37,6 +38,7 @@ class LogFile:
         live: time goes on while no frame comes.
         triggers: what it waits for, where the plan has it wait.
         wanted: which frames are recorded; None for all.
+        kept: what is written stays there if it cannot be written on.
 
     Raises:
         Refused: the name tells no format, the format needs what is not there, or the file is
@@ -44,15 +46,18 @@ class LogFile:
         SourceFailed: it cannot be written, now or later.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - what a recording can be
         self,
         plan: Plan,
         source: Sequence[str],
         live: bool = False,
         triggers: Sequence[Trigger] = (),
         wanted: FilterTrigger | None = None,
+        *,
+        kept: bool = True,
     ) -> None:
         check_not_read(plan.path, source)
+        self._kept = kept
         self._watch, self._live = Stopwatch(), live
         try:
             log_format(plan.path)
@@ -85,7 +90,7 @@ class LogFile:
         """End the recording, and say how it went."""
         failed = self.recorder.failed
         self.recorder.close()
-        for word in self.recorder.messages():
+        for word in self.recorder.messages() if self._kept or not self.recorder.failed else ():
             click.echo(word, err=True)
         if self.recorder.failed != failed:
             raise SourceFailed(self.recorder.failed)
@@ -96,6 +101,35 @@ class LogFile:
         if not self._live:
             return self._watch.latest_us
         return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
+
+
+@contextmanager
+def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
+    """Give where a log is written: a new file, which takes the place of `path` in the end.
+
+    Where something else than files is read, this may be long, and somebody may read on: then it is
+    `path` itself.
+
+    Raises:
+        Refused: its name tells no format, or it is read meanwhile.
+        SourceFailed: it cannot be written.
+    """
+    check_not_read(path, source)
+    try:
+        log_format(path)
+    except LogFormatError as error:
+        raise Refused(str(error)) from None
+    if not all(isinstance(parse_source(word), FileSpec) for word in source):
+        yield path
+        return
+    beside = path
+    try:
+        with replacing(path) as beside:
+            yield beside
+    except click.ClickException as error:
+        raise type(error)(error.message.replace(str(beside), str(path))) from error
+    except OSError as error:
+        raise SourceFailed(f"{path}: {error.strerror}") from error
 
 
 def check_not_read(path: Path, source: Sequence[str]) -> None:
@@ -115,12 +149,10 @@ def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
     if path.exists():
         raise ValueError(f"{path} is there already: choose another name")
     try:
-        with closing(write_log(path)) as writer:
+        with replacing(path) as beside, closing(write_log(beside)) as writer:
             for frame in frames:
                 writer.write(frame)
     except OSError as error:
-        with suppress(OSError):
-            path.unlink(missing_ok=True)
         raise ValueError(f"{path}: {error.strerror}") from None
     lines = len(records) - len(frames)
     left_out = [f"{counted(lines, 'line')} of serial ports left out"] if lines else []

@@ -45,6 +45,7 @@ from tickrig.host.monitor.check.rules import (
 )
 from tickrig.host.monitor.frames.dump_line import Stamp
 from tickrig.host.monitor.frames.record import Record
+from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
     from tickrig.host.monitor.check.column_check import ColumnChecker
@@ -291,7 +292,7 @@ def _write(option: str, path: Path | None, text: Callable[..., str], judged: Jud
     if path is None:
         return
     try:
-        path.write_text(text(*judged), "utf-8")
+        write_whole(path, text(*judged))
     except OSError as error:
         refuse_path(option, error)
 

@@ -10,7 +10,7 @@ import click
 
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.listening import report, until_interrupted
-from tickrig.host.canmon.output.log_file import LogFile
+from tickrig.host.canmon.output.log_file import LogFile, whole_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
@@ -21,6 +21,7 @@ from tickrig.host.canmon.verbs.decode_options import (
 from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.options import PATH
+from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.monitor.recorder.plan import Plan
 
 
@@ -42,7 +43,7 @@ def command(  # noqa: PLR0913 - options
     """Write what SOURCE holds into the file LOG; its name says the format.
 
     Several files are merged by time. What a format cannot hold is said on
-    standard error.
+    standard error. Of files LOG is written whole, or stays as it was.
 
     \b
     canmon conv a.blf b.log
@@ -55,12 +56,14 @@ def command(  # noqa: PLR0913 - options
     chosen = read_filter(wanted)
     decoder = None if chosen is None else make_decoder(eds, dbc)
     meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
-    with (
-        closing(frames),
-        closing(LogFile(Plan(path=log), source)) as out,
-        until_interrupted() as signals,
-    ):
-        pass_on(frames, meaning, signals.behind(out.take))
+    with closing(frames), whole_log(log, source) as place:
+        with (
+            closing(LogFile(Plan(path=place), source, kept=place == log)) as out,
+            until_interrupted() as signals,
+        ):
+            pass_on(frames, meaning, signals.behind(out.take))
+        if signals.came and place != log:
+            raise click.exceptions.Exit(INTERRUPTED)
     report(frames, strict, meaning.messages())
 
 

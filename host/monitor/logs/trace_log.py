@@ -67,9 +67,11 @@ class TraceLogWriter:
     def close(self) -> None:
         """End the trace."""
         if not self._file.closed:
-            if self._channel:
-                self._put(BenchRecord(self._latest_us, "", Mark.END).encode())
-            self._file.close()
+            try:
+                if self._channel:
+                    self._put(BenchRecord(self._latest_us, "", Mark.END).encode())
+            finally:
+                self._file.close()
 
     def messages(self) -> list[str]:
         """Say what was left out."""

@@ -10,6 +10,7 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system import System
 from tickrig.host.rtc.system.system_toml import parse_toml
+from tickrig.host.text.whole_file import write_whole
 
 TOML: Final = ".toml"
 XML: Final = ".xml"
@@ -31,7 +32,7 @@ def read_system(path: Path) -> System:
 def write_system(text: str, path: Path) -> None:
     """Write a system file; Refused if that cannot be done."""
     try:
-        path.write_text(text, "utf-8")
+        write_whole(path, text)
     except OSError as error:
         refuse_path("system", error)
 

@@ -68,6 +68,8 @@ def _build(path: Path) -> tuple[Project, dict[str, str]]:
 
 def _write(folder: Path, files: dict[str, str], *, force: bool) -> None:
     """Write the files; a skeleton that is there may have been filled and is kept."""
+    from tickrig.host.text.whole_file import write_whole  # noqa: PLC0415 - a TAB needs none
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
@@ -75,6 +77,6 @@ def _write(folder: Path, files: dict[str, str], *, force: bool) -> None:
             if path.suffix == SKELETON_SUFFIX and path.exists() and not force:
                 click.echo(f"{path} is kept; --force overwrites it", err=True)
                 continue
-            path.write_text(text, "utf-8", newline="\n")
+            write_whole(path, text)
     except OSError as error:
         refuse_path("file", error)

@@ -19,6 +19,7 @@ from tickrig.host.rtc_canopen.definition.definition import (
     SdoEntry,
     SystemDefinition,
 )
+from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -57,13 +58,7 @@ def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> N
         OSError: the file cannot be written.
     """
     nodes = tuple(_seen_from(node, folder, path.parent) for node in definition.nodes)
-    text = write_definition(replace(definition, nodes=nodes))
-    beside = path.with_name(f".{path.name}.new")
-    try:
-        beside.write_text(text, "utf-8")
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_whole(path, write_definition(replace(definition, nodes=nodes)))
 
 
 def write_definition(definition: SystemDefinition) -> str:

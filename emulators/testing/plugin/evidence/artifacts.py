@@ -13,6 +13,7 @@ from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.bench.journal import missing_of
 from tickrig.emulators.testing.plugin.evidence.journal_text import buses_of, frame_of
 from tickrig.host.text.trace import Mark
+from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.candump import LogLine
 
 TRACE: Final = ".trace"
@@ -76,12 +77,12 @@ def _candump(bench: Bench, path: Path) -> bool:
         if line.source in buses and line.mark is not Mark.PHYSICAL
     ]
     if frames:
-        path.write_text("".join(frames), "utf-8")
+        write_whole(path, "".join(frames))
     return bool(frames)
 
 
 def _transcript(bench: Bench, path: Path) -> bool:
-    path.write_text(f"{bench.transcript()}\n", "utf-8")
+    write_whole(path, f"{bench.transcript()}\n")
     return True
 
 

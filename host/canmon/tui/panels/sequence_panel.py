@@ -30,6 +30,7 @@ from tickrig.host.monitor.sequence.sequence_run import (
     outline,
 )
 from tickrig.host.text.steps import StepError
+from tickrig.host.text.whole_file import write_whole
 from tickrig.host.tui.line_view import Line, LineView, plain
 
 STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType.END: "bold"}
@@ -202,7 +203,7 @@ class SequencePanel(SendingPanel):
 
     def _write_file(self, text: str) -> None:
         try:
-            Path(text).write_text(self.texts[self.number], "utf-8")
+            write_whole(Path(text), self.texts[self.number])
         except OSError as error:
             raise ValueError(f"{text}: {error.strerror}") from None
         self.notify(f"{text} is written", markup=False)

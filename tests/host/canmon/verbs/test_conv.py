@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import gzip
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -151,3 +152,16 @@ def test_info_of_what_is_no_log_fails(tmp_path: Path) -> None:
     assert canmon("info", log(tmp_path, "LOG", "run.blf")).exit_code == 3
     assert canmon("info", tmp_path / "nothing.log").exit_code == 3
     assert canmon("info", tmp_path / "run.xyz").exit_code == 2
+
+
+@pytest.mark.realtime
+def test_a_log_that_is_interrupted_leaves_the_one_of_before(tmp_path: Path) -> None:
+    source, out = log(tmp_path, LOG * 100_000, "in.log"), log(tmp_path, "before\n", "out.log")
+    words = ["-c", "from tickrig.commands import canmon; canmon()", "conv", str(source)]
+    with subprocess.Popen([sys.executable, *words, str(out)]) as process:
+        while not list(tmp_path.glob(".tickrig.*/out.log")):
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["in.log", "out.log"]
+    assert out.read_text("ascii") == "before\n"

@@ -12,6 +12,7 @@ from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, Place, Wire
 from tickrig.host.text.bench_record import BenchRecord, change_text
 from tickrig.host.text.trace import RESET, Mark
 from tickrig.host.text.values import Setting
+from tickrig.host.text.whole_file import write_whole
 
 
 class PortRecord:
@@ -64,7 +65,7 @@ class PortRecord:
         records = sorted((x for x in self._records if x.at_us <= now_us), key=lambda x: x.at_us)
         end = BenchRecord(now_us, "", Mark.END)
         lines = [self._header.encode(), *(each.encode() for each in (*records, end))]
-        path.write_text("".join(f"{line}\n" for line in lines), "ascii", newline="\n")
+        write_whole(path, "".join(f"{line}\n" for line in lines))
 
     def _done(self, device: str, text: str, after_us: int = 0) -> None:
         if device in self._names.values():
