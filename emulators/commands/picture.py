@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.cli.refused import Refused
+from tickrig.host.text.whole_file import check_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,8 +23,10 @@ def check_plot(path: Path) -> None:
         raise Refused(f"--plot {path}: the name ends in {', '.join(FORMATS)}")
     if find_spec(PLOTTER) is None:
         raise Refused(f"--plot needs {PLOTTER}: pip install 'tickrig[plot]'")
-    if not path.parent.is_dir():
-        raise Refused(f"--plot {path}: no directory {path.parent}")
+    try:
+        check_file(path, "--plot")
+    except ValueError as error:
+        raise Refused(str(error)) from None
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:

@@ -18,7 +18,12 @@ from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc.commands.console import Console
 from tickrig.host.rtc.commands.system_control import SystemControl
-from tickrig.host.rtc.commands.system_file import file_format, read_system, write_system
+from tickrig.host.rtc.commands.system_file import (
+    check_system,
+    file_format,
+    read_system,
+    write_system,
+)
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.system.manager import Manager
@@ -55,7 +60,7 @@ def run_system(options: SystemOptions) -> None:
     """
     system = System() if options.system is None else read_system(options.system)
     if options.save is not None:
-        file_format(options.save)
+        check_system(options.save)
     manager = Manager()
     for kind in (*EXAMPLES, *map(find_rt_component, options.components)):
         manager.register(kind)

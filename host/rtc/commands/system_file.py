@@ -10,7 +10,7 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system import System
 from tickrig.host.rtc.system.system_toml import parse_toml
-from tickrig.host.text.whole_file import write_whole
+from tickrig.host.text.whole_file import check_file, write_whole
 
 TOML: Final = ".toml"
 XML: Final = ".xml"
@@ -42,3 +42,12 @@ def file_format(path: Path) -> str:
     if path.suffix.lower() not in (TOML, XML):
         raise Refused(f"system {path}: the name ends in {TOML} or {XML}")
     return path.suffix.lower().removeprefix(".")
+
+
+def check_system(path: Path) -> None:
+    """See before a run whether a system could be written after it; Refused if not."""
+    file_format(path)
+    try:
+        check_file(path, "system")
+    except ValueError as error:
+        raise Refused(str(error)) from None

@@ -80,6 +80,7 @@ def test_the_curves_are_drawn(tmp_path: Path, name: str, begin: bytes) -> None:
     [
         (("--plot", "a.doc"), "--plot a.doc: the name ends in .png, .svg, .html"),
         (("--plot", "none/a.png"), "--plot none/a.png: no directory none"),
+        (("--plot", "/proc/a.png"), "--plot /proc/a.png: No such file or directory"),
         (("-i", "virtual"), "virtual is inside one process, and the nodes run in another"),
     ],
 )

@@ -102,6 +102,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("words", "error"),
     [
+        ("--save none/a.toml", "system none/a.toml: no directory none"),
+        ("--save /proc/a.toml", "system /proc/a.toml: No such file or directory"),
         ("none.toml", "system none.toml: No such file or directory"),
         ("twice.py", "system twice.py: the name ends in .toml or .xml"),
         ("bad.toml", "system bad.toml: [[component]] 1 has no type"),
