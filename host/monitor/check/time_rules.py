@@ -159,7 +159,7 @@ class Watched:
 
         values = {HEARTBEAT_TIME: period_ms.to_bytes(2, "little")} if period_ms else {}
         self._name, self._memory = f"{channel} node {node}", NodeMemory(EdsObjects(values=values))
-        self._heartbeats, self._sdo = Heartbeats(self._memory), SdoChannel(node)
+        self._heartbeats, self._sdo = Heartbeats(self._memory, from_boot=False), SdoChannel(node)
         self._heartbeat_time = HEARTBEAT_TIME
         self.has_sent = self.guarded = self.requested = self.judged = False
 

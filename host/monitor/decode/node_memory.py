@@ -216,6 +216,7 @@ class Heartbeats:
 
     Args:
         memory: what is known of its objects.
+        from_boot: learn the period also from the gap between a boot-up and the first heartbeat.
 
     Attributes:
         last_us: when it told its state last, None while it told none.
@@ -226,6 +227,7 @@ class Heartbeats:
     """
 
     memory: NodeMemory = field(compare=False)
+    from_boot: bool = True
     last_us: int | None = None
     since_us: int | None = None
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
@@ -253,7 +255,7 @@ class Heartbeats:
         return now_us - self.since_us > LATE * period_us
 
     def boot(self, at_us: int) -> None:
-        """Begin anew with a boot-up; the first heartbeat behind it comes when it likes."""
+        """Begin anew with a boot-up."""
         self.gaps.clear()
         self._booted = True
         self.last_us = self.since_us = at_us
@@ -266,7 +268,7 @@ class Heartbeats:
 
     def take(self, at_us: int, *, learns: bool = True) -> None:
         """Take a heartbeat; the period is learnt from it, unless it may answer a request."""
-        learns = learns and not self._booted
+        learns = learns and (self.from_boot or not self._booted)
         if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time
             self._take_gap(at_us - self.last_us)
         self.last_us = self.since_us = at_us

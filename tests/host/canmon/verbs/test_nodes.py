@@ -45,7 +45,7 @@ def test_each_node_is_a_json_object() -> None:
 
 def test_without_nodes_there_is_no_json(tmp_path: Path) -> None:
     path = tmp_path / "run.log"
-    path.write_text("(1.000000) can0 181#00\n")
+    path.write_text("(1.000000) can0 7FF#00\n")
     assert nodes(str(path), "--jsonl").stdout == ""
     assert nodes(str(path)).stdout == "no node was heard\n"
 
