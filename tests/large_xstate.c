@@ -30,7 +30,6 @@ static long trace_state(trace_call *real, int request, pid_t pid, struct iovec *
         errno = EFAULT;
         return -1;
     }
-    memset(state, 0, sizeof state);
     if (real(PTRACE_GETREGSET, pid, (void *)NT_X86_XSTATE, &known) < 0)
         return -1;
     if (request == PTRACE_GETREGSET) {

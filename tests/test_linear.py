@@ -82,6 +82,9 @@ MEGABYTE: Final = 1_000_000
 SLOW: Final = 100_000
 """Characters for readers that look at each line a dozen times."""
 
+SHORT: Final = 20_000
+"""Characters of all else, behind what has a reader look at it."""
+
 UNITS: Final = ("\n", " ", "a", "0", "[", "{", "(", "<a>", '"', ",", ";", "\\", "[a]\n", "a = 1\n")
 WHOLE: Final = ("\n", "a", "[")
 """Those that come by the megabyte."""
@@ -97,11 +100,13 @@ class Reader(NamedTuple):
         read: reads a text; what needs a file is given one.
         begin: what stands before the text, so that it is looked at.
         size: characters.
+        long: what else it is given so many of: a beginning, and what follows it.
     """
 
     read: Callable[[str], object]
     begin: tuple[str, ...] = ()
     size: int = MEGABYTE
+    long: tuple[tuple[str, str], ...] = ()
 
 
 def of_file(read: Callable[[Path], object], name: str) -> Callable[[str], object]:
@@ -137,10 +142,14 @@ READERS: Final = {
     "host.control.requests": Reader(
         lambda text: RequestDispatcher({}).answer_line(text.encode()), ('{"v": 1, "do": ',)
     ),
-    "host.canopen.gateway.request": Reader(parse_request, ("[1] ", '[1] 5 w 0x2000 0 vs "')),
+    "host.canopen.gateway.request": Reader(
+        parse_request, ("[1] ", '[1] 5 w 0x2000 0 vs "'), long=(("[1] ", "1 "), ("[1] r ", '"" '))
+    ),
     "wire.candump": Reader(parse_log, ("(1.000000) can0 123#",)),
     "wire.canopen.eds": Reader(
-        of_file(read_sound, "a.eds"), ("[2000]\nDataType=7\nDefaultValue=", "[2000]\nObjectType=")
+        of_file(read_sound, "a.eds"),
+        ("[2000]\nDataType=7\nDefaultValue=", "[2000]\nObjectType="),
+        SLOW,
     ),
     "host.canopen.data_sheet": Reader(
         of_file(lambda path: check(read_document(path)), "b.eds"),
@@ -148,10 +157,15 @@ READERS: Final = {
         SLOW,
     ),
     "wire.canopen.eds.xdd": Reader(
-        of_file(read_sound, "a.xdd"), ("<a><CANopenObjectList/>", '<a b="', "<a><![CDATA[")
+        of_file(read_sound, "a.xdd"),
+        ("<a><CANopenObjectList/>", '<a b="', "<a><![CDATA["),
+        SLOW,
+        (("<a>", "a\n"),),
     ),
     "emulators.canopen.bus_file.urdf": Reader(
-        lambda text: parse_urdf(text.encode(), "a.urdf"), ("<robot>", '<robot name="')
+        lambda text: parse_urdf(text.encode(), "a.urdf"),
+        ("<robot>", '<robot name="'),
+        long=(("<robot>", "\n"),),
     ),
     "host.canopen.bus_file.yaml_tree": Reader(
         lambda text: decode_bus_file(text.encode(), Path("bus.yml")), ("nodes: ",), SLOW
@@ -231,12 +245,12 @@ def test_a_megabyte_of_anything_is_read_or_told_in_a_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     reader = READERS[name]
-    for unit in UNITS:
-        for begin in ("", *reader.begin):
-            size = reader.size if unit in WHOLE else min(reader.size, SLOW)
-            text = begin + unit * (size // len(unit))
-            with suppress(*TOLD):
-                reader.read(text)
+    texts = [unit * reader.size for unit in WHOLE]
+    texts += [begin + unit * (MEGABYTE // len(unit)) for begin, unit in reader.long]
+    texts += [begin + unit * (SHORT // len(unit)) for unit in UNITS for begin in reader.begin]
+    for text in texts:
+        with suppress(*TOLD):
+            reader.read(text)
 
 
 PARSES: Final = re.compile(

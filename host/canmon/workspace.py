@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.host.text.toml_reader import read_toml
 from tickrig.host.text.whole_file import write_whole
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from tomlkit import TOMLDocument
     from tomlkit.container import Container
     from tomlkit.items import Table
+
+
+MOST: Final = 200_000
+"""Characters; tomlkit takes the square of it."""
 
 
 class SettingError(ValueError):
@@ -54,6 +58,8 @@ class Workspace:
         except ImportError as error:
             raise WorkspaceError("workspaces need tomlkit: pip install 'tickrig[tui]'") from error
         self.path, self._text = path, text
+        if len(text) > MOST:
+            raise WorkspaceError(f"{path}: more than {MOST:,} characters: no workspace")
         try:
             self._document: TOMLDocument = tomlkit.parse(text)
             self._document.unwrap()  # some tables that are there twice are found by it alone

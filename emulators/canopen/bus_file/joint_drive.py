@@ -12,6 +12,7 @@ from typing import Final
 from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.ds402.motion.switches import FAR_DEG
 from tickrig.device.canopen.ds402.objects import indices
 from tickrig.device.canopen.ds402.objects.parameters import Parameters
 from tickrig.device.canopen.ds402.objects.settings import Settings, read_settings
@@ -105,6 +106,8 @@ class JointDrive:
             found["positive_limit_at"] = self.upper * degrees
         if self.home is not None:
             found["home_from"], found["home_to"] = (place * degrees for place in self.home)
+        for name in found.keys() - {"supply_v"}:  # where no shaft ever is, a switch is nowhere
+            found[name] = max(-FAR_DEG, min(found[name], FAR_DEG))
         return found
 
     @property

@@ -14,6 +14,7 @@ Nothing but elements and attributes is read: a document type, and so entities, a
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
@@ -29,6 +30,10 @@ from tickrig.wire.canopen.eds.xdd import Element, XddError, read_xml
 MOST_BYTES: Final = 32_000_000
 XACRO_TAGS: Final = ("macro", "include", "property", "arg")
 XACRO: Final = "xacro a.urdf.xacro > a.urdf expands it"
+LEAST, MOST = 1e-9, 1e9
+"""Of a limit or a reduction, in rad, m, Nm, N and their rates; no joint is anywhere near."""
+
+_NODE_ID: Final = re.compile("[0-9]{1,9}")
 LIMITS: Final = ("lower", "upper", "velocity", "effort")
 REVOLUTE, CONTINUOUS, PRISMATIC = "revolute", "continuous", "prismatic"
 MOVES: Final = (REVOLUTE, CONTINUOUS, PRISMATIC)
@@ -200,8 +205,9 @@ class _Reader:
 
     def _node_id(self, element: Element) -> int | None:
         text = element.text.strip()
-        if text.isascii() and text.isdecimal() and 1 <= int(text[:9]) <= HIGHEST_NODE_ID:
-            return int(text)
+        number = int(text) if _NODE_ID.fullmatch(text) else 0
+        if 1 <= number <= HIGHEST_NODE_ID:
+            return number
         self._wrong(element, f"node_id {text!r:.40} is not 1..{HIGHEST_NODE_ID}{_hint(text)}")
         return None
 
@@ -210,9 +216,13 @@ class _Reader:
             value = float(text)
         except ValueError:
             value = float("nan")
-        if isfinite(value):
+        if not isfinite(value):
+            self._wrong(element, f"{what}: {text!r:.40} is no number{_hint(text)}")
+        elif value and not LEAST <= abs(value) <= MOST:
+            bounds = f"nothing here is below {LEAST:g} or above {MOST:g}"
+            self._wrong(element, f"{what}: {text!r:.40}: {bounds}")
+        else:
             return value
-        self._wrong(element, f"{what}: {text!r:.40} is no number{_hint(text)}")
         return None
 
     def _wrong(self, element: Element, text: str) -> None:

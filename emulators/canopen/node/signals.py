@@ -62,7 +62,10 @@ def object_name(dictionary: Dictionary, entry: Entry) -> str:
 def find_object(dictionary: Dictionary, name: str) -> Entry | None:
     """Return the entry of this name, None if there is none; `0x6000` is `0x6000:0`."""
     match = _NAME.fullmatch(name)
-    return dictionary.find(int(match[1], 16), int(match[2] or "0", 0)) if match else None
+    if match is None:
+        return None
+    sub = match[2] or "0"
+    return dictionary.find(int(match[1], 16), int(sub, 16 if sub.startswith("0x") else 10))
 
 
 DeferredCall = Callable[[Callable[[], None]], None]

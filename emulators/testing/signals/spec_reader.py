@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any, Final
 
@@ -199,6 +200,6 @@ def _limits(fields: Fields) -> dict[str, float]:
     """Return the limits and the quantisation; ValueError if nothing is between the limits."""
     named = {"min": "low", "max": "high", "step": "step"}
     limits = {named[key]: float(fields[key]) for key in named if key in fields}
-    if limits.get("low", 0) > limits.get("high", limits.get("low", 0)):
+    if limits.get("low", -inf) > limits.get("high", inf):
         raise ValueError(f"min {limits['low']:g} is above max {limits['high']:g}")
     return limits

@@ -107,9 +107,10 @@ def read_filter(text: str | None) -> Filter | None:
 
 def _split(word: str) -> tuple[int, Path]:
     match = _EDS.fullmatch(word)
-    if match is None or not 1 <= int(match[1], 0) <= 127:
+    node = int(match[1], 16 if match[1][1:2] in ("x", "X") else 10) if match else 0
+    if match is None or not 1 <= node <= 127:
         raise Refused(f"--eds {word!r} is not NODE=FILE with a node-ID 1..127, as 3=drive.eds")
-    return int(match[1], 0), Path(match[2])
+    return node, Path(match[2])
 
 
 def _read(node: int, path: Path) -> EdsObjects:

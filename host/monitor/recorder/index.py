@@ -81,7 +81,7 @@ class Index:
 
 
 def _objects(text: str) -> Iterator[dict[str, Any]]:
-    for line in text.splitlines():
+    for line in filter(None, text.splitlines()):
         try:
             said = json.loads(line)
         except (ValueError, RecursionError):

@@ -81,3 +81,13 @@ def test_lines_of_noise_are_shown_in_ascii_by_canmon_alone(tmp_path: Path, name:
     assert ran.stdout == ""
     assert ran.stderr.isascii()
     assert all(line.startswith((f"{path}: ", "Error: ")) for line in ran.stderr.splitlines())
+
+
+@pytest.mark.parametrize(
+    "word", ["08", "0128", "0", "0x80", "0x", "1e1", "-1", "1_0", "٣", "9" * 99]
+)
+def test_a_node_id_is_read_in_decimal_or_told_to_be_none(tmp_path: Path, word: str) -> None:
+    result = canmon("dump", DRIVE, "--eds", f"{word}={tmp_path / 'x.eds'}")
+    wrong = f"--eds '{word}={tmp_path}/x.eds' is not NODE=FILE with a node-ID 1..127"
+    said = f"--eds {tmp_path}/x.eds: No such file" if word == "08" else wrong
+    assert (result.exit_code, said in result.stderr) == (2, True), result.stderr

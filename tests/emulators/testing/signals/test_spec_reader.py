@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from math import exp, isclose
+from math import exp, inf, isclose
 from pathlib import Path
 
 import pytest
@@ -165,3 +165,10 @@ def test_all_mistakes_are_found_at_once(toml: str, mistakes: list[str]) -> None:
     found = read(toml)
     assert isinstance(found, list)
     assert [str(mistake) for mistake in found] == mistakes
+
+
+@pytest.mark.parametrize("limit", [{"max": -5}, {"min": 5}, {"min": -1, "max": -1}])
+def test_a_limit_may_stand_alone(limit: dict[str, int]) -> None:
+    found = read_signal_spec({"ramp": [0, 1], "over": "1s", **limit})
+    assert isinstance(found, SignalSpec)
+    assert (found.low, found.high) == (limit.get("min", -inf), limit.get("max", inf))
