@@ -17,12 +17,15 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tests.interop.buses import GROUP, PORT
+from tickrig.emulators.tkernel.resolution.table import EXAMPLE
 from tickrig.host.links.terminal import MOST_WAITING
 
 pytestmark = pytest.mark.realtime
 
+MULTICAST = ("-i", "udp_multicast", "-c", GROUP, "--bus-kwargs", f"port={PORT}")
 BUS = (f"udp:{GROUP}", "--bus-kwargs", f"port={PORT}")
 EDS = Path(__file__).parents[1] / "examples" / "eds"
+DEFINITION = f"nodes:\n- {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}\n"
 RESET_COMMUNICATION = (0x000, b"\x82\x10")
 F8 = "\x1b[19~"
 MORE = 60
@@ -168,11 +171,8 @@ def test_the_editor_leaves_its_nodes_though_its_terminal_is_stuck(
     bus: can.BusABC, ending: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "robot.yaml"
-    file.write_text(
-        f"nodes:\n- {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}\n", "utf-8"
-    )
-    words = (str(file), "-i", "udp_multicast", "-c", GROUP, "--bus-kwargs", f"port={PORT}")
-    terminal = Terminal(*words, program=command("rtc_canopen_editor"))
+    file.write_text(DEFINITION, "utf-8")
+    terminal = Terminal(str(file), *MULTICAST, program=command("rtc_canopen_editor"))
     terminal.wait_for("Palette0")
     while bus.recv(0):
         pass
@@ -211,28 +211,58 @@ def test_an_emulator_writes_its_trace_to_the_end_though_its_terminal_is_stuck(
     assert trace.read_text("ascii").splitlines()[-1].endswith(" .")
 
 
-SCRIPT = '"$@" & echo $!; wait $!; echo status $?'
+SCRIPT = '"$@" 2>&1 & echo $!; wait $!; echo status $?'
 BACKGROUND: dict[str, tuple[str, tuple[str, ...], int]] = {
     "rrc-emu": ("rrc_emu", (), 0),
+    "rtc-lite-emu": ("rtc_lite_emu", (), 0),
+    "rh3-emu": ("rh3_emu", (), 0),
+    "urg-emu": ("urg_emu", (), 0),
+    "ucode-reader-emu": ("ucode_reader_emu", (), 0),
+    "ucode-resolver": ("ucode_resolver", ("table.txt",), 0),
+    "tkernel-emu": ("tkernel_emu", (), 0),
+    "canopen-slave-emu": ("canopen_slave_emu", ("--node", "5=epos", *MULTICAST), 0),
+    "rtc-canopen-server": ("rtc_canopen_server", ("robot.yaml", *MULTICAST), 0),
+    "tickrig emu": ("tickrig", ("emu", "rrc"), 0),
+    "tickrig run": ("tickrig", ("run", "rig.toml"), 0),
+    "tickrig rtc run": ("tickrig", ("rtc", "run", "--control", "control"), 0),
+    "tickrig demo": ("tickrig", ("demo", "rtc-lite"), 130),
     "canmon dump": ("canmon", ("dump", *BUS), 0),
-    "tickrig demo rtc-lite": ("tickrig", ("demo", "rtc-lite"), 130),
+    "canmon check": ("canmon", ("check", *BUS, "--known", "1"), 1),
+    "canmon gateway": ("canmon", ("gateway", *BUS, "--listen", "0"), 0),
 }
+"""Commands that run until they are ended, and how that is."""
 
 
 @pytest.mark.parametrize("name", BACKGROUND)
-def test_sigint_ends_what_a_script_has_begun_in_the_background(bus: can.BusABC, name: str) -> None:
+def test_sigint_ends_what_a_script_has_begun_in_the_background(
+    bus: can.BusABC, name: str, tmp_path: Path
+) -> None:
+    (tmp_path / "rig.toml").write_text('[device.chair]\ntype = "rrc"\n', "utf-8")
+    (tmp_path / "robot.yaml").write_text(DEFINITION, "utf-8")
+    (tmp_path / "table.txt").write_text(EXAMPLE, "utf-8")
     point, words, status = BACKGROUND[name]
-    told = subprocess.Popen(
-        ["sh", "-c", SCRIPT, "sh", sys.executable, "-u", "-c", command(point), *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert told.stdout is not None
-    pid = int(told.stdout.readline())
-    while not select.select([told.stdout], [], [], 0.01)[0]:
-        tell(bus, 1)
-    told.stdout.readline()
-    os.kill(pid, signal.SIGINT)
-    with told:
-        assert told.stdout.read().splitlines()[-1] == f"status {status}"
+    program = [sys.executable, "-u", "-c", command(point), *words]
+    with subprocess.Popen(
+        ["sh", "-c", SCRIPT, "sh", *program], stdout=subprocess.PIPE, text=True, cwd=tmp_path
+    ) as script:
+        assert script.stdout is not None
+        pid = int(script.stdout.readline())
+        while not select.select([script.stdout], [], [], 0.01)[0]:
+            tell(bus, 1)
+        script.stdout.readline()
+        os.kill(pid, signal.SIGINT)
+        assert script.stdout.read().splitlines()[-1] == f"status {status}"
+
+
+@pytest.mark.parametrize("verb", ["top", "nodes"])
+def test_sigint_ends_a_verb_that_prints_in_the_end(
+    bus: can.BusABC, verb: str, tmp_path: Path
+) -> None:
+    """Nothing shows when it listens, so it may be ended before: by the signal, with 130."""
+    program = [sys.executable, "-u", "-c", command("canmon"), verb, *BUS]
+    with subprocess.Popen(
+        ["sh", "-c", SCRIPT, "sh", *program], stdout=subprocess.PIPE, text=True
+    ) as script:
+        assert script.stdout is not None
+        os.kill(int(script.stdout.readline()), signal.SIGINT)
+        assert script.stdout.read().splitlines()[-1] in ("status 0", "status 130")

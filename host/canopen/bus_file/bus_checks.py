@@ -39,15 +39,7 @@ STOPS: Final = frozenset(
     (
         *("access-form", "access-missing", "bom", "data-type-missing", "doubled-key"),
         *("doubled-section", "list-entry", "list-extra", "list-gap", "name-missing", "no-keyword"),
-        *(
-            "leading-zero",
-            "no-number",
-            "no-objects",
-            "number-form",
-            "number-word",
-            "object-index",
-            "pdo-half",
-        ),
+        *("no-number", "no-objects", "number-form", "number-word", "object-index", "pdo-half"),
         *("truncated", "utf-16", "xml"),
     )
 )

@@ -18,7 +18,7 @@ from tickrig.wire.canopen.eds.eds_device import (
     read_device,
 )
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, shorten
-from tickrig.wire.canopen.eds.eds_value import parse_number
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
@@ -83,7 +83,7 @@ class Sheet:
     def head_number(self, section: str, key: str) -> int:
         """Return a number of the head, 0 if there is none."""
         try:
-            return parse_number(self.file.value(section, key) or "0")
+            return parse_number(plain_numbers(self.file.value(section, key)) or "0")
         except ValueError:
             return 0
 

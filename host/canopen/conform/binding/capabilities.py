@@ -12,7 +12,7 @@ from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_value import parse_number
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import Abort
 from tickrig.wire.canopen.sdo.sdo_block import (
@@ -137,7 +137,7 @@ def _unsaid(file: EdsFile | None, key: str, what: str) -> str:
 def _number(text: str) -> int | None:
     """Read a number of an EDS, None if it is none."""
     with suppress(ValueError):
-        return parse_number(text)
+        return parse_number(plain_numbers(text))
     return None
 
 
