@@ -249,6 +249,7 @@ STREAMS = {
     "emulators/serial/pty_link.py": "a lock",
     "emulators/testing/campaign/journal.py": "verdicts as they come, one line each",
     "emulators/testing/campaign/worker.py": "/dev/null",
+    "host/cli/start.py": "standard streams that were closed",
     "host/monitor/logs/log_file.py": "a recording, or a new file of `whole_log`",
     "host/monitor/recorder/index.py": "the index of a recording",
     "host/rtc_canopen/commands/opening.py": "events as they come",

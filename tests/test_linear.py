@@ -227,7 +227,9 @@ READERS: Final = {
     "host.monitor.sequence.lines": Reader(lambda text: parse_lines(text, "s.txt"), ("+1 123#",)),
     "host.monitor.sequence.variables": Reader(lambda text: fill_in(f"{{{text}}}", {}), ("- ",)),
     "host.monitor.sequence.evaluate": Reader(lambda text: evaluate(text, {}), ("1+", "-")),
-    "host.monitor.transmit.transmit_list": Reader(parse_row_text, ("123#", "123#00 --every ")),
+    "host.monitor.transmit.transmit_list": Reader(
+        parse_row_text, ("123#", "123#00 --every "), SLOW
+    ),
     "host.motion.components.odometry": Reader(of_file(read_conf, "a.conf"), ("conf.a.b: ",)),
     "host.motion.path_file": Reader(of_file(read_path, "p.txt"), ("1 2 ",)),
     "host.rtc.parameter": Reader(Constraint, ("x<", "(")),

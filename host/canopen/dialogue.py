@@ -186,7 +186,7 @@ class Unanswered:
         """How many questions are open; one that was repeated counts once."""
         return len(self._objects)
 
-    def ask(self, at: Object) -> None:
+    def add(self, at: Object) -> None:
         """Add a question."""
         if self._objects[-1:] != [at]:
             self._objects.append(at)
@@ -250,8 +250,8 @@ class Dialogue:
         self._jobs: deque[QueuedScript] = deque()
         self._unanswered = Unanswered()
         self._transfer: Object | None = None
-        self._asked: Object | None = None  # which answer the step waits for: its own, or a fence's
-        self._asked_us = self._settled_us = 0
+        self._expected: Object | None = None  # about which an answer is waited for, a fence too
+        self._sent_us = self._settled_us = 0
         self._answer = b""
 
     @property
@@ -275,7 +275,7 @@ class Dialogue:
         """Forget all jobs."""
         dropped = [self.job, *self._jobs] if self.job is not None else []
         self._jobs.clear()
-        self.job, self._step, self._asked, self.due_us = None, None, None, NEVER
+        self.job, self._step, self._expected, self.due_us = None, None, None, NEVER
         for job in dropped:
             job.script.close()
             job.dropped()
@@ -288,7 +288,7 @@ class Dialogue:
 
     def remember(self, at: Object) -> None:
         """Take note that somebody else has asked the server about an object, and got no answer."""
-        self._unanswered.ask(at)
+        self._unanswered.add(at)
 
     def receive_sdo(self, now_us: int, data: bytes) -> None:
         """Take a response; the answer to another question, or a copy, is ignored."""
@@ -301,14 +301,14 @@ class Dialogue:
         if named is not None:
             self._unanswered.hear(named)
         step = self._step
-        if not isinstance(step, SdoRequest) or self._asked is None:
+        if not isinstance(step, SdoRequest) or self._expected is None:
             return
-        if self._asked != (step.index, step.sub):
-            if named == self._asked:
+        if self._expected != (step.index, step.sub):
+            if named == self._expected:
                 self._pass_fence(step, answer)
         elif self._is_answer(step, answer, data):
             self._unanswered.clear()
-            took_us = max(LEAST_COPY_US, now_us - self._asked_us)
+            took_us = max(LEAST_COPY_US, now_us - self._sent_us)
             self._answer, self._settled_us = data, now_us + min(took_us, MOST_COPY_US)
             self._go_on(answer)
 
@@ -330,7 +330,7 @@ class Dialogue:
         """Ask at last what the script asks: all earlier questions are settled."""
         if isinstance(fence, UploadInitiateResponse) and fence.data is None:
             self._say(Abort(fence.index, fence.sub, AbortCode.GENERAL).encode())
-        self._ask((step.index, step.sub), step.request)
+        self._send_request((step.index, step.sub), step.request)
 
     def receive_state(self, now_us: int, state: NmtState) -> None:
         """Take what a heartbeat or a boot-up says."""
@@ -350,10 +350,10 @@ class Dialogue:
             return
         match self._step:
             case SdoRequest() as step:
-                if self._asked is None:
-                    self._ask((step.index, step.sub), step.request)
+                if self._expected is None:
+                    self._send_request((step.index, step.sub), step.request)
                     return
-                self._say(Abort(*self._asked, AbortCode.TIMEOUT).encode())
+                self._say(Abort(*self._expected, AbortCode.TIMEOUT).encode())
                 self._go_on(SdoTimeout(step.index, step.sub, self.sdo_timeout_us))
             case AwaitState() as wait:
                 self._go_on(StateTimeout(f"{wait.state.name} was not reported"))
@@ -369,7 +369,7 @@ class Dialogue:
         """Give a script what came of its step, and take the steps up to one that waits."""
         job = self.job
         assert job is not None
-        self._step, self._asked, self.due_us = None, None, NEVER
+        self._step, self._expected, self.due_us = None, None, NEVER
         try:
             step = _resume(job.script, value)
             while not self._take(step):
@@ -399,7 +399,7 @@ class Dialogue:
             case SdoFrame():
                 self._say(step.request)
                 if self._transfer is not None and step.request[0] == ClientCommand.ABORT:
-                    self._unanswered.ask(self._transfer)
+                    self._unanswered.add(self._transfer)
             case Guard():
                 self._guard(ERROR_CONTROL_COB_ID + self._node_id)
             case Command():
@@ -410,20 +410,20 @@ class Dialogue:
         """Ask what a step asks, or first what has to be asked before; or wait with it."""
         at = step.index, step.sub
         if step.goes_on:
-            self._ask(at, step.request)
+            self._send_request(at, step.request)
         elif at in self._unanswered:
             fence = self._unanswered.fence(at)
-            self._ask(fence, UploadInitiateRequest(*fence).encode())
+            self._send_request(fence, UploadInitiateRequest(*fence).encode())
         elif at == self._transfer and self._now_us < self._settled_us:
             self.due_us = self._settled_us
         else:
-            self._ask(at, step.request)
+            self._send_request(at, step.request)
 
-    def _ask(self, at: Object, request: bytes) -> None:
-        self._transfer = self._asked = at
-        self._unanswered.ask(at)
+    def _send_request(self, at: Object, request: bytes) -> None:
+        self._transfer = self._expected = at
+        self._unanswered.add(at)
         self._say(request)
-        self._asked_us, self.due_us = self._now_us, self._now_us + self.sdo_timeout_us
+        self._sent_us, self.due_us = self._now_us, self._now_us + self.sdo_timeout_us
 
     def _say(self, data: bytes) -> None:
         self._send(REQUEST_COB_ID + self._node_id, data)

@@ -54,7 +54,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import encode_request
 from tickrig.wire.modbus.rtu import encode_frame
 
-ONE_HASH: Final = "1878f63c531e26ede6f2b8a2f9d78b4e77ba0b230c2577547f2fe355bba88880"
+ONE_HASH: Final = "c51ec5639a5a3d57181aa949788c579d28d182a5ec2e99757fcd21c49f8c8cb2"
 """Renew it where a device is meant to do something else than before."""
 
 LIBM: Final = "574a9963050bcfdf2120e6d203e0430883376a31cfa780fdc74e39ea730c6536"

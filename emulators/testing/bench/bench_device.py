@@ -49,7 +49,7 @@ class BenchDevice:
         >>> with Bench("rrc") as bench:
         ...     about = bench.describe()
         >>> about.inputs["gauge"].unit, about.outputs["state"].text, about.faults["flip"].rated
-        ('', 'state of the controller', True)
+        ('', 'state of the RRC', True)
         """
         return self._mode.describe(self.name)
 

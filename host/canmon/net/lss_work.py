@@ -123,13 +123,13 @@ class LssWork:
         found = 0
         for address, old_id in self._slaves():
             found += 1
-            self._tell(address, old_id)
+            self._show_slave(address, old_id)
             node_id = next(ids, None)
             if self._settings.configures:
                 self._configure(node_id, old_id)
         return found
 
-    def _tell(self, address: LssAddress, old_id: int) -> None:
+    def _show_slave(self, address: LssAddress, old_id: int) -> None:
         """Show who was found; NodeFailed if several were, and are to be configured."""
         count = self._master.count()
         shared = f", {count} nodes with this identity" if count > 1 else ""

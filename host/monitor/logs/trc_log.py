@@ -5,7 +5,7 @@
 ';$FILEVERSION=1.1'
 >>> record = lines.read("     6)      1349.2  Error      0008  4  00 19 08 08", tally)
 >>> record.at_us, record.channel, str(record.frame)
-(1349200, 'can0', '200002A8#0000001900000808')
+(1349200, 'can0', '200002A8#0000801900000808')
 """
 
 from __future__ import annotations

@@ -73,6 +73,18 @@ def test_a_run_is_its_steps(
     assert state(goes) == one_by_one(stays, path[: run.steps + 1])
 
 
+@pytest.mark.parametrize("velocity", [10.0, 200.0, 10_000.0])
+def test_a_demand_to_stand_where_it_turns_is_a_step_as_any_other(velocity: float) -> None:
+    goes, stays = make(velocity), make(velocity)
+    path = [(float(goes.counts), 0.0)] * 3
+    for servo in (goes, stays):
+        servo.drive_position(*path[0])
+    run = goes.run_ahead(path[: min(2, goes.plain_steps)], ANYWHERE, inf, 1_000)
+    goes.follow(run, *path[run.steps])
+    goes.step_to(goes.now_us + STEP_US)
+    assert state(goes) == one_by_one(stays, path[: run.steps + 1])
+
+
 @pytest.fixture
 def servo() -> Servo:
     """One that turns, as it is told, with 10 000 counts a second."""

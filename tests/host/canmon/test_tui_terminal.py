@@ -99,7 +99,7 @@ def test_a_bus_that_is_unplugged_is_told_and_ends_it_with_status_3() -> None:
     finally:
         os.close(slave)
         os.close(master)
-    terminal.wait_for(name)
+    terminal.wait_for("the last ")  # reads have failed
     assert "[1] 1A" in terminal.text()
     by_key(terminal)
     assert terminal.end() == 3

@@ -249,10 +249,10 @@ def test_what_names_no_object_may_answer_what_was_asked_before(stray: str) -> No
 def test_a_fence_is_another_object_than_all_that_were_asked_for_in_vain(asked: Object) -> None:
     unanswered = Unanswered()
     for at in (*FENCES[:8], asked):
-        unanswered.ask(at)
+        unanswered.add(at)
     fence = unanswered.fence(asked)
     assert fence not in unanswered
-    unanswered.ask(fence)
+    unanswered.add(fence)
     unanswered.hear(fence)
     assert asked not in unanswered
 
@@ -260,7 +260,7 @@ def test_a_fence_is_another_object_than_all_that_were_asked_for_in_vain(asked: O
 def test_where_all_fences_were_asked_for_in_vain_the_oldest_question_is_forgotten() -> None:
     unanswered, asked = Unanswered(), (0x2000, 0)
     for at in (*FENCES, asked):
-        unanswered.ask(at)
+        unanswered.add(at)
     assert unanswered.fence(asked) == FENCES[0]
     assert (FENCES[0] in unanswered, FENCES[1] in unanswered) == (False, True)
 

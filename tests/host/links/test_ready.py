@@ -143,6 +143,9 @@ def test_nothing_else_waits_with_select() -> None:
         if re.search(r"(?m)^(import select$|from select import)", path.read_text("utf-8"))
     }
     assert waiting - {"host/links/ready.py"} == {
+        "emulators/serial/pty_port.py",  # epoll
+        "host/cli/start.py",  # poll
+        "host/links/terminal.py",  # poll
         "emulators/testing/host_clock/host_waits.py",
         "emulators/testing/host_clock/kept_names.py",
     }

@@ -31,7 +31,7 @@ ACCESS: Final = {
 _MAPPED_AS: Final = {("rw", "TPDO"): "rwr", ("rw", "RPDO"): "rww"}
 _FLAGS: Final = {"true": "1", "false": "0"}
 _RATE: Final = re.compile(
-    r"([0-9]+) *(?:(k)|(m))? *(?:bps|bit/s|bd|baud)?", re.ASCII | re.IGNORECASE
+    r"([0-9]++) *+(?:(k)|(m))? *+(?:bps|bit/s|bd|baud)?", re.ASCII | re.IGNORECASE
 )
 
 IDENTITY: Final = {

@@ -158,7 +158,7 @@ def test_an_eds_is_told_by_line_section_and_key_and_used_as_far_as_it_is_sound(
     sound = "[1000]\nParameterName=Kind\nDataType=7\nAccessType=ro\n"
     eds.write_text(f"{sound}[1001]\nParameterName=b\nAccessType=ro\n")
     result = canmon("dump", log, "--eds", f"5={eds}")
-    assert result.stderr.startswith(f"{eds}:5: [1001] DataType is missing: DOMAIN is taken")
+    assert result.stderr.startswith(f"{eds}:5: [1001] DataType is missing: UNSIGNED8 is taken")
     assert "1000h:00 kind" in result.stdout
 
 

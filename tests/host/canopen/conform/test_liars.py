@@ -176,9 +176,10 @@ def test_a_node_that_answers_late(late_us: int) -> None:
 
 def test_a_node_that_resets_by_itself() -> None:
     r1 = R1()
+    r1.slave.tick(0, ())  # it is on, else it hears nothing
 
     def lie(now_us: int, rx: Frames) -> Frames:
-        if now_us % 700_000 == 0:
+        if now_us % 700_000 == 0 and not rx:
             r1.slave.reset()
         return r1.slave.tick(now_us, rx)
 

@@ -330,7 +330,7 @@ def test_a_file_that_cannot_be_used_is_told_and_the_server_goes_on(tmp_path: Pat
         for key, file, why in (
             ("ctrl+o", bad, f"{bad}: line 1: "),
             ("ctrl+o", tmp_path / "none.yaml", f"{tmp_path}/none.yaml: No such file"),
-            ("ctrl+s", tmp_path / "none" / "x.yaml", f"{tmp_path}/none/.x.yaml.new: No such"),
+            ("ctrl+s", tmp_path / "none" / "x.yaml", f"{tmp_path}/none/x.yaml: No such"),
         ):
             await desk.press(key)
             await desk.answer(str(file))
