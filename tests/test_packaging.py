@@ -15,8 +15,16 @@ import pytest
 ROOT = Path(__file__).parents[1]
 STALE = shutil.ignore_patterns("__pycache__", "*.egg-info")
 FOLDERS = {"wire", "device", "host", "emulators"}
-OTHERS = {"src", "tests", "docs", "examples", "tools", ".ci", ".devcontainer"}
-FILES = {"CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "Makefile", "MANIFEST.in", "README.md"}
+OTHERS = {"src", "tests", "docs", "examples", "findings", "tools", ".ci", ".devcontainer"}
+FILES = {
+    "SECURITY.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "LICENSE",
+    "Makefile",
+    "MANIFEST.in",
+    "README.md",
+}
 FILES |= {"conftest.py", "pyproject.toml", "setup.py", ".gitignore"}
 FILES |= {"Dockerfile", ".dockerignore", "action.yml"}
 TREE = (*sorted(FOLDERS | OTHERS), *sorted(FILES))
