@@ -203,7 +203,7 @@ def test_an_emulator_writes_its_trace_to_the_end_though_its_terminal_is_stuck(
     link, trace = tmp_path / "tty", tmp_path / "run.trace"
     words = ("--link", str(link), "--trace", str(trace), "-vv")
     terminal = Terminal(*words, program=command("rrc_emu"))
-    terminal.wait_for("Ctrl-C ends")
+    terminal.wait_for("EV:Initialized")
     stuck = Stuck(terminal)
     link.write_bytes(b"output1e00\n" * 10)
     ENDINGS[ending](stuck)
@@ -227,10 +227,20 @@ BACKGROUND: dict[str, tuple[str, tuple[str, ...], int]] = {
     "tickrig rtc run": ("tickrig", ("rtc", "run", "--control", "control"), 0),
     "tickrig demo": ("tickrig", ("demo", "rtc-lite"), 130),
     "canmon dump": ("canmon", ("dump", *BUS), 0),
-    "canmon check": ("canmon", ("check", *BUS, "--known", "1"), 1),
+    "canmon check": ("canmon", ("check", *BUS, "--known", "001"), 1),
     "canmon gateway": ("canmon", ("gateway", *BUS, "--listen", "0"), 0),
 }
 """Commands that run until they are ended, and how that is."""
+
+IMPATIENT = """
+import click, signal
+say = click.echo
+def echo(text="", *words, **named):
+    say(text, *words, **named)
+    if "Ctrl-C ends" in str(text):
+        signal.raise_signal(signal.SIGINT)
+click.echo = echo
+"""
 
 
 @pytest.mark.parametrize("name", BACKGROUND)
@@ -252,6 +262,20 @@ def test_sigint_ends_what_a_script_has_begun_in_the_background(
         script.stdout.readline()
         os.kill(pid, signal.SIGINT)
         assert script.stdout.read().splitlines()[-1] == f"status {status}"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name for name in BACKGROUND if name not in {"tickrig demo", "canmon dump", "canmon check"}],
+)
+def test_who_ends_a_command_in_the_moment_it_says_how_ends_it(name: str, tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text('[device.chair]\ntype = "rrc"\n', "utf-8")
+    (tmp_path / "robot.yaml").write_text(DEFINITION, "utf-8")
+    (tmp_path / "table.txt").write_text(EXAMPLE, "utf-8")
+    point, words, status = BACKGROUND[name]
+    program = [sys.executable, "-c", IMPATIENT + command(point), *words]
+    ended = subprocess.run(program, capture_output=True, text=True, cwd=tmp_path)
+    assert (ended.returncode, "Ctrl-C ends" in ended.stderr) == (status, True), ended.stderr
 
 
 @pytest.mark.parametrize("verb", ["top", "nodes"])

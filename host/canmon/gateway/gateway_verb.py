@@ -70,8 +70,9 @@ def command(
             _answer_input(Gateway(bus, net, VERSION))
         else:
             with _listening(address, path) as (listener, where):
-                say(f"CANopen gateway to {opened.name}, net {net}, at {where}. Ctrl-C ends.")
-                _serve(listener, bus, net)
+                _serve(
+                    listener, bus, net, f"CANopen gateway to {opened.name}, net {net}, at {where}"
+                )
     except LinkClosed as error:
         raise SourceFailed(str(error)) from None
     finally:
@@ -131,7 +132,7 @@ def _listening(
         yield listener, f"{host}:{port}"
 
 
-def _serve(listener: socket.socket, bus: NodeBus, net: int) -> None:
+def _serve(listener: socket.socket, bus: NodeBus, net: int, greeting: str) -> None:
     """Answer clients until Ctrl-C; meanwhile the bus is listened to, so that no queue fills."""
     stopped: list[bool] = []
 
@@ -140,6 +141,7 @@ def _serve(listener: socket.socket, bus: NodeBus, net: int) -> None:
 
     server = LineServer(listener, begin, _refusal, MAX_LINE)
     with stopped_by_signals(lambda: stopped.append(True)), suppress(KeyboardInterrupt):
+        say(f"{greeting}. Ctrl-C ends.")
         while not stopped:
             server.serve(WAIT_US)
             bus.listen(bus.now_us)

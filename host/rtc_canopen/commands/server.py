@@ -92,7 +92,6 @@ def main(file: Path, span: str | None, **options: Any) -> None:
         server.log.listeners += log_listener(log, stack)
         bus = bus_of(BusOptions(**options), definition.bus)
         link, name = open_link(bus, server.bus_state, stack)
-        click.echo(f"{len(server.nodes)} nodes on {name}. Ctrl-C ends.", err=True)
         if start:
             server.start()
         _run(server, link, span_us, _Doors(control, name, engines))
@@ -114,6 +113,7 @@ def _run(server: RtcCanopenServer, link: StampedLink, span_us: int, doors: _Door
     try:
         with ExitStack() as stack:
             stack.enter_context(stopped_by_signals(runner.stop))
+            click.echo(f"{len(server.nodes)} nodes on {doors.bus}. Ctrl-C ends.", err=True)
             doors.open(stack, server, runner)
             runner.run(until_us)
         link.send(server.stop(link.now_us))

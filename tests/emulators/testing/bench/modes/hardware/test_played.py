@@ -156,6 +156,7 @@ def test_a_master_meets_two_nodes_in_another_process() -> None:
         ) as child,
         Bench.of_plan(bus_plan(child), "hardware") as bench,
     ):
+        assert bench.wait_until(lambda: bench.get("left/state") == "Pre-operational", within="5s")
         network = bench.canopen_network()
         left = network.add_node(1)
         left.sdo.RESPONSE_TIMEOUT = 5
