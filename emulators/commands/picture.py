@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.cli.refused import Refused
-from tickrig.host.text.whole_file import check_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,6 +22,8 @@ def check_plot(path: Path) -> None:
         raise Refused(f"--plot {path}: the name ends in {', '.join(FORMATS)}")
     if find_spec(PLOTTER) is None:
         raise Refused(f"--plot needs {PLOTTER}: pip install 'tickrig[plot]'")
+    from tickrig.host.text.whole_file import check_file  # noqa: PLC0415 - a TAB needs none
+
     try:
         check_file(path, "--plot")
     except ValueError as error:

@@ -17,7 +17,6 @@ from click.shell_completion import CompletionItem
 from tickrig.host.cli.options import Decorator, Program, add_options
 from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.cli.start import loading
-from tickrig.host.links.errors import first_line
 from tickrig.host.text.values import parse_setting
 
 if TYPE_CHECKING:
@@ -233,10 +232,10 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
     except can.CanInterfaceNotImplementedError as error:
         unnamed = UNNAMED in str(error)
         raise Refused(
-            _nothing_named(instead) if unnamed else f"CAN bus: {first_line(error)}"
+            _nothing_named(instead) if unnamed else f"CAN bus: {_first_line(error)}"
         ) from None
     except (ValueError, TypeError) as error:
-        raise Refused(f"CAN bus: {first_line(error)}") from None
+        raise Refused(f"CAN bus: {_first_line(error)}") from None
     interface, channel = str(config["interface"]), config["channel"]
     try:
         bus = can.Bus(**{"single_handle": True, **given})
@@ -296,7 +295,7 @@ def _timing(pairs: Mapping[str, Any]) -> can.BitTiming:
     try:
         return can.BitTiming(**pairs)
     except (TypeError, ValueError) as error:
-        raise Refused(f"--timing: {first_line(error)}") from None
+        raise Refused(f"--timing: {_first_line(error)}") from None
 
 
 def _nothing_named(instead: str) -> str:
@@ -308,10 +307,16 @@ def _nothing_named(instead: str) -> str:
     )
 
 
+def _first_line(error: BaseException) -> str:
+    from tickrig.host.links.errors import first_line  # noqa: PLC0415 - a TAB needs none
+
+    return first_line(error)
+
+
 def bus_reason(error: BaseException) -> str:
     """Return in a line why a bus cannot be opened, and what to do where that is known."""
     number = getattr(error, "errno", None) or getattr(error, "error_code", None)
     hint = HINTS.get(number) if isinstance(number, int) else None
     if NO_MSGPACK in str(error):
         hint = "pip install 'python-can[multicast]'"
-    return f"{first_line(error)} ({hint})" if hint else first_line(error)
+    return f"{_first_line(error)} ({hint})" if hint else _first_line(error)
