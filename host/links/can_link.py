@@ -227,6 +227,17 @@ class BusReceiver:
         time.sleep(AGAIN_S if wait_s is None else min(wait_s, AGAIN_S))
         return None
 
+    def check(self, error: Exception | None = None) -> None:
+        """Raise LinkClosed if the last 100 reads have failed.
+
+        Args:
+            error: of the last of them.
+        """
+        if self.last and self._row >= MOST_FAULTS:
+            text = f"the last {self._row} reads have failed: {self.last}"
+            self.faults -= self._row  # these were no frames
+            raise self._gone(f"{self._name}: {text}") from error
+
     def _fail(self, error: Exception) -> None:
         """Count a read; end the reading if there is no hope."""
         if isinstance(error, self._raises):
@@ -239,10 +250,8 @@ class BusReceiver:
         ends = self.closed or isinstance(error.__cause__, LinkError)
         if ends or error_code(error) in self._ends:
             raise self._gone(f"{self._name}: {self.last}") from error
-        if self._row >= MOST_FAULTS and now_s - self._since_s >= FAULTY_S:
-            text = f"the last {self._row} reads have failed: {self.last}"
-            self.faults -= self._row  # these were no frames
-            raise self._gone(f"{self._name}: {text}") from error
+        if now_s - self._since_s >= FAULTY_S:
+            self.check(error)
         if self.faults in _TOLD:
             many = "a read has" if self.faults == 1 else f"{self.faults} reads have"
             self.on_fault(f"{self._name}: {many} failed: {self.last}; what came is lost")

@@ -9,12 +9,19 @@ from typing import Final
 import can
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.bus_source import BusSource, merged, open_bus, reader_of
+from tickrig.host.canmon.sources.bus_source import (
+    BusReader,
+    BusSource,
+    merged,
+    open_bus,
+    reader_of,
+)
 from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
-from tickrig.host.links.can_link import close_bus, reason_of
+from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of
 from tickrig.host.links.can_message import to_message
+from tickrig.host.links.errors import LinkClosed
 from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
@@ -50,9 +57,11 @@ class Transmitter:
         self._bus, interface, self.name = open_bus(whole)
         self._takes_fd = whole.fd or interface in FD_WITHOUT_ASKING
         self._source: BusSource | None = None
+        self._reads: BusReceiver | None = None
         if receives:
             reader = reader_of(self._bus, interface, self.name)
             self._source = BusSource([reader], [bus_word.chosen])
+            self._reads = reader.reads if isinstance(reader, BusReader) else None
 
     def send(self, frame: CanFrame | FdFrame) -> None:
         """Send a frame; SourceFailed if the bus is gone, takes none for 1 s or no CAN FD."""
@@ -71,6 +80,14 @@ class Transmitter:
         if not records and self._source.failed:
             raise SourceFailed(self._source.failed)
         return records
+
+    def check_reads(self) -> None:
+        """Raise SourceFailed if the last 100 reads of the bus have failed: nothing can be heard."""
+        try:
+            if self._reads is not None:
+                self._reads.check()
+        except LinkClosed as error:
+            raise SourceFailed(str(error)) from None
 
     def close(self) -> None:
         """Close the bus."""

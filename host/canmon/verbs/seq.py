@@ -142,6 +142,9 @@ def _carry_out(
                 watch.take(record)
                 _send(out, watch, run.tick(pace.now_us, (record,)))
             _send(out, watch, run.tick(pace.now_us))
+        _show(run, quiet)
+        if run.missed:
+            out.check_reads()
     _show(run, quiet)
 
 

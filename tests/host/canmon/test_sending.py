@@ -244,11 +244,12 @@ def test_a_sequence_that_is_not_answered_ends_with_status_1(wire: Wire, tmp_path
     assert result.stdout.endswith(f" ? {path}:2: no 705#05 within 2 ms\n")
 
 
+@pytest.mark.parametrize("within", ["100ms", "1s", "60s"])
 def test_a_bus_that_is_gone_ends_a_sequence_with_status_3(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, within: str
 ) -> None:
     path = tmp_path / "a.toml"
-    path.write_text('[[step]]\nexpect = "705#05"\n')
+    path.write_text(f'[[step]]\nexpect = "705#05"\nwithin = "{within}"\n')
     monkeypatch.setattr("can.interfaces.virtual.VirtualBus.recv", Unplugged.recv)
     result = canmon("seq", "virtual:alone", str(path))
     last = result.stderr.splitlines()[-1]
