@@ -24,7 +24,7 @@ TPDO_TYPES: Final = frozenset((*SYNCHRONOUS, RTR_SYNCHRONOUS, RTR_EVENT, *EVENT_
 """All others are reserved (CiA 301, transmission type)."""
 
 COB_ID, TYPE, INHIBIT_TIME, RESERVED, EVENT_TIMER, SYNC_START = range(1, 7)
-"""Sub-indices."""
+"""Sub-indices. No device may have the reserved one (CiA 301, 7.5.2.37); one whose EDS has it does."""
 
 MAX_SYNC_START: Final = 240
 _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
@@ -61,8 +61,6 @@ class PdoParameters(Part):
                 self._entries[entry.sub] = entry
                 entry.guard = check
                 entry.watch(changed)
-        if RESERVED in self._entries:
-            self._entries[RESERVED].source = _absent
 
     @property
     def valid(self) -> bool:
@@ -110,8 +108,6 @@ class PdoParameters(Part):
                 self._check_cob_id(whole_number(value))
             case 2 if value not in self._types:
                 raise SdoAbort(AbortCode.VALUE_RANGE)
-            case 4:  # reserved
-                raise SdoAbort(AbortCode.NO_SUBINDEX)
             case 3 | 6 if self.valid:  # inhibit time, SYNC start value
                 raise SdoAbort(AbortCode.VALUE_RANGE)
             case 6 if whole_number(value) > MAX_SYNC_START:
@@ -127,8 +123,3 @@ class PdoParameters(Part):
         can_id = cob_id & CAN_ID_MASK
         if is_restricted(can_id) or (self.valid and can_id != self.can_id):
             raise SdoAbort(AbortCode.VALUE_RANGE)
-
-
-def _absent(entry: Entry) -> bytes:
-    """Answer for sub-index 4, which must not be there even if an EDS has it."""
-    raise SdoAbort(AbortCode.NO_SUBINDEX)

@@ -32,7 +32,13 @@ CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     list_rules.lists,
     *(object_rules.names, object_rules.kinds, object_rules.sub_numbers, object_rules.sub_zeros),
     *(value_rules.numbers, value_rules.list_numbers, value_rules.limits),
-    *(pdo_rules.compact, pdo_rules.cob_ids, pdo_rules.halves, pdo_rules.mappings),
+    *(
+        pdo_rules.compact,
+        pdo_rules.cob_ids,
+        pdo_rules.halves,
+        pdo_rules.reserved,
+        pdo_rules.mappings,
+    ),
     *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
 )
 UNREADABLE: Final = frozenset({"xml", "no-objects"})

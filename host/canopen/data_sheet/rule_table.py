@@ -160,6 +160,7 @@ _NOTES: Final = (
     ("name-empty", OBJECT_KEYS, "tools show nothing", "give it a name"),
     ("pdo-mapping-missing", OBJECT_KEYS, "it counts as 0", "add PDOMapping=0"),
     ("limit-type", OBJECT_KEYS, "tools skip it", "limits are for numbers"),
+    ("pdo-reserved", PDO_PARAMETER, "conformance tests report it", "leave out sub-index 4"),
     ("profile-none", "CiA 301 7.5.2.1", "masters see no profile", "name the profile in 1000h"),
 )
 

@@ -37,6 +37,7 @@ DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
 ALL_SUBS: Final = (1 << len(ELEMENTS)) - 1
 NEEDED_SUBS: Final = 0b11
 """COB-ID and transmission type."""
+RESERVED: Final = 4
 NODE: Final = 5
 """The node-ID for which CAN-IDs are compared."""
 
@@ -127,6 +128,13 @@ def halves(document: Document) -> Iterator[RuleFinding]:
         if (parameter in RPDO or parameter in TPDO) and parameter not in objects:
             what = f"there is no communication parameter {parameter:04X}h"
             yield document.found("pdo-half", what, f"{index:04X}")
+
+
+def reserved(document: Document) -> Iterator[RuleFinding]:
+    """Find the sub-index 4 of communication parameters: a device must refuse it."""
+    for index, sub in document.rows:
+        if sub == RESERVED and (index in RPDO or index in TPDO):
+            yield document.found("pdo-reserved", "sub-index 4 is reserved", f"{index:04X}sub4")
 
 
 def mappings(document: Document) -> Iterator[RuleFinding]:

@@ -592,6 +592,15 @@ CORPUS: Final = (
         "pdo-half", lambda text: re.sub(r"\[1603(sub.)?\]\n[^\[]*", "", text), False, lacks(0x1603)
     ),
     Deviation(
+        "pdo-reserved",
+        lambda text: (
+            text + "\n[1800sub4]\nParameterName=reserved\nObjectType=7\nDataType=5\n"
+            "AccessType=rw\nDefaultValue=0\nPDOMapping=0\n"
+        ),
+        False,
+        entry(0x1800, 4, default=b"\0"),
+    ),
+    Deviation(
         "mapping-count", within("1A00sub0", "DefaultValue=0x02", "DefaultValue=9"), False, anything
     ),
     Deviation(

@@ -64,12 +64,6 @@ def forgets_can_id(slave: CanopenSlave) -> Bends:
     return Bends()
 
 
-def has_reserved_sub(slave: CanopenSlave) -> Bends:
-    for number in PDOS:
-        slave.dictionary[0x1800 + number, 4].source = None
-    return Bends()
-
-
 def seems_event_driven(slave: CanopenSlave) -> Bends:
     """Say that TPDOs are event-driven, whoever writes that too, and wait for SYNC."""
     for number in PDOS:
@@ -271,7 +265,7 @@ DEFECTS: Final = (
     ),
     Defect(
         *("sub-index 4 of a TPDO", ("PC-22",)),
-        has_reserved_sub,
+        lambda _: Bends(),
         rows=tuple(
             EntryDescription(0x1800 + n, 4, "reserved", DataType.UNSIGNED8, RW) for n in PDOS
         ),
