@@ -305,6 +305,9 @@ def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float
         reason = f"{key}={shorten(text)} is no {kind.name}: no limit is taken"
         file.warn(section, reason, "limit-value", key)
         return None
+    if limit is None and kind.is_integer and "NODEID" in text.upper():
+        reason = f"{key}={shorten(text)} depends on the node-ID: no limit is taken"
+        file.warn(section, reason, "limit-value", key)
     if isinstance(limit, int) and kind is not DataType.BOOLEAN:
         _check_form(file, section, key, kind, text, limit)
     return limit

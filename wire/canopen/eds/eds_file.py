@@ -106,6 +106,7 @@ class EdsFile:
         self._objects: list[tuple[str, int, int | None]] = []  # each rule goes through them
         self._errors: dict[Finding, None] = {}
         self._warnings: dict[Finding, None] = {}
+        self._has_long_titles = False
         try:
             self.lines = xdd_lines(text) if self.is_xml else read_lines(text)
         except XddError as error:
@@ -243,8 +244,10 @@ class EdsFile:
         if self.is_xml and title not in KNOWN_SECTIONS.values() and object_section(title) is None:
             reason = "is no index of four, or sub-index of two hexadecimal digits: it is lost"
             self._errors[Finding(self.name, title, reason, line.number, "object-index")] = None
-        if self.is_xml and len(line.title) > LONGEST_TITLE and object_section(title) is not None:
-            reason = "subIndex has more than two digits: they are taken for one number"
+        is_long = self.is_xml and len(line.title) > LONGEST_TITLE
+        if is_long and not self._has_long_titles and object_section(title) is not None:
+            self._has_long_titles = True  # some editors write all of them so
+            reason = "subIndex has more than two digits, taken for one number; others may follow"
             self._warn_at(line, reason, "section-form")
         if title in self.sections and describes_device(title):
             reason = "is there twice: of each keyword the first is taken"

@@ -29,6 +29,9 @@ _SPLIT_HEX: Final = re.compile(r"0x((?: *[0-9a-f])+)", re.IGNORECASE | re.ASCII)
 _ASSEMBLER_HEX: Final = re.compile(r"([0-9][0-9a-f ]*)h", re.IGNORECASE | re.ASCII)
 _COMMENT: Final = re.compile(r"(?<!\s)\s*+(?:[#;]|//).*", re.DOTALL)
 _HEX_BYTES: Final = re.compile(r"0x([0-9a-f]+)", re.IGNORECASE | re.ASCII)
+_LONE_BYTES: Final = re.compile(
+    r"0x[0-9a-f]{1,2}(?:[ ,]++0x[0-9a-f]{1,2})++", re.IGNORECASE | re.ASCII
+)
 _UNDERSCORE: Final = re.compile(r"(?<=[0-9a-f])_(?=[0-9a-f])", re.IGNORECASE)
 _OCTAL: Final = re.compile(r"0[0-7]+")
 _NO_OCTAL: Final = re.compile(r"\b0++(?=[0-7]*+[89])([0-9]++)\b", re.ASCII)
@@ -237,13 +240,18 @@ def is_hex_bytes(text: str) -> bool:
 
 
 def _parse_bytes(text: str) -> bytes:
-    r"""Read hexadecimal bytes; some editors write 0x before them, or a text instead.
+    r"""Read hexadecimal bytes; some editors write 0x before them or before each, or a text instead.
 
     >>> _parse_bytes("0102"), _parse_bytes("0x0102"), _parse_bytes("0x0"), _parse_bytes("no")
     (b'\x01\x02', b'\x01\x02', b'\x00', b'no')
+    >>> _parse_bytes("0x1 0xFF"), _parse_bytes("0x01,0x02"), _parse_bytes("01 02 # two")
+    (b'\x01\xff', b'\x01\x02', b'\x01\x02')
     """
-    if is_hex_bytes(text):
-        return bytes.fromhex(text)
-    if digits := _HEX_BYTES.fullmatch(text):
+    said = without_comment(text)
+    if said and is_hex_bytes(said):
+        return bytes.fromhex(said)
+    if digits := _HEX_BYTES.fullmatch(said):
         return bytes.fromhex(digits[1].rjust(len(digits[1]) + len(digits[1]) % 2, "0"))
+    if _LONE_BYTES.fullmatch(said):
+        return bytes(int(byte, 16) for byte in said.replace(",", " ").split())
     return text.encode()

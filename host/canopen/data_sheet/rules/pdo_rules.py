@@ -132,9 +132,9 @@ def halves(document: Document) -> Iterator[RuleFinding]:
 
 def reserved(document: Document) -> Iterator[RuleFinding]:
     """Find the sub-index 4 of communication parameters: a device must refuse it."""
-    for index, sub in document.rows:
+    for section, index, sub in document.file.objects():
         if sub == RESERVED and (index in RPDO or index in TPDO):
-            yield document.found("pdo-reserved", "sub-index 4 is reserved", f"{index:04X}sub4")
+            yield document.found("pdo-reserved", "sub-index 4 is reserved", section)
 
 
 def mappings(document: Document) -> Iterator[RuleFinding]:

@@ -39,7 +39,7 @@ def encoding(document: Document) -> Iterator[RuleFinding]:
         return
     if not document.is_unicode:
         first = next(at for at, text in enumerate(document.texts, 1) if not text.isascii())
-        what = f"the file is not UTF-8; {document.letters(first)}"
+        what = f"not UTF-8, which the canopen library and dcf-tools need; {document.letters(first)}"
         yield document.found("not-utf-8", what, "", first, edit)
     for number, text in enumerate(document.texts, 1):
         if not text.isascii():

@@ -20,6 +20,7 @@ from tickrig.wire.canopen.eds.eds_value import (
     FLOATS,
     NODE_IDS,
     TIMES,
+    is_hex_bytes,
     parse_limit,
     plain_numbers,
     without_comment,
@@ -235,7 +236,8 @@ def _standard_type(document: Document, finding: Finding, line: EdsLine) -> tuple
 def _bytes(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
     """Write the bytes that are taken; what a text is meant for is left to the author."""
     taken = finding.reason.rpartition(": ")[2].removesuffix(" is taken").replace(" ", "")
-    return (document.with_value(line, taken),) if line.value[:2].lower() == "0x" else ()
+    is_plain = is_hex_bytes(taken) and without_comment(line.value) == line.value
+    return (document.with_value(line, taken),) if is_plain else ()
 
 
 def _bit_rate(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:

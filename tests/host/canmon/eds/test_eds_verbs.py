@@ -211,7 +211,8 @@ def test_fix_writes_utf_8_or_ascii_and_tells_which_letter_it_took(tmp_path: Path
     path.write_bytes(GOOD.replace("u8 write", "für Schönaich").encode("cp850"))
     check = run("check", path)
     assert check.exit_code == 0
-    assert "warning: [not-utf-8] the file is not UTF-8; byte 81h is 'ü' in cp850" in check.stdout
+    said = "not UTF-8, which the canopen library and dcf-tools need; byte 81h is 'ü' in cp850"
+    assert f"warning: [not-utf-8] {said}" in check.stdout
     assert (
         "the canopen library"
         in json.loads(run("check", path, "--json").stdout.splitlines()[0])["breaks"]

@@ -539,6 +539,27 @@ CORPUS: Final = (
     ),
     Deviation(
         "byte-form",
+        within("2008", "DefaultValue=", "DefaultValue=0x1, 0xFF"),
+        True,
+        entry(0x2008, 0, default=b"\1\xff"),
+        keeps=("DefaultValue=01FF",),
+    ),
+    Deviation(
+        "byte-form",
+        within("2008", "DefaultValue=", "DefaultValue=0102 # two"),
+        False,
+        entry(0x2008, 0, default=b"\1\2"),
+        keeps=("DefaultValue=0102 # two",),
+    ),
+    Deviation(
+        "byte-form",
+        within("2008", "DefaultValue=", "DefaultValue=0x or more"),
+        False,
+        entry(0x2008, 0, default=b"0x or more"),
+        keeps=("DefaultValue=0x or more",),
+    ),
+    Deviation(
+        "byte-form",
         within("2008", "DefaultValue=", "DefaultValue=hello"),
         False,
         entry(0x2008, 0, default=b"hello"),
@@ -571,6 +592,9 @@ CORPUS: Final = (
         entry(0x2006, 0, low=None, high=None),
     ),
     Deviation("limit-value", put_in("1017", "LowLimit=none"), False),
+    Deviation(
+        "limit-value", put_in("1017", "LowLimit=$NODEID+1"), False, entry(0x1017, 0, low=None)
+    ),
     Deviation(
         "limit-range", put_in("1017", "HighLimit=65536"), False, entry(0x1017, 0, high=65536)
     ),

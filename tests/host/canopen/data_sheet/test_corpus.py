@@ -148,7 +148,9 @@ def test_what_is_not_utf_8_becomes_utf_8_and_its_letter_is_told(page: str) -> No
     ((rule, text),) = [(one.rule.name, one.text) for one in fixed.mended]
     assert rule == "not-utf-8"
     byte = "ö".encode(page).hex().upper()
-    assert text.startswith(f"the file is not UTF-8; byte {byte}h is 'ö' in {page}, ")
+    assert text.startswith(
+        f"not UTF-8, which the canopen library and dcf-tools need; byte {byte}h is 'ö' in {page}, "
+    )
 
 
 def test_the_encoding_that_is_named_is_that_of_the_file() -> None:

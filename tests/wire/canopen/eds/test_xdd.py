@@ -84,7 +84,7 @@ def test_a_file_of_canopen_editor_is_read(
     assert file.errors == ()
     said = [str(one).partition("] ")[2] for one in file.warnings]
     assert said == [
-        *["subIndex has more than two digits: they are taken for one number (section-form)"] * 2,
+        "subIndex has more than two digits, taken for one number; others may follow (section-form)",
         "ParameterValue belongs to a sub-index of the RECORD: it is skipped (value-place)",
         *warnings,
     ]
