@@ -160,7 +160,8 @@ class Watched:
         values = {HEARTBEAT_TIME: period_ms.to_bytes(2, "little")} if period_ms else {}
         self._name, self._memory = f"{channel} node {node}", NodeMemory(EdsObjects(values=values))
         self._heartbeats, self._sdo = Heartbeats(self._memory, from_boot=False), SdoChannel(node)
-        self._heartbeat_time = HEARTBEAT_TIME
+        self._heartbeat_time, self._eds_us = HEARTBEAT_TIME, period_ms * 1_000
+        self._doubted: str | None = None  # lost by the EDS alone, if the next gap agrees with it
         self.has_sent = self.guarded = self.requested = self.judged = False
 
     def take_sdo(self, at_us: int, data: bytes, *, request: bool) -> None:
@@ -177,14 +178,28 @@ class Watched:
             self._memory.boot()
             self._heartbeats.boot(at_us)
             self.guarded = self.requested = False
+            self._doubted = None
             return None
         self.guarded |= bool(data and data[0] & GUARD_TOGGLE)
-        sure = self._heartbeats.by_sdo or len(self._heartbeats.gaps) >= SURE_GAPS
-        eds_alone = not self._heartbeats.gaps
-        said = self.overdue(at_us) if sure or eds_alone else None
+        said = self._lost_before(at_us)
         self._heartbeats.take(at_us, learns=not self.requested)
         self.requested = False
         return said
+
+    def _lost_before(self, at_us: int) -> str | None:
+        """Say that a heartbeat is lost before one: what is heard goes before what an EDS says."""
+        beats = self._heartbeats
+        said = self.overdue(at_us)
+        if beats.by_sdo or len(beats.gaps) >= SURE_GAPS:
+            return said
+        if not beats.gaps:
+            doubted, self._doubted = self._doubted, said
+        else:
+            doubted, self._doubted = self._doubted, None
+        keeps_eds = beats.since_us is not None and at_us - beats.since_us <= (
+            LOST_AFTER * self._eds_us
+        )
+        return doubted if keeps_eds else None
 
     def overdue(self, at_us: int) -> str | None:
         """Say that its heartbeat is lost at a time."""

@@ -260,7 +260,14 @@ def test_an_eds_tells_the_period_of_a_node_until_it_is_heard() -> None:
     ]
     assert lost("1 080#", 1.16) == ["node 3: no heartbeat for 160.000 ms, its EDS says 100 ms"]
     assert lost("1 080#", 1.15) == []
-    assert lost("1 703#05\n2 703#05\n3 703#05", 4)[1:] == []  # heard: one a second
+    assert lost("1 703#05\n2 703#05\n3 703#05", 4) == []  # heard: one a second
+    assert lost("1 703#05\n2 703#05", 3) == []
+    assert lost("1 703#05\n2 703#05\n2.1 703#05\n2.2 703#05", 2.2) == [
+        "can0 node 3: no heartbeat for 1000.0 ms, its 1017h says 100.000 ms"
+    ]
+    assert lost("1 703#05\n2 703#00\n3 703#05\n4 703#05\n4.1 703#05", 4.1) == [
+        "can0 node 3: no heartbeat for 1000.0 ms, its 1017h says 100.000 ms"
+    ]
     assert lost("1 703#R\n1.01 703#85", 9) == []  # guarded
     assert lost(f"1 {WRITE_1017.replace('64', '00')}", 9) == []
 
