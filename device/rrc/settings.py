@@ -62,7 +62,7 @@ class Settings:
             case Output():
                 self.output = command
             case Joystick():
-                self.joystick = command
+                self.joystick = command.after(self.joystick)
             case SpeedMode(mode, locked):
                 self.speed_mode, self.speed_locked = mode, bool(locked)
             case Watchdog(ticks):

@@ -195,13 +195,15 @@ class Joystick(Command):
         v_exponent: #5, 0..15: output = input ^ (1 + 0.1 * #5).
         w_exponent: #6, 0..15.
         reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change turned round.
-        neutral_pct: #8, neutral radius, 0..100 %.
-        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back.
-        fade_deg: #10, where the backward gear begins to fade, 0..90 from straight back.
+        neutral_pct: #8, neutral radius, 0..100 %; with #7 at 0 or 1 any byte (DECISION R14).
+        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back;
+            likewise.
+        fade_deg: #10, where the backward gear begins to fade, 0..90 from straight back; likewise.
     """
 
     name = b"joystick"
-    parameters = (*[PERCENT] * 4, NIBBLE, NIBBLE, REVERSE_MODE, PERCENT, ANGLE, ANGLE)
+    parameters = (*[PERCENT] * 4, NIBBLE, NIBBLE, REVERSE_MODE, BYTE, BYTE, BYTE)
+    gear_parameters: ClassVar[tuple[Parameter, ...]] = (PERCENT, ANGLE, ANGLE)  # of a gear change
 
     v_low_pct: int = 0
     w_low_pct: int = 0
@@ -215,10 +217,33 @@ class Joystick(Command):
     fade_deg: int = 45
 
     def __post_init__(self) -> None:
-        """Refuse a dead zone that is upside down, too."""
+        """Refuse a dead zone that is upside down, and #8 to #10 that no gear change could use."""
         Command.__post_init__(self)
+        try:
+            for number, parameter in enumerate(self.gear_parameters, 8):
+                if self.reverse_mode > 1:
+                    parameter.checked(self.values()[number - 1])
+        except FieldError as error:
+            raise BadParameters(self.name, f"#{number} {error}") from error
         if self.v_low_pct >= self.v_high_pct or self.w_low_pct >= self.w_high_pct:
             raise BadParameters(self.name, "lower dead zone is not below the upper one")
+
+    def after(self, former: Joystick) -> Joystick:
+        """Return what holds after this command: #8 to #10 out of range leave the former ones.
+
+        Args:
+            former: what held before (DECISION R14).
+
+        >>> Joystick(neutral_pct=255, switch_deg=20).after(Joystick(neutral_pct=7)).values()[7:]
+        (7, 20, 45)
+        """
+        taken = [
+            new if new <= parameter.high else old
+            for parameter, new, old in zip(
+                self.gear_parameters, self.values()[7:], former.values()[7:], strict=True
+            )
+        ]
+        return Joystick(*self.values()[:7], *taken)
 
 
 @dataclass(frozen=True, slots=True)

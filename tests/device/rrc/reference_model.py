@@ -384,11 +384,16 @@ class ReferenceRrc:
 
     def obey_joystick(self, digits: bytes) -> None:
         values = numbers(digits, [2, 2, 2, 2, 1, 1, 1, 2, 2, 2])
-        within(values, [100, 100, 100, 100, 15, 15, 3, 100, 90, 90])
+        within(values[:7], [100, 100, 100, 100, 15, 15, 3])
+        if values[6] >= 2:
+            within(values[7:], [100, 90, 90])
         if values[0] >= values[2] or values[1] >= values[3]:
             raise ValueError("lower >= upper")
         if values[6] != self.joystick[6]:
             self.gear = "N"
+        for number, top in ((7, 100), (8, 90), (9, 90)):
+            if values[number] > top:
+                values[number] = self.joystick[number]
         self.joystick = values
 
     def obey_watchdog(self, digits: bytes) -> None:

@@ -16,6 +16,8 @@ def commands(draw: st.DrawFn) -> cmd.Command:
     if kind is cmd.Joystick:
         values[0:2] = [draw(st.integers(0, values[2] - 1)) if values[2] else 0, 0]
         values[2], values[3] = max(values[2], 1), max(values[3], 1)
+        if values[6] > 1:
+            values[7:] = [draw(st.integers(p.low, p.high)) for p in kind.gear_parameters]
     return cmd.Beep(tuple(values)) if kind is cmd.Beep else kind(*values)
 
 
@@ -54,6 +56,8 @@ def test_noise_is_a_wire_error_or_a_command(message: bytes) -> None:
         (b"output0080", "output: #2 -128 is not in -100..100"),
         (b"output1g00", "output: #1 b'1g' is not hexadecimal"),
         (b"output1e", "output: b'1e' is not 4 characters of its grammar"),
+        (b"joystick00006464002650000", "joystick: #8 101 is not in 0..100"),
+        (b"joystick0000646400305005b", "joystick: #10 91 is not in 0..90"),
         (b"speedmode60", "speedmode: #1 6 is not in 1..5"),
         (b"statusB1", "status: b'B1' is not 2 characters of its grammar"),
         (b"joystick64006464000000000", "joystick: lower dead zone is not below the upper one"),
