@@ -189,7 +189,7 @@ class Rrc(Copyable):
         if request is None:
             return
         if isinstance(request, Refusal):
-            if request.reason == "beep":  # it silences even when it is in error (DECISION R9)
+            if line.startswith(cmd.Beep.name):  # refused for whatever reason (DECISION R9)
                 self._buzzer.silence()
             self._reply(request)
         elif self._obey(request, tick):

@@ -317,6 +317,7 @@ class ReferenceRrc:
 
     def command(self, line: bytes) -> None:
         was_stable = self.stable
+        whole = line
         try:
             if was_stable:
                 if chr(line[-1]).upper() != check(line[:-1]):
@@ -332,7 +333,7 @@ class ReferenceRrc:
                 raise CommandError(name) from None
         except CommandError as error:
             self.reply(f"ER:{error}")
-            if str(error) == "beep":
+            if whole.startswith(b"beep"):
                 self.pattern = []
                 self.pattern_start = self.now
             return

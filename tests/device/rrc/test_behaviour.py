@@ -45,12 +45,14 @@ def test_silence_and_a_wrong_beep_stop_the_sound_at_once(line: str) -> None:
     assert bench.rrc.read("buzzer") == 0
 
 
-def test_a_beep_with_a_wrong_check_does_not_touch_the_sound() -> None:
+def test_a_beep_with_a_wrong_check_stops_the_sound_and_another_line_does_not() -> None:
     bench = RrcBench().power_on()
     bench.step("beepff000000000000000000")
     bench.step("stablemode1")
-    assert bench.step("beep00000000000000000000F") == ["ER:CommandChecksum"]
+    assert bench.step("statusA1F") == ["ER:CommandChecksum"]
     assert bench.rrc.read("buzzer") == 1
+    assert bench.step("beep00000000000000000000F") == ["ER:CommandChecksum"]
+    assert bench.rrc.read("buzzer") == 0
 
 
 def test_gear_r_sounds_half_a_second_on_and_off() -> None:

@@ -67,7 +67,7 @@ def prepared(vector: dict[str, Any]) -> Bench:
         bench.tick()
         return bench
     bench.standby()
-    if "stablemode on" in vector["note"]:
+    if "stablemode on" in vector["note"] or kind == "G04":
         bench.tick("stablemode1")
     if kind == "D07":
         bench.tick("poweroff")

@@ -21,7 +21,7 @@ VECTORS: dict[str, list[dict[str, Any]]] = json.loads(
 BEGIN = {"D01": "WaitPowerOn", "D02": "WaitPowerOn", "D03": "WaitPowerOn", "D04": "WaitPowerOn"}
 BEGIN |= {"D07": "PowerOffByOthers"}
 STATUS_ON = {"E01", "E02", "E03", "E04", "E05", "E06"}
-STABLE = {row["id"] for row in VECTORS["lines"] if "stablemode on" in row["note"]}
+STABLE = {row["id"] for row in VECTORS["lines"] if "stablemode on" in row["note"]} | {"G04"}
 
 CAUSES = {
     "CommunicationError": "bus_noise",
