@@ -74,7 +74,7 @@ class Gearbox:
             self.resets_at = None
             return False
         if self.resets_at is None:
-            self.resets_at = tick + RESET_TICKS - 1
+            self.resets_at = tick + RESET_TICKS
         if tick >= self.resets_at:
             self.gear = Gear.NEUTRAL
         return True

@@ -58,7 +58,7 @@ class PowerSequence:
 
     def due_tick(self, state: RrcState) -> int:
         """Return the next tick at which something happens without input."""
-        holds = (since + self.config.fault_hold_ticks - 1 for since in self._faults.values())
+        holds = (since + self.config.fault_hold_ticks for since in self._faults.values())
         if self._since is None:
             return min(holds, default=NEVER)
         return self._since + self._wait_ticks(state)
@@ -69,7 +69,7 @@ class PowerSequence:
         for name, event in RUNNING_FAULTS.items():
             if not inputs[name]:
                 self._faults.pop(name, None)
-            elif tick - self._faults.setdefault(name, tick) + 1 >= self.config.fault_hold_ticks:
+            elif tick - self._faults.setdefault(name, tick) >= self.config.fault_hold_ticks:
                 return Step(event, Move.FORCED)
         return NOTHING
 

@@ -287,7 +287,7 @@ class ReferenceRrc:
         for name, _ in FAULTS:
             self.fault_ticks[name] = self.fault_ticks[name] + 1 if self.inputs[name] else 0
         for name, cause in FAULTS:
-            if self.fault_ticks[name] == 10:
+            if self.fault_ticks[name] == 11:
                 self.force_off(cause)
                 return
 
@@ -471,7 +471,7 @@ class ReferenceRrc:
     def change_gear(self, v: int, w: int, radius: int, switch: int) -> None:
         if v * v + w * w <= radius * radius:
             self.neutral_ticks += 1
-            if self.neutral_ticks >= 20:
+            if self.neutral_ticks > 20:
                 self.gear = "N"
             return
         self.neutral_ticks = 0

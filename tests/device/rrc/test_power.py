@@ -76,10 +76,12 @@ def test_a_fault_at_power_on_has_its_error(fault: str, event: str) -> None:
 
 @pytest.mark.parametrize("state", ["Standby", "Limit", "Output"])
 @pytest.mark.parametrize(("fault", "cause"), CAUSES.items())
-def test_a_fault_is_detected_in_its_tenth_tick(fault: str, cause: str, state: str) -> None:
+def test_a_fault_is_detected_100_ms_after_its_first_tick(
+    fault: str, cause: str, state: str
+) -> None:
     bench = RrcBench().enter(state)
     bench.set(**{fault: 1})
-    assert bench.run(9) == []
+    assert bench.run(10) == []
     assert bench.step() == [f"EV:PowerOffWaitBy{cause}"]
     assert bench.state == "PowerOffByOthers"
 
@@ -88,7 +90,7 @@ def test_a_fault_that_goes_away_in_time_is_forgotten() -> None:
     bench = RrcBench().enter("Standby")
     for _ in range(3):
         bench.set(bus_noise=1)
-        assert bench.run(9) == []
+        assert bench.run(10) == []
         bench.set(bus_noise=0)
         assert bench.run(1) == []
 
@@ -96,7 +98,7 @@ def test_a_fault_that_goes_away_in_time_is_forgotten() -> None:
 def test_a_change_of_mode_does_not_hide_a_fault() -> None:
     bench = RrcBench().enter("Limit")
     bench.set(bus_noise=1)
-    bench.run(8)
+    bench.run(9)
     assert bench.step("output0000") == ["OK:output"]
     assert bench.step() == ["EV:PowerOffWaitByCommunicationError"]
 

@@ -134,7 +134,7 @@ def vr2_on(bench: Bench, cause: str) -> list[str]:
 
 def force_off(bench: Bench, cause: str) -> list[str]:
     if cause in FAULT_OF_CAUSE:
-        found = bench.ticks(10, **{FAULT_OF_CAUSE[cause]: 1})
+        found = bench.ticks(11, **{FAULT_OF_CAUSE[cause]: 1})
         return found + bench.tick(**{FAULT_OF_CAUSE[cause]: 0})
     if cause == "Host":
         bench.tick("stablemode1")

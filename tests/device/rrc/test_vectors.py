@@ -115,7 +115,7 @@ def force_off(bench: RrcBench, cause: str) -> list[str]:
             bench.set(extra_load_pct=400)
         case _:
             bench.set(**{CAUSES[cause]: 1})
-    lines = bench.run(10)
+    lines = bench.run(11)
     bench.set(extra_load_pct=0, **dict.fromkeys(CAUSES.values(), 0))
     return lines
 
