@@ -138,12 +138,12 @@ class Rrc(Copyable):
         if self.state is RrcState.OFF:
             self._boot(tick)
         self._sent, self._commands, self._replies = [], 0, 0
-        self._receive(rx)
+        overflows = self._receive(rx) if rx else 0
         self._read_inputs(tick)
         self._work(tick)
         self._watch(tick)
         self._drive.step(tick, self.state, self._settings, self.inputs)
-        self._report_and_account(tick)
+        self._report_and_account(tick, rx.count(b"\n"), overflows)
         running = self.state in POWERED_ON
         self._buzzer.tick(tick, self._drive.alarm_since if running else None)
         self._due_us = min(self._next_due(tick) * TICK_US, NEVER)
@@ -154,9 +154,14 @@ class Rrc(Copyable):
         self.state = RrcState.INITIALIZE
         self._power.enter(self.state, tick - 1)
 
-    def _receive(self, rx: bytes) -> None:
-        for _ in range(self._buffer.push(rx) if rx else 0):
-            self._reply(Refusal(RECEIVE_BUFFER_OVERFLOW))
+    def _receive(self, rx: bytes) -> int:
+        """Take bytes; return how often the load account has to pay for an overflow."""
+        buffer = self._buffer
+        overflows, thrown = buffer.overflows, buffer.thrown_blocks
+        buffer.push(rx)
+        overflows, thrown = buffer.overflows - overflows, buffer.thrown_blocks - thrown
+        self._sent += [Refusal(RECEIVE_BUFFER_OVERFLOW).encode()] * overflows
+        return overflows + thrown
 
     def _read_inputs(self, tick: int) -> None:
         """Take notice of buttons, faults and time."""
@@ -240,15 +245,18 @@ class Rrc(Copyable):
         self._move(Move.FORCED, tick)
         self._sent.append(Event(cause).encode())
 
-    def _report_and_account(self, tick: int) -> None:
+    def _report_and_account(self, tick: int, line_feeds: int, overflows: int) -> None:
         """Send the SA line, then see whether the period was long enough for it all."""
-        status = self._settings.status and self.state in POWERED_ON
-        if status:
-            self._sent.append(self._status().encode())
-        extra_pct = self.inputs["extra_load_pct"]
-        self._load.spend(self._commands, self._replies, status=status, extra_pct=extra_pct)
-        if self.config.overtime and self._load.too_far_behind and self.state in POWERED_ON:
-            self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
+        load, status = self._load, self._settings.status
+        if self.state in POWERED_ON:
+            if status:
+                self._sent.append(self._status().encode())
+            extra_pct = self.inputs["extra_load_pct"]
+            load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
+            if self.config.overtime and load.too_far_behind:
+                self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
+        if self.state not in POWERED_ON:
+            load.backlog_pct = 0
 
     def _status(self) -> Status:
         settings, inputs = self._settings, self.inputs

@@ -16,32 +16,35 @@ class ReceiveBuffer:
     """Bytes that wait to be worked on, cut into lines (DECISION R27).
 
     The byte that does not fit drops all that waits; it and what follows are
-    ignored up to the next LF.
+    thrown away up to the next LF.
 
     Attributes:
         size: bytes it holds, line ends included.
+        overflows: how often it has overflowed.
+        thrown_blocks: how often `size` bytes more of such a line were thrown away.
     """
 
     size: int
     _lines: deque[bytes] = field(default_factory=deque, init=False)
     _used: int = field(default=0, init=False)
     _begun: bytes = field(default=b"", init=False)
-    _ignoring: bool = field(default=False, init=False)
+    _thrown: int | None = field(default=None, init=False)  # bytes of the line behind an overflow
+    overflows: int = field(default=0, init=False)
+    thrown_blocks: int = field(default=0, init=False)
 
     def __bool__(self) -> bool:
         """Whether a whole line waits."""
         return bool(self._lines)
 
-    def push(self, data: bytes) -> int:
-        """Take bytes from the line; return how often the buffer overflowed."""
-        overflows = 0
+    def push(self, data: bytes) -> None:
+        """Take bytes from the line."""
         *lines, tail = data.split(b"\n")
         for line in lines:
-            overflows += self._push(line + b"\n")
-            if not self._ignoring:
-                self._lines.append(self._begun[:-1])
-            self._begun, self._ignoring = b"", False
-        return overflows + self._push(tail)
+            self._push(line, 1)
+            if self._thrown is None:
+                self._lines.append(self._begun)
+            self._begun, self._thrown = b"", None
+        self._push(tail, 0)
 
     def pop(self) -> bytes:
         """Take the oldest whole line, without its LF."""
@@ -49,17 +52,22 @@ class ReceiveBuffer:
         self._used -= len(line) + 1
         return line
 
-    def _push(self, piece: bytes) -> bool:
-        """Append a piece of one line; True if that was too much."""
-        if self._ignoring:
-            return False
-        if self._used + len(piece) > self.size:
+    def _push(self, piece: bytes, end: int) -> None:
+        """Append a piece of one line, and its LF if `end` is 1."""
+        if self._thrown is None:
+            beyond = self._used + len(piece) + end - self.size
+            if beyond <= 0:
+                self._used += len(piece) + end
+                self._begun += piece
+                return
             self._lines.clear()
-            self._used, self._begun, self._ignoring = 0, b"", True
-            return True
-        self._used += len(piece)
-        self._begun += piece
-        return False
+            self._used, self._begun = 0, b""
+            self.overflows += 1
+            before, piece = 0, piece[len(piece) + end - beyond + 1 :]  # behind the byte too many
+        else:
+            before = self._thrown
+        self._thrown = before + len(piece)
+        self.thrown_blocks += self._thrown // self.size - before // self.size
 
 
 def read_line(line: bytes, *, check_wanted: bool) -> Command | Refusal | None:

@@ -30,10 +30,12 @@ def powered_on() -> list[Act]:
 @settings(deadline=None)
 @given(st.binary(max_size=600), st.lists(st.integers(0, 600), max_size=8).map(sorted))
 def test_chunking_within_a_tick_makes_no_difference(data: bytes, cuts: list[int]) -> None:
-    def buffered(chunks: list[bytes]) -> tuple[int, list[bytes]]:
+    def buffered(chunks: list[bytes]) -> tuple[int, int, list[bytes]]:
         buffer = Rrc()._buffer
-        overflows = sum(map(buffer.push, chunks))
-        return overflows, [buffer.pop() for _ in iter(buffer.__bool__, False)]
+        for chunk in chunks:
+            buffer.push(chunk)
+        lines = [buffer.pop() for _ in iter(buffer.__bool__, False)]
+        return buffer.overflows, buffer.thrown_blocks, lines
 
     edges = [0, *cuts, len(data)]
     assert buffered([data[a:b] for a, b in pairwise(edges)]) == buffered([data])

@@ -140,6 +140,7 @@ class ReferenceRrc:
         self.state = "Off"
         self.buffer = b""
         self.ignoring = False
+        self.ignored = 0
         self.power_level = 0
         self.wipe()
 
@@ -201,12 +202,20 @@ class ReferenceRrc:
 
     def receive(self, rx: bytes) -> None:
         for byte in rx:
+            if byte == 0x0A:
+                self.cost += 25
             if self.ignoring:
                 self.ignoring = byte != 0x0A
+                if self.ignoring:
+                    self.ignored += 1
+                    if self.ignored % 256 == 0:
+                        self.cost += 150
             elif len(self.buffer) == 256:
                 self.buffer = b""
                 self.ignoring = byte != 0x0A
-                self.reply("ER:ReceiveBufferOverflow")
+                self.ignored = 0
+                self.sent.append("ER:ReceiveBufferOverflow")
+                self.cost += 150
             else:
                 self.buffer += bytes([byte])
 
@@ -309,7 +318,6 @@ class ReferenceRrc:
             if b"\n" not in self.buffer:
                 return
             line, self.buffer = self.buffer.split(b"\n", 1)
-            self.cost += 25
             if line.endswith(b"\r"):
                 line = line[:-1]
             if line:
@@ -496,9 +504,12 @@ class ReferenceRrc:
     # load account
 
     def account(self) -> None:
-        self.backlog = max(0, self.backlog + self.cost - 100)
-        if self.state in DRIVING and self.backlog >= 300:
-            self.force_off("OverTime")
+        if self.state in DRIVING:
+            self.backlog = max(0, self.backlog + self.cost - 100)
+            if self.backlog >= 300:
+                self.force_off("OverTime")
+        if self.state not in DRIVING:
+            self.backlog = 0
 
     # buzzer
 

@@ -135,10 +135,13 @@ LOADS = {
     "T03": (2, True, True),
     "T04": (1, False, True),
     "T05": (3, True, True),
+    "T07": (8, True, True),
+    "T08": (4, True, False),
 }
+LOAD = {row["id"]: row for row in VECTORS["load"]}
 
 
-@pytest.mark.parametrize("row", VECTORS["load"][:5], ids=ids(VECTORS["load"][:5]))
+@pytest.mark.parametrize("row", [LOAD[key] for key in LOADS], ids=LOADS)
 def test_load(row: dict[str, Any]) -> None:
     commands, stable, status = LOADS[row["id"]]
     bench = RrcBench().enter("Output")
@@ -156,11 +159,21 @@ def test_load(row: dict[str, Any]) -> None:
 
 
 def test_line_feed_ends_an_overflow() -> None:
-    row = VECTORS["load"][5]
+    row = LOAD["T06"]
     bench = RrcBench().enter("Standby")
     noise = b"x" * 115
     sent = [bench.step(raw=data) for data in (noise, noise, noise, b"\ndevice\n")]
     assert sent == row["per_tick"]
+
+
+def test_noise_that_is_thrown_away_stops_vr2() -> None:
+    row, bench = LOAD["T09"], RrcBench().enter("Standby")
+    bench.step("statusA1")
+    bench.run(1)
+    for tick in range(row["tick"] + 1):
+        events = [text for text in bench.step(raw=b"x" * 115) if text.startswith("EV")]
+        assert events == (row["first"] if tick == row["tick"] else [])
+    assert bench.state == row["state"]
 
 
 @pytest.mark.parametrize("row", VECTORS["limit"])
