@@ -49,6 +49,7 @@ class Exchange:
 
     def __init__(self, command: Command, *, stable: bool) -> None:
         self.command, self.name = command, command.name.decode()
+        self._stable = stable
         self.lines: tuple[bytes, ...] = (command.encode(check=stable),)
         self.text, self.done = "", False
         self.refusal: str | None = None
@@ -70,6 +71,11 @@ class Exchange:
         if self._wants_text:
             return f"the answer of {self._last}"
         return f"OK:{self.name}"
+
+    @property
+    def replies(self) -> int:
+        """How many lines the RRC sends if it does what was asked."""
+        return (not self._stable) + self._wants_text
 
     @property
     def has_barrier(self) -> bool:
