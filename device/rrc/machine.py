@@ -19,14 +19,12 @@ from tickrig.device.rrc.terminals import OUTPUTS, new_inputs
 from tickrig.device.twin import Copyable
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.load import LINES_A_PERIOD, PACE_WITHOUT_VR2, PERIOD_PCT, pace_lines_s
 from tickrig.wire.rrc.replies import RECEIVE_BUFFER_OVERFLOW, Event, Ok, Refusal, RrcEvent, Text
 from tickrig.wire.rrc.replies import StatusA as Status
 
 TICK_US: Final = 10_000
 """The RRC's internal command period (RRC manual, notes)."""
-
-LINES_A_TICK: Final = 2
-"""Lines worked on in a tick while VR2 runs; elsewhere one in two ticks (DECISION R27)."""
 
 MOVES: Final[dict[type[cmd.Command], Move]] = {
     cmd.Limit: Move.LIMIT,
@@ -90,7 +88,7 @@ class Rrc(Copyable):
         """Forget everything but configuration and physical inputs, as a power cut does."""
         self.state = RrcState.OFF
         self._buffer = ReceiveBuffer(self.config.buffer_bytes)
-        self._power = PowerSequence(self.config)
+        self._power, self._load = PowerSequence(self.config), LoadAccount()
         self._wipe()
         self._due_us = 0
 
@@ -116,8 +114,18 @@ class Rrc(Copyable):
             "speed_mode": self._settings.speed_mode,
             "gear": self._drive.gearbox.gear.value,
             "buzzer": int(self._buzzer.sounding),
+            "load_pct": self._load.load_pct,
+            "margin_pct": PERIOD_PCT - self._load.load_pct,
             "backlog_pct": self._load.backlog_pct,
+            "pace_lines_s": self._pace_lines_s,
         }[name]
+
+    @property
+    def _pace_lines_s(self) -> int:
+        now, extra_pct = self._settings, self._load.extra_pct
+        if self.state in POWERED_ON:
+            return pace_lines_s(stable=now.stable, status=now.status, extra_pct=extra_pct)
+        return 0 if self.state is RrcState.OFF else PACE_WITHOUT_VR2
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
         """Run one period, in the order of DECISION R28.
@@ -182,7 +190,7 @@ class Rrc(Copyable):
 
     def _work(self, tick: int) -> None:
         """Work on as many lines as the period allows."""
-        quota = LINES_A_TICK if self.state in POWERED_ON else 1 - tick % 2
+        quota = LINES_A_PERIOD if self.state in POWERED_ON else 1 - tick % 2
         while self._commands < quota and self._buffer:
             self._commands += 1
             self._answer(self._buffer.pop(), tick)
@@ -255,8 +263,6 @@ class Rrc(Copyable):
             load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
             if self.config.overtime and load.too_far_behind:
                 self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
-        if self.state not in POWERED_ON:
-            load.backlog_pct = 0
 
     def _status(self) -> Status:
         settings, inputs = self._settings, self.inputs
@@ -284,6 +290,7 @@ class Rrc(Copyable):
             self._drive.gearbox.reset()
         if self.state not in POWERED_ON or state not in POWERED_ON:
             self._power.enter(state, tick)
+            self._load = LoadAccount()
         if state is RrcState.STANDBY:
             self._renewed = tick
         if RrcState.INITIALIZE in (self.state, state):  # what commands set in there goes, too
@@ -296,12 +303,12 @@ class Rrc(Copyable):
     def _wipe(self) -> None:
         """Reset what Initialize resets (RRC manual, state description; DECISION R5)."""
         self._settings = Settings()
-        self._drive, self._buzzer, self._load = Drive(), Buzzer(), LoadAccount()
+        self._drive, self._buzzer = Drive(), Buzzer()
 
     def _next_due(self, tick: int) -> int:
         """Return the next tick at which something happens without input, `NEVER` if none does."""
         settings, running = self._settings, self.state in POWERED_ON
-        busy = self._buffer or self._load.backlog_pct or (settings.status and running)
+        busy = self._buffer or not self._load.settled or (settings.status and running)
         if busy or self._moved == tick:  # a new state looks at buttons from the next tick on
             return tick + 1
         due = self._power.due_tick(self.state)

@@ -9,6 +9,7 @@ from typing import Final
 from rich.text import Text
 
 from tickrig.wire.errors import WireError
+from tickrig.wire.rrc.load import SAFE_PCT
 from tickrig.wire.rrc.replies import StatusA, parse_reply
 
 Value = int | str
@@ -154,6 +155,13 @@ def lamps(view: View) -> list[Text]:
     ]
 
 
+def load(view: View) -> Text:
+    """Show how busy the RRC is, and how much of its time is left."""
+    margin_pct = view.number("margin_pct")
+    style = FAULT if margin_pct < 0 else ON if margin_pct < 100 - SAFE_PCT else ""
+    return Text(f"{view.number('load_pct')} %, margin {margin_pct} %", style=style)
+
+
 def state_of(view: View) -> Text:
     """Show the state in its colour."""
     state = str(view.values.get("state", "?"))
@@ -166,11 +174,14 @@ def outputs_pane(view: View) -> Text:
         Text.assemble("state  ", state_of(view)),
         Text.assemble("drive  v ", bar(view.number("out_v_pct"))),
         Text.assemble("       w ", bar(view.number("out_w_pct"))),
-        Text.assemble("speed  ", scale(view.number("speed_mode"), 5), "   gear "),
-        Text.assemble("gauge  ", scale(view.number("gauge"), 10)),
+        Text.assemble(
+            *("speed  ", scale(view.number("speed_mode"), 5)),
+            *("   gear ", (str(view.values.get("gear", "?")), "bold")),
+            *("   gauge ", scale(view.number("gauge"), 10)),
+        ),
+        Text.assemble("load   ", load(view), f"; at most {view.number('pace_lines_s')} lines/s"),
         Text.assemble("       ", Text("   ").join(lamps(view))),
     ]
-    rows[3].append(str(view.values.get("gear", "?")), style="bold")
     return Text("\n").join(rows)
 
 

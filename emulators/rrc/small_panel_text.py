@@ -12,7 +12,12 @@ def outputs_pane(view: View) -> Text:
     """Show what the RRC does, and the stick beside what becomes of it."""
     rows = [
         Text(" ").join([panel_text.state_of(view), *panel_text.lamps(view)]),
-        Text(f"stick {panel_text.stick_hint(view)}", style="bold"),
+        Text.assemble(
+            (f"{f'stick {panel_text.stick_hint(view)}':<27}", "bold"),
+            " load ",
+            panel_text.load(view),
+            f" ≤{view.number('pace_lines_s')}/s",
+        ),
         *(
             Text.assemble(f"{axis} stick {signed(view.number(f'stick_{axis}_pct'))}  out ", shown)
             for axis, shown in (

@@ -163,6 +163,7 @@ class ReferenceRrc:
         self.gear_tick = 0
         self.neutral_ticks = 0
         self.backlog = 0
+        self.costs = [0] * 10
         self.out_v = 0
         self.out_w = 0
         self.by_stick = False
@@ -506,10 +507,19 @@ class ReferenceRrc:
     def account(self) -> None:
         if self.state in DRIVING:
             self.backlog = max(0, self.backlog + self.cost - 100)
+            self.costs = [*self.costs[-9:], self.cost]
             if self.backlog >= 300:
                 self.force_off("OverTime")
         if self.state not in DRIVING:
             self.backlog = 0
+            self.costs = [0] * 10
+
+    def pace(self) -> int:
+        """Return how many lines a second take the RRC to 90 %, and two in a tick to 90 %."""
+        if self.state not in DRIVING:
+            return 0 if self.state == "Off" else 45
+        left = 90 - 30 - self.inputs["extra_load_pct"] - 20 * self.status
+        return max(0, min(180, left * 100 // (25 if self.stable else 40)))
 
     # buzzer
 

@@ -21,7 +21,10 @@ pytestmark = pytest.mark.unmeasured
 TICK_US = 10_000
 FAULTS = ("bus_noise", "joystick_fault", "power_module_fault", "vr2_fault", "bus_unplugged")
 BUTTONS = ("power_button", "alarm_button", "speed_up_button", "speed_down_button")
-SHOWN = ("state", "gear", "buzzer", "out_v_pct", "out_w_pct", "speed_mode")
+SHOWN = (
+    *("state", "gear", "buzzer", "out_v_pct", "out_w_pct", "speed_mode"),
+    *("load_pct", "margin_pct", "backlog_pct", "pace_lines_s"),
+)
 PERCENTS = (-100, -99, -60, -50, -45, -30, -10, -5, -4, -3, -1, 0, 1, 3, 4, 5, 10, 50, 99, 100)
 # Limits, dead zones and angles at and around the ends of their ranges.
 BYTES = (0, 1, 5, 10, 30, 45, 50, 89, 90, 91, 99, 100, 101, 127, 128, 155, 156, 200, 254, 255)
@@ -91,7 +94,11 @@ class Pair:
             self.sparse.inputs.set(name, value)
         model = self.model
         sent = model.tick(self.now, step.rx, self.inputs)
-        shown = (model.state, model.gear, model.buzzer, model.out_v, model.out_w, model.speed_mode)
+        load = sum(model.costs) // 10
+        shown = (
+            *(model.state, model.gear, model.buzzer, model.out_v, model.out_w, model.speed_mode),
+            *(load, 100 - load, model.backlog, model.pace()),
+        )
         dense_sent = self.dense.tick(now_us, step.rx)
         wanted = step.rx != b"" or now_us >= self.sparse.due_us
         sparse_sent = self.sparse.tick(now_us, step.rx) if wanted else b""

@@ -238,3 +238,71 @@ def test_a_joystick_command_takes_effect_at_once_in_limit_mode() -> None:
     assert out(bench) == (-50, 0)
     bench.step("joystick00006464001051e2d")
     assert out(bench) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("stable", "status", "pace"),
+    [(False, False, 150), (False, True, 100), (True, False, 180), (True, True, 160)],
+)
+def test_it_says_how_fast_a_host_may_send(stable: bool, status: bool, pace: int) -> None:
+    bench = RrcBench()
+    assert bench.rrc.read("pace_lines_s") == 0
+    assert bench.boot().rrc.read("pace_lines_s") == 45
+    bench.enter("Output")
+    bench.step(f"statusA{int(status)}")
+    bench.step(f"stablemode{int(stable)}")
+    bench.run(12)
+    assert bench.rrc.read("pace_lines_s") == pace
+    line = "output00001" if stable else "output0000"
+    loads = []
+    for tick in range(1_000):
+        due = (tick + 1) * pace // 100 - tick * pace // 100
+        bench.step(*[line] * due)
+        loads.append(int(bench.rrc.read("load_pct")))
+        assert int(bench.rrc.read("backlog_pct")) <= 40
+    assert max(loads[10:]) <= 90
+    assert bench.rrc.read("margin_pct") == 100 - loads[-1]
+    bench.step("poweroff8" if stable else "poweroff")
+    assert [bench.rrc.read(name) for name in ("load_pct", "margin_pct", "pace_lines_s")] == [
+        0,
+        100,
+        45,
+    ]
+
+
+def test_other_work_leaves_a_host_less_time() -> None:
+    bench = RrcBench().enter("Output")
+    bench.set(extra_load_pct=40)
+    bench.run(12)
+    assert bench.rrc.read("load_pct") == 70
+    assert bench.rrc.read("pace_lines_s") == 50
+    bench.set(extra_load_pct=90)
+    bench.run(2)
+    assert bench.rrc.read("pace_lines_s") == 0
+    bench.run(9)
+    assert bench.rrc.read("margin_pct") == -20
+
+
+@pytest.mark.parametrize(("stable", "status"), [(False, False), (False, True), (True, True)])
+def test_eight_lines_in_each_period_stop_vr2_in_the_second(stable: bool, status: bool) -> None:
+    bench = RrcBench().enter("Output")
+    bench.step(f"statusA{int(status)}")
+    bench.step(f"stablemode{int(stable)}")
+    bench.run(3)
+    line = "output00001" if stable else "output0000"
+    stops = ["EV:PowerOffWaitByOverTime" in bench.step(*[line] * 8) for _ in range(2)]
+    assert stops == [False, True]
+
+
+def test_two_lines_with_check_and_status_are_exactly_all_that_it_can() -> None:
+    bench = RrcBench().enter("Output")
+    bench.step("statusA1")
+    bench.step("stablemode1")
+    bench.run(10)
+    assert bench.rrc.read("backlog_pct") == 0
+    for backlog in (25, 50, 75):  # one line too many each time: nothing of it drains
+        bench.step(*["output00001"] * 3)
+        for _ in range(100):
+            bench.step(*["output00001"] * 2)
+            assert bench.rrc.read("backlog_pct") == backlog
+    assert bench.rrc.read("load_pct") == 100

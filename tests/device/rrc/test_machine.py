@@ -14,6 +14,7 @@ def test_it_works_every_10_ms_and_begins_at_once() -> None:
 
 def test_it_is_due_at_once_when_an_input_is_set_or_it_is_reset() -> None:
     bench = RrcBench().power_on()
+    bench.run(10)
     assert bench.rrc.due_us == NEVER
     bench.set(gauge=1)
     assert bench.rrc.due_us == 0
@@ -31,8 +32,21 @@ def test_it_is_due_when_power_on_ends() -> None:
 
 def test_it_is_due_when_the_watchdog_would_trip() -> None:
     bench = RrcBench().power_on()
-    bench.step("watchdog05")
+    bench.step("watchdog0f")
+    bench.run(10)
     assert bench.rrc.due_us == 10_000 * (bench.tick + 5)
+
+
+def test_it_is_due_until_its_load_says_no_more_of_a_command() -> None:
+    bench = RrcBench().power_on()
+    bench.run(10)
+    bench.step("gauge")
+    for _ in range(10):
+        assert bench.rrc.due_us == 10_000 * (bench.tick + 1)
+        assert bench.rrc.read("load_pct") == 34
+        bench.step()
+    assert bench.rrc.due_us == NEVER
+    assert bench.rrc.read("load_pct") == 30
 
 
 def test_it_is_due_in_each_period_while_it_sends_its_status() -> None:

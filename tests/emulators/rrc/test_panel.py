@@ -195,12 +195,14 @@ def drive_in_limit_mode(emulator: Emulator) -> None:
 def test_in_60_columns_and_15_lines_all_is_there(size: tuple[int, int]) -> None:
     async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
         drive_in_limit_mode(emulator)
+        pass_time(emulator, 100_000)
         await pilot.pause()
         await panel.look()
         await pilot.pause()
         text = "\n".join(on_screen(panel))
         for words in (
-            *("Limit", "● VR2 runs", "○ error LED", "○ buzzer", "stick drives, within limits"),
+            *("Limit", "● VR2 runs", "○ error LED", "○ buzzer", "stick drives, within limits load"),
+            *("load 50 %, margin 50 % ≤100/s",),
             *("v stick -100  out", "w stick -100  out", "█│░░░░░░░░░░░░░░░ -100 %"),
             *(
                 "speed ■□□□□ 1  gear N  gauge ■■■■■■■■■■ 10",
@@ -212,6 +214,40 @@ def test_in_60_columns_and_15_lines_all_is_there(size: tuple[int, int]) -> None:
             assert words in text
 
     on_panel(act, size)
+
+
+def test_load_margin_and_pace_stand_in_one_row() -> None:
+    async def act(panel: RrcPanel, emulator: Emulator, pilot: Any) -> None:
+        drive_in_limit_mode(emulator)
+        emulator.send(emulator.rig.now_us, b"limit6464ffffff\n" * 2)
+        pass_time(emulator, 10_000)
+        await panel.look()
+        await pilot.pause()
+        load_pct = panel.view.number("load_pct")
+        row = f"load   {load_pct} %, margin {100 - load_pct} %; at most 100 lines/s"
+        assert 50 < load_pct < 100
+        assert row in "\n".join(on_screen(panel))
+
+    on_panel(act)
+
+
+def test_a_load_that_is_too_much_fits_and_is_marked() -> None:
+    values: dict[str, int | str] = {
+        "load_pct": 1_030,
+        "margin_pct": -930,
+        "pace_lines_s": 0,
+        "state": "Standby",
+    }
+    view = View(values)
+    roomy, small = panel_text.outputs_pane(view), small_panel_text.outputs_pane(view)
+    assert "load   1030 %, margin -930 %; at most 0 lines/s" in roomy.plain.split("\n")
+    assert small.plain.split("\n")[1].endswith(" load 1030 %, margin -930 % ≤0/s")
+    assert max(len(row) for row in small.plain.split("\n")) <= 60
+    assert [panel_text.load(View({"margin_pct": pct})).style for pct in (10, 9, -1)] == [
+        "",
+        panel_text.ON,
+        panel_text.FAULT,
+    ]
 
 
 @pytest.mark.parametrize("size", [(59, 15), (60, 14), (20, 3)])
