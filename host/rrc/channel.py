@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.links.errors import LinkTimeout
@@ -13,18 +15,34 @@ from tickrig.host.rrc.reply_matcher import OnRefusals, ReplyMatcher
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
-from tickrig.wire.rrc.replies import Event, Ok, Refusal, RrcEvent
+from tickrig.wire.rrc.load import (
+    BASE_PCT,
+    LINE_FEED_PCT,
+    OVERFLOW_PCT,
+    PERIOD_PCT,
+    PERIOD_US,
+    PERIODS_A_SECOND,
+    REPLY_PCT,
+    SAFE_PCT,
+    STATUS_PCT,
+)
+from tickrig.wire.rrc.replies import (
+    RECEIVE_BUFFER_OVERFLOW,
+    Event,
+    Ok,
+    Refusal,
+    RrcEvent,
+    StatusA,
+)
 
-LINE_US: Final = 6_250
-REPLY_US: Final = 3_750
-"""What a line to the RRC takes, and what its answer takes, at 90 % of what the RRC can do.
+PCT_US: Final = PERIOD_US // (SAFE_PCT - BASE_PCT - STATUS_PCT)
+"""What 1 % of the RRC's period takes of the time that its own work and a status line leave."""
 
-Of each period of 10 ms its own work takes 30 %, a status line 20 %, a line that arrives 25 % and
-an answer 15 % (DECISION R27). At exactly 100 % nothing drains: a clock 0.2 % fast stops VR2.
-"""
+LINE_US: Final = LINE_FEED_PCT * PCT_US
+REPLY_US: Final = REPLY_PCT * PCT_US
+"""What a line to the RRC takes, 6.25 ms, and what its answer takes, 3.75 ms."""
 
-PERIOD_US: Final = 10_000
-"""The RRC's internal period; renewing its watchdog more often gains nothing."""
+SECOND_US: Final = 1_000_000
 
 RENEWALS: Final = 3
 """The watchdog is renewed this many times in its time: one renewal may be lost."""
@@ -33,6 +51,23 @@ FORGETTING: Final = (RrcEvent.POWER_OFF_FINISHED, RrcEvent.INITIALIZED)
 """Events after which the RRC has none of its settings (RRC manual, notes)."""
 
 _log = log_of(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class RrcLoad:
+    """How busy an RRC is whose VR2 runs, as its client counts the lines of the latest second.
+
+    What others send to the same RRC is not in it.
+
+    Attributes:
+        load_pct: its work in per cent of its time: 30 of its own, and what the lines cost.
+        margin_pct: what this leaves of 100. The client leaves 10 or more.
+        pace_lines_s: lines that the client sends in a second at most, if none is waited for.
+    """
+
+    load_pct: int
+    margin_pct: int
+    pace_lines_s: int
 
 
 class Channel:
@@ -62,6 +97,15 @@ class Channel:
         self._renewed_us = 0  # when the last command was sent; long ago if it was refused
         self._free_us = link.now_us  # when the RRC will have worked on all that was sent
         self._alarm: str | None = None
+        self._costs: deque[tuple[int, int]] = deque()  # time and per cent, of the latest second
+
+    @property
+    def load(self) -> RrcLoad:
+        """How busy the RRC is with what passed here."""
+        self._forget_costs()
+        load_pct = BASE_PCT + sum(pct for _, pct in self._costs) // PERIODS_A_SECOND
+        line_us = LINE_US + REPLY_US * (not self.matcher.settings.stable)
+        return RrcLoad(load_pct, PERIOD_PCT - load_pct, SECOND_US // line_us)
 
     def send(self, command: Command) -> None:
         """Send a command that nobody waits for."""
@@ -113,10 +157,14 @@ class Channel:
         data = self._receive(until_us)
         now_us = self._link.now_us
         for reply in self._inbox.push(now_us, data):
-            if not isinstance(reply, Event):
-                self._deliver(reply, exchange)
-            elif reply.kind in FORGETTING:
-                self.matcher.initialized()
+            match reply:
+                case Event():
+                    if reply.kind in FORGETTING:
+                        self.matcher.initialized()
+                case StatusA():
+                    self._account(STATUS_PCT)
+                case _:
+                    self._deliver(reply, exchange)
         self.matcher.settle(now_us)
 
     @property
@@ -158,11 +206,27 @@ class Channel:
         _log.debug("sent %r", line)
         now_us = self._link.now_us
         self._link.send(line)
+        self._account(LINE_FEED_PCT)
         self._free_us = max(now_us, self._free_us) + LINE_US + REPLY_US * replies
         self._renewed_us = now_us
 
+    def _account(self, cost_pct: int) -> None:
+        self._forget_costs()
+        self._costs.append((self._link.now_us, cost_pct))
+
+    def _forget_costs(self) -> None:
+        since_us = self._link.now_us - SECOND_US
+        while self._costs and self._costs[0][0] <= since_us:
+            self._costs.popleft()
+
     def _deliver(self, reply: Answer, exchange: Exchange | None) -> None:
         stopped_before = self.matcher.refusals.stopped
+        overflow = reply == Refusal(RECEIVE_BUFFER_OVERFLOW)
+        cost_pct = OVERFLOW_PCT if overflow else REPLY_PCT
+        self._account(cost_pct)
+        if isinstance(reply, Refusal) and (overflow or self.matcher.settings.stable):
+            # nothing was planned for this answer
+            self._free_us = max(self._link.now_us, self._free_us) + cost_pct * PCT_US
         if not self.matcher.take(reply, exchange):
             self._report(reply)
         if isinstance(reply, Refusal):

@@ -10,7 +10,7 @@ from tickrig.host.links.closing import Closing
 from tickrig.host.links.errors import LinkTimeout
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rrc.channel import Channel
+from tickrig.host.rrc.channel import Channel, RrcLoad
 from tickrig.host.rrc.errors import RrcRefused
 from tickrig.host.rrc.inbox import Arrival, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals
@@ -147,6 +147,11 @@ class RrcClient(Closing):
     def latest_status(self) -> Arrival[StatusA] | None:
         """The newest status line received in any call; look at its age."""
         return self._inbox.latest_status
+
+    @property
+    def load(self) -> RrcLoad:
+        """How busy the RRC is with this client, and how many lines a second it may send."""
+        return self._channel.load
 
     def resume(self) -> None:
         """Send again after RrcStopped.

@@ -63,10 +63,10 @@ class Inbox:
         self._on_unknown = on_unknown
         self._lines = LineSplitter()
 
-    def push(self, now_us: int, data: bytes) -> list[Answer | Event]:
-        """Take bytes in; return what says something about commands, in order."""
+    def push(self, now_us: int, data: bytes) -> list[Reply]:
+        """Take bytes in; return what the manual lists, in order."""
         replies = [self._read(now_us, line) for line in self._lines.push(data)]
-        return [r for r in replies if isinstance(r, Ok | Refusal | Text | Event)]
+        return [reply for reply in replies if reply is not None]
 
     def report(self, now_us: int, line: str) -> None:
         """Keep a line that means nothing here, and tell whoever wants to know."""

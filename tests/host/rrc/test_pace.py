@@ -5,28 +5,19 @@ from __future__ import annotations
 import pytest
 
 from tests.host.rigs import standby_bench
-from tickrig.host.links.link import Link
-from tickrig.host.rrc import RrcClient
+from tests.host.spy_link import SpyLink
+from tickrig.host.rrc import RrcClient, RrcLoad
 
 
-class FastClock:
-    """A `Link[bytes]` whose clock is 1 % fast."""
-
-    def __init__(self, link: Link[bytes]) -> None:
-        self._link = link
+class FastClock(SpyLink):
+    """A link whose clock is 1 % fast."""
 
     @property
     def now_us(self) -> int:
-        return self._link.now_us * 101 // 100
-
-    def send(self, traffic: bytes, /) -> None:
-        self._link.send(traffic)
+        return super().now_us * 101 // 100
 
     def receive(self, timeout_us: int, /) -> bytes:
-        return self._link.receive(-(-timeout_us * 100 // 101))
-
-    def close(self) -> None:
-        self._link.close()
+        return super().receive(-(-timeout_us * 100 // 101))
 
 
 @pytest.mark.parametrize("stable", [False, True])
@@ -52,3 +43,56 @@ def test_a_stall_of_100_ms_is_not_made_up_for() -> None:
             bench.client.output(10, 0, confirm=False)
             assert int(bench.rrc.read("backlog_pct")) < 50
     assert bench.rrc.read("state") == "Output"
+
+
+def test_refusals_cost_and_are_paid_for() -> None:
+    bench = standby_bench(stable=True, max_refusals=10_000)
+    client = bench.client
+    client.status(on=True)
+    bench.link.spoil = lambda line: line[:-2] + b"?\n"
+    for _ in range(1_000):
+        client.output(10, 0, confirm=False)
+        assert int(bench.rrc.read("backlog_pct")) < 100
+    assert bench.rrc.read("state") == "Standby"
+
+
+@pytest.mark.parametrize("stable", [False, True])
+def test_the_client_tells_the_load_that_the_rrc_has(stable: bool) -> None:
+    bench = standby_bench(stable=stable)
+    client, pace = bench.client, 160 if stable else 100
+    assert client.load == RrcLoad(load_pct=30, margin_pct=70, pace_lines_s=pace)
+    client.status(on=True)
+    client.run_for(1_500_000)
+    assert client.load == RrcLoad(load_pct=50, margin_pct=50, pace_lines_s=pace)
+    assert bench.rrc.read("load_pct") == 50
+    assert bench.rrc.read("pace_lines_s") == pace
+    until_us = client.now_us + 1_500_000
+    while client.now_us < until_us:
+        client.output(1, 0, confirm=False)
+    assert client.load.load_pct == pytest.approx(90, abs=1)
+    assert client.load.margin_pct == 100 - client.load.load_pct
+    assert bench.rrc.read("load_pct") == pytest.approx(90, abs=5)
+    client.run_for(1_000_000)
+    assert client.load.load_pct == 50
+
+
+def test_a_client_at_its_pace_sends_so_many_lines() -> None:
+    bench = standby_bench(stable=True)
+    bench.client.output(1, 0)
+    bench.link.sent.clear()
+    until_us = bench.client.now_us + 1_000_000
+    while bench.client.now_us < until_us:
+        bench.client.output(1, 0)
+    assert len(bench.link.sent) == pytest.approx(bench.client.load.pace_lines_s, abs=1)
+
+
+def test_a_client_waits_for_the_work_of_an_overflow() -> None:
+    bench = standby_bench(stable=True)
+    bench.link.send(b"x" * 257 + b"\n")
+    while b"ReceiveBufferOverflow" not in bench.link.heard:
+        bench.client.run_for(1_000)
+    heard_us = bench.client.now_us
+    bench.client.output(1, 0)
+    sent_us, line = bench.link.sent[-1]
+    assert line.startswith(b"output")
+    assert sent_us - heard_us >= 36_500

@@ -7,8 +7,10 @@ from itertools import groupby
 from pathlib import Path
 
 from tickrig import Bench
+from tickrig.host import RrcClient
 from tickrig.wire.rrc.check import check_digit
 from tickrig.wire.rrc.commands import COMMANDS, Command, Parameter, parse_command
+from tickrig.wire.rrc.load import PACE_WITHOUT_VR2, pace_lines_s
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "devices" / "rrc.md"
 
@@ -62,6 +64,42 @@ def test_each_example_is_that_command_and_is_answered_as_it_says() -> None:
         line = example.encode()
         assert name.startswith(parse_command(line).name.decode())
         assert answer(line) == answered, name
+
+
+def test_the_table_of_paces_is_that_of_the_code() -> None:
+    table = PAGE.read_text("utf-8").partition("| VR2 | stablemode |")[2].partition("\n\n")[0]
+    rows = [line.strip("| ").split(" | ") for line in table.splitlines()[2:]]
+    said = {(c[0], c[1], c[2]): (int(c[3]), float(c[4].removesuffix(" ms"))) for c in rows[:4]}
+    paces = {
+        ("runs", stable, status): pace_lines_s(stable=stable == "on", status=status == "on")
+        for stable in ("on", "off")
+        for status in ("on", "off")
+    }
+    assert {key: pace for key, (pace, _) in said.items()} == paces
+    for pace, line_ms in said.values():
+        assert line_ms == round(1_000 / pace, 2)
+    assert rows[4][3:] == [str(PACE_WITHOUT_VR2), f"{1_000 / PACE_WITHOUT_VR2:.1f} ms"]
+
+
+def test_ctl_and_client_tell_load_and_pace_as_the_page_shows() -> None:
+    """A host at its full pace, with CHECK and status lines."""
+    page = PAGE.read_text("utf-8")
+    shown = page.partition("get load_pct margin_pct backlog_pct pace_lines_s\n")[2]
+    said = dict(line.split() for line in shown.partition("```")[0].splitlines())
+    with Bench("rrc") as bench:
+        bench.run_for("1s")
+        bench.press("power_button")
+        bench.run_for("1s")
+        client = RrcClient(bench.link)
+        client.start()
+        client.status()
+        client.stablemode()
+        client.run_for(100_000)
+        until_us = client.now_us + 1_000_000
+        while client.now_us < until_us:
+            client.output(1, 0)
+        assert {name: str(bench.get(name)) for name in said} == said
+        assert f"{client.load!r}" in page
 
 
 def test_the_example_of_check_is_right() -> None:
