@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
@@ -50,14 +51,16 @@ EPOS_WHEEL: Final = ServoParameters(
     ),
 )
 
+CORE_RATIO: Final = 100.0  # strain wave gear, chosen
+
 CORE_MOTOR: Final = MotorParameters(  # chosen, typical of a brushless motor of 100 W, but:
     resistance_ohm=0.5,
     inductance_h=0.5e-3,
-    torque_constant_nm_a=15 / 7 / 100,  # 15 Nm at 7 A behind a ratio of 100
+    torque_constant_nm_a=9.0 / CORE_RATIO,  # table 5: 60 rpm at 60 V, of which 0.95 arrive
     inertia_kg_m2=4.0e-6,
     coulomb_nm=2.0e-3,  # with the gear's: 0.5 Nm at the output
     viscous_nm_s=1.0e-6,
-    winding_housing_k_w=1.0,
+    winding_housing_k_w=8.0,  # so that a winding can be too hot before its housing is
     housing_ambient_k_w=2.5,
     winding_s=20.0,
     housing_s=900.0,
@@ -75,10 +78,12 @@ FTMD: Final = PowerStage(  # NEDO report, FTMD 1 axis: 7 A continuous, 10 A peak
 
 MOTOR_CORE_UNIT: Final = ServoParameters(
     motor=CORE_MOTOR,
-    stage=FTMD,
+    stage=replace(  # the driver, set to what the gear bears (table 5): 15 Nm, 30 Nm at the peak
+        FTMD, continuous_a=15.0 / 9.0, peak_a=30.0 / 9.0
+    ),
     encoders=Encoders(counts_per_turn=4_096, gear_counts_per_turn=65_536),  # chosen
-    gear=GearParameters(  # strain wave; with the rotor: 0.05 kg m2 at the output
-        ratio=100.0,
+    gear=GearParameters(  # with the rotor: 0.05 kg m2 at the output
+        ratio=CORE_RATIO,
         efficiency=1.0,  # its loss is in the torque constant and in the friction
         inertia_kg_m2=0.01,
         coulomb_nm=0.3,

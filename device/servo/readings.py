@@ -61,6 +61,14 @@ class Readings(ServoSettings):
         return round(self.supply_v * 1_000)
 
     @property
+    def spare_mv(self) -> int:
+        """Voltage that the stage has left above the back-EMF; below 0 a load drives the motor."""
+        stage, motor = self.parameters.stage, self.parameters.motor
+        speed_rad_s = 0.0 if self.encoder_unplugged else abs(self._plant.speed_rad_s)
+        back_emf_v = motor.torque_constant_nm_a * speed_rad_s
+        return round((self.supply_v * stage.duty_max - back_emf_v) * 1_000)
+
+    @property
     def winding_dc(self) -> int:
         """Temperature of the winding, 0.1 degC."""
         return round(self.winding_c * 10)

@@ -26,6 +26,7 @@ class Measurements(Immutable):
         current_ma: current in the motor.
         limited: limits or the supply keep the current below what the loops want.
         deviates: the motor is far from what is wanted of it.
+        spare_mv: voltage that the supply leaves above the back-EMF, to make a current with.
         overloaded: the I2t of the power stage is used up.
         slip_deg: by how much motor encoder and gear encoder disagree.
     """
@@ -40,6 +41,7 @@ class Measurements(Immutable):
     current_ma: int
     limited: bool
     deviates: bool
+    spare_mv: int
     overloaded: bool
     slip_deg: float
 
@@ -87,6 +89,8 @@ STALLED_US: Final = 500_000
 OVERLOADED_US: Final = 1_000_000
 NO_CURRENT_MA: Final = 50
 NO_CURRENT_US: Final = 100_000
+SPARE_MV: Final = 500
+"""With less no current is missed: the motor turns as fast as its supply lets it."""
 SLIP_DEG: Final = 1.0
 DIP_US: Final = 5_000
 
@@ -128,7 +132,7 @@ FAULTS: Final = (
     ),
     Fault(
         *("motor commutation", 0x7122, _DRIVE),
-        seen=lambda s: s.deviates and abs(s.current_ma) < NO_CURRENT_MA,
+        seen=lambda s: s.deviates and abs(s.current_ma) < NO_CURRENT_MA and s.spare_mv > SPARE_MV,
         gone=_unless_tripped,
         after_us=NO_CURRENT_US,
     ),

@@ -59,7 +59,7 @@ class Motion(Part):
 
     Attributes:
         action: what the motor does.
-        reached: the reference is reached.
+        reached: the planned motion has ended at the reference, and the motor is there.
     """
 
     def __init__(self, shaft: Shaft, references: References) -> None:
@@ -119,6 +119,7 @@ class Motion(Part):
                 self.reached = False
             case _:
                 assert_never(action)
+        self.reached = self.reached and not self.deviates(0)
 
     def drive(self, since_us: int) -> None:
         """Command the motor until the next ms.

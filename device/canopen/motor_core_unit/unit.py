@@ -200,6 +200,7 @@ class MotorCoreUnit(Application):
             current_ma=servo.current_ma,
             limited=servo.current_limited,
             deviates=self._motion.deviates(now_us - self._begin_us),
+            spare_mv=servo.spare_mv,
             overloaded=servo.overloaded,
             slip_deg=self._shaft.slip_deg,
         )

@@ -131,7 +131,7 @@ def test_a_step_that_ends_a_reversal_does_not_jump_over_standstill() -> None:
 
 
 def test_an_open_winding_has_no_current_and_its_energy_is_heat() -> None:
-    plant = steps(Plant(MOTOR_CORE_UNIT), 0.01, 5.0, 60.0)
+    plant = steps(Plant(MOTOR_CORE_UNIT), 0.003, 5.0, 60.0)
     before = plant.losses.copper_j
     plant.open()
     assert plant.current_a == 0.0

@@ -8,7 +8,8 @@ from math import pi
 import pytest
 
 from tickrig.device.servo.parameters import Encoders, GearParameters
-from tickrig.device.servo.presets import EPOS_24_5, EPOS_WHEEL, MOTOR_CORE_UNIT, RE_30
+from tickrig.device.servo.presets import EPOS_24_5, EPOS_WHEEL, FTMD, MOTOR_CORE_UNIT, RE_30
+from tickrig.device.servo.sizing import free_speed_rad_s
 
 RAD_S_PER_RPM = pi / 30
 
@@ -30,11 +31,15 @@ def test_the_re_30_is_as_stiff_and_as_fast_as_its_catalogue_says() -> None:
 def test_the_motor_core_unit_is_what_its_table_says() -> None:
     unit, motor = MOTOR_CORE_UNIT, MOTOR_CORE_UNIT.motor
     ratio = unit.gear.ratio
-    assert motor.torque_constant_nm_a * ratio * 7 == pytest.approx(15.0)
+    constant_nm_a = motor.torque_constant_nm_a * ratio
+    assert constant_nm_a == pytest.approx(9.0)
+    assert constant_nm_a * unit.stage.continuous_a == pytest.approx(15.0)
+    assert constant_nm_a * unit.stage.peak_a == pytest.approx(30.0)
+    assert (FTMD.continuous_a, FTMD.peak_a) == (7.0, 10.0)
+    assert unit.stage.peak_a < FTMD.continuous_a
     assert unit.inertia_kg_m2 * ratio**2 == pytest.approx(0.05)
     assert unit.coulomb_nm * ratio == pytest.approx(0.5)
-    at_60_rpm_v = motor.torque_constant_nm_a * ratio * 60 * RAD_S_PER_RPM
-    assert at_60_rpm_v + 10 * motor.resistance_ohm < 60 * unit.stage.duty_max
+    assert free_speed_rad_s(unit) == pytest.approx(60 * RAD_S_PER_RPM, rel=0.01)
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])

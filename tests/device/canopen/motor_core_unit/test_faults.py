@@ -21,8 +21,11 @@ from tests.device.canopen.motor_core_unit.bench import (
     UnitBench,
 )
 
-WARM_C, HOT_C = 92, 108
-"""Air in which 7 A make the unit give less, and in which they are too much."""
+WARM_C = 107
+"""Air in which 15 Nm are too much for the winding, and 30 Nm at once are given less."""
+
+CONTINUOUS, PEAK = 5_461, 10_922
+"""References for 15 Nm and 30 Nm in current mode: 1.67 A and 3.33 A of 10 A."""
 
 
 @pytest.fixture
@@ -54,11 +57,11 @@ def cause_hot_housing(bench: UnitBench) -> None:
 
 
 def cause_hot_winding(bench: UnitBench) -> None:
-    bench.set("ambient_c", HOT_C)
+    bench.set("ambient_c", WARM_C)
     bench.pass_ms(7_200_000)
     bench.set("shaft_blocked", 1)
-    bench.begin(CURRENT, 22_937)
-    bench.pass_ms(20_000)
+    bench.begin(CURRENT, CONTINUOUS)
+    bench.pass_ms(60_000)
 
 
 def cause_encoder_loss(bench: UnitBench) -> None:
@@ -86,7 +89,7 @@ def cause_stall(bench: UnitBench) -> None:
 
 def cause_overload(bench: UnitBench) -> None:
     bench.begin(ANGLE, 0)
-    bench.set("shaft_load_nm", -19.5)
+    bench.set("shaft_load_nm", -29)
     bench.pass_ms(6_000)
 
 
@@ -236,10 +239,10 @@ def test_a_short_circuit_without_power_is_not_seen(bench: UnitBench) -> None:
 
 def test_a_blocked_shaft_is_no_fault_while_a_current_is_wanted(bench: UnitBench) -> None:
     bench.set("shaft_blocked", 1)
-    bench.begin(CURRENT, 10_000)
+    bench.begin(CURRENT, CONTINUOUS)
     bench.pass_ms(3_000)
     assert bench.emergencies == []
-    assert bench.see("current_a") == pytest.approx(3.05, rel=0.02)
+    assert bench.see("current_a") == pytest.approx(1.67, rel=0.01)
 
 
 @pytest.mark.unmeasured
@@ -247,10 +250,10 @@ def test_i2t_cuts_the_peak_current_to_the_continuous_one(bench: UnitBench) -> No
     bench.set("shaft_blocked", 1)
     bench.begin(CURRENT, 32_767)
     bench.pass_ms(1_900)
-    assert bench.see("current_a") == pytest.approx(10, rel=0.02)
+    assert bench.see("current_a") == pytest.approx(30 / 9, rel=0.01)
     bench.pass_ms(300)
-    assert bench.see("current_a") == pytest.approx(7, rel=0.02)
-    assert bench.status & LIMITED
+    assert bench.see("current_a") == pytest.approx(15 / 9, rel=0.01)
+    assert bench.status == ON | LIMITED
 
 
 @pytest.mark.unmeasured
@@ -258,11 +261,12 @@ def test_a_hot_winding_gets_less_current(bench: UnitBench) -> None:
     bench.set("ambient_c", WARM_C)
     bench.pass_ms(7_200_000)
     bench.set("shaft_blocked", 1)
-    bench.begin(CURRENT, 22_937)
+    bench.begin(CURRENT, PEAK)
     bench.pass_ms(100)
-    assert bench.see("current_a") == pytest.approx(7, rel=0.02)
-    bench.pass_ms(30_000)
-    assert 5 < bench.see("current_a") < 6.8
+    assert bench.see("current_a") == pytest.approx(30 / 9, rel=0.01)
+    bench.pass_ms(1_400)
+    assert 2.5 < bench.see("current_a") < 3.2
+    assert bench.status == ON | LIMITED
 
 
 def test_a_fault_leaves_the_node_operational(bench: UnitBench) -> None:

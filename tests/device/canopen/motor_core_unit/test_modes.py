@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import radians
 
 import pytest
 
@@ -118,27 +119,75 @@ def test_a_velocity_is_ramped_and_kept(bench: UnitBench) -> None:
 
 
 def test_a_current_makes_the_torque_of_the_table(bench: UnitBench) -> None:
-    """15/7 Nm/A, 0.05 kg m^2, 0.5 Nm of friction (K19)."""
+    """9.0 Nm/A, 0.05 kg m^2, 0.5 Nm of friction (K19)."""
     bench.begin(CURRENT, 3277)
-    bench.pass_ms(110)
+    bench.pass_ms(18)
     assert bench.see("current_a") == pytest.approx(1.0, rel=0.02)
-    assert bench.read(0x6401, 3) == pytest.approx(3277, rel=0.02)
     before = bench.see("velocity_deg_s")
-    bench.pass_ms(50)
-    acceleration_rad_s2 = (bench.see("velocity_deg_s") - before) / 0.05 / 57.2958
-    assert acceleration_rad_s2 == pytest.approx((15 / 7 - 0.5) / 0.05, rel=0.1)
+    bench.pass_ms(10)
+    assert bench.read(0x6401, 3) == pytest.approx(3277, rel=0.02)
+    acceleration_rad_s2 = radians(bench.see("velocity_deg_s") - before) / 0.01
+    assert acceleration_rad_s2 == pytest.approx((9.0 - 0.5) / 0.05, rel=0.01)
 
 
 def test_a_current_limit_holds(bench: UnitBench) -> None:
     bench.begin(VELOCITY)
-    bench.refer(32767, current_limit=3277)
+    bench.refer(32767, current_limit=983)
     seen, status = [], 0
     for _ in range(100):
         bench.pass_ms(2)
         seen.append(bench.see("current_a"))
         status |= bench.status
-    assert max(seen) == pytest.approx(1.0, abs=0.05)
+    assert max(seen) == pytest.approx(0.3, abs=0.015)
     assert status & LIMITED
+
+
+@pytest.mark.unmeasured
+@pytest.mark.parametrize("supply_v", [10, 24, 48])
+@pytest.mark.parametrize("direction", [-1, 1])
+def test_a_supply_below_60_v_limits_the_velocity_and_bit_2_says_so(
+    bench: UnitBench, supply_v: int, direction: int
+) -> None:
+    bench.set("supply_v", supply_v)
+    bench.begin(VELOCITY, 32767 * direction)
+    bench.pass_ms(1_000)
+    assert bench.see("velocity_deg_s") == pytest.approx(6 * supply_v * direction, rel=0.01)
+    assert bench.status == ON | LIMITED
+    bench.refer(round(32767 * direction * supply_v / 60 * 0.98))
+    bench.pass_ms(1_000)
+    assert bench.status == ON | REACHED
+    assert bench.emergencies == []
+
+
+@pytest.mark.unmeasured
+@pytest.mark.parametrize(("supply_v", "after_ms"), [(10, 1_635), (24, 808), (48, 535), (60, 354)])
+def test_a_supply_below_60_v_delays_an_angle_and_does_no_more(
+    bench: UnitBench, supply_v: int, after_ms: int
+) -> None:
+    bench.set("supply_v", supply_v)
+    bench.begin(ANGLE, 16384)
+    seen = []
+    for _ in range(after_ms + 300):
+        bench.pass_ms(1)
+        seen.append((bench.see("angle_deg"), bench.status))
+    there = next(ms for ms, (deg, _) in enumerate(seen, 3) if abs(deg - 90.0027) < 0.01)
+    assert there == pytest.approx(after_ms, abs=5)
+    assert max(deg for deg, _ in seen) < 90.0027 + ENCODER_DEG
+    assert any(status & LIMITED for _, status in seen) == (supply_v < 60)
+    assert min(deg for deg, status in seen if status & REACHED) > 89.0
+    assert (bench.status, bench.emergencies) == (ON | REACHED, [])
+
+
+@pytest.mark.parametrize("mode", [CURRENT, VELOCITY])
+def test_a_load_that_drives_a_motor_at_its_highest_speed_is_no_open_wire(
+    bench: UnitBench, mode: int
+) -> None:
+    bench.set("supply_v", 24)
+    bench.set("shaft_load_nm", 0.52)  # as much as friction takes
+    bench.begin(mode, 32767 if mode == VELOCITY else 3277)
+    bench.pass_ms(2_000)
+    assert abs(bench.see("current_a")) < 0.01
+    assert bench.emergencies == []
 
 
 def test_free_lets_the_shaft_coast_to_a_stop(bench: UnitBench) -> None:
