@@ -196,8 +196,11 @@ def find_layout(name: PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
 
 
 def check_lengths(link: PdoLink, source: PdoLayout, target: PdoLayout) -> None:
-    """Raise ServerRefused if what one sends is not as long as what the other takes."""
-    if source.bits != target.bits:
+    """Raise ServerRefused if the frame of one is not as long as that of the other.
+
+    Dummy bits fill up an RPDO, and nothing the TPDO of the same Booleans.
+    """
+    if source.size != target.size:
         raise ServerRefused(
             f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
         )

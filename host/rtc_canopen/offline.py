@@ -17,6 +17,7 @@ from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.node.boot import boot
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc_canopen.proxy.sdo_ports import lay_out_sdo_ports
 from tickrig.host.rtc_canopen.server import RtcCanopenServer
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
@@ -86,7 +87,10 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
 def _proxies(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
     for node_id, on in layouts.items():
         try:
-            server.manager.add(ProxyRtc(server.nodes[node_id].entry, on))
+            node = server.nodes[node_id]
+            made, refused = lay_out_sdo_ports(node.entry, node.file.data_types)
+            yield from (f"nodes: {node.entry.name}.{text}" for text in refused)
+            server.manager.add(ProxyRtc(node.entry, on, made))
         except RtcRefused as error:
             yield f"nodes: {error}"
 

@@ -11,13 +11,14 @@ from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc_canopen.connections import PdoLinks, PortConnections
-from tickrig.host.rtc_canopen.data_flow import PdoDataFlow
+from tickrig.host.rtc_canopen.data_flow import PdoDataFlow, SdoDataFlow
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefinition
 from tickrig.host.rtc_canopen.definition.device_file import DeviceFile
 from tickrig.host.rtc_canopen.events import EventLog, ServerEventType
 from tickrig.host.rtc_canopen.node.receiver import QUIET_US, SYNC_COB_ID, FrameDispatcher
 from tickrig.host.rtc_canopen.node.served_node import NodePhase, ServedNode
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc_canopen.proxy.sdo_ports import lay_out_sdo_ports
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.can_error import ErrorState
 from tickrig.wire.canopen.nmt import (
@@ -78,6 +79,7 @@ class RtcCanopenServer:
         self.connections = PortConnections(self.manager, definition.rt_connections, self.notify)
         self._receiver = FrameDispatcher(self.nodes, definition, self)
         self._data = PdoDataFlow(self.nodes, self.send, self.notify)
+        self._by_sdo = SdoDataFlow(self.nodes, self.notify)
         self._start_order = tuple(self.nodes[node_id] for node_id in definition.start_order)
         self._states: dict[int, LifeCycleState] = {}
 
@@ -103,6 +105,8 @@ class RtcCanopenServer:
             self._carry_out()
             self._activate_next()
         self._data.send_values()
+        if begins:
+            self._by_sdo.exchange(now_us)
         if self._sync.advance(now_us):
             self.send(SYNC_COB_ID, b"")
         if self._heartbeat.advance(now_us):
@@ -136,7 +140,8 @@ class RtcCanopenServer:
             BAD_PARAMETER if there is no such port or the value does not fit,
             PRECONDITION_NOT_MET while its proxy is not Active or another device sends it.
         """
-        return self._data.put(name, value)
+        result = self._by_sdo.put(name, value)
+        return self._data.put(name, value) if result is None else result
 
     def start(self) -> None:
         """Activate all nodes in the start order, each when those before it are Active.
@@ -210,8 +215,11 @@ class RtcCanopenServer:
     def _make_proxy(self, node: ServedNode) -> None:
         if node.proxy is not None:
             return
-        proxy = ProxyRtc(node.entry, node.layouts)
+        by_sdo, refused = lay_out_sdo_ports(node.entry, node.file.data_types)
+        proxy = ProxyRtc(node.entry, node.layouts, by_sdo)
         node.operations.proxy = self.manager.add(proxy, context=self._context)
+        for text in refused:
+            self.notify(ServerEventType.PORT_REFUSED, node.entry.id, text)
         for layout in node.layouts:
             if layout.unknown:
                 mapped = ", ".join(f"{m.index:04X}h:{m.sub:02X}" for m in layout.unknown)

@@ -10,11 +10,21 @@ from __future__ import annotations
 from typing import Final
 
 from tickrig.wire.canopen.eds.communication_profile import (
+    OFF,
     CommunicationProfile,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.eds.object_table import BIT_RATES, ROT, RWW, DeviceInfo, ObjectTable
+from tickrig.wire.canopen.eds.object_table import (
+    BIT_RATES,
+    MAX_VARIABLE_BYTES,
+    RO,
+    ROT,
+    RW,
+    RWW,
+    DeviceInfo,
+    ObjectTable,
+)
 from tickrig.wire.rtc_canopen.profile import PlacedPort, PortDirection, RtcProfile
 
 NO_PROFILE: Final = 0
@@ -50,13 +60,28 @@ def device_info(profile: RtcProfile) -> DeviceInfo:
 
 
 def _pdos(profile: RtcProfile, direction: PortDirection) -> list[Pdo]:
-    return [Pdo(port.cob_id, port.mapping) for port in profile.placed(direction)]
+    return [
+        Pdo(OFF if port.cob_id is None else port.cob_id, port.mapping, relative=port.relative)
+        for port in profile.placed(direction)
+    ]
+
+
+ACCESS: Final = {
+    (PortDirection.IN, False): RWW,
+    (PortDirection.OUT, False): ROT,
+    (PortDirection.IN, True): RW,
+    (PortDirection.OUT, True): RO,
+}
+"""By direction, and whether SDO alone carries the port."""
 
 
 def _add_port(table: ObjectTable, port: PlacedPort) -> None:
     kind, name = port.profile.port_type, port.profile.name
-    access = RWW if port.profile.direction is PortDirection.IN else ROT
+    access = ACCESS[port.profile.direction, port.profile.by_sdo]
+    default, most = None, MAX_VARIABLE_BYTES
+    if not kind.data_type.size:
+        default, most = kind.default, kind.max_bytes
     if kind.length == 1:
-        table.variable(port.index, name, kind.data_type, access)
+        table.variable(port.index, name, kind.data_type, access, default, max_bytes=most)
     else:
-        table.array(port.index, name, kind.length, kind.data_type, access)
+        table.array(port.index, name, kind.length, kind.data_type, access, default, max_bytes=most)

@@ -18,6 +18,9 @@ from tickrig.wire.errors import FieldError
 
 T = TypeVar("T")
 
+MAX_TEXT: Final = 255
+"""Characters that a text port holds; ours."""
+
 
 @dataclass(frozen=True, slots=True)
 class CanopenPortType(Generic[T]):
@@ -29,6 +32,7 @@ class CanopenPortType(Generic[T]):
         kind: the Python type of an element.
         length: number of elements.
         many: a value is a tuple of its elements, always as many; else it is the one element.
+        width: bits of an element where its data type leaves them open.
 
     Raises:
         ValueError: a sequence without elements.
@@ -39,6 +43,7 @@ class CanopenPortType(Generic[T]):
     kind: type[Any]
     length: int = 1
     many: bool = False
+    width: int = 0
 
     def __post_init__(self) -> None:
         """Refuse an empty sequence."""
@@ -47,19 +52,43 @@ class CanopenPortType(Generic[T]):
 
     def sequence(self, length: int) -> CanopenPortType[tuple[T, ...]]:
         """Return the type of so many elements together (DECISION K3)."""
-        return CanopenPortType(self.name, self.data_type, self.kind, length, many=True)
+        return CanopenPortType(
+            self.name, self.data_type, self.kind, length, many=True, width=self.width
+        )
+
+    @property
+    def element_bits(self) -> int:
+        """Bits of an element, as Table 4 has them; 0 for a text."""
+        return self.width or self.data_type.bits
 
     @property
     def bits(self) -> int:
-        """Bits in a PDO, where BOOLEAN takes a byte (DECISION K5); 0 for a text."""
-        return 8 * self.data_type.size * self.length
+        """Bits of a value in a PDO; 0 for a text, which fits none."""
+        return self.element_bits * self.length
+
+    @property
+    def max_bytes(self) -> int:
+        """Largest size of an element in the dictionary."""
+        if self.element_bits:
+            return (self.element_bits + 7) // 8
+        return len(self.data_type.encode(" " * MAX_TEXT))
+
+    @property
+    def default(self) -> bytes:
+        """Bytes of an element at power-on: 0, or an empty text."""
+        return bytes(self.max_bytes if self.element_bits else 0)
 
     def encode(self, value: T) -> tuple[bytes, ...]:
         """Return the bytes of each element; FieldError if the type has no such value."""
         items: Any = value if self.many else (value,)
         if len(items) != self.length:
             raise FieldError(f"{len(items)} elements of {self.name}, {self.length} are needed")
-        return tuple(self.data_type.encode(item) for item in items)
+        elements = tuple(self.data_type.encode(item) for item in items)
+        for item, data in zip(items, elements, strict=True):
+            if len(data) > self.max_bytes or (self.width and len(data) != self.max_bytes):
+                allowed = f"at most {MAX_TEXT} characters" if not self.width else "one of 16 bits"
+                raise FieldError(f"{item!r} is no {self.name}, which has {allowed}")
+        return elements
 
     def decode(self, elements: Sequence[bytes]) -> T:
         """Return the value of the bytes of all elements."""
@@ -68,8 +97,8 @@ class CanopenPortType(Generic[T]):
         return cast(T, values if self.many else values[0])
 
 
-def _row(name: str, data_type: DataType, kind: type[T]) -> CanopenPortType[T]:
-    return CanopenPortType(name, data_type, kind)
+def _row(name: str, data_type: DataType, kind: type[T], width: int = 0) -> CanopenPortType[T]:
+    return CanopenPortType(name, data_type, kind, width=width)
 
 
 BOOLEAN: Final = _row("Boolean", DataType.BOOLEAN, bool)
@@ -84,7 +113,7 @@ DOUBLE: Final = _row("Double", DataType.REAL64, float)
 UNSIGNED_LONG_LONG: Final = _row("UnsignedLongLong", DataType.UNSIGNED64, int)
 LONG_LONG: Final = _row("LongLong", DataType.INTEGER64, int)
 STRING: Final = _row("String", DataType.VISIBLE_STRING, str)
-WIDE_CHARACTER: Final = _row("WideCharacter", DataType.UNICODE_STRING, str)
+WIDE_CHARACTER: Final = _row("WideCharacter", DataType.UNICODE_STRING, str, width=16)
 WIDE_STRING: Final = _row("WideString", DataType.UNICODE_STRING, str)
 
 PORT_TYPES: Final[Mapping[str, CanopenPortType[Any]]] = MappingProxyType(

@@ -7,18 +7,32 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 from typing import Any, Final
 
+from tickrig.wire.canopen.cob_id import is_restricted
+from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen.port_types import CanopenPortType
 
 FIRST_PORT: Final = 0x2100
 """Index of the first port; the others follow in order of declaration."""
 
-MOST_PORTS: Final = 4
-"""In-ports, and out-ports: the pre-defined connection set has so many COB-IDs each way."""
+PORT_OBJECTS: Final = range(FIRST_PORT, 0x6000)
+"""Up to the end of the manufacturer's objects (CiA 301)."""
 
+MOST_PDOS: Final = 512
+"""Each way (CiA 301: 1400h to 15FFh, 1800h to 19FFh)."""
+
+MOST_ELEMENTS: Final = 254
+"""Sub-indices of an array (CiA 301)."""
+
+PREDEFINED_PDOS: Final = 4
+"""Each way: the pre-defined connection set has COB-IDs for so many."""
+
+CAN_IDS: Final = range(0x181, 0x6E0)
+
+_DUMMY_BIT: Final = MappedObject(DataType.BOOLEAN, 0, 1).encode()
 RATE_HZ: Final = range(1, 1001)
 _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 _VERSION: Final = re.compile(r"[0-9]{1,4}\.[0-9]{1,4}(\.[0-9]{1,4})?")
@@ -31,6 +45,13 @@ class PortDirection(Enum):
     OUT = "out"
 
 
+class PortTransport(StrEnum):
+    """What carries the values of a port."""
+
+    PDO = "pdo"
+    SDO = "sdo"
+
+
 @dataclass(frozen=True, slots=True)
 class CanopenPortProfile:
     """A port as it is declared.
@@ -39,11 +60,25 @@ class CanopenPortProfile:
         name: a letter, then up to 31 letters, digits and underscores.
         direction: in-port or out-port.
         port_type: type of its values.
+        cob_id: CAN-ID of its PDO; None for that of the pre-defined connection set.
+        transport: None for a PDO if the type fits into one, else SDO.
     """
 
     name: str
     direction: PortDirection
     port_type: CanopenPortType[Any]
+    cob_id: int | None = None
+    transport: PortTransport | None = None
+
+    @property
+    def fits_pdo(self) -> bool:
+        """Whether a PDO has room for a value."""
+        return 0 < self.port_type.bits <= MAX_PDO_BITS
+
+    @property
+    def by_sdo(self) -> bool:
+        """Whether its object is read and written by SDO alone."""
+        return self.transport is PortTransport.SDO or not self.fits_pdo
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +88,7 @@ class PlacedPort:
     Attributes:
         profile: the port.
         index: of its object.
-        number: of its RPDO or TPDO, 1..4.
+        number: of its RPDO or TPDO, 1..512; 0 without one.
     """
 
     profile: CanopenPortProfile
@@ -61,8 +96,18 @@ class PlacedPort:
     number: int
 
     @property
-    def cob_id(self) -> int:
-        """CAN-ID without the node-ID: of RPDO n for an in-port, of TPDO n for an out-port."""
+    def relative(self) -> bool:
+        """Whether the node-ID is added to the COB-ID."""
+        return self.profile.cob_id is None and 0 < self.number <= PREDEFINED_PDOS
+
+    @property
+    def cob_id(self) -> int | None:
+        """CAN-ID of RPDO n for an in-port, of TPDO n for an out-port.
+
+        Without the node-ID if `relative`; None if nobody has named one: the PDO is off.
+        """
+        if not self.relative:
+            return self.profile.cob_id
         first = 0x200 if self.profile.direction is PortDirection.IN else 0x180
         return first + 0x100 * (self.number - 1)
 
@@ -74,9 +119,15 @@ class PlacedPort:
 
     @property
     def mapping(self) -> tuple[int, ...]:
-        """What its PDO carries, as the mapping parameter says it."""
-        bits = 8 * self.profile.port_type.data_type.size
-        return tuple(MappedObject(self.index, sub, bits).encode() for sub in self.subs)
+        """What its PDO carries, as the mapping parameter says it.
+
+        Booleans have a bit each (Table 4). Dummy bits fill up the last byte of an RPDO; a TPDO
+        can have none (CiA 301), so its last byte ends with zeros that nothing is mapped to.
+        """
+        kind = self.profile.port_type
+        mapped = [MappedObject(self.index, sub, kind.element_bits).encode() for sub in self.subs]
+        gap = -kind.bits % 8 if self.profile.direction is PortDirection.IN else 0
+        return (*mapped, *[_DUMMY_BIT] * gap)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,37 +181,58 @@ class RtcProfile:
         return int(major) << 16 | int(minor)
 
     def placed(self, direction: PortDirection | None = None) -> tuple[PlacedPort, ...]:
-        """Return the ports with their places; those of one direction, or all."""
-        return tuple(port for port in self._place() if direction in (None, port.profile.direction))
+        """Return the ports with their places; those with a PDO of one direction, or all."""
+        return tuple(
+            port
+            for port in self._place()
+            if direction is None or (port.number and port.profile.direction is direction)
+        )
 
     def _place(self) -> Iterator[PlacedPort]:
         numbers = Counter[PortDirection]()
         for index, port in enumerate(self.ports, FIRST_PORT):
-            numbers[port.direction] += 1
-            yield PlacedPort(port, index, numbers[port.direction])
+            numbers[port.direction] += not port.by_sdo
+            yield PlacedPort(port, index, 0 if port.by_sdo else numbers[port.direction])
 
 
 def _check_ports(ports: tuple[CanopenPortProfile, ...]) -> None:
     for name, count in Counter(port.name for port in ports).items():
         if count > 1:
             raise ValueError(f"{count} ports are called {name!r}")
-    for direction in PortDirection:
-        count = sum(port.direction is direction for port in ports)
-        if count > MOST_PORTS:
-            raise ValueError(f"{count} {direction.value}-ports; {MOST_PORTS} have a COB-ID")
     for port in ports:
         _check_port(port)
+    for direction in PortDirection:
+        count = sum(port.direction is direction and not port.by_sdo for port in ports)
+        if count > MOST_PDOS:
+            raise ValueError(f"{count} {direction.value}-ports with a PDO, there are {MOST_PDOS}")
+    if len(ports) > len(PORT_OBJECTS):
+        raise ValueError(f"{len(ports)} ports, there are objects for {len(PORT_OBJECTS)}")
+    given = Counter(port.cob_id for port in ports if port.cob_id is not None)
+    for cob_id, count in given.items():
+        if count > 1:
+            raise ValueError(f"cob_id {cob_id:03X}h belongs to {count} ports; give each its own")
 
 
 def _check_port(port: CanopenPortProfile) -> None:
     _check_name("port", port.name)
     kind = port.port_type
-    if not kind.bits:
-        raise ValueError(f"port {port.name}: {kind.name} does not fit a PDO; use an SDO")
-    if kind.bits > MAX_PDO_BITS:
+    if kind.length > MOST_ELEMENTS:
         raise ValueError(
-            f"port {port.name}: {kind.length} x {kind.name} are {kind.bits} bits, "
-            f"a PDO has {MAX_PDO_BITS}"
+            f"port {port.name}: {kind.length} elements, an array has {MOST_ELEMENTS} at most"
+        )
+    if port.transport is PortTransport.PDO and not port.fits_pdo:
+        what = f"{kind.length} x {kind.name} are {kind.bits} bits" if kind.bits else kind.name
+        raise ValueError(
+            f"port {port.name}: {what}, a PDO has {MAX_PDO_BITS} bits; take transport sdo"
+        )
+    if port.cob_id is None:
+        return
+    if port.by_sdo:
+        raise ValueError(f"port {port.name}: it has no PDO for cob_id {port.cob_id:03X}h")
+    if port.cob_id not in CAN_IDS or is_restricted(port.cob_id):
+        raise ValueError(
+            f"port {port.name}: cob_id {port.cob_id:03X}h is not in 181h..6DFh, or is one of "
+            "581h..5FFh and 601h..67Fh, which belong to SDO"
         )
 
 

@@ -1,4 +1,4 @@
-"""64-bit integers with a time stamp: not in BasicDataType.idl, ours (K5)."""
+"""64-bit integers with a time stamp, one and many: not in BasicDataType.idl, ours (K5)."""
 
 from __future__ import annotations
 
@@ -12,3 +12,11 @@ class TimedLongLong(Timed[LongLong]):
 
 class TimedULongLong(Timed[ULongLong]):
     """An unsigned long long, with its time."""
+
+
+class TimedLongLongSeq(Timed[tuple[LongLong, ...]]):
+    """A sequence of long long, with its time."""
+
+
+class TimedULongLongSeq(Timed[tuple[ULongLong, ...]]):
+    """A sequence of unsigned long long, with its time."""

@@ -7,7 +7,7 @@ from typing import ClassVar, Generic, TypeVar
 
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.wire.rtc_canopen.port_types import CanopenPortType
-from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection
+from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, PortTransport
 
 T = TypeVar("T")
 
@@ -18,12 +18,23 @@ class CanopenPort(Generic[T]):
     Args:
         name: a letter, then up to 31 letters, digits and underscores.
         port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
+        cob_id: CAN-ID of its PDO; None for that of the pre-defined connection set, which the
+            first four of each direction have. Without one the PDO is off.
+        transport: None for a PDO if the type fits into one, else SDO.
     """
 
     direction: ClassVar[PortDirection]
 
-    def __init__(self, name: str, port_type: CanopenPortType[T]) -> None:
+    def __init__(
+        self,
+        name: str,
+        port_type: CanopenPortType[T],
+        *,
+        cob_id: int | None = None,
+        transport: PortTransport | None = None,
+    ) -> None:
         self.name, self.port_type = name, port_type
+        self.cob_id, self.transport = cob_id, transport
         self.entries: Sequence[Entry] = ()
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
@@ -33,7 +44,9 @@ class CanopenPort(Generic[T]):
     @property
     def profile(self) -> CanopenPortProfile:
         """The port as the profile of its component has it."""
-        return CanopenPortProfile(self.name, self.direction, self.port_type)
+        return CanopenPortProfile(
+            self.name, self.direction, self.port_type, self.cob_id, self.transport
+        )
 
     @property
     def value(self) -> T:

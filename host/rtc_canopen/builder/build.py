@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Final
+from typing import Any, Final
 
 from tickrig.host.rtc_canopen.builder.c_header import write_header
 from tickrig.host.rtc_canopen.builder.names import check_identifiers, snake_name
 from tickrig.host.rtc_canopen.builder.profile_file import Project
 from tickrig.host.rtc_canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
-from tickrig.host.rtc_canopen.definition.definition import NodeEntry, SystemDefinition
+from tickrig.host.rtc_canopen.definition.definition import (
+    NodeEntry,
+    SdoPortEntry,
+    SystemDefinition,
+)
 from tickrig.host.rtc_canopen.definition.definition_writer import write_definition
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.rtc_canopen.objects import device_info, object_table
-from tickrig.wire.rtc_canopen.profile import FIRST_PORT, PlacedPort, PortDirection, RtcProfile
+from tickrig.wire.rtc_canopen.port_types import INTEGER, CanopenPortType
+from tickrig.wire.rtc_canopen.profile import (
+    FIRST_PORT,
+    PlacedPort,
+    PortDirection,
+    PortTransport,
+    RtcProfile,
+)
 
 
 def build(project: Project) -> dict[str, str]:
@@ -42,13 +53,27 @@ def write_fragment(project: Project) -> str:
         project.node_id,
         f"{profile.type_name}0",
         f"{snake_name(profile.type_name)}.eds",
-        ports={pdo_name(port): port.profile.name for port in profile.placed()},
+        ports={pdo_name(port): port.profile.name for port in profile.placed() if port.number},
+        sdo_ports={
+            port.profile.name: SdoPortEntry(
+                port.index, port.profile.direction, _sdo_type(port.profile.port_type)
+            )
+            for port in profile.placed()
+            if not port.number
+        },
     )
     return write_definition(SystemDefinition((node,)))
 
 
+def _sdo_type(kind: CanopenPortType[Any]) -> str | None:
+    """Return what a System Definition calls a type; the data type in the EDS says which Integer."""
+    return None if kind.name == INTEGER else kind.name
+
+
 def pdo_name(port: PlacedPort) -> str:
-    """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`."""
+    """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`; else `sdo`."""
+    if not port.number:
+        return PortTransport.SDO.value
     kind = "rpdo" if port.profile.direction is PortDirection.IN else "tpdo"
     return f"{kind}{port.number}"
 
@@ -87,5 +112,10 @@ def _objects(rows: Iterable[EntryDescription]) -> Iterator[str]:
 def _pdo(port: PlacedPort) -> str:
     kind = port.profile.port_type
     what = f"{kind.length} x {kind.name}" if kind.length > 1 else kind.name
-    cob_id, name = f"{port.cob_id:03X}h+id", port.profile.name
-    return PDO.format(pdo_name(port), cob_id, kind.bits, f"{name}: {what}")
+    if not port.number:
+        cob_id = "-"
+    elif port.cob_id is None:
+        cob_id = "off"
+    else:
+        cob_id = f"{port.cob_id:03X}h{'+id' * port.relative}"
+    return PDO.format(pdo_name(port), cob_id, kind.bits or "-", f"{port.profile.name}: {what}")

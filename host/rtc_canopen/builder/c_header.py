@@ -10,6 +10,7 @@ from tickrig.host.rtc_canopen.builder.skeleton import CALLBACKS
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.rtc_canopen.objects import object_table
+from tickrig.wire.rtc_canopen.port_types import MAX_TEXT
 from tickrig.wire.rtc_canopen.profile import PlacedPort, RtcProfile
 
 C_TYPES: Final = {
@@ -25,6 +26,8 @@ C_TYPES: Final = {
     DataType.REAL32: "float",
     DataType.REAL64: "double",
     DataType.VISIBLE_CHAR: "char",
+    DataType.VISIBLE_STRING: "char",
+    DataType.UNICODE_STRING: "uint16_t",
 }
 """Data types of ports."""
 
@@ -49,6 +52,7 @@ extern "C" {{
 #define {upper}_RATE_HZ {rate_hz}u
 #define {upper}_OD_COUNT {count}u
 #define {upper}_NO_PORT 0xFFFFu
+#define {upper}_TEXT {text}u /* characters of a text port; a 0 follows them */
 
 /* Bits of `access`. */
 #define {upper}_READ 0x01u
@@ -68,7 +72,7 @@ typedef struct {{
     uint8_t sub;
     uint8_t data_type;  /* CiA 301; A0h is one character */
     uint8_t access;
-    uint8_t size;       /* bytes of a number, 0 of a text */
+    uint8_t size;       /* bytes of a number or of a wide character, 0 of a text */
     uint16_t port;      /* offset in {lower}_ports, or {upper}_NO_PORT */
     uint64_t number;    /* default of a number, bit by bit */
     const char *text;   /* default of a text */
@@ -96,13 +100,14 @@ def write_header(profile: RtcProfile) -> str:
         "version": profile.version,
         "rate_hz": profile.rate_hz,
         "count": len(rows),
+        "text": MAX_TEXT,
         "lower": lower,
         "upper": lower.upper(),
     }
     return "\n".join(
         [
             HEAD.format(**words),
-            *_ports(profile, lower),
+            *_ports(profile, lower, lower.upper()),
             ENTRY.format(**words),
             *_prototypes(lower),
             *_table(profile, rows, lower),
@@ -111,13 +116,15 @@ def write_header(profile: RtcProfile) -> str:
     )
 
 
-def _ports(profile: RtcProfile, lower: str) -> Iterator[str]:
-    yield "/* What RPDOs write and TPDOs send. */"
+def _ports(profile: RtcProfile, lower: str, upper: str) -> Iterator[str]:
+    yield "/* What RPDOs write and TPDOs send; ports that SDO alone carries are marked so. */"
     yield "typedef struct {"
     for port in profile.placed():
         kind = port.profile.port_type
         length = f"[{kind.length}]" if kind.length > 1 else ""
-        place = f"{port.profile.direction.value}-port, {port.index:04X}h"
+        length += "" if kind.element_bits else f"[{upper}_TEXT + 1]"
+        by_sdo = ", by SDO" if port.profile.by_sdo else ""
+        place = f"{port.profile.direction.value}-port, {port.index:04X}h{by_sdo}"
         member = f"{C_TYPES[kind.data_type]} {c_name(port.profile.name)}{length};"
         yield f"    {member} /* {place} */"
     if not profile.ports:
@@ -147,14 +154,16 @@ def _table(profile: RtcProfile, rows: list[EntryDescription], lower: str) -> Ite
 
 def _entry(row: EntryDescription, port: PlacedPort | None, lower: str) -> str:
     access = row.access.value | (NODE_ID if row.relative else 0)
-    number, text = "0u", "NULL"
-    if row.data_type.size:
+    number, text, size = "0u", "NULL", row.data_type.size
+    if port is not None and port.profile.port_type.width and row.sub in port.subs:
+        size = port.profile.port_type.max_bytes
+    if size:
         number = f"0x{int.from_bytes(row.default, 'little'):X}u"
     else:
         text = f'"{row.default.decode("ascii")}"'
     return (
         f"{{0x{row.index:04X}u, {row.sub}u, 0x{row.data_type:02X}u, 0x{access:02X}u, "
-        f"{row.data_type.size}u, {_offset(row, port, lower)}, {number}, {text}}}"
+        f"{size}u, {_offset(row, port, lower)}, {number}, {text}}}"
     )
 
 

@@ -28,7 +28,7 @@ COMPONENT_NAMES: Final = frozenset(
 )
 """What a component has beside its ports."""
 
-IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "integer"))
+IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "PortTransport", "integer"))
 """What the skeleton uses while it declares ports, beside the types."""
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from enum import Enum
+from typing import Any, Final, TypeVar
 
 from tickrig.wire.rtc_canopen.port_types import (
     INTEGER,
@@ -12,9 +13,15 @@ from tickrig.wire.rtc_canopen.port_types import (
     CanopenPortType,
     integer,
 )
-from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
+from tickrig.wire.rtc_canopen.profile import (
+    CanopenPortProfile,
+    PortDirection,
+    PortTransport,
+    RtcProfile,
+)
 
 Table = Mapping[str, Any]
+E = TypeVar("E", bound=Enum)
 
 EXAMPLE: Final = """\
 # A DeviceRTC: rtc-canopen-builder gripper.toml --out build
@@ -25,7 +32,8 @@ category = "actuator"
 rate_hz = 100           # on_execute, error_check and on_error
 node_id = 16            # in the System Definition; 1..127
 
-[[port]]                # objects from 2100h up in this order, each port in a PDO of its own
+[[port]]                # objects from 2100h up in this order, each port in a PDO of its own;
+                        # texts, and what is wider than 64 bits, are read and written by SDO
 name = "target_um"
 direction = "in"
 type = "Short"          # Table 4: Boolean, Octet, Character, Short, UnsignedShort, Float, ...
@@ -40,7 +48,7 @@ length = 3              # more than 1: a sequence
 TEXTS: Final = ("version", "vendor", "category")
 NUMBERS: Final = ("rate_hz", "product_code")
 KEYS: Final = ("name", *TEXTS, *NUMBERS, "node_id", "word_bits", "strict_cia301", "port")
-PORT_KEYS: Final = ("name", "direction", "type", "length")
+PORT_KEYS: Final = ("name", "direction", "type", "length", "cob_id", "transport")
 _KINDS: Final = {str: "no text", int: "no whole number", bool: "neither true nor false"}
 
 DEFAULT_WORD_BITS: Final = 32
@@ -105,16 +113,24 @@ def _port(number: int, table: Table, word_bits: int) -> CanopenPortProfile:
     """Read a port; errors say which of them."""
     try:
         _check_keys(table, PORT_KEYS)
-        direction = _take(table, "direction", str)
-        if direction not in (known := [item.value for item in PortDirection]):
-            raise ProfileError(f"direction {direction!r} is not one of {', '.join(known)}")
+        direction = _member(table, "direction", PortDirection)
         return CanopenPortProfile(
             _take(table, "name", str),
-            PortDirection(direction),
+            direction,
             _port_type(_take(table, "type", str), _take(table, "length", int, 1), word_bits),
+            _take(table, "cob_id", int) if "cob_id" in table else None,
+            _member(table, "transport", PortTransport) if "transport" in table else None,
         )
     except ValueError as error:
         raise ProfileError(f"port {number}: {error}") from None
+
+
+def _member(table: Table, key: str, kind: type[E]) -> E:
+    """Return a member of an enumeration by its value."""
+    value, known = _take(table, key, str), [str(item.value) for item in kind]
+    if value not in known:
+        raise ProfileError(f"{key} {value!r} is not one of {', '.join(known)}")
+    return kind(value)
 
 
 def _port_type(name: str, length: int, word_bits: int) -> CanopenPortType[Any]:

@@ -51,12 +51,15 @@ def _head(project: Project) -> Iterator[str]:
 
 def _imports(profile: RtcProfile) -> Iterator[str]:
     ports = sorted({_port_class(port) for port in profile.ports})
+    told = any(port.transport for port in profile.ports)
     types = sorted({_constant(port.port_type) for port in profile.ports})
     if ports:
         yield f"from tickrig.device.canopen.device_rtc.ports import {', '.join(ports)}"
     yield "from tickrig.device.component import Result"
     if ports:
         yield f"from tickrig.wire.rtc_canopen.port_types import {', '.join(types)}"
+    if told:
+        yield "from tickrig.wire.rtc_canopen.profile import PortTransport"
 
 
 def _attributes(project: Project) -> Iterator[str]:
@@ -68,7 +71,12 @@ def _attributes(project: Project) -> Iterator[str]:
     if project.strict_cia301:
         yield "    strict_cia301 = True"
     for port in profile.ports:
-        made = f"{_port_class(port)}({_quoted(port.name)}, {_type(port.port_type)})"
+        words = [_quoted(port.name), _type(port.port_type)]
+        if port.cob_id is not None:
+            words.append(f"cob_id=0x{port.cob_id:03X}")
+        if port.transport is not None:
+            words.append(f"transport=PortTransport.{port.transport.name}")
+        made = f"{_port_class(port)}({', '.join(words)})"
         yield f"    {python_name(port.name)} = {made}"
 
 

@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import Final
 
 from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.rtc_canopen.profile import PortDirection
 
 PDO_COUNT: Final = 512
 """PDOs in each direction (CiA 301, object dictionary: 1400h to 15FFh, 1800h to 19FFh)."""
@@ -95,6 +96,21 @@ class PdoEntry:
 
 
 @dataclass(frozen=True, slots=True)
+class SdoPortEntry:
+    """A port whose object is read or written by SDO.
+
+    Attributes:
+        index: of the object; all elements of an array are one value.
+        direction: `out` gives what is read, `in` writes.
+        type: name in Table 4; None for the one of the data type in the EDS.
+    """
+
+    index: int
+    direction: PortDirection
+    type: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class NodeEntry:
     """A node.
 
@@ -107,6 +123,7 @@ class NodeEntry:
         ports: names of ports by PDO, such as `tpdo2`.
         pdos: what is written into PDOs, by the same names.
         restart: how often one after the other it is restarted when it was lost.
+        sdo_ports: ports beside those of PDOs, by name.
     """
 
     id: int
@@ -117,6 +134,7 @@ class NodeEntry:
     ports: Mapping[str, str] = field(default_factory=dict)
     pdos: Mapping[str, PdoEntry] = field(default_factory=dict)
     restart: int = 0
+    sdo_ports: Mapping[str, SdoPortEntry] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ from tickrig.host.rtc_canopen.definition.definition import (
     Role,
     RtConnection,
     SdoEntry,
+    SdoPortEntry,
     StartEntry,
     SystemDefinition,
 )
@@ -43,6 +44,8 @@ from tickrig.host.rtc_canopen.definition.marked_yaml import (
 )
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
+from tickrig.wire.rtc_canopen.port_types import PORT_TYPES
+from tickrig.wire.rtc_canopen.profile import PortDirection
 
 LEAVE: Final = ("pre_operational", "stopped")
 SIZES: Final = (1, 2, 4, 8)
@@ -152,10 +155,14 @@ def _node(node: yaml.Node, place: str) -> NodeEntry:
         "restart": _U16,
         "ports": _ports,
         "pdos": mapping(pdo, _pdo),
+        "sdo_ports": mapping(matching(_NAME, "label"), _sdo_port),
     }
     values = read_table(node, place, fields, ("id", "name", "eds"))
     if "role" in values:
         values["role"] = Role(values["role"])
+    for name in values.get("sdo_ports", ()):
+        if name in values.get("ports", {}).values():
+            refuse(node, f"{place}: 2 ports are called {name}")
     for name in (*values.get("ports", ()), *values.get("pdos", ())):
         _check_number(node, place, name)
     return NodeEntry(**values)
@@ -178,6 +185,16 @@ def _pdo(node: yaml.Node, place: str) -> PdoEntry:
         "event_ms": _U16,
     }
     return PdoEntry(**read_table(node, place, fields))
+
+
+def _sdo_port(node: yaml.Node, place: str) -> SdoPortEntry:
+    fields: dict[str, Reader] = {
+        "index": whole(0x1000, 0xFFFF),
+        "direction": one_of(*(item.value for item in PortDirection)),
+        "type": one_of(*PORT_TYPES),
+    }
+    values = read_table(node, place, fields, ("index", "direction"))
+    return SdoPortEntry(**{**values, "direction": PortDirection(values["direction"])})
 
 
 def _mapping(node: yaml.Node, place: str) -> tuple[MappedObject, ...]:

@@ -17,6 +17,7 @@ from tickrig.host.rtc_canopen.definition.definition import (
     Role,
     RtConnection,
     SdoEntry,
+    SdoPortEntry,
     SystemDefinition,
 )
 from tickrig.host.text.whole_file import write_whole
@@ -112,6 +113,8 @@ def _node(node: NodeEntry) -> Table:
     values = _plain(_changed(node))
     if node.ports:
         values["ports"] = dict(node.ports)
+    if node.sdo_ports:
+        values["sdo_ports"] = {name: _sdo_port(port) for name, port in node.sdo_ports.items()}
     if node.pdos:
         values["pdos"] = {name: _pdo(pdo) for name, pdo in node.pdos.items()}
     return values
@@ -124,6 +127,11 @@ def _pdo(pdo: PdoEntry) -> Table:
     if pdo.cob_id is not None:
         values["cob_id"] = Hex(pdo.cob_id)
     return values
+
+
+def _sdo_port(entry: SdoPortEntry) -> Table:
+    values: Table = {"index": Hex(entry.index), "direction": entry.direction.value}
+    return values if entry.type is None else {**values, "type": entry.type}
 
 
 def _sdo(entry: SdoEntry) -> Table:

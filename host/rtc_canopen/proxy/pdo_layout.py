@@ -1,8 +1,8 @@
 """A PDO of a device as its proxy has it (NEDO report, Fig. 109, Table 4; ours: K5).
 
-A PDO has room for one 64-bit value: those have no sequence. INTEGER8, which RTC
-has not, is a short. The canopen library reads A0h, VISIBLE_CHAR, as DOMAIN; no
-other DOMAIN has 8 bits.
+A PDO has room for one 64-bit value: those have no sequence there. INTEGER8, which RTC
+has not, is a short. UNICODE_STRING of 16 bits is a wide character. The canopen library
+reads A0h, VISIBLE_CHAR, as DOMAIN; no other DOMAIN has 8 bits.
 
 >>> PDO_FIELD_TYPES[DataType.INTEGER16, 16].decode(0xFFFE)
 -2
@@ -16,11 +16,16 @@ from typing import Any, Final
 
 from tickrig.host.rtc_canopen.definition.device_file import TPDOS
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import port_types as table_4
 from tickrig.wire.rtc_types import basic
 from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.long_long import TimedLongLong, TimedULongLong
+from tickrig.wire.rtc_types.long_long import (
+    TimedLongLong,
+    TimedLongLongSeq,
+    TimedULongLong,
+    TimedULongLongSeq,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +54,12 @@ class PdoFieldType:
         return int.from_bytes(self.row.encode(value)[0], "little")
 
 
-_KINDS: Final = (
+PORT_KINDS: Final = (
     (table_4.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq),
+    (table_4.CHARACTER, basic.TimedChar, basic.TimedCharSeq),
+    (table_4.WIDE_CHARACTER, basic.TimedWChar, basic.TimedWCharSeq),
+    (table_4.STRING, basic.TimedString, basic.TimedStringSeq),
+    (table_4.WIDE_STRING, basic.TimedWString, basic.TimedWStringSeq),
     (table_4.OCTET, basic.TimedOctet, basic.TimedOctetSeq),
     (table_4.integer(8), basic.TimedShort, basic.TimedShortSeq),
     (table_4.SHORT, basic.TimedShort, basic.TimedShortSeq),
@@ -58,22 +67,39 @@ _KINDS: Final = (
     (table_4.LONG, basic.TimedLong, basic.TimedLongSeq),
     (table_4.UNSIGNED_LONG, basic.TimedULong, basic.TimedULongSeq),
     (table_4.FLOAT, basic.TimedFloat, basic.TimedFloatSeq),
-    (table_4.DOUBLE, basic.TimedDouble, None),
-    (table_4.UNSIGNED_LONG_LONG, TimedULongLong, None),
-    (table_4.LONG_LONG, TimedLongLong, None),
+    (table_4.DOUBLE, basic.TimedDouble, basic.TimedDoubleSeq),
+    (table_4.UNSIGNED_LONG_LONG, TimedULongLong, TimedULongLongSeq),
+    (table_4.LONG_LONG, TimedLongLong, TimedLongLongSeq),
 )
+"""Rows of Table 4, each with the struct of one value and that of several."""
+
+
+def _field_type(
+    row: table_4.CanopenPortType[Any], one: type[Struct], many: type[Struct], bits: int = 0
+) -> PdoFieldType:
+    bits = bits or row.element_bits
+    return PdoFieldType(row, one, many if 2 * bits <= MAX_PDO_BITS else None, bits)
+
+
+_BOOLEAN, _CHARACTER = PORT_KINDS[0], PORT_KINDS[1]
 
 PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], PdoFieldType]] = {
     **{
-        (row.data_type, row.bits): PdoFieldType(row, one, many, row.bits)
-        for row, one, many in _KINDS
+        (row.data_type, row.element_bits): _field_type(row, one, many)
+        for row, one, many in PORT_KINDS
+        if row.element_bits
     },
-    (DataType.BOOLEAN, 1): PdoFieldType(
-        table_4.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 1
-    ),
-    (DataType.DOMAIN, 8): PdoFieldType(table_4.CHARACTER, basic.TimedChar, basic.TimedCharSeq, 8),
+    (DataType.BOOLEAN, 8): _field_type(*_BOOLEAN, 8),
+    (DataType.DOMAIN, 8): _field_type(*_CHARACTER),
 }
 """By data type and bits in the PDO; strings are not among them."""
+
+
+def sequence_of(kind: type[Any], tm: basic.Time, values: tuple[Value, ...]) -> Struct:
+    """Return a struct with several values."""
+    if isinstance(kind().data, bytes):
+        return kind(tm, bytes(map(int, values)))  # type: ignore[no-any-return]
+    return kind(tm, values)  # type: ignore[no-any-return]
 
 
 PAIR = 0x400

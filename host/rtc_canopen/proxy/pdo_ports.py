@@ -7,7 +7,7 @@ from typing import Any
 
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc_canopen.proxy.pdo_decoder import pdo_decoder
-from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoField, PdoLayout
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoField, PdoLayout, sequence_of
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.idl import Struct
@@ -65,7 +65,7 @@ class PdoSource:
         if self._single:
             (port,) = self.ports
             if port.connectors:
-                port.write(_sequence(port.data_type, tm, values))
+                port.write(sequence_of(port.data_type, tm, values))
             return
         for port, value in zip(self.ports, values, strict=True):
             if port.connectors:
@@ -123,12 +123,6 @@ class PdoSink:
         encoded = self.layout.encode(tuple(latest))
         self._latest = latest
         return encoded
-
-
-def _sequence(kind: type[Any], tm: Time, values: tuple[Value, ...]) -> Struct:
-    if isinstance(kind().data, bytes):
-        return kind(tm, bytes(map(int, values)))  # type: ignore[no-any-return]
-    return kind(tm, values)  # type: ignore[no-any-return]
 
 
 def _suffix(field: PdoField) -> str:

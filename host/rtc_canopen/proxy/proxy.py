@@ -11,6 +11,8 @@ from tickrig.host.rtc.states import LifeCycleState, ReturnCode
 from tickrig.host.rtc_canopen.definition.definition import NodeEntry
 from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
+from tickrig.host.rtc_canopen.proxy.sdo_ports import SdoPortLayout, SdoSink, SdoSource
+from tickrig.wire.rtc_canopen.profile import PortDirection
 
 OK: Final = ReturnCode.RTC_OK
 
@@ -41,10 +43,13 @@ class ProxyRtc(RtComponent):
     Args:
         entry: its node.
         layouts: PDOs of the device.
+        sdo_layouts: objects of the device that have ports by SDO.
 
     Attributes:
         sources: TPDOs of the device, whose data go to OutPorts.
         sinks: RPDOs of the device, which take data from InPorts.
+        sdo_sources: objects of the device whose values go to OutPorts.
+        sdo_sinks: objects of the device that take values from InPorts.
         requested: what the callbacks asked for.
         passing: between on_activated and on_deactivated: data of the device pass.
         confirmed: the device has reported that it is Operational: data for it pass as well.
@@ -53,7 +58,12 @@ class ProxyRtc(RtComponent):
 
     spec = ModuleSpec("ProxyRTC", "A CANopen device", category="RTC-CANopen")
 
-    def __init__(self, entry: NodeEntry, layouts: tuple[PdoLayout, ...]) -> None:
+    def __init__(
+        self,
+        entry: NodeEntry,
+        layouts: tuple[PdoLayout, ...],
+        sdo_layouts: tuple[SdoPortLayout, ...] = (),
+    ) -> None:
         super().__init__(entry.name)
         self.requested, self.ready = NOTHING, False
         self.passing = self.confirmed = False
@@ -67,6 +77,13 @@ class ProxyRtc(RtComponent):
         for sink in self.sinks:
             for in_ in sink.ports:
                 self.add_port(in_)
+        outs = [layout for layout in sdo_layouts if layout.direction is PortDirection.OUT]
+        self.sdo_sources = tuple(map(SdoSource, outs))
+        self.sdo_sinks = tuple(SdoSink(layout) for layout in sdo_layouts if layout not in outs)
+        for read in self.sdo_sources:
+            self.add_port(read.port)
+        for written in self.sdo_sinks:
+            self.add_port(written.port)
 
     @property
     def state(self) -> LifeCycleState:
@@ -83,6 +100,8 @@ class ProxyRtc(RtComponent):
         self.requested, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
         for sink in self.sinks:
             sink.clear()
+        for written in self.sdo_sinks:
+            written.clear()
         return OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:

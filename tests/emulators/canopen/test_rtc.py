@@ -30,7 +30,7 @@ class Mine(CanopenComponent):
 
 class Wordy(CanopenComponent):
     type_name = "Wordy"
-    words = CanopenInPort("words", STRING)
+    words = CanopenInPort("words", STRING, cob_id=0x300)
 
 class Greedy(CanopenComponent):
     type_name = "Greedy"
@@ -134,7 +134,7 @@ def test_a_callback_that_raises_is_one_line(mine: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("Wordy", "mine.py:Wordy: Wordy: port words: String does not fit a PDO; use an SDO"),
+        ("Wordy", "mine.py:Wordy: Wordy: port words: it has no PDO for cob_id 300h"),
         ("Greedy", "input 'power_off' is one that every node has"),
         ("Broken", "line 25: AttributeError: 'Broken' object has no attribute 'nothing'"),
         ("Other", "has no component 'Other'; it has Mine, Wordy, Greedy, Broken"),

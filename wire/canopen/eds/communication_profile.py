@@ -39,6 +39,7 @@ class Pdo:
         transmission_type: 0..255.
         inhibit_100us: inhibit time of a TPDO.
         event_ms: event timer.
+        relative: the node-ID is added to the COB-ID.
     """
 
     cob_id: int
@@ -46,6 +47,7 @@ class Pdo:
     transmission_type: int = 255
     inhibit_100us: int = 0
     event_ms: int = 0
+    relative: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,7 +133,7 @@ def _add_supervision(objects: ObjectTable, profile: CommunicationProfile) -> Non
 def _add_pdo(objects: ObjectTable, kind: str, index: int, pdo: Pdo, timing: list[Element]) -> None:
     number = index % 0x200 + 1
     head = [
-        Element(1, "COB-ID", U32, RW, pdo.cob_id, relative=True),
+        Element(1, "COB-ID", U32, RW, pdo.cob_id, relative=pdo.relative),
         Element(2, "Transmission type", U8, RW, pdo.transmission_type),
     ]
     objects.record(index, f"{kind}{number} communication parameter", [*head, *timing])

@@ -262,6 +262,7 @@ class ObjectTable:
         low: int | float | None = None,
         high: int | float | None = None,
         relative: bool = False,
+        max_bytes: int = MAX_VARIABLE_BYTES,
     ) -> None:
         """Add a variable."""
         self._infos[index] = ObjectDescription(name)
@@ -271,6 +272,7 @@ class ObjectTable:
             low=low,
             high=high,
             relative=relative,
+            max_bytes=max_bytes,
         )
         self._rows.append(row)
 
@@ -282,11 +284,15 @@ class ObjectTable:
         kind: DataType,
         access: Access,
         default: Value | None = None,
+        *,
+        max_bytes: int = MAX_VARIABLE_BYTES,
     ) -> None:
         """Add an array of elements that are alike; sub-index 0 counts them."""
         self._head(index, name, ObjectCode.ARRAY, RO, count)
         self._rows += (
-            EntryDescription(index, sub, f"{name} {sub}", kind, access, default=default)
+            EntryDescription(
+                *(index, sub, f"{name} {sub}", kind, access), default=default, max_bytes=max_bytes
+            )
             for sub in range(1, count + 1)
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,17 @@ from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
 from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
 from tickrig.device.physical import InputSignal
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_canopen.port_types import BOOLEAN, CHARACTER, DOUBLE, LONG, SHORT
+from tickrig.wire.rtc_canopen.port_types import (
+    BOOLEAN,
+    CHARACTER,
+    DOUBLE,
+    LONG,
+    SHORT,
+    STRING,
+    WIDE_CHARACTER,
+    WIDE_STRING,
+)
+from tickrig.wire.rtc_canopen.profile import PortTransport
 
 
 class Everything(CanopenComponent):
@@ -90,6 +101,7 @@ def test_identity_and_heartbeat_are_those_of_the_profile() -> None:
         ("210#FEFFFFFF", "190#FEFFFFFF"),
         ("310#0100FFFF0080", "290#0100FFFF0080"),
         ("410#01", "390#01"),
+        ("410#FE", "390#00"),  # dummies fill up the byte of a Boolean
     ],
 )
 def test_what_an_in_port_gets_the_component_has_in_its_next_period(
@@ -98,6 +110,59 @@ def test_what_an_in_port_gets_the_component_has_in_its_next_period(
     bus = active(Everything)
     bus.step()
     assert bus.step(received) == [sent]
+
+
+class Wide(CanopenComponent):
+    """What needs more than whole bytes of the first four PDOs; all of it is sent back."""
+
+    type_name = "Wide"
+    rate_hz = 1_000
+    flags = CanopenInPort("flags", BOOLEAN.sequence(10))
+    word = CanopenInPort("word", WIDE_CHARACTER.sequence(3))
+    label = CanopenInPort("label", STRING)
+    path = CanopenInPort("path", DOUBLE.sequence(2))
+    flags_out = CanopenOutPort("flags_out", BOOLEAN.sequence(10))
+    word_out = CanopenOutPort("word_out", WIDE_CHARACTER.sequence(3))
+    label_out = CanopenOutPort("label_out", WIDE_STRING)
+    path_out = CanopenOutPort("path_out", DOUBLE.sequence(2))
+    slow = CanopenOutPort("slow", SHORT, transport=PortTransport.SDO)
+    third = CanopenOutPort("third", SHORT)
+    fourth = CanopenOutPort("fourth", SHORT)
+    fifth = CanopenOutPort("fifth", SHORT, cob_id=0x2A5)
+    sixth = CanopenOutPort("sixth", SHORT)
+
+    def on_execute(self) -> None:
+        pairs: tuple[tuple[CanopenInPort[Any], CanopenOutPort[Any]], ...] = (
+            *((self.flags, self.flags_out), (self.word, self.word_out)),
+            *((self.label, self.label_out), (self.path, self.path_out)),
+        )
+        for inlet, outlet in pairs:
+            if inlet.is_new:
+                outlet.write(inlet.read())
+                self.slow.write(self.slow.value + 1)
+                self.fifth.write(self.slow.value)
+
+
+@pytest.mark.parametrize(
+    ("received", "sent"),
+    [
+        ("210#FFFD", "190#FF01"),
+        ("210#0102", "190#0102"),
+        ("310#2B734100FFFF", "290#2B734100FFFF"),
+    ],
+)
+def test_bits_and_wide_characters_lie_in_pdos_as_table_4_has_them(received: str, sent: str) -> None:
+    bus = active(Wide)
+    bus.step()
+    assert bus.step(received) == [sent, "2A5#0100"]
+
+
+def test_a_fifth_pdo_is_sent_with_the_cob_id_that_was_named_and_one_without_is_off() -> None:
+    bus = Bus(make_device_rtc(Wide, 16))
+    bus.step()
+    sent = bus.step("000#0110")
+    assert {text.partition("#")[0] for text in sent} == {"190", "290", "390", "490", "2A5"}
+    assert bus.slave.dictionary[0x1805, 1].number == 0x8000_0000
 
 
 def test_activation_sends_every_out_port_once() -> None:

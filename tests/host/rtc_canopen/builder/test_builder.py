@@ -39,6 +39,15 @@ port = [
     {name = "real", direction = "out", type = "Double"},
     {name = "small", direction = "out", type = "Float", length = 2},
     {name = "octets", direction = "in", type = "Octet", length = 8},
+    {name = "bits", direction = "in", type = "Boolean", length = 3, cob_id = 0x2A5},
+    {name = "off", direction = "in", type = "Short"},
+    {name = "word", direction = "out", type = "WideCharacter", length = 3, transport = "pdo"},
+    {name = "letter", direction = "out", type = "WideCharacter"},
+    {name = "sentence", direction = "in", type = "String"},
+    {name = "title", direction = "out", type = "WideString", length = 2},
+    {name = "letters", direction = "out", type = "WideCharacter", length = 5},
+    {name = "numbers", direction = "out", type = "Integer", length = 5},
+    {name = "slow", direction = "out", type = "Short", transport = "sdo"},
 ]
 """
 NO_PORTS = 'name = "Nothing"\n'
@@ -122,16 +131,21 @@ def test_the_header_compiles_and_its_table_is_the_dictionary(tmp_path: Path, tex
     command = ["cc", "-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "main.c", "-o", "main"]
     subprocess.run(command, cwd=tmp_path, check=True)
     shown = subprocess.run([tmp_path / "main"], capture_output=True, check=True, text=True)
-    ports = {(port.index, sub) for port in project.profile.placed() for sub in port.subs}
+    ports = {
+        (port.index, sub): port.profile.port_type
+        for port in project.profile.placed()
+        for sub in port.subs
+    }
     expected = []
     for row in object_table(project.profile):
         access = row.access.value | 0x80 * row.relative
-        number = int.from_bytes(row.default, "little") if row.data_type.size else 0
-        words = "" if row.data_type.size else row.default.decode()
-        port = int((row.index, row.sub) in ports)
+        kind = ports.get((row.index, row.sub))
+        size = kind.max_bytes if kind and kind.element_bits else row.data_type.size
+        number = int.from_bytes(row.default, "little") if size else 0
+        words = "" if size else row.default.decode()
         expected.append(
-            f"{row.index:x} {row.sub:x} {row.data_type:x} {access:x} {row.data_type.size:x}"
-            f" {number:x} {words} {port}"
+            f"{row.index:x} {row.sub:x} {row.data_type:x} {access:x} {size:x}"
+            f" {number:x} {words} {int(kind is not None)}"
         )
     assert shown.stdout.splitlines() == expected
 
@@ -144,11 +158,15 @@ def test_the_fragment_is_a_system_definition_of_this_node(tmp_path: Path, text: 
     assert (node.id, node.name) == (16, f"{project.profile.type_name}0")
     assert (tmp_path / node.eds).exists()
     ports = {port.profile.name: port for port in project.profile.placed()}
-    assert set(node.ports.values()) == ports.keys()
+    by_sdo = {name for name, port in ports.items() if port.profile.by_sdo}
+    assert ({*node.sdo_ports}, {*node.ports.values()}) == (by_sdo, ports.keys() - by_sdo)
+    for name, entry in node.sdo_ports.items():
+        assert (entry.index, entry.direction) == (ports[name].index, ports[name].profile.direction)
     dictionary = make_dictionary(component(tmp_path, project))
     for pdo, name in node.ports.items():
         parameter = (0x1800 if pdo[0] == "t" else 0x1400) + int(pdo[4:]) - 1
-        assert dictionary[parameter, 1].number == ports[name].cob_id
+        cob_id = ports[name].cob_id
+        assert dictionary[parameter, 1].number == (0x8000_0000 if cob_id is None else cob_id)
 
 
 def test_names_that_a_component_has_are_known() -> None:
@@ -177,8 +195,10 @@ REFUSED = [
     ("{type}", "port 1: type 'Int' is not one of Boolean, Octet, Character, Short"),
     ("{length}", "port 1: a sequence of 0 elements, at least 1 is needed"),
     ("{name}", "port 1: name is missing"),
-    ("{bits}", "port a: 9 x Octet are 72 bits, a PDO has 64"),
-    ("{text}", "port a: String does not fit a PDO; use an SDO"),
+    ("{bits}", "port a: 9 x Octet are 72 bits, a PDO has 64 bits; take transport sdo"),
+    ("{text}", "port a: String, a PDO has 64 bits; take transport sdo"),
+    ("{transport}", "port 1: transport 'can' is not one of pdo, sdo"),
+    ("{cob_id}", "port a: cob_id 601h is not in 181h..6DFh, or is one of 581h..5FFh"),
     ("{word}", "port 1: a word of 12 bits; Integer has 8, 16 or 32"),
     ("{twice}", "port 'in' becomes 'in_', and so is another called"),
 ]
@@ -188,8 +208,10 @@ PORTS = {
     "{type}": '{name = "a", direction = "in", type = "Int"}',
     "{length}": '{name = "a", direction = "in", type = "Short", length = 0}',
     "{name}": '{direction = "in", type = "Short"}',
-    "{bits}": '{name = "a", direction = "in", type = "Octet", length = 9}',
-    "{text}": '{name = "a", direction = "in", type = "String"}',
+    "{bits}": '{name = "a", direction = "in", type = "Octet", length = 9, transport = "pdo"}',
+    "{text}": '{name = "a", direction = "in", type = "String", transport = "pdo"}',
+    "{transport}": '{name = "a", direction = "in", type = "Short", transport = "can"}',
+    "{cob_id}": '{name = "a", direction = "in", type = "Short", cob_id = 0x601}',
     "{word}": '{name = "a", direction = "in", type = "Integer"}',
     "{twice}": '{name = "in", direction = "in", type = "Short"},'
     ' {name = "in_", direction = "in", type = "Short"}',
@@ -248,6 +270,12 @@ def test_objects_and_pdos_are_shown(tmp_path: Path) -> None:
         *("PDO", "rpdo1", "tpdo1"),
     ]
     assert lines[-1].split() == ["tpdo1", "180h+id", "48", "forces_mn:", "3", "x", "Short"]
+    (tmp_path / "e.toml").write_text(EVERYTHING)
+    pdos = [line.split()[:3] for line in run(tmp_path / "e.toml").stdout.splitlines()[-17:]]
+    assert [" ".join(words) for words in pdos if words[1] != "-"][8:] == [
+        *("rpdo5 2A5h 3", "rpdo6 off 16", "tpdo5 off 48", "tpdo6 off 16"),
+    ]
+    assert [words[2] for words in pdos if words[0] == "sdo"] == ["-", "-", "80", "80", "16"]
     every = run(tmp_path / "g.toml", "--all").stdout
     assert "1017h:00  Producer heartbeat time" in every
     assert len(every.splitlines()) > 70

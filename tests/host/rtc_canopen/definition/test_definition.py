@@ -19,6 +19,7 @@ from tickrig.host.rtc_canopen.definition.definition import (
     Role,
     RtConnection,
     SdoEntry,
+    SdoPortEntry,
     StartEntry,
     SystemDefinition,
 )
@@ -26,6 +27,8 @@ from tickrig.host.rtc_canopen.definition.definition_reader import parse_definiti
 from tickrig.host.rtc_canopen.definition.definition_writer import write_definition
 from tickrig.host.rtc_canopen.errors import DefinitionError
 from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.rtc_canopen.port_types import PORT_TYPES
+from tickrig.wire.rtc_canopen.profile import PortDirection
 
 K16 = """\
 bus: {channel: vcan0, bitrate: 1000000}
@@ -104,6 +107,27 @@ def test_json_is_read_as_well() -> None:
             "line 5: ports: 2 ports are called x",
         ),
         (
+            "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {x: {index: 0x2100}}}",
+            "line 2: sdo_ports.x has no 'direction'",
+        ),
+        (
+            "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {x: {index: 1, direction: in}}}",
+            "line 2: index: 1 is not a whole number in 4096..65535",
+        ),
+        (
+            "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {x: {index: 0x2100, direction: up}}}",
+            "line 2: direction: 'up' is none of: in, out",
+        ),
+        (
+            "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {1x: {index: 0x2100, direction: in}}}",
+            "line 2: sdo_ports: '1x' is not like label",
+        ),
+        (
+            "nodes:\n- id: 1\n  name: A\n  eds: a\n  ports: {tpdo1: x}\n  sdo_ports:\n"
+            "    x: {index: 0x2100, direction: in, type: String}",
+            "line 2: a node: 2 ports are called x",
+        ),
+        (
             "nodes:\n- id: 1\n  name: A\n  eds: a\n  pdos:\n    tpdo1: {mapping: [0x140, 0x108]}",
             "line 6: mapping: 72 bits, a PDO has 64",
         ),
@@ -167,6 +191,12 @@ def test_a_pdo_has_its_communication_parameter(name: str, index: int) -> None:
     assert PdoName(5, name).index == index
 
 
+def test_ports_by_sdo_are_read() -> None:
+    text = "nodes:\n- {id: 1, name: A, eds: a, sdo_ports: {x: {index: 0x2100, direction: out}}}"
+    (node,) = parse_definition(text).nodes
+    assert node.sdo_ports == {"x": SdoPortEntry(0x2100, PortDirection.OUT)}
+
+
 def test_what_is_written_is_short_and_in_the_order_of_the_digest() -> None:
     assert write_definition(READ) == (
         "bus: {channel: vcan0, bitrate: 1000000}\n"
@@ -200,6 +230,12 @@ def definitions(draw: st.DrawFn) -> SystemDefinition:
         some,
     )
     words = st.sampled_from(("ai", "x1", "no", "null"))
+    sdo_ports = st.builds(
+        SdoPortEntry,
+        st.integers(0x1000, 0xFFFF),
+        st.sampled_from(PortDirection),
+        st.none() | st.sampled_from(tuple(PORT_TYPES)),
+    )
     nodes = tuple(
         NodeEntry(
             node_id,
@@ -210,6 +246,7 @@ def definitions(draw: st.DrawFn) -> SystemDefinition:
             draw(st.dictionaries(st.just("tpdo1"), words)),
             draw(st.dictionaries(st.just("rpdo512"), pdos)),
             draw(st.integers(0, 0xFFFF)),
+            draw(st.dictionaries(st.just("label"), sdo_ports)),
         )
         for node_id in ids
     )

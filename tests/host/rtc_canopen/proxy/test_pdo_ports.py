@@ -23,6 +23,9 @@ GOLDEN = Path(__file__).parents[3] / "golden" / "rtc_canopen.json"
 Row = tuple[int, type[Any], type[Any] | None, int, bytes, Any]
 TABLE_4: list[Row] = [
     (DataType.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 8, b"\x01", True),
+    (DataType.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 1, b"\x01", True),
+    (DataType.VISIBLE_CHAR, basic.TimedChar, basic.TimedCharSeq, 8, b"A", "A"),
+    (DataType.UNICODE_STRING, basic.TimedWChar, basic.TimedWCharSeq, 16, b"\x2b\x73", "猫"),
     (DataType.UNSIGNED8, basic.TimedOctet, basic.TimedOctetSeq, 8, b"\xfe", 254),
     (DataType.DOMAIN, basic.TimedChar, basic.TimedCharSeq, 8, b"A", "A"),
     (DataType.INTEGER8, basic.TimedShort, basic.TimedShortSeq, 8, b"\xfe", -2),
