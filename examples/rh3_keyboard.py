@@ -22,10 +22,10 @@ def main(device: str) -> None:
     chain.ref_hard.configuration.set("DeviceFileName", device)
     for component in (GamePad("GamePad0"), SwitchInput("SwitchInputRTC0")):
         manager.add(component, context=chain.context)
-    manager.disconnect("PathFollower.velocity", "RefHardRh3.InTargetVelocity")
+    manager.disconnect("PathFollower0.velocity", "RefHardRh30.InTargetVelocity")
     manager.connect("GamePad0.velocity", "SwitchInputRTC0.joystick")
-    manager.connect("PathFollower.velocity", "SwitchInputRTC0.automatic")
-    manager.connect("SwitchInputRTC0.velocity", "RefHardRh3.InTargetVelocity")
+    manager.connect("PathFollower0.velocity", "SwitchInputRTC0.automatic")
+    manager.connect("SwitchInputRTC0.velocity", "RefHardRh30.InTargetVelocity")
     chain.activate()
     manager.activate("GamePad0", "SwitchInputRTC0")
     try:

@@ -41,7 +41,7 @@ class MotionChain:
     Args:
         manager: who runs them.
         open_link: opens the line to the base.
-        suffix: behind each instance name, for several carts.
+        number: behind each instance name, as OpenRTM numbers them; each cart has its own.
         rate_hz: of the execution context.
 
     Attributes:
@@ -56,16 +56,16 @@ class MotionChain:
         self,
         manager: Manager,
         open_link: Opener = SerialLink,
-        suffix: str = "",
+        number: int = 0,
         rate_hz: float = RATE_HZ,
     ) -> None:
-        self.manager, self._suffix = manager, suffix
-        self.ref_hard = RefHardRh3(f"RefHardRh3{suffix}", open_link)
-        self.odometry = Odometry(f"Odometry{suffix}")
-        self.position_input = PositionInput(f"PositionInput{suffix}")
-        self.omni_to_2wd = OmniTo2WD(f"OmniTo2WD{suffix}")
-        self.navigation = Navigation(f"Navigation{suffix}")
-        self.path_follower = PathFollower(f"PathFollower{suffix}")
+        self.manager, self._number = manager, number
+        self.ref_hard = RefHardRh3(f"RefHardRh3{number}", open_link)
+        self.odometry = Odometry(f"Odometry{number}")
+        self.position_input = PositionInput(f"PositionInput{number}")
+        self.omni_to_2wd = OmniTo2WD(f"OmniTo2WD{number}")
+        self.navigation = Navigation(f"Navigation{number}")
+        self.path_follower = PathFollower(f"PathFollower{number}")
         self.components = (
             self.ref_hard,
             self.odometry,
@@ -106,4 +106,4 @@ class MotionChain:
 
     def _named(self, port: str) -> str:
         component, _, name = port.partition(".")
-        return f"{component}{self._suffix}.{name}"
+        return f"{component}{self._number}.{name}"

@@ -55,10 +55,10 @@ def pursuit(name: str, points: Sequence[Pose], tolerance: Tolerance) -> None:
     """Drive with RefHardRh3, Odometry and the other controller."""
     loop = ClosedLoop()
     other = loop.manager.add(Pursuit((Pose(), *points), tolerance), context=loop.chain.context)
-    loop.manager.disconnect("PathFollower.velocity", "RefHardRh3.InTargetVelocity")
-    loop.manager.connect("Odometry.OdometryPosition", "Pursuit.position")
-    loop.manager.connect("Pursuit.velocity", "RefHardRh3.InTargetVelocity")
-    loop.manager.activate("RefHardRh3", "Odometry")
+    loop.manager.disconnect("PathFollower0.velocity", "RefHardRh30.InTargetVelocity")
+    loop.manager.connect("Odometry0.OdometryPosition", "Pursuit.position")
+    loop.manager.connect("Pursuit.velocity", "RefHardRh30.InTargetVelocity")
+    loop.manager.activate("RefHardRh30", "Odometry0")
     loop.run_to(SETTLE_US)
     loop.manager.activate("Pursuit")
     track: list[Pose] = []

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import ClassVar
 
-from tickrig.wire.rtc_types.basic import Time, Timed
-from tickrig.wire.rtc_types.idl import Double, Long, Short, Struct
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.idl import Double, Short, Struct
 
 
 class NavigationState(IntEnum):
@@ -34,16 +33,12 @@ class RunMode(IntEnum):
     WHEEL_VEL = 7
 
 
-class TimedState(Timed[Long]):
-    """A navigation's state; OpenRTM's own TimedState has a short."""
-
-    idl_module: ClassVar[str] = "RH"
-
-
 class Path(Struct):
-    """One relay point for the follower; `coordinate` and `r` are unused but for circles."""
+    """One relay point for the follower; `coordinate` and `r` are unused but for circles.
 
-    idl_module: ClassVar[str] = "RH"
+    The public ancestor of Navigation and PathFollower declares it in the module RTC (RS003,
+    intellirobot.idl), so that an original component connects.
+    """
 
     type: Short = RunMode.FREE
     coordinate: Short = 0

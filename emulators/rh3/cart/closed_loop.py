@@ -153,7 +153,7 @@ class ClosedLoop:
         self.rig = Rig(*map(Station, bases, ports), *stations, couplings=couplings, dense=dense)
         self.manager = Manager()
         self.carts = tuple(
-            Cart(base, MotionChain(self.manager, self._opener(line), str(n) if n else ""), port)
+            Cart(base, MotionChain(self.manager, self._opener(line), n), port)
             for n, (base, line, port) in enumerate(zip(bases, lines, ports, strict=True))
         )
         self.cart = self.carts[0]

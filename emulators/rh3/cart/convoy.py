@@ -130,7 +130,7 @@ class Convoy:
     def command(self, source: str) -> None:
         """Let all robots obey one OutPort of IIS velocities, in the place of their planners."""
         manager = self.loop.manager
-        manager.disconnect("PathFollower.velocity", self.robots[0].velocity)
+        manager.disconnect("PathFollower0.velocity", self.robots[0].velocity)
         for robot in self.robots:
             manager.connect(source, robot.velocity, WIDE)
 
@@ -147,11 +147,10 @@ class Convoy:
     def _cart(self, number: int, pose: Pose) -> Robot:
         cart, manager = self.loop.carts[number], self.loop.manager
         place(cart, pose)
-        suffix = str(number) if number else ""
-        velocity = f"RefHardRh3{suffix}.InTargetVelocity"
+        velocity = f"RefHardRh3{number}.InTargetVelocity"
         if number:
-            manager.disconnect(f"PathFollower{suffix}.velocity", velocity)
-        return Robot(f"Odometry{suffix}.OdometryPosition", velocity, cart)
+            manager.disconnect(f"PathFollower{number}.velocity", velocity)
+        return Robot(f"Odometry{number}.OdometryPosition", velocity, cart)
 
     def _omni_cart(self, number: int, pose: Pose) -> Robot:
         name = f"OmniCart{number}"

@@ -32,7 +32,7 @@ from tickrig.host.rtc import Manager
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.real_time import RealTime
 
-SCANNER: Final = "LRFCapture_URG"
+SCANNER: Final = "LRFCapture_URG0"
 """The component of a range finder, if the cart has one."""
 
 

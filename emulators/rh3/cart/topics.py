@@ -6,22 +6,22 @@ from typing import Final
 
 TOPICS: Final = """
 [[topic]]
-port = "RefHardRh3.InTargetVelocity"
+port = "RefHardRh30.InTargetVelocity"
 topic = "cmd_vel"
 type = "geometry_msgs/msg/Twist"
 
 [[topic]]
-port = "Odometry.OdometryPosition"
+port = "Odometry0.OdometryPosition"
 topic = "odom"
 type = "nav_msgs/msg/Odometry"
 
 [[topic]]
-port = "Odometry.OdometryPosition"
+port = "Odometry0.OdometryPosition"
 topic = "tf"
 type = "tf2_msgs/msg/TFMessage"
 
 [[topic]]
-port = "RefHardRh3.OutWheelAngle"
+port = "RefHardRh30.OutWheelAngle"
 topic = "joint_states"
 type = "sensor_msgs/msg/JointState"
 joints = ["left_wheel", "right_wheel"]
@@ -29,7 +29,7 @@ joints = ["left_wheel", "right_wheel"]
 
 SCAN: Final = """
 [[topic]]
-port = "LRFCapture_URG.ranges"
+port = "LRFCapture_URG0.ranges"
 topic = "scan"
 type = "sensor_msgs/msg/LaserScan"
 """

@@ -9,8 +9,8 @@ from tickrig.host.motion.geometry import Pose, wrap
 from tickrig.host.motion.ports import read_newest, read_newest_pose, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.rh2 import NavigationState, Path, RunMode, TimedState
+from tickrig.wire.rtc_types.basic import Time, TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState, Path, RunMode
 
 State = NavigationState
 

@@ -15,8 +15,8 @@ from tickrig.host.motion.ports import read_all, read_newest, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
+from tickrig.wire.rtc_types.basic import Time, TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState
 
 LEAST_WAY_M: Final = 1e-6
 """Metres that are no way: the heading of such a step would mean nothing."""

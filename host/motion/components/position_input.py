@@ -10,8 +10,8 @@ from tickrig.host.motion.geometry import Pose
 from tickrig.host.motion.ports import plausible, read_newest, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
+from tickrig.wire.rtc_types.basic import Time, TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState
 
 START_POINT: Final = 100
 INTERMEDIATE_POINT: Final = 101

@@ -34,12 +34,12 @@ class CollisionGuard:
 
     def __init__(self, manager: Manager, chain: MotionChain, open_urg: Opener) -> None:
         self._manager = manager
-        suffix = chain.ref_hard.instance_name.removeprefix("RefHardRh3")
-        capture = LrfCaptureUrg(f"LRFCapture_URG{suffix}", open_urg)
-        points = UrgToObstacles(f"Urg_to_Obstacles{suffix}")
-        self.monitor = ObstacleMonitor(f"ObstacleMonitor{suffix}")
-        detection = CollisionDetection(f"CollisionDetection{suffix}")
-        avoidance = ObstaclesAvoidance(f"ObstaclesAvoidance{suffix}")
+        number = chain.ref_hard.instance_name.removeprefix("RefHardRh3")
+        capture = LrfCaptureUrg(f"LRFCapture_URG{number}", open_urg)
+        points = UrgToObstacles(f"Urg_to_Obstacles{number}")
+        self.monitor = ObstacleMonitor(f"ObstacleMonitor{number}")
+        detection = CollisionDetection(f"CollisionDetection{number}")
+        avoidance = ObstaclesAvoidance(f"ObstaclesAvoidance{number}")
         self.components = (capture, points, self.monitor, detection, avoidance)
         for component in self.components:
             manager.add(component, context=chain.context)

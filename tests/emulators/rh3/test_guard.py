@@ -126,10 +126,10 @@ def test_a_hand_takes_the_cart_over_and_the_planner_finishes() -> None:
     manager, context = loop.manager, loop.chain.context
     manager.add(GamePad("GamePad0", lambda name: Push()), context=context)
     manager.add(SwitchInput("SwitchInputRTC0"), context=context)
-    base = "RefHardRh3.InTargetVelocity"
-    manager.disconnect("PathFollower.velocity", base)
+    base = "RefHardRh30.InTargetVelocity"
+    manager.disconnect("PathFollower0.velocity", base)
     manager.connect("GamePad0.velocity", "SwitchInputRTC0.joystick")
-    manager.connect("PathFollower.velocity", "SwitchInputRTC0.automatic")
+    manager.connect("PathFollower0.velocity", "SwitchInputRTC0.automatic")
     manager.connect("SwitchInputRTC0.velocity", base)
     loop.activate("tuned")
     manager.activate("GamePad0", "SwitchInputRTC0")

@@ -61,7 +61,7 @@ def followed(law: str, k3: int) -> Following:
     chain.path_follower.configuration.set("line_K3", str(k3))
     line = OutPort("line", Path)
     connect(line, chain.path_follower.target_path)
-    loop.manager.activate("RefHardRh3", "Odometry", "PathFollower")
+    loop.manager.activate("RefHardRh30", "Odometry0", "PathFollower0")
     line.write(Path(RunMode.VEL, v=SPEED_M_S))
     loop.run_to(2_500_000)
     line.write(Path(RunMode.LINEFOLLOW, x=10.0, v=SPEED_M_S))

@@ -30,11 +30,11 @@ class IisCart:
         manager.add(PathInterface("Path0"), context=context)
         manager.add(RunningInformation("Info0"), rate_hz=100.0)
         for first, second in (
-            ("Goal0.position", "OmniTo2WD.goal"),
-            ("Goal0.min_path", "Navigation.min_path"),
-            ("Path0.target_path", "PathFollower.target_path"),
-            ("Odometry.OdometryPosition", "Path0.position"),
-            ("Odometry.OdometryPosition", "Info0.position"),
+            ("Goal0.position", "OmniTo2WD0.goal"),
+            ("Goal0.min_path", "Navigation0.min_path"),
+            ("Path0.target_path", "PathFollower0.target_path"),
+            ("Odometry0.OdometryPosition", "Path0.position"),
+            ("Odometry0.OdometryPosition", "Info0.position"),
         ):
             manager.connect(first, second, WIDE)
         self.loop.activate("tuned")

@@ -49,14 +49,14 @@ class DrivenCart:
     def speed_m_s(self) -> float:
         return self.cart.base.ground.speed_m_s
 
-    def state(self, component: str = "RefHardRh3") -> str:
+    def state(self, component: str = "RefHardRh30") -> str:
         return self.loop.manager.state_of(component).name
 
     def restart(self) -> None:
         """Reset and activate what is in Error."""
-        self.loop.manager.reset("RefHardRh3")
+        self.loop.manager.reset("RefHardRh30")
         self.run(0.02)
-        self.loop.manager.activate("RefHardRh3")
+        self.loop.manager.activate("RefHardRh30")
 
 
 def test_a_new_goal_takes_the_place_of_the_old_one_without_a_stop() -> None:
@@ -194,10 +194,10 @@ def test_deactivate_and_activate_sets_the_odometry_to_its_initial_pose() -> None
     driven = DrivenCart()
     assert driven.arrives(AHEAD)
     odometry = driven.chain.odometry
-    driven.loop.manager.deactivate("Odometry")
+    driven.loop.manager.deactivate("Odometry0")
     driven.run(0.1)
     odometry.configuration.set("initialPose_x", "5.0")
-    driven.loop.manager.activate("Odometry")
+    driven.loop.manager.activate("Odometry0")
     driven.run(0.1)
     assert odometry.pose == pytest.approx((5.0, 0.0, 0.0))
     driven.entered.replace(Pose(6.0))

@@ -11,18 +11,18 @@ from tickrig.host.rtc.ports.service_port import ServicePort
 
 PORTS = """
 PositionInput > position IIS/TimedPose2D
-PositionInput < status RH/TimedState
+PositionInput < status RTC/TimedState
 OmniTo2WD < current_position IIS/TimedPose2D
 OmniTo2WD < goal IIS/TimedPose2D
-OmniTo2WD < status RH/TimedState
+OmniTo2WD < status RTC/TimedState
 OmniTo2WD > min_path IIS/TimedPath2DSeq
-OmniTo2WD > status_out RH/TimedState
+OmniTo2WD > status_out RTC/TimedState
 Navigation < position IIS/TimedPose2D
 Navigation < min_path IIS/TimedPath2DSeq
-Navigation > path RH/Path
-Navigation > status RH/TimedState
+Navigation > path RTC/Path
+Navigation > status RTC/TimedState
 PathFollower < position IIS/TimedPose2D
-PathFollower < target_path RH/Path
+PathFollower < target_path RTC/Path
 PathFollower > velocity IIS/TimedVelocity2D
 RefHardRh3 < InTargetVelocity IIS/TimedVelocity2D
 RefHardRh3 > OutWheelAngle RTC/TimedDoubleSeq
@@ -110,9 +110,12 @@ def test_there_are_a_faithful_and_a_tuned_set(components: dict[str, RtComponent]
     assert (tuned["line_K3"], tuned["spin"]) == ("40", "time-optimal")
 
 
-def test_two_carts_have_names_of_their_own() -> None:
+def test_the_first_cart_has_the_names_of_the_specification_the_second_the_next_number() -> None:
     manager = Manager()
-    MotionChain(manager)
-    second = MotionChain(manager, suffix="1")
-    assert second.navigation.instance_name == "Navigation1"
-    assert manager.find("Navigation") is not second.navigation
+    first, second = MotionChain(manager), MotionChain(manager, number=1)
+    assert [component.instance_name for component in first.components] == [
+        *("RefHardRh30", "Odometry0", "PositionInput0"),
+        *("OmniTo2WD0", "Navigation0", "PathFollower0"),
+    ]
+    assert manager.find("Navigation0") is first.navigation
+    assert manager.find("Navigation1") is second.navigation

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from tests.host.motion.port_bench import PortBench, at, poses_of
 from tickrig.host.motion.components.omni_to_2wd import OmniTo2WD, plan
 from tickrig.host.motion.geometry import Pose, wrap
-from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
+from tickrig.wire.rtc_types.basic import TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState
 
 FINISH = TimedState(data=NavigationState.FINISH)
 RUNS = TimedState(data=NavigationState.ANGLE_CHECK)

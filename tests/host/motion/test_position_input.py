@@ -7,7 +7,8 @@ import pytest
 from tests.host.motion.port_bench import PortBench, at
 from tickrig.host.motion.components.position_input import PositionInput
 from tickrig.host.motion.geometry import Pose
-from tickrig.wire.rtc_types.rh2 import NavigationState, TimedState
+from tickrig.wire.rtc_types.basic import TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState
 
 FINISH = TimedState(data=NavigationState.FINISH)
 GOAL = Pose(1.0, 2.0, 0.5)

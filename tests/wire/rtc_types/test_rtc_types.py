@@ -122,7 +122,7 @@ def values_of(hint: Any) -> st.SearchStrategy[Any]:
 
 
 def test_there_are_types_of_all_idl_files() -> None:
-    assert len(TYPES) == 135
+    assert len(TYPES) == 134
     assert len({kind.idl_id() for kind in TYPES}) == len(TYPES)
 
 

@@ -95,11 +95,11 @@ def test_a_server_of_nodes_decides_itself_which_components_there_are(tmp_path: P
 @pytest.mark.realtime
 def test_the_components_of_a_cart_are_served_until_it_is_ended(tmp_path: Path) -> None:
     with live_system(tmp_path, command="rh3 serve") as system:
-        has_components(system, "PathFollower")
-        assert system.listed()["Odometry.rtc"] == "Active"
-        assert system.tool("rtdeact", "@/Odometry.rtc") == (0, "", "")
-        assert system.listed()["Odometry.rtc"] == "Inactive"
-        assert system.tool("rtact", "@/Odometry.rtc") == (0, "", "")
+        has_components(system, "PathFollower0")
+        assert system.listed()["Odometry0.rtc"] == "Active"
+        assert system.tool("rtdeact", "@/Odometry0.rtc") == (0, "", "")
+        assert system.listed()["Odometry0.rtc"] == "Inactive"
+        assert system.tool("rtact", "@/Odometry0.rtc") == (0, "", "")
         code, said = system.end()
         assert code == 0, said
         assert system.tool("rtls", "@") == (0, "", "")

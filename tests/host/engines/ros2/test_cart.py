@@ -68,7 +68,7 @@ def test_a_peer_drives_the_cart_and_it_stands_when_the_peer_is_gone() -> None:
                 assert len(moved & posed) > 10
                 assert abs(max(moved)[0] - time.time()) < DEADLINE_S
                 levels = {each["name"]: each["level"] for each in _statuses(watcher)}
-                assert levels["Odometry"] == 0
+                assert levels["Odometry0"] == 0
             finally:
                 driver.end()
                 watcher.end()

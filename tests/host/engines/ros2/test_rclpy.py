@@ -61,7 +61,7 @@ def test_a_node_drives_the_cart_until_it_is_gone() -> None:
                 assert watcher.heard("joint_states")[-1]["name"] == ["left_wheel", "right_wheel"]
                 assert min(watcher.heard("scan")[-1]["ranges"]) == pytest.approx(2.0, abs=0.1)
                 statuses = watcher.heard("diagnostics")[-1]["status"]
-                assert {each["name"]: each["level"] for each in statuses}["Odometry"] == 0
+                assert {each["name"]: each["level"] for each in statuses}["Odometry0"] == 0
             finally:
                 driver.end()
                 watcher.end()

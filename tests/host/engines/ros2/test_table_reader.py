@@ -8,7 +8,7 @@ from tickrig.host.engines.ros2.table_reader import parse_table
 
 ODOMETRY = """
 [[topic]]
-port = "Odometry.OdometryPosition"
+port = "Odometry0.OdometryPosition"
 topic = "/odom"
 type = "nav_msgs/msg/Odometry"
 """
@@ -67,7 +67,7 @@ def test_what_a_table_leaves_out_is_as_usual() -> None:
     (entry,) = table.entries
     assert (entry.topic, entry.frame, entry.child_frame) == ("odom", "odom", "base_link")
     assert (entry.stop_after_us, entry.reliable) == (0, True)
-    assert str(entry) == "robot.toml:2: Odometry.OdometryPosition"
+    assert str(entry) == "robot.toml:2: Odometry0.OdometryPosition"
     assert (table.diagnostics, table.period_us) == ("diagnostics", 1_000_000)
 
 
