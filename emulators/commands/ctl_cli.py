@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import wraps
+from math import degrees
+from pathlib import Path
 from typing import Any, Final
 
 import click
 
 from tickrig.host.cli.control import request
-from tickrig.host.cli.refused import time_us
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused, refuse_path, time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
 from tickrig.host.text.page_text import json_text
@@ -63,6 +66,7 @@ def complete(names: Names) -> Complete:
 
 EMULATOR: Final = "emulator"
 SERVER: Final = "server"
+CART: Final = "cart"
 
 AS_JSON: Final = "Print the answer as JSON."
 
@@ -210,6 +214,41 @@ def status() -> Object:
 def restart(node: int) -> Object:
     """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again."""
     return {"node": node}
+
+
+_NUMBERS: Final = {"ignore_unknown_options": True}
+
+
+@verb(whom=CART, context_settings=_NUMBERS)
+@click.argument("x", type=float)
+@click.argument("y", type=float)
+@click.argument("deg", type=float)
+def goal(x: float, y: float, deg: float) -> Object:
+    """Let the cart of 'rh3 serve' drive to X and Y in metres, and turn to DEG in degrees."""
+    return {"pose": [x, y, deg]}
+
+
+@verb(whom=CART)
+@click.argument("file", type=PATH, required=False)
+def path(file: Path | None) -> Object:
+    """Let it drive along the points of FILE, as 'rh3 path', or along its defined path."""
+    from tickrig.host.motion.path_file import read_path  # noqa: PLC0415 - a TAB needs none
+
+    if file is None:
+        return {}
+    try:
+        points = read_path(file)
+    except OSError as error:
+        refuse_path("path", error)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    return {"points": [[x, y, degrees(heading)] for x, y, heading in points]}
+
+
+@verb(whom=CART)
+def end() -> Object:
+    """Let PositionInput go into Error when the last command has finished."""
+    return {}
 
 
 @verb()

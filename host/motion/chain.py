@@ -97,8 +97,9 @@ class MotionChain:
         self.manager.activate(*(component.instance_name for component in self.components))
 
     def deactivate(self) -> None:
-        """Ask those that are Active for Inactive."""
-        self.manager.deactivate(*self._in(LifeCycleState.ACTIVE))
+        """Ask those that are Active for Inactive; one that is on its way to Error refuses."""
+        for component in self.components:
+            self.context.deactivate_component(component)
 
     def _in(self, state: LifeCycleState) -> tuple[str, ...]:
         state_of = self.context.state_of

@@ -14,6 +14,10 @@ from tickrig.wire.rtc_types import basic
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 from tickrig.wire.rtc_types.idl import Struct
 
+LOW: Final = -(2**31)
+HIGH: Final = 2**31 - 1
+"""What ConsoleIn takes."""
+
 LENGTH: Final = 10
 """Elements of a sequence that SeqOut writes."""
 
@@ -52,6 +56,16 @@ class ConsoleIn(RtComponent):
     def enter(self, *numbers: int) -> None:
         """Enter numbers, -2**31..2**31-1."""
         self.waiting.extend(numbers)
+
+    def typed(self, line: str) -> None:
+        """Enter a number as a person types it; ValueError if it is none, or out of range."""
+        try:
+            number = int(line)
+        except ValueError:
+            number = HIGH + 1
+        if not LOW <= number <= HIGH:
+            raise ValueError(f"{line!r} is not a number in {LOW}..{HIGH}")
+        self.enter(number)
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Write the oldest number that was entered."""

@@ -149,9 +149,17 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
     metavar="WIDTH DEPTH",
     help="Walls around an emulated base in m, and a range finder that sees them.",
 )
+@click.option(
+    "--control",
+    type=PATH,
+    help="Control socket, for tickrig ctl PATH goal and tickrig rtc --at PATH.",
+)
 @_SHARED
 def serve(**options: Any) -> None:
-    """Run the six components in real time until Ctrl-C, for others to work with.
+    """Run the six components in real time until Ctrl-C, for you and others to work with.
+
+    PositionInput takes what you type: goal X Y DEG, path FILE, path X Y, X Y DEG, path alone
+    for a square of 1 m, end. Metres and degrees; FILE has radians.
 
     \b
     rh3 serve --openrtm localhost:2809

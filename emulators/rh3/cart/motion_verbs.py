@@ -68,7 +68,8 @@ def serve(options: dict[str, Any]) -> None:
     if engines.ros2 and options["pace"] not in {None, 1.0}:
         raise Refused("--pace is not for --ros2: what others send has real time")
     pace = options["pace"] or (None if options["device"] else 1.0)
-    serve_cart(_checked({**options, "pace": pace}), engines)
+    control = options.pop("control")
+    serve_cart(_checked({**options, "pace": pace}), engines, control)
 
 
 def _checked(options: dict[str, Any]) -> MotionOptions:

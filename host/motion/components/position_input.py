@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import ClassVar, Final
 
 from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.ports import plausible, read_newest, to_pose_2d
+from tickrig.host.motion.path_file import describe_pose, parse_points, read_path
+from tickrig.host.motion.ports import plausible, read_newest, to_pose, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedState
@@ -18,16 +20,26 @@ INTERMEDIATE_POINT: Final = 101
 END_POINT: Final = 102
 """`id[0]` of the points of a path; a goal has none."""
 
+DEFINED_PATH: Final = (Pose(1.0), Pose(1.0, 1.0), Pose(0.0, 1.0), Pose())
+"""The default of `PositionInput.defined_path`: a square of 1 m, back to the origin."""
+
+USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
+"""What a person types: metres and degrees; a file has radians."""
+
 
 class PositionInput(RtComponent):
     """Sends one command after the other; the next when the last one has finished.
 
-    The original waits at its console in on_execute; here nothing waits: `goal`, `path`
-    and `end` are called by whoever has the console. Its configuration is declared and
-    unused, as there.
+    The original waits at its console in on_execute; here nothing waits: whoever has the
+    console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its
+    configuration is declared and unused, as there.
 
     Attributes:
         finished: how many commands have finished.
+        defined_path: the path of the command `path` without a file or points.
+        ask: called with what can be typed each time that it wants a command; the console
+            prints it.
+        tell: called with each command that it sends, and with FINISH.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositionInput", "Goals and paths from the console")
@@ -44,8 +56,11 @@ class PositionInput(RtComponent):
         self.status = self.add_port(InPort("status", TimedState))
         self.position = self.add_port(OutPort("position", iis.TimedPose2D))
         self._commands: deque[tuple[iis.TimedPose2D, ...]] = deque()
-        self._running = self._ending = False
+        self._running = self._ending = self._asked = False
         self.finished = 0
+        self.defined_path: Sequence[Pose] = DEFINED_PATH
+        self.ask: Callable[[str], None] | None = None
+        self.tell: Callable[[str], None] | None = None
 
     @property
     def idle(self) -> bool:
@@ -79,24 +94,89 @@ class PositionInput(RtComponent):
         self._running = False
         self._commands.append(command)
 
+    def typed(self, line: str) -> None:
+        """Enter a command as a person types it, see `USAGE`; it waits for those before it.
+
+        Raises:
+            ValueError: no such command, a pose or path that cannot be, a file that cannot be
+                read, or `end` was typed before; nothing is changed.
+        """
+        self.require_open()
+        word, _, rest = line.strip().partition(" ")
+        match word, rest.strip():
+            case "goal", text if text:
+                (pose,) = _exactly(1, parse_points(text), line)
+                self.goal(pose)
+            case "path", "":
+                self.path(self.defined_path)
+            case "path", text:
+                self.path(parse_points(text) if "," in text else _read(text))
+            case "end", "":
+                self.end()
+            case _:
+                raise ValueError(f"{line!r} is not a command: {USAGE}")
+
+    def require_open(self) -> None:
+        """Raise ValueError if `end` was called, and nobody has reset it since."""
+        if self._ending:
+            raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
+
     def end(self) -> None:
         """Go into Error when all has finished, as the original does after its last command."""
         self._ending = True
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Ask anew."""
+        self._asked = False
+        return ReturnCode.RTC_OK
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Take commands again after `end`."""
+        self._ending = False
+        return ReturnCode.RTC_OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Send the next command, or look whether the last one has finished."""
         status = read_newest(self.status)
         if self._running and status is not None and status.data == NavigationState.FINISH:
-            self._running = False
+            self._running = self._asked = False
             self.finished += 1
+            self._say("FINISH")
         if self._commands and not self._running:
             self._running = True
-            now = Time.from_us(ec.now_us)
-            for point in self._commands.popleft():
-                self.position.write(iis.TimedPose2D(now, point.id, point.data))
-        if self._ending and self.idle:
+            self._send(self._commands.popleft(), ec)
+        if self.idle and self._ending:
+            self._say("the end")
             return ReturnCode.RTC_ERROR
+        if self.idle and self.ask is not None and not self._asked:
+            self._asked = True
+            self.ask(USAGE)
         return ReturnCode.RTC_OK
+
+    def _send(self, points: Sequence[iis.TimedPose2D], ec: ExecutionContext) -> None:
+        now = Time.from_us(ec.now_us)
+        for point in points:
+            self.position.write(iis.TimedPose2D(now, point.id, point.data))
+        last = to_pose(points[-1].data) or Pose()
+        what = "goal" if len(points) == 1 else f"path of {len(points)} points to"
+        self._say(f"{what} {describe_pose(last)}")
+
+    def _say(self, text: str) -> None:
+        if self.tell is not None:
+            self.tell(text)
+
+
+def _exactly(count: int, points: Sequence[Pose], line: str) -> Sequence[Pose]:
+    if len(points) != count:
+        raise ValueError(f"{line!r} is not a command: {USAGE}")
+    return points
+
+
+def _read(file: str) -> list[Pose]:
+    try:
+        return read_path(Path(file).expanduser())
+    except OSError as error:
+        raise ValueError(f"path {file}: {error.strerror or error}") from None
 
 
 def _points(poses: Sequence[Pose]) -> tuple[iis.TimedPose2D, ...]:

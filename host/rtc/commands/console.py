@@ -1,60 +1,97 @@
-"""The terminal of a system: numbers typed go to ConsoleIn, those of ConsoleOut are shown."""
+"""The terminal of a system: components take typed lines, and what they tell is shown."""
 
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from functools import partial
-from typing import Final
+from typing import Final, Protocol, TypeGuard
 
 from tickrig.host.links.ready import ready
-from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
+from tickrig.host.rtc.components import ConsoleOut
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.rtc_types.basic import TimedLong
 from tickrig.wire.serial.lines import LineSplitter
 
 READ_BYTES: Final = 4_096
-LOW: Final = -(2**31)
-HIGH: Final = 2**31 - 1
+
+
+class TypedTo(Protocol):
+    """A component to which lines are typed, as ConsoleIn and PositionInput."""
+
+    def typed(self, line: str) -> None:
+        """Take a line; ValueError if it is none for this component, which is not changed."""
+
+
+def is_typed_to(component: object) -> TypeGuard[TypedTo]:
+    """Return whether lines are typed to a component."""
+    return hasattr(component, "typed")
 
 
 class Console:
-    """Shows what arrives at each ConsoleOut, as `ConsoleOut0 5`.
+    """Shows what components tell, as `ConsoleOut0 5` or `PositionInput0 FINISH`.
+
+    A line that is typed goes to each component that takes it. If none does, the console
+    prints why. A component may have the attributes `tell` and `ask`: the console sets `tell`
+    to a function that shows a line, and `ask` to one that shows it to people alone.
 
     Args:
         manager: whose components.
         show: prints a line.
         warn: prints a line that is for people alone.
+
+    Attributes:
+        is_open: whether more may be typed; False once the standard input ends.
     """
 
     def __init__(
         self, manager: Manager, show: Callable[[str], None], warn: Callable[[str], None]
     ) -> None:
         self._manager, self._show, self._warn = manager, show, warn
-        self._typed, self._open = LineSplitter(), True
+        self._typed, self.is_open = LineSplitter(), True
         for component in manager.components:
+            name = component.instance_name
             if isinstance(component, ConsoleOut):
-                component.show = partial(self._shown, component.instance_name)
+                component.show = partial(self._shown, name)
+            for attribute, printed in (("tell", show), ("ask", warn)):
+                if hasattr(component, attribute):
+                    setattr(component, attribute, partial(_prefixed, printed, name))
 
     def read(self, descriptor: int) -> None:
-        """Take numbers that were typed, one a line, to each ConsoleIn; never wait."""
-        if self._open and ready([descriptor], wait_s=0)[0]:
+        """Take lines that were typed; never wait."""
+        if self.is_open and ready([descriptor], wait_s=0)[0] and _in_foreground(descriptor):
             data = os.read(descriptor, READ_BYTES)
-            self._open = bool(data)
-            for line in self._typed.push(data):
-                self._enter(line.decode("utf-8", "replace").strip())
+            self.is_open = bool(data)
+            for line in self._typed.push(data or b"\n"):
+                if data or line:
+                    self._enter(line.decode("utf-8", "replace").strip())
 
-    def _enter(self, word: str) -> None:
-        try:
-            number = int(word)
-        except ValueError:
-            number = HIGH + 1
-        if not LOW <= number <= HIGH:
-            self._warn(f"{word!r} is not a number in {LOW}..{HIGH}")
-            return
+    def _enter(self, line: str) -> None:
+        refusals, taken = dict[str, None](), False
         for component in self._manager.components:
-            if isinstance(component, ConsoleIn):
-                component.enter(number)
+            if is_typed_to(component):
+                try:
+                    component.typed(line)
+                    taken = True
+                except ValueError as error:
+                    refusals[str(error)] = None
+        if not taken:
+            self._warn("; ".join(refusals) or f"{line!r}: no component takes what is typed")
 
     def _shown(self, name: str, value: TimedLong) -> None:
         self._show(f"{name} {value.data}")
+
+
+def _prefixed(printed: Callable[[str], None], name: str, text: str) -> None:
+    printed(f"{name} {text}")
+
+
+def _in_foreground(descriptor: int) -> bool:
+    """Return whether this process may read there: a terminal stops one in its background."""
+    if sys.platform == "win32":
+        return True
+    try:
+        return not os.isatty(descriptor) or os.tcgetpgrp(descriptor) == os.getpgrp()
+    except OSError:  # a terminal that does not control this process
+        return True

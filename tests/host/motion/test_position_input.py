@@ -1,11 +1,13 @@
 from __future__ import annotations
 
-from math import inf, nan
+import re
+from math import degrees, inf, nan
+from pathlib import Path
 
 import pytest
 
 from tests.host.motion.port_bench import PortBench, at
-from tickrig.host.motion.components.position_input import PositionInput
+from tickrig.host.motion.components.position_input import USAGE, PositionInput
 from tickrig.host.motion.geometry import Pose
 from tickrig.wire.rtc_types.basic import TimedState
 from tickrig.wire.rtc_types.rh2 import NavigationState
@@ -107,3 +109,88 @@ def test_its_configuration_changes_nothing() -> None:
     on = PortBench(PositionInput("PositionInput0"), **{"01_x": "9"})
     on.period(3)
     assert on.taken("position") == []
+
+
+def passed(on: PortBench[PositionInput]) -> list[tuple[tuple[int, ...], float, float, float]]:
+    """Return ids, x, y and degrees of what was sent."""
+    return [
+        (m.id, m.data.position.x, m.data.position.y, round(degrees(m.data.heading), 9))
+        for m in on.taken("position")
+    ]
+
+
+def test_a_typed_goal_is_in_metres_and_degrees() -> None:
+    on = bench()
+    on.component.typed(" goal 1 -2 90 \r")
+    on.period()
+    assert passed(on) == [((), 1.0, -2.0, 90.0)]
+
+
+def test_a_path_is_typed_or_comes_from_a_file_or_is_the_defined_one(tmp_path: Path) -> None:
+    file = tmp_path / "my path.txt"
+    file.write_text("1 0\n1 1 1.5707963267948966\n")
+    on = bench()
+    on.component.defined_path = (Pose(3.0), Pose(4.0))
+    for line in ("path 2 0, 2 2 45", f"path {file}", "path"):
+        on.component.typed(line)
+        on.period()
+        on.feed("status", FINISH)
+        on.period()
+    assert passed(on) == [
+        *[((100,), 2.0, 0.0, 0.0), ((102,), 2.0, 2.0, 45.0)],
+        *[((100,), 1.0, 0.0, 0.0), ((102,), 1.0, 1.0, 90.0)],
+        *[((100,), 3.0, 0.0, 0.0), ((102,), 4.0, 0.0, 0.0)],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("line", "error"),
+    [
+        ("", "'' is not a command: goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"),
+        ("go 1 2 3", "'go 1 2 3' is not a command: goal X Y DEG;"),
+        ("goal", "'goal' is not a command"),
+        ("goal 1", "'1' is not X Y in metres, and a heading in degrees"),
+        ("goal 1 2 3 4", "'1 2 3 4' is not X Y in metres"),
+        ("goal 1 nan 3", "'1 nan 3' is not X Y in metres"),
+        ("goal 1 2 3, 4 5", "is not a command"),
+        ("goal 1001 0 0", "'1001 0 0' is beyond 1000 m"),
+        ("path 1 2,", "'' is not X Y in metres"),
+        ("path /no/such", "path /no/such: No such file or directory"),
+        ("end now", "'end now' is not a command"),
+    ],
+)
+def test_a_typed_line_that_is_no_command_says_why(line: str, error: str) -> None:
+    on = bench()
+    with pytest.raises(ValueError, match=re.escape(error)):
+        on.component.typed(line)
+    on.period()
+    assert (on.taken("position"), on.component.idle) == ([], True)
+
+
+def test_it_asks_tells_what_it_sends_and_asks_again_after_finish() -> None:
+    component = PositionInput("PositionInput0")
+    said: list[str] = []
+    component.ask = component.tell = said.append
+    on = PortBench(component)
+    on.period(5)
+    assert said == [USAGE]
+    component.typed("goal 1 0 90")
+    on.period(5)
+    on.feed("status", FINISH)
+    on.period(5)
+    assert said[1:] == ["goal 1.000 0.000 m, 90.0 deg", "FINISH", USAGE]
+
+
+def test_after_the_end_it_takes_commands_again_once_it_is_reset() -> None:
+    on = bench()
+    on.component.typed("end")
+    with pytest.raises(ValueError, match="PositionInput0 has ended; reset it, then activate it"):
+        on.component.typed("goal 1 0 0")
+    on.period(2)
+    assert on.state == "ERROR"
+    on.manager.reset("PositionInput0")
+    on.period()
+    on.activate()
+    on.component.typed("goal 1 0 0")
+    on.period(3)
+    assert (on.state, len(on.taken("position"))) == ("ACTIVE", 1)

@@ -15,7 +15,6 @@ from tests.host.engines.openrtm.live_system import has_components, live_system
 from tests.host.engines.openrtm.name_server import eventually, free_port
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.rh3.cart.motion_cli import main as rh3
 from tickrig.host.control.client import ControlClient
 
 CHAIN = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"
@@ -103,12 +102,6 @@ def test_the_components_of_a_cart_are_served_until_it_is_ended(tmp_path: Path) -
         code, said = system.end()
         assert code == 0, said
         assert system.tool("rtls", "@") == (0, "", "")
-
-
-def test_a_cart_that_nobody_could_work_with_is_refused() -> None:
-    result = CliRunner().invoke(rh3, ["serve"])
-    assert result.exit_code == 2
-    assert result.stderr.startswith("Error: rh3 serve wants --openrtm")
 
 
 @OMNIORB

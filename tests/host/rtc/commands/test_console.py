@@ -8,6 +8,8 @@ from collections.abc import Iterator
 import pytest
 
 from tests.host.rtc.chain import PERIOD_US, Chain
+from tickrig.host.motion.components.position_input import USAGE, PositionInput
+from tickrig.host.rtc import Manager
 from tickrig.host.rtc.commands.console import Console
 
 
@@ -65,3 +67,47 @@ def test_after_the_end_of_the_input_nothing_is_read(bench: Bench) -> None:
     os.close(bench.keys)
     bench.run()
     assert bench.shown == ["ConsoleOut0 3"]
+
+
+def test_the_last_line_counts_when_the_input_ends(bench: Bench) -> None:
+    bench.type(b"1\n2")
+    os.close(bench.keys)
+    bench.run()
+    bench.keys = os.dup(0)
+    assert bench.shown == ["ConsoleOut0 1", "ConsoleOut0 2"]
+    assert not bench.console.is_open
+
+
+def test_a_line_goes_to_each_component_that_takes_it() -> None:
+    chain = Chain()
+    entered = chain.manager.add(PositionInput("PositionInput0"), rate_hz=1_000)
+    chain.manager.activate("PositionInput0")
+    keyboard, keys = os.pipe()
+    shown: list[str] = []
+    told: list[str] = []
+    console = Console(chain.manager, shown.append, told.append)
+    chain.manager.run_for(5 * PERIOD_US)
+    os.write(keys, b"7\ngoal 1 0 90\nnothing\n")
+    os.close(keys)
+    console.read(keyboard)
+    os.close(keyboard)
+    chain.manager.run_for(5 * PERIOD_US)
+    assert sorted(shown) == ["ConsoleOut0 7", "PositionInput0 goal 1.000 0.000 m, 90.0 deg"]
+    assert told == [
+        f"PositionInput0 {USAGE}",
+        "'nothing' is not a number in -2147483648..2147483647; "
+        f"'nothing' is not a command: {USAGE}",
+    ]
+    assert not entered.idle
+
+
+def test_a_line_that_nobody_takes_is_told() -> None:
+    manager = Manager()
+    keyboard, keys = os.pipe()
+    told: list[str] = []
+    console = Console(manager, told.append, told.append)
+    os.write(keys, b"5\n")
+    console.read(keyboard)
+    os.close(keyboard)
+    os.close(keys)
+    assert told == ["'5': no component takes what is typed"]
