@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from functools import wraps
 from math import degrees
-from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -17,6 +16,9 @@ from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import format_time, parse_setting
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 PATIENCE_S: Final = 1.0
 
