@@ -18,6 +18,8 @@ from click.testing import CliRunner
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
 from tickrig.host.control.client import ControlClient
+from tickrig.host.motion.chain import CONNECTIONS, MotionChain
+from tickrig.host.rtc import Manager
 from tickrig.host.rtc.commands.request import default_path
 from tickrig.host.rtc.system.system_toml import parse_toml
 
@@ -268,3 +270,43 @@ def test_a_device_takes_part_by_its_proxy_and_is_not_left_active(folder: Path) -
             assert hand.request("get", names=["state"])["values"] == {"state": "Active"}
             child.end(signal.SIGTERM)
         assert hand.request("get", names=["state"])["values"] == {"state": "Inactive"}
+
+
+CART = Path(__file__).parents[4] / "examples" / "rh3_cart.toml"
+
+
+def test_the_cart_of_the_example_is_joined_as_the_motion_chain() -> None:
+    system = parse_toml(CART.read_text("utf-8"))
+    assert [entry.name for entry in system.components] == [
+        component.instance_name for component in MotionChain(Manager()).components
+    ]
+    joined = [tuple(name.replace(".", "0.") for name in pair) for pair in CONNECTIONS]
+    assert [tuple(entry.ports) for entry in system.connections] == joined
+
+
+@pytest.mark.realtime
+def test_a_cart_of_our_types_drives_an_emulated_base_as_it_is_told_at_the_console(
+    tmp_path: Path,
+) -> None:
+    with running("tickrig.emulators.rh3.cli") as base:
+        file = tmp_path / "cart.toml"
+        file.write_text(CART.read_text("utf-8").replace("/tmp/rh3", str(base.link)))
+        command = [sys.executable, "-m", "tickrig", "rtc", "run", str(file), "--console"]
+        process = subprocess.Popen(
+            [*command, "--control", str(tmp_path / "ctl")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            process.stdin.write("goal 0.1 0 0\n")
+            process.stdin.flush()
+            told = [process.stdout.readline() for _ in range(2)]
+            process.send_signal(signal.SIGTERM)
+            process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert told == ["PositionInput0 goal 0.100 0.000 m, 0.0 deg\n", "PositionInput0 FINISH\n"]
+    assert process.returncode == 0
