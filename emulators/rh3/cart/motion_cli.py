@@ -162,7 +162,8 @@ def serve(**options: Any) -> None:
     for a square of 1 m, end. Metres and degrees; FILE has radians.
 
     \b
-    rh3 serve --openrtm localhost:2809
+    printf 'goal 1 0 90\\npath 0 0, 1 1\\n' | rh3 serve
+    rh3 serve --control /tmp/cart
     rh3 serve --openrtm localhost:2809 --device /dev/ttyUSB0
     rh3 serve --ros2 --room 6 4
     """  # noqa: D301

@@ -13,9 +13,11 @@ from click.testing import CliRunner
 from tests.host.engines.openrtm.extra import OMNIORB
 from tests.host.engines.openrtm.live_system import has_components, live_system
 from tests.host.engines.openrtm.name_server import eventually, free_port
+from tests.host.engines.openrtm.ports.foreign import Peer, compile_foreign
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
 from tickrig.host.control.client import ControlClient
+from tickrig.wire.rtc_types.rh2 import RunMode
 
 CHAIN = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"
 EDS = Path(__file__).parents[4] / "examples" / "eds"
@@ -102,6 +104,32 @@ def test_the_components_of_a_cart_are_served_until_it_is_ended(tmp_path: Path) -
         code, said = system.end()
         assert code == 0, said
         assert system.tool("rtls", "@") == (0, "", "")
+
+
+@OMNIORB
+@pytest.mark.realtime
+def test_a_foreign_component_with_paths_is_joined_by_rtshell(tmp_path: Path) -> None:
+    """Its ports are of RTC::Path, as those of the original Navigation and PathFollower."""
+    control = tmp_path / "cart"
+    with live_system(tmp_path, "--control", str(control), command="rh3 serve") as system:
+        has_components(system, "PathFollower0")
+        peer = Peer(compile_foreign(tmp_path), name_server=system.names.address)
+        theirs = f"/{system.names.address}/peer.host_cxt/Peer0.rtc"
+        try:
+            for words in (
+                ("rtdis", "@/Navigation0.rtc:path", "@/PathFollower0.rtc:target_path"),
+                ("rtcon", f"{theirs}:path_out", "@/PathFollower0.rtc:target_path"),
+                ("rtcon", "@/Navigation0.rtc:path", f"{theirs}:path_in"),
+            ):
+                assert (words, system.tool(*words)) == (words, (0, "", ""))
+            with ControlClient(control) as cart:
+                assert peer.ask("put_path", RunMode.VEL, 0.05, 0.1) == "PORT_OK"
+                eventually(lambda: cart.request("status")["x_m"] > 0.01, "it does not drive")
+                cart.request("goal", pose=[1, 2, 0])
+            eventually(lambda: len(peer.ask("received_paths")) > 0, "no path has come")
+            assert peer.ask("received_paths")[0][2] in (RunMode.SPIN, RunMode.STOP)
+        finally:
+            peer.kill()
 
 
 @OMNIORB
