@@ -103,7 +103,9 @@ def test_the_status_of_a_full_buffer_is_told(system: Served, peer: Peer) -> None
     assert peer.ask("put", 1, 2, 3) == ["PORT_OK", "PORT_OK", "BUFFER_FULL"]
 
 
-@pytest.mark.parametrize("data", ["", "00", "ff" * 13, "00" * 100_000])
+@pytest.mark.parametrize(
+    "data", ["", "00", "ff" * 13, "00" * 100_000], ids=["none", "one", "thirteen", "many"]
+)
 def test_bytes_that_are_no_value_are_refused(
     system: Served, peer: Peer, data: str, caplog: pytest.LogCaptureFixture
 ) -> None:
