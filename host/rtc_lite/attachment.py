@@ -144,7 +144,9 @@ class Attachment:
             self._notify(ProxyEventType.REDISCOVERED, self.proxy)
 
     def _notify(self, kind: ProxyEventType, proxy: RtcLiteProxy) -> None:
-        notify(self.listener, ProxyEvent(self.link.now_us, kind, proxy.instance_name))
+        pings = proxy.pings if kind is ProxyEventType.REMOVED else None
+        event = ProxyEvent(self.link.now_us, kind, proxy.instance_name, pings=pings)
+        notify(self.listener, event)
 
 
 def attach(  # noqa: PLR0913 - options, by keyword

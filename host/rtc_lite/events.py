@@ -9,6 +9,7 @@ from typing import Final
 
 from tickrig.host.rtc.component_action import guarded
 from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.rtc_lite.ping_monitor import PingStatistics
 from tickrig.host.text.log import log_of
 
 _LOG: Final = log_of(__name__)
@@ -33,6 +34,7 @@ class ProxyEvent:
         instance_name: to which proxy.
         reason: why it went to Error, for people; empty for other events.
         frames: the last ones before that, with their times on the clock of its link.
+        pings: how its PINGs went; None unless it was removed.
     """
 
     at_us: int
@@ -40,12 +42,14 @@ class ProxyEvent:
     instance_name: str
     reason: str = ""
     frames: tuple[str, ...] = ()
+    pings: PingStatistics | None = None
 
     def __str__(self) -> str:
         """Write it in a line for people."""
         why = f": {self.reason}" if self.reason else ""
         frames = f"; last frames: {', '.join(self.frames)}" if self.frames else ""
-        return f"{self.at_us / 1e6:.3f} s: {self.instance_name}: {self.kind}{why}{frames}"
+        pings = f"; {self.pings}" if self.pings else ""
+        return f"{self.at_us / 1e6:.3f} s: {self.instance_name}: {self.kind}{why}{frames}{pings}"
 
 
 ProxyListener = Callable[[ProxyEvent], None]

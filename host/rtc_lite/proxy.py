@@ -11,6 +11,7 @@ from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.rtc_lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
+from tickrig.host.rtc_lite.ping_monitor import PingStatistics
 from tickrig.host.rtc_lite.port_bridges import PortBridges
 from tickrig.host.rtc_lite.request_channel import RETRIES, RequestChannel
 from tickrig.host.rtc_lite.settings import ProxySettings
@@ -102,9 +103,15 @@ class RtcLiteProxy(RtComponent):
 
     @property
     def profile(self) -> ComponentProfile:
-        """The component as it is, with the type of the one on the device."""
-        properties = {} if self.device is None else self.device.properties
+        """The component as it is, with the type of the one on the device and its PINGs."""
+        pings = {"rtc_lite.pings": str(self.pings).removeprefix("PINGs: ")}
+        properties = {} if self.device is None else {**self.device.properties, **pings}
         return replace(super().profile, properties=properties)
+
+    @property
+    def pings(self) -> PingStatistics:
+        """How the PINGs went since `on_initialize`."""
+        return self._channel.ping_monitor.statistics
 
     def tick(self) -> None:
         """Send PINGs and look for their answers; a device that is lost leads to Error."""
@@ -128,6 +135,7 @@ class RtcLiteProxy(RtComponent):
             self.relays = PortBridges(self.device.in_ports, self.device.out_ports)
             for port in self.relays.ports:
                 self.add_port(port)
+            self._channel.ping_monitor.start(self._channel.now_us)
         except (LinkError, DeviceRefused, WireError, RtcRefused) as error:
             _LOG.warning("%s: no start-up: %s", self.instance_name, error)
             return ReturnCode.RTC_ERROR

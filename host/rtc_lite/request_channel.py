@@ -80,9 +80,7 @@ class RequestChannel:
 
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
         self._line, self._settings = _frames_over(link, settings), settings
-        self.ping_monitor = PingMonitor(
-            settings.ping_period_us, settings.reply_us, settings.pings, link.now_us
-        )
+        self.ping_monitor = PingMonitor(settings.ping_period_us, settings.reply_us, settings.pings)
         self.state: LiteState | None = None
         self.pushed: list[tuple[int, LitePortData]] = []
         self.in_ports: list[LitePortProfile] = []
@@ -120,7 +118,10 @@ class RequestChannel:
             self._ping(number)
 
     def request(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
-        """Send a request and wait for its reply; None without one, or if nothing may be sent."""
+        """Send a request and wait for its reply; None without one, or if nothing may be sent.
+
+        A PING that has fallen due goes first.
+        """
         if not self._free():
             return None
         reply = self._exchange(command, data)
@@ -128,6 +129,8 @@ class RequestChannel:
         if reply is None:
             _LOG.info("%s", self.trouble)
             self._ping(self.ping_monitor.doubt(self.now_us))
+        else:
+            self.ping_monitor.replied()
         return reply
 
     def request_again(self, command: LiteCommand) -> LiteReply | None:
@@ -162,6 +165,8 @@ class RequestChannel:
     def _free(self) -> bool:
         """Whether a request may be sent; waits for the answer to a PING that is under way."""
         ping_monitor = self.ping_monitor
+        if not ping_monitor.awaiting and (number := ping_monitor.tick(self.now_us)) is not None:
+            self._ping(number)
         while ping_monitor.pending and self.now_us < ping_monitor.due_us:
             if not self._receive(ping_monitor.due_us - self.now_us):
                 return False
@@ -208,7 +213,6 @@ class RequestChannel:
 
     def _take(self, frame: LiteFrame) -> None:
         """Note what a frame says."""
-        self.ping_monitor.received_us = self.now_us
         match frame.command:
             case LiteCommand.DATA:
                 self.pushed.append((self.now_us, parse_port_data(frame.data)))
@@ -229,7 +233,7 @@ class RequestChannel:
 
     def _take_reply(self, command: LiteCommand, reply: LiteReply) -> None:
         if command is LiteCommand.PING and reply.ok:
-            self.ping_monitor.answered(reply.fields[0])
+            self.ping_monitor.answered(reply.fields[0], self.now_us)
         if command in WITH_STATE and reply.fields:
             self.state = _state(reply.fields[0])
         if command is self._awaited:

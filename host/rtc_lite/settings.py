@@ -16,7 +16,8 @@ class ProxySettings:
         checksum: how frames are summed up (DECISION L5); packets of RTno always by `sum8`.
         boot_us: silence after the link was opened; 3 s for boards that an open port resets.
         reply_us: how long a reply may take, 1 us or more (DECISION L13).
-        ping_period_us: from the last correct frame to a PING, 1 us or more (DECISION L14).
+        ping_period_us: from one PING to the next, whatever else is on the line, 1 us or more
+            (DECISION L14).
         pings: how many are unanswered when a device is lost, 1 or more.
         linger_us: how long a proxy stays in Error after that (DECISION L15).
         rediscover: whether the device is looked for afterwards.

@@ -67,9 +67,7 @@ def rtc() -> None:
     "--rate", "rate_hz", type=NumberRange(1e-6, 1e6), metavar="HZ", help="Rate of all components."
 )
 @click.option("--save", type=PATH, help="Write the system at the end, as .toml or .xml.")
-@click.option(
-    "--console", is_flag=True, help="Lines typed here go to each component that takes them."
-)
+@click.option("--console", is_flag=True, help="Lines typed here go to components that take them.")
 @openrtm_options
 @ros2_options
 def run(lite_boot: str, **options: Any) -> None:

@@ -202,6 +202,7 @@ def describe_component(manager: Manager, component: RtComponent) -> Object:
         "version": spec.version,
         "vendor": spec.vendor,
         "category": spec.category,
+        "properties": dict(component.profile.properties),
         "state": _state(component),
         "contexts": [
             {

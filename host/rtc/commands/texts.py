@@ -32,6 +32,8 @@ def component_lines(component: Any, *, long: bool) -> Iterator[str]:
     yield f"  {'Path':<14}{component['path']}"
     for key in ("type", "description", "version", "vendor", "category"):
         yield f"  {key.capitalize():<14}{component[key]}".rstrip()
+    for name, text in component["properties"].items():
+        yield f"  {'Property':<14}{name} = {text}"
     for context in component["contexts"]:
         runs = "" if context["running"] else ", stopped"
         yield f"  {'Runs at':<14}{context['rate_hz']:g} Hz{runs}"

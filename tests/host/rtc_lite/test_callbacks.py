@@ -155,14 +155,38 @@ def test_a_callback_waits_for_a_ping_that_is_under_way() -> None:
 
 def test_a_callback_goes_on_when_a_single_ping_was_lost() -> None:
     proxy, link = made("Inactive")
-    link.now_us = proxy.due_us
+    due_us = link.now_us = proxy.due_us
     link.answers[LiteCommand.PING] = []
     proxy.tick()
     requested_us = link.now_us
     assert proxy.on_activated(EC) is OK
     assert link.taken() == ["CY", "AA"]
     assert 100_000 <= link.now_us - requested_us <= 102_000
-    assert proxy.due_us == link.now_us + 1_000_000
+    assert proxy.due_us == due_us + 1_000_000
+
+
+def test_a_ping_that_has_fallen_due_goes_before_the_next_request() -> None:
+    proxy, link = made("Active")
+    due_us = proxy.due_us
+    link.now_us = due_us - 500
+    assert proxy.on_execute(EC) is OK  # the reply comes when the PING is due already
+    assert proxy.on_execute(EC) is OK
+    assert link.taken() == ["AE", "CY", "AE"]
+    proxy.tick()
+    assert proxy.due_us == due_us + 1_000_000
+
+
+def test_an_unanswered_ping_counts_when_the_request_after_it_is_not_answered_either() -> None:
+    proxy, link = made("Active")
+    link.answers = {LiteCommand.PING: [], LiteCommand.EXECUTE: []}
+    link.now_us = proxy.due_us
+    proxy.tick()
+    assert proxy.on_execute(EC) is ERROR
+    while proxy.fatal_us is None:
+        link.now_us = proxy.due_us
+        proxy.tick()
+    assert link.taken() == ["CY", "AE", "CY", "CY", "CY"]
+    assert (proxy.pings.sent, proxy.pings.answered, proxy.pings.lost) == (4, 0, 4)
 
 
 def test_a_late_reply_is_not_taken_for_that_of_the_next_request() -> None:

@@ -50,6 +50,7 @@ def test_a_profile_says_what_the_device_is() -> None:
     assert proxy.profile.properties == {
         "rtc_lite.type_name": "Echo0",
         "rtc_lite.context": "0x21",
+        "rtc_lite.pings": "0 sent, 0 answered, 0 lost",
     }
     assert [port.name for port in proxy.profile.port_profiles] == ["Echo0.in", "Echo0.out"]
 
