@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Generic
@@ -14,6 +15,26 @@ from tickrig.host.text.trace import Mark
 
 Fault = Callable[[int, W], W]
 """What a fault makes of the traffic that passes at a time in us; it is state, so no closure."""
+
+
+class HoldingFault(ABC, Generic[W]):
+    """A fault that holds traffic back, and lets it go later."""
+
+    @property
+    @abstractmethod
+    def due_us(self) -> int:
+        """When `release` has something to give; `NEVER` if nothing is held."""
+
+    @abstractmethod
+    def __call__(self, now_us: int, traffic: W, /) -> W:
+        """Take traffic in; return what passes at once."""
+
+    @abstractmethod
+    def release(self, now_us: int) -> W | None:
+        """Return what was held until now, None if nothing was."""
+
+    def pair(self, other: HoldingFault[W]) -> None:
+        """Share with the fault of the other direction what both directions have in common."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,22 +98,34 @@ class FaultyPort(Copyable, Generic[W]):
         self.check(name, rate)
         threshold, make = threshold_of(rate or 0), self.fault_types[name].make
         self.drawn |= rate is not None
-        self._to_device[name] = make(Chance(self.seed, f"{name} >"), threshold)
-        self._from_device[name] = make(Chance(self.seed, f"{name} <"), threshold)
+        there = make(Chance(self.seed, f"{name} >"), threshold)
+        back = make(Chance(self.seed, f"{name} <"), threshold)
+        if isinstance(there, HoldingFault) and isinstance(back, HoldingFault):
+            there.pair(back)
+        self._to_device[name], self._from_device[name] = there, back
 
     def clear(self, name: str) -> None:
-        """Let a fault end; clearing one that is not armed is no error."""
+        """Let a fault end; what it holds is lost. Clearing one that is not armed is no error."""
         self._to_device.pop(name, None)
         self._from_device.pop(name, None)
 
     @property
     def due_us(self) -> int:
-        """When the next traffic reaches the port behind."""
-        return self._port.due_us
+        """When the next traffic reaches the port behind, or a fault lets traffic go."""
+        due_us = self._port.due_us
+        for faults in (self._to_device, self._from_device):
+            for fault in faults.values():
+                if isinstance(fault, HoldingFault):
+                    due_us = min(due_us, fault.due_us)
+        return due_us
 
     def poll(self, now_us: int, /) -> W:
         """Take what has arrived and survived."""
-        return self._suffer(Mark.TO_DEVICE, self._to_device, now_us, self._port.poll(now_us))
+        if (held := _released(self._from_device, now_us)) is not None:
+            self._port.send(now_us, held)
+        left = self._suffer(Mark.TO_DEVICE, self._to_device, now_us, self._port.poll(now_us))
+        late = _released(self._to_device, now_us)
+        return left if late is None else late + left  # type: ignore[operator] # bytes or frames
 
     def send(self, now_us: int, traffic: W, /) -> None:
         """Send what the faults leave of one tick's traffic."""
@@ -110,3 +143,16 @@ class FaultyPort(Copyable, Generic[W]):
             for hear in self.listeners:
                 hear(now_us, mark, traffic, left)
         return left
+
+
+def _released(faults: Mapping[str, Fault[W]], now_us: int) -> W | None:
+    """Return what faults let go now; it meets those behind them as well."""
+    released: W | None = None
+    for fault in faults.values():
+        if released:
+            released = fault(now_us, released)
+        if isinstance(fault, HoldingFault) and fault.due_us <= now_us:
+            held = fault.release(now_us)
+            if held is not None:
+                released = held if released is None else released + held
+    return released

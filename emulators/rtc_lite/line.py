@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final
 
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.config import LiteConfig
-from tickrig.emulators.rig.faults import FaultType
+from tickrig.emulators.rig.faults import FaultType, HoldingFault
 from tickrig.emulators.scenario.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.byte_faults import BYTE_FAULTS, ByteFault
 from tickrig.host.text.byte_text import unescape
 from tickrig.host.text.names import near
 from tickrig.host.text.values import parse_setting
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite import rtno
 from tickrig.wire.rtc_lite.codes import LiteCommand
 from tickrig.wire.rtc_lite.frame import HEADER, Framing
@@ -92,8 +96,99 @@ class _LostPing:
         return b"" if self._seen % self._every == 0 else match[0]
 
 
+@dataclass(frozen=True, slots=True)
+class RadioSettings:
+    """What a radio link between host and node is like.
+
+    Attributes:
+        latency_us: the shortest time that a packet takes.
+        jitter_us: up to so much longer it takes, by chance; packets keep their order.
+        gap_us: silence after which a radio sends what it has taken in, as one packet.
+        up_us: mean time from one dropout to the next, 0 for no dropouts.
+        dropout_us: mean time of a dropout; both times vary by half by chance.
+    """
+
+    latency_us: int = 15_000
+    jitter_us: int = 10_000
+    gap_us: int = 2_000
+    up_us: int = 60_000_000
+    dropout_us: int = 2_000_000
+
+
+class _Dropouts:
+    """When both directions hear nothing."""
+
+    def __init__(self, chance: Chance, settings: RadioSettings) -> None:
+        self._chance, self._settings = chance, settings
+        self._down, self._until_us = True, 0
+
+    def down(self, now_us: int) -> bool:
+        """Return whether there is a dropout; times do not go back."""
+        while self._settings.up_us and now_us >= self._until_us:
+            self._down = not self._down
+            mean_us = self._settings.dropout_us if self._down else self._settings.up_us
+            self._until_us += mean_us // 2 + self._chance.draw() % (mean_us + 1)
+        return self._down and self._settings.up_us > 0
+
+
+class Radio(HoldingFault[bytes]):
+    """One direction of a radio link: packets are late, lost by chance, or fall into a dropout."""
+
+    def __init__(self, settings: RadioSettings, chance: Chance, threshold: int) -> None:
+        self._settings, self._chance, self._threshold = settings, chance, threshold
+        self._dropouts = _Dropouts(Chance(chance.draw()), settings)
+        self._taken, self._taken_us = b"", 0
+        self._flying: deque[tuple[int, bytes]] = deque()
+
+    @property
+    def due_us(self) -> int:
+        """When a packet leaves or arrives."""
+        leaves_us = self._taken_us + self._settings.gap_us if self._taken else NEVER
+        return min(leaves_us, self._flying[0][0] if self._flying else NEVER)
+
+    def pair(self, other: HoldingFault[bytes]) -> None:
+        """Let both directions have the same dropouts."""
+        assert isinstance(other, Radio)
+        other._dropouts = self._dropouts
+
+    def __call__(self, now_us: int, data: bytes, /) -> bytes:
+        """Take bytes in."""
+        self._leave(now_us)
+        self._taken += data
+        self._taken_us = now_us
+        return b""
+
+    def release(self, now_us: int) -> bytes | None:
+        """Return the packets that have arrived."""
+        self._leave(now_us)
+        arrived = b""
+        while self._flying and self._flying[0][0] <= now_us:
+            arrived += self._flying.popleft()[1]
+        return arrived or None
+
+    def _leave(self, now_us: int) -> None:
+        """Send what was taken in before the last gap."""
+        leaves_us = self._taken_us + self._settings.gap_us
+        if not self._taken or now_us < leaves_us:
+            return
+        packet, self._taken = self._taken, b""
+        lost, late_us = self._chance.hit(self._threshold), self._chance.draw()
+        if self._dropouts.down(leaves_us) or lost:
+            return
+        at_us = leaves_us + self._settings.latency_us + late_us % (self._settings.jitter_us + 1)
+        after_us = self._flying[-1][0] if self._flying else 0
+        self._flying.append((max(at_us, after_us), packet))
+
+
+def radio(settings: RadioSettings) -> FaultType[bytes]:
+    """Return a radio link as a fault of a line, armed with the rate at which packets are lost."""
+    text = "a radio link: packets are late, lost at this rate, and dropouts last seconds"
+    return FaultType(text, partial(Radio, settings))
+
+
 LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {
     **BYTE_FAULTS,
     "noise": FaultType("a byte of chance comes before each byte at this rate", _Noise),
     "ping": FaultType("every n-th answer to a PING is lost, at a rate of 1/n", _LostPing),
+    "radio": radio(RadioSettings()),
 }

@@ -11,6 +11,7 @@ from tests.host.rtc_lite.bench import PERIOD_US, TICK_US, Bench
 from tests.host.rtc_lite.experiment import ALL, JOINTS, Experiment
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.rtc_lite.component import LiteEcho
+from tickrig.emulators.rtc_lite.line import RadioSettings, radio
 from tickrig.host.rtc.commands.system_control import describe_component
 from tickrig.host.rtc.commands.texts import component_lines
 from tickrig.host.rtc_lite import ProxySettings
@@ -217,6 +218,31 @@ def test_the_statistics_of_pings_are_in_the_profile_and_in_the_event_of_a_remova
     assert removed.pings is not None
     assert (removed.pings.sent, removed.pings.answered, removed.pings.lost) == (14, 10, 4)
     assert "; PINGs: 14 sent, 10 answered, 4 lost; round trip " in str(removed)
+
+
+def test_over_a_lossy_radio_an_inactive_device_is_kept() -> None:
+    bench = Bench(LiteEcho)
+    bench.lines[0].fault_types = {"radio": radio(RadioSettings(up_us=0))}
+    proxy = bench.attach(0, "Echo")
+    bench.lines[0].arm("radio", 0.1)
+    bench.run_to(60_000_000)
+    assert bench.events == []
+    assert 0 < proxy.pings.lost < 20
+    assert (
+        36_000 <= proxy.pings.shortest_us < proxy.pings.mean_us < proxy.pings.longest_us <= 65_000
+    )
+
+
+def test_a_dropout_of_seconds_removes_the_device_and_it_is_found_again() -> None:
+    bench = Bench(LiteEcho)
+    settings = RadioSettings(up_us=10_000_000, dropout_us=3_000_000)
+    bench.lines[0].fault_types = {"radio": radio(settings)}
+    bench.attach(0, "Echo", ProxySettings(rediscover=True))
+    bench.lines[0].arm("radio", 0.001)
+    bench.run_to(60_000_000)
+    kinds = [event.kind.value for event in bench.events]
+    assert kinds[:3] == ["FatalError", "Removed", "Rediscovered"]
+    assert len(kinds) >= 6
 
 
 def test_answers_to_older_pings_are_ignored() -> None:

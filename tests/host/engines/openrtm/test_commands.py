@@ -130,7 +130,7 @@ def test_a_foreign_component_with_paths_is_joined_by_rtshell(tmp_path: Path) -> 
                 assert (words, system.tool(*words)) == (words, (0, "", ""))
             with ControlClient(control) as cart:
                 assert peer.ask("put_path", RunMode.VEL, 0.05, 0.1) == "PORT_OK"
-                eventually(lambda: at_x(cart) > 0.01, "it does not drive")
+                eventually(lambda: float(str(cart.request("status")["x_m"])) > 0.01, "it stands")
                 cart.request("goal", pose=[1, 2, 0])
             eventually(lambda: len(peer.ask("received_paths")) > 0, "no path has come")
             assert peer.ask("received_paths")[0][2] in (RunMode.SPIN, RunMode.STOP)
