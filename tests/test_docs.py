@@ -76,6 +76,30 @@ def test_every_link_and_named_test_is_there(page: Path) -> None:
         assert (ROOT / named).exists(), f"{page.name} names {named}"
 
 
+def requirements() -> Iterator[tuple[str, str, str]]:
+    """Yield number, state and evidence of each requirement of the sources."""
+    for line in (ROOT / "docs/reference/seeds.md").read_text("utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if re.fullmatch(r"(RRC|Lite|RH3|NEDO) \d+", cells[0]):
+            number, _, state, evidence = cells
+            yield number, state, evidence
+
+
+def test_each_requirement_of_the_sources_names_what_shows_it_or_says_why_not() -> None:
+    modules = [path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py")]
+    there = set(re.findall(r"def (test_\w+)", "".join(modules)))
+    numbers: list[str] = []
+    for number, state, evidence in requirements():
+        numbers.append(number)
+        named = re.findall(r"`([^`]+)`", evidence)
+        assert re.match(r"yes|in part: [\w`]|on the page|\*\*no\*\*: \w|not needed: \w", state), number
+        assert named or re.match(r"\*\*no\*\*|not needed", state), number
+        for name in named:
+            exists = (ROOT / name).exists() if name.startswith("tests/") else name in there
+            assert exists, f"{number} names {name}"
+    assert len(numbers) == len(set(numbers)) > 240
+
+
 def decided() -> Iterator[str]:
     """Yield the decisions that a table of a page has, as K14."""
     for page in PAGES:
