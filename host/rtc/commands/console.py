@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Final, Protocol, TypeGuard
 
@@ -89,9 +90,7 @@ def _prefixed(printed: Callable[[str], None], name: str, text: str) -> None:
 
 def _in_foreground(descriptor: int) -> bool:
     """Return whether this process may read there: a terminal stops one in its background."""
-    if sys.platform == "win32":
-        return True
-    try:
-        return not os.isatty(descriptor) or os.tcgetpgrp(descriptor) == os.getpgrp()
-    except OSError:  # a terminal that does not control this process
-        return True
+    if sys.platform != "win32":
+        with suppress(OSError):  # a terminal that does not control this process
+            return not os.isatty(descriptor) or os.tcgetpgrp(descriptor) == os.getpgrp()
+    return True
