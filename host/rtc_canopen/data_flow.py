@@ -177,7 +177,7 @@ class SdoDataFlow:
 
         def fail(failure: Failure) -> None:
             end()
-            self._tell(node, kind_of(failure), "", str(failure))
+            self._report(node, kind_of(failure), "", str(failure))
 
         self._busy.add(node_id)
         node.run(now_us, QueuedScript("ports", script, end, fail, end, moves=False))
@@ -210,13 +210,13 @@ class SdoDataFlow:
         try:
             yield from script
         except SdoAborted as error:
-            self._tell(node, ServerEventType.SDO_ABORTED, name, str(error))
+            self._report(node, ServerEventType.SDO_ABORTED, name, str(error))
         except FieldError as error:
-            self._tell(node, ServerEventType.VALUE_REFUSED, name, str(error))
+            self._report(node, ServerEventType.VALUE_REFUSED, name, str(error))
         else:
             self._failed.discard((node.entry.id, name))
 
-    def _tell(self, node: ServedNode, kind: ServerEventType, port: str, why: str) -> None:
+    def _report(self, node: ServedNode, kind: ServerEventType, port: str, why: str) -> None:
         """Tell of a port that does not work, once until it works again."""
         at = node.entry.id, port
         if at not in self._failed:
