@@ -39,6 +39,9 @@ LISTEN_MS: Final = 1_000
 EXAMINE_US: Final = 120_000_000
 """So long may it take to read the node before the first check."""
 
+INTEGERS: Final = {1: "u8", 2: "u16", 3: "u24", 4: "u32", 5: "u40", 6: "u48", 7: "u56", 8: "u64"}
+"""Types by the size of a value in bytes."""
+
 MOST_CRASHES: Final = 20
 """So many ways in which the program of the node crashed are told."""
 
@@ -226,6 +229,7 @@ class ConformRun:
         findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
         stray = [self._stray.finding] if self._stray.finding else []
         findings = tuple(dict.fromkeys((*self._crashes, *stray, *findings)))
+        repairs = tuple(f"{i:04X}h:{s:02X}={_typed(data)}" for (i, s), data in self._care.repairs)
         gone = (self._stray.unrestored,) if self._stray.unrestored else ()
         return Report(
             self._source,
@@ -236,8 +240,16 @@ class ConformRun:
             settings=describe_settings(self._plan, self._exchange.others),
             findings=findings,
             unrestored=(*self._care.unrestored, *gone),
+            repairs=repairs,
             duration_us=self._exchange.now_us - self._exchange.start_us,
             aborted=aborted,
             absent=self._absent,
             doubt=other_device(self._device, subject.about) if subject else "",
         )
+
+
+def _typed(data: bytes) -> str:
+    """Write a value as `canmon net write` takes it."""
+    if kind := INTEGERS.get(len(data)):
+        return f"{kind}:0x{int.from_bytes(data, 'little'):X}"
+    return f"hex:{data.hex().upper()}"

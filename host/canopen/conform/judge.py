@@ -9,7 +9,7 @@ from typing import Final
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.steps import Player
-from tickrig.host.canopen.conform.check import STIMULUS, Check
+from tickrig.host.canopen.conform.check import STIMULUS, Check, Level
 from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
 from tickrig.host.canopen.conform.notation.names import Unbound
 from tickrig.host.canopen.conform.notation.step_words import step_head
@@ -52,6 +52,8 @@ class Judge:
         bound = self._bind(check, subject)
         if isinstance(bound, str):
             return Result(check, Outcome(Verdict.NOT_APPLICABLE, bound))
+        if unread := self._unread(bound, subject):
+            return Result(check, Outcome(Verdict.INCONCLUSIVE, unread))
         first = self._go(bound)
         if first.verdict is not Verdict.FAIL or self._care.lost:
             return Result(check, first)
@@ -85,6 +87,14 @@ class Judge:
         except NotAllowed as error:
             return str(error)
         return bound
+
+    def _unread(self, bound: BoundCheck, subject: Subject) -> str:
+        """Say what a check would write that could not be written back; empty if all can be."""
+        written = bound.changed | bound.written & subject.values
+        if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
+            return ""
+        places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)
+        return f"{places} cannot be read, so that what it holds could not be written back"
 
     def _go(self, bound: BoundCheck) -> Outcome:
         """Do a check once, and bring the node back."""

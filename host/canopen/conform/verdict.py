@@ -92,6 +92,7 @@ class Report:
         settings: adapter, bit rate, tolerances, seed, versions and such, by name, for people.
         findings: of the EDS, and contradictions between it and the node, one a line.
         unrestored: what could not be written back, one a line.
+        repairs: what restores it, written in this order: words of `canmon net SOURCE write NODE`.
         duration_us: of the run, in bus time.
         aborted: why it ended before its end; empty if it did not.
         doubt: why all of it may say nothing of the node; empty if it does.
@@ -106,6 +107,7 @@ class Report:
     settings: Mapping[str, str] = field(default_factory=dict, repr=False)
     findings: tuple[str, ...] = ()
     unrestored: tuple[str, ...] = ()
+    repairs: tuple[str, ...] = ()
     duration_us: int = 0
     aborted: str = ""
     doubt: str = ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
+from tickrig.host.canopen.conform.bus.sdo_client import number_of
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode, describe_abort
@@ -50,13 +51,13 @@ class ObjectReader:
         return answer if isinstance(answer, bytes) and not wrong else None
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number, None where there is none.
+        """Return an unsigned number of at most 32 bits, None where there is none.
 
         Raises:
             SdoTimeout: the node has stopped answering.
         """
         answer = self.try_read(index, sub)
-        return int.from_bytes(answer, "little") if isinstance(answer, bytes) and answer else None
+        return number_of(answer) if isinstance(answer, bytes) else None
 
     def has_nothing(self, index: int, sub: int) -> bool:
         """Return whether the node refuses to read a place, with whatever code.

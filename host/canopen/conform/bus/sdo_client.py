@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from contextlib import suppress
+from typing import Final, TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.dialogue import Dialogue, Script
-from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.canopen.script_run import run_script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.can import data_frame
@@ -19,6 +20,15 @@ T = TypeVar("T")
 
 SizeOf = Callable[[int, int], int]
 """Tells the bytes of an object by index and sub-index, 0 where nobody knows."""
+
+
+NUMBER_BYTES: Final = range(1, 5)
+"""No number that the tester asks for is longer; a node may send anything."""
+
+
+def number_of(data: bytes) -> int | None:
+    """Return an unsigned number of at most 32 bits, None if the bytes are none."""
+    return int.from_bytes(data, "little") if len(data) in NUMBER_BYTES else None
 
 
 class SdoClient:
@@ -40,25 +50,31 @@ class SdoClient:
         self.size_of: SizeOf = lambda index, sub: 0
 
     def upload(self, index: int, sub: int) -> bytes:
-        """Read an object.
+        """Read an object; a request that is not answered is sent once more.
 
         Raises:
             SdoAborted: the node refuses.
             SdoTimeout: it does not answer.
             LinkClosed: the bus is gone.
         """
-        return self.run(upload(index, sub, self.size_of(index, sub)))
+        return self._twice(lambda: upload(index, sub, self.size_of(index, sub)))
 
     def download(self, index: int, sub: int, data: bytes) -> None:
-        """Write an object; raises as `upload`."""
-        self.run(download(index, sub, data))
+        """Write an object, as `upload` reads one; raises the same."""
+        self._twice(lambda: download(index, sub, data))
 
     def number(self, index: int, sub: int) -> int | None:
-        """Return an unsigned number, None if the node gives none."""
+        """Return an unsigned number of at most 32 bits, None if the node gives none."""
         try:
-            return int.from_bytes(self.upload(index, sub), "little")
+            return number_of(self.upload(index, sub))
         except SdoFailed:
             return None
+
+    def _twice(self, make: Callable[[], Script[T]]) -> T:
+        """Run a script, and once more if the node did not answer: one frame may be lost."""
+        with suppress(SdoTimeout):
+            return self.run(make())
+        return self.run(make())
 
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Final, NamedTuple
@@ -76,6 +77,12 @@ def causes(results: Iterable[Result]) -> list[list[Result]]:
 OF_OBJECT: Final = re.compile(r"OD-.*-(\w+)")
 PLACE: Final = re.compile(r"step \d+|\b[0-9A-F]{4}h?:[0-9A-F]{2}\b|\b\d+ bytes")
 """What differs in the reasons of objects that fail alike."""
+
+
+def repair_commands(report: Report) -> tuple[str, ...]:
+    """Return the commands that write back what could not be restored, in their order."""
+    head = f"canmon net {shlex.quote(report.source)} write {report.node_id}"
+    return tuple(f"{head} {shlex.quote(words)} --yes" for words in report.repairs)
 
 
 def _rows(report: Report, name_of: Callable[[Result], str]) -> list[Row]:

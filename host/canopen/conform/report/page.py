@@ -31,6 +31,7 @@ from tickrig.host.canopen.conform.report.overview import (
     by_clause,
     by_group,
     counts_text,
+    repair_commands,
     unwell,
     verdict_counts,
 )
@@ -64,6 +65,7 @@ def html_page(
     found = unwell(report)
     template: Any = _environment().get_template("page.html")
     page: str = template.render(
+        repairs=repair_commands(report),
         report=report,
         baseline=baseline,
         mended=baseline.mended(report),

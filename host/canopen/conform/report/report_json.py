@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.canopen.conform.notation.step_words import step_words
 from tickrig.host.canopen.conform.notation.suite import group_titles
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
-from tickrig.host.canopen.conform.report.overview import by_group
+from tickrig.host.canopen.conform.report.overview import by_group, repair_commands
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
 
 VERSION: Final = 1
@@ -39,6 +39,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
         "settings": dict(report.settings),
         "findings": list(report.findings),
         "unrestored": list(report.unrestored),
+        "repairs": list(repair_commands(report)),
         "checks": [_check(result, baseline) for result in report.results],
     }
     return json.dumps(said, indent=1) + "\n"

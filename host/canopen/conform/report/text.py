@@ -19,6 +19,7 @@ from tickrig.host.canopen.conform.report.overview import (
     by_group,
     causes,
     counts_text,
+    repair_commands,
     unwell,
     verdict_counts,
 )
@@ -56,6 +57,7 @@ def text_report(
         parts += [[f"{len(more)} {ELSEWHERE}"], *(_failure(alike, None, again) for alike in more)]
     parts.append(_never_begun([result for result in found if not _was_begun(result)]))
     parts += [_list("findings", report.findings), _list("not restored", report.unrestored)]
+    parts.append(_list("to restore it, in this order", repair_commands(report)))
     parts.append(list(_ending(report, baseline)))
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
 

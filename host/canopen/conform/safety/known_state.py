@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Final
+from collections.abc import Callable, Collection, Iterable
+from contextlib import suppress
+from functools import partial
+from typing import Final, TypeVar
 
+from tickrig.host.canopen.conform.binding.object_reader import PATIENCE
 from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.bus.sdo_client import SdoClient, number_of
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
 from tickrig.host.canopen.conform.notation.names import Address
-from tickrig.host.canopen.conform.safety.write_order import Values, in_order
-from tickrig.host.canopen.errors import SdoAborted
+from tickrig.host.canopen.conform.safety.write_order import Values, Write, in_order, is_standard
+from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
 from tickrig.wire.canopen.cob_id import FLAG_30
+
+T = TypeVar("T")
 
 SYNC_COB_ID: Final = (0x1005, 0)
 QUIET: Final = (
@@ -39,26 +44,27 @@ class KnownState:
 
     Attributes:
         original: what objects held before the run.
-        changed: what the check under way may have changed.
-        written: what checks wrote, or tried to, in this run.
+        written: what may have changed, and has not been seen to be as before since.
+        all_written: what was written in this run.
         unrestored: what could not be written back, one a line.
+        repairs: what to write to restore the rest, in this order.
     """
 
     def __init__(self, exchange: Exchange, client: SdoClient) -> None:
         self._exchange, self._client = exchange, client
         self.original: Values = {}
         self._begin: Values = {}
-        self.changed: frozenset[Address] = frozenset()
         self.written: set[Address] = set()
+        self.all_written: set[Address] = set()
         self.unrestored: dict[str, None] = {}
+        self.repairs: list[Write] = []
+        self._silent = 0
 
     def learn(self, addresses: Iterable[Address]) -> None:
         """Read objects that are not known yet; what cannot be read is not restored."""
         for at in addresses:
-            if at not in self.original:
-                value = self._read(at)
-                if value is not None:
-                    self.original[at] = self._begin[at] = value
+            if at not in self.original and (value := self._read(at)) is not None:
+                self.original[at] = self._begin[at] = value
 
     def prepare(self) -> None:
         """Bring what is known into the state in which checks begin."""
@@ -72,22 +78,42 @@ class KnownState:
         for at in left:
             self._begin[at] = self.original[at]
 
+    def write(self, addresses: Collection[Address]) -> None:
+        """Take note of what may change."""
+        self.written.update(addresses)
+        self.all_written.update(addresses)
+
+    def reset(self) -> None:
+        """Take note that all that was written may have other values."""
+        self.written |= self.all_written
+
     def tidy(self, addresses: Iterable[Address] | None) -> None:
         """Bring objects into the state in which checks begin; all that are known if None."""
         touched = self._begin if addresses is None else addresses
         self._write_back(self._begin, [at for at in touched if at in self._begin])
-        self.changed = frozenset()
 
     def restore(self) -> None:
         """Bring all objects into the state before the run, and tell what could not be."""
-        for at in self._write_back(self.original, self.original):
+        left = self._write_back(self.original, self.original)
+        for at in left:
             self.unrestored[self._was(at)] = None
+        self._repair(left)
 
     def give_up(self) -> None:
         """Tell what was written and may not be as it was: the node is gone."""
-        for at, value in self.original.items():
-            if at in self.written and (self._begin[at] != value or at in self.changed):
-                self.unrestored[f"{self._was(at)}; not verified: the node was lost"] = None
+        left = [at for at in self.original if at in self.written]
+        for at in left:
+            self.unrestored[f"{self._was(at)}; not verified: the node was lost"] = None
+        self._repair(left)
+
+    def _repair(self, addresses: Iterable[Address]) -> None:
+        """Take note of what a person has to write to restore what is left."""
+
+        def number(at: Address) -> int | None:
+            value = self.original.get(at, b"")
+            return number_of(value) if is_standard(at, value) else None
+
+        self.repairs += in_order({at: self.original[at] for at in addresses}, number)
 
     def _was(self, at: Address) -> str:
         value = self.original[at]
@@ -100,22 +126,52 @@ class KnownState:
         wrong = self._differing(target, addresses)
         if not wrong:
             return []
-        for at, value in in_order({at: target[at] for at in wrong}, self._number):
-            self.written.add(at)
-            try:
-                self._client.download(*at, value)
-            except (SdoAborted, NotAllowed):
-                continue  # told below, if it differs still
-        return self._differing(target, wrong)
+        touched = dict.fromkeys(wrong)
+        writes = in_order({at: target[at] for at in wrong}, lambda at: self._number(at, target))
+        for at, value in writes:
+            touched[at] = None
+            self.write({at})
+            with suppress(SdoAborted, NotAllowed):  # it is reported if it differs still
+                self._patiently(partial(self._client.download, *at, value))
+        return self._differing(target, [at for at in touched if at in target])
 
     def _differing(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
-        return [at for at in addresses if self._read(at) != target[at]]
+        return [at for at in addresses if not self._holds(at, target[at])]
 
-    def _number(self, at: Address) -> int:
-        return int.from_bytes(self._read(at) or b"", "little")
+    def _holds(self, at: Address, wanted: bytes) -> bool:
+        held = self._read(at)
+        if held is not None and held == self.original.get(at):
+            self.written.discard(at)
+        return held == wanted
+
+    def _number(self, at: Address, target: Values) -> int | None:
+        """Return what an object holds, or should hold if the node does not tell it well.
+
+        None if it is not known what it should hold: then it is not touched.
+        """
+        if at not in target or not is_standard(at, target[at]):
+            return None
+        held = self._read(at)
+        return number_of(held if held and is_standard(at, held) else target[at])
 
     def _read(self, at: Address) -> bytes | None:
+        """Read an object; None if the node refuses, or does not answer this one."""
+        with suppress(SdoAborted):
+            return self._patiently(partial(self._client.upload, *at))
+        return None
+
+    def _patiently(self, ask: Callable[[], T]) -> T | None:
+        """Ask the node; None if it does not answer this one, SdoTimeout if it is gone."""
         try:
-            return self._client.upload(*at)
-        except SdoAborted:
+            answer = ask()
+        except SdoTimeout:
+            self._silent += 1
+            if self._silent >= PATIENCE:
+                self._silent = 0
+                raise
             return None
+        except SdoAborted:
+            self._silent = 0
+            raise
+        self._silent = 0
+        return answer

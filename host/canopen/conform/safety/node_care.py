@@ -14,6 +14,7 @@ from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.notation.bound_check import BoundCheck
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.safety.known_state import KnownState
+from tickrig.host.canopen.conform.safety.write_order import Write
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand, NmtState
@@ -103,10 +104,24 @@ class NodeCare:
         self._stored = self._stored or bool(STORAGE & {index for index, _ in bound.changed})
         try:
             self._state.learn(bound.written)
-            self._state.written |= bound.written
-            self._state.changed = frozenset(self._state.original) if bound.resets else bound.written
+            self._state.write(bound.written)
+            if bound.resets:
+                self._state.reset()
         except (SdoFailed, StepFailed):
             self._recover()
+
+    def unread(self, addresses: frozenset[Address]) -> list[Address]:
+        """Return which of these could not be read: nobody could write them back."""
+        self._exchange.begin(CARE_US)
+        known = self._state.original
+        with suppress(SdoFailed, StepFailed):
+            self._state.learn(at for at in addresses if at[0] not in STORAGE)
+        return sorted(at for at in addresses - known.keys() if at[0] not in STORAGE)
+
+    @property
+    def repairs(self) -> tuple[Write, ...]:
+        """What to write to restore what could not be, in this order."""
+        return tuple(self._state.repairs)
 
     def held(self, at: Address) -> bytes:
         """Return what an object held before the run; nothing if that is not known."""
@@ -142,12 +157,19 @@ class NodeCare:
                 self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
             self._state.restore()
             if self._stored:
-                self._client.download(*STORE, SAVE)
+                self._store()
             if self._nmt_state in TO_STATE:
                 self._command(TO_STATE[self._nmt_state])
         except (SdoFailed, StepFailed):
             return False
         return True
+
+    def _store(self) -> None:
+        """Store what was there before, in place of what a check has stored."""
+        try:
+            self._client.download(*STORE, SAVE)
+        except SdoAborted as error:
+            self._state.unrestored[f"what a check stored is still stored: {error}"] = None
 
     def _tidy(self, addresses: Iterable[Address] | None) -> None:
         self._client.abort()
@@ -208,9 +230,9 @@ class NodeCare:
 
     def _learn_state(self) -> NmtState | None:
         """Learn the NMT state from a heartbeat, which is switched on for the purpose."""
-        before = self._client.number(*HEARTBEAT)
-        if before is None:
+        if HEARTBEAT not in self._state.original:  # it could not be written back
             return None
+        self._state.write({HEARTBEAT})
         try:
             self._client.download(*HEARTBEAT, PROBE_MS.to_bytes(2, "little"))
             pattern = f"{ERROR_CONTROL_COB_ID + self._node_id:03X}#.."

@@ -10,6 +10,7 @@ from tickrig.wire.canopen.cob_id import CAN_ID_MASK, FLAG_30, INVALID
 
 Values = dict[Address, bytes]
 Write = tuple[Address, bytes]
+Number = Callable[[Address], int | None]
 
 SYNC: Final = 0x1005
 CYCLE: Final = 0x1006
@@ -20,9 +21,10 @@ SERVERS: Final = range(0x1200, 0x1300)
 PDOS: Final = (range(0x1400, 0x1600), range(0x1800, 0x1A00))
 MAPPINGS: Final = (range(0x1600, 0x1800), range(0x1A00, 0x1C00))
 TO_MAPPING: Final = 0x200
+COB_ID_BYTES: Final = 4
 
 
-def in_order(values: Mapping[Address, bytes], number: Callable[[Address], int]) -> Iterator[Write]:
+def in_order(values: Mapping[Address, bytes], number: Number) -> Iterator[Write]:
     """Yield what to write, one after the other, to bring objects to their values.
 
     A PDO is disabled while its parameters change, its mapping is emptied first; SYNC is
@@ -30,17 +32,33 @@ def in_order(values: Mapping[Address, bytes], number: Callable[[Address], int]) 
 
     Args:
         values: what the objects shall hold.
-        number: reads an object of the node, as an unsigned number.
+        number: reads an object of the node, as an unsigned number of its size; None if its value
+            was not known, so that it could not be written back.
     """
-    left = dict(values)
+    left = {at: value for at, value in values.items() if is_standard(at, value)}
+    odd = {at: value for at, value in values.items() if at not in left}
     for pdo in sorted({_pdo_of(index) for index, _ in values} - {0}):
         yield from _pdo(pdo, left, number)
     if left.keys() & {(SYNC, 0), (CYCLE, 0), (SYNC_COUNTER, 0)}:
         yield from _sync(left, number)
-    for at in [at for at in left if at[0] == EMCY or at[0] in SERVERS]:
+    for at in [at for at in left if at[0] == EMCY or _is_server(at)]:
         yield from _cob_id(at, left.pop(at), number)
     yield from [(at, bytes(len(value))) for at, value in left.items() if at[0] == CONSUMERS]
-    yield from left.items()
+    yield from (left | odd).items()
+
+
+def is_standard(at: Address, value: bytes) -> bool:
+    """Say whether a COB-ID or a number of mapped objects is as long as CiA 301 has it."""
+    index, sub = at
+    if any(index in area for area in MAPPINGS) and not sub:
+        return len(value) == 1
+    pdo_cob_id = sub == 1 and any(index in area for area in PDOS)
+    is_cob_id = pdo_cob_id or at in {(SYNC, 0), (EMCY, 0)} or _is_server(at)
+    return len(value) == COB_ID_BYTES or not is_cob_id
+
+
+def _is_server(at: Address) -> bool:
+    return at[0] in SERVERS and at[1] in {1, 2}
 
 
 def _pdo_of(index: int) -> int:
@@ -50,43 +68,50 @@ def _pdo_of(index: int) -> int:
     return index - TO_MAPPING if any(index in area for area in MAPPINGS) else 0
 
 
-def _pdo(pdo: int, left: Values, number: Callable[[Address], int]) -> Iterator[Write]:
+def _pdo(pdo: int, left: Values, number: Number) -> Iterator[Write]:
     cob_id_at, mapping = (pdo, 1), pdo + TO_MAPPING
-    before = number(cob_id_at)
-    wanted = int.from_bytes(left.pop(cob_id_at, _u32(before)), "little")
-    yield cob_id_at, _u32(before | INVALID)
-    yield cob_id_at, _u32(wanted | INVALID)
+    given, before = left.pop(cob_id_at, None), number(cob_id_at)
+    wanted = before if given is None else int.from_bytes(given, "little")
+    if wanted is not None:
+        yield cob_id_at, _u32((wanted if before is None else before) | INVALID)
+        yield cob_id_at, _u32(wanted | INVALID)
     mapped = {at: left.pop(at) for at in sorted(left) if at[0] == mapping}
     if mapped:
-        count = mapped.pop((mapping, 0), None) or bytes([number((mapping, 0))])
-        yield (mapping, 0), b"\0"
+        count = mapped.pop((mapping, 0), None)
+        if count is None and (held := number((mapping, 0))) is not None:
+            count = bytes([held])
+        if count is not None:
+            yield (mapping, 0), b"\0"
         yield from mapped.items()
-        yield (mapping, 0), count
+        if count is not None:
+            yield (mapping, 0), count
     yield from [(at, left.pop(at)) for at in sorted(left) if at[0] == pdo]
-    if not wanted & INVALID:
+    if wanted is not None and not wanted & INVALID:
         yield cob_id_at, _u32(wanted)
 
 
-def _sync(left: Values, number: Callable[[Address], int]) -> Iterator[Write]:
+def _sync(left: Values, number: Number) -> Iterator[Write]:
     """Stop the producer, write counter and period, and let it run as it shall."""
-    cob_id = left.pop((SYNC, 0), None) or _u32(number((SYNC, 0)))
-    cycle = left.pop((CYCLE, 0), None)
-    if cycle is None and (SYNC_COUNTER, 0) in left:
-        cycle = _u32(number((CYCLE, 0)))
-    yield (SYNC, 0), _u32(number((SYNC, 0)) & ~FLAG_30)
+    given, before, cycle = left.pop((SYNC, 0), None), number((SYNC, 0)), left.pop((CYCLE, 0), None)
+    if cycle is None and (SYNC_COUNTER, 0) in left and (known := number((CYCLE, 0))) is not None:
+        cycle = _u32(known)
+    if before is not None:
+        yield (SYNC, 0), _u32(before & ~FLAG_30)
     if cycle is not None:
-        yield (CYCLE, 0), bytes(4)
+        yield (CYCLE, 0), bytes(len(cycle))
     if (SYNC_COUNTER, 0) in left:
         yield (SYNC_COUNTER, 0), left.pop((SYNC_COUNTER, 0))
     if cycle is not None:
         yield (CYCLE, 0), cycle
-    yield (SYNC, 0), _u32(int.from_bytes(cob_id, "little") & ~FLAG_30)
-    yield (SYNC, 0), cob_id
+    wanted = before if given is None else int.from_bytes(given, "little")
+    if wanted is not None:
+        yield (SYNC, 0), _u32(wanted & ~FLAG_30)
+        yield (SYNC, 0), _u32(wanted)
 
 
-def _cob_id(at: Address, value: bytes, number: Callable[[Address], int]) -> Iterator[Write]:
+def _cob_id(at: Address, value: bytes, number: Number) -> Iterator[Write]:
     wanted, before = int.from_bytes(value, "little"), number(at)
-    if before & CAN_ID_MASK != wanted & CAN_ID_MASK:
+    if before is not None and before & CAN_ID_MASK != wanted & CAN_ID_MASK:
         yield at, _u32(before | INVALID)
         yield at, _u32(wanted | INVALID)
     yield at, value

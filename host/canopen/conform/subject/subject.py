@@ -36,6 +36,7 @@ class Subject:
         names: what stands for names in checks.
         about: what it says of itself, by name, for people.
         has: its objects by index and sub-index; made once, a tenth of a run.
+        values: those that can be read and written.
     """
 
     binding: Binding
@@ -43,6 +44,7 @@ class Subject:
     names: NodeNames
     about: dict[str, str]
     has: frozenset[Address]
+    values: frozenset[Address]
 
     def missing(self, addresses: Collection[Address]) -> str | None:
         """Return why not all of these can be used: the first that is not there; None if all are."""
@@ -85,8 +87,10 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     binding = bind(device, client.upload, allow=plan.allow, never=plan.never)
     features = find_features(binding, client, eds)
     names = NodeNames(node_id, binding, client.number, others)
-    has = frozenset((entry.index, entry.sub) for entry in binding.device.entries)
-    return Subject(binding, features, names, dict(_about(client)), has)
+    entries = binding.device.entries
+    has = frozenset((entry.index, entry.sub) for entry in entries)
+    values = frozenset((e.index, e.sub) for e in entries if e.readable and e.writable)
+    return Subject(binding, features, names, dict(_about(client)), has, values)
 
 
 def _sizes(device: EdsDevice) -> SizeOf:

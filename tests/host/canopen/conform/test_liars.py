@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from random import Random
 
 import pytest
 
 from tests.device.canopen.actions import SlaveActions
-from tests.host.canopen.conform.r1 import R1, Stimulus, yes
+from tests.host.canopen.conform.fuzzing import FuzzNode, judge_conversation
+from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
 from tests.host.canopen.conform.test_safety import SpyLink, failing
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
@@ -17,8 +21,13 @@ from tickrig.emulators.rig.station import Station
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.eds import read_sound
 from tickrig.wire.can import CanFrame, Frames, data_frame
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.object_table import RO, RW, DeviceInfo, ObjectTable
 from tickrig.wire.instant import NEVER
 
 LONGEST_S = 600
@@ -51,12 +60,14 @@ class Liar:
         return self._lie(now_us, rx)
 
 
-def judge(liar: Liar, *only: str, longest_s: float = LONGEST_S) -> Report:
+def judge(
+    liar: Liar, *only: str, longest_s: float = LONGEST_S, device: EdsDevice | None = None
+) -> Report:
     plan = Plan(Level.INTRUSIVE, only, confirm=yes, longest_s=longest_s)
     wire = CanWire()
     rig = Rig(Station(liar, wire.end()))
     link = CanHost(rig, wire.end())
-    report = ConformRun(link, 5, plan).run()
+    report = ConformRun(link, 5, plan, device=device).run()
     assert report.duration_us < longest_s * 1_000_000 + CARE_US
     assert report.exit_status != 0
     return report
@@ -174,12 +185,62 @@ def test_a_node_that_answers_late(late_us: int) -> None:
     judge(late(R1(), late_us), "NMT", "UE", "US", longest_s=60)
 
 
-def test_a_node_that_resets_by_itself() -> None:
-    r1 = R1()
-    r1.slave.tick(0, ())  # it is on, else it hears nothing
+def test_a_silent_object_blocks_no_check_of_others() -> None:
+    r1, multiplexer = R1(), bytes.fromhex("191000")
+    r1.slave.tick(0, ())
 
     def lie(now_us: int, rx: Frames) -> Frames:
-        if now_us % 700_000 == 0 and not rx:
+        heard = tuple(frame for frame in rx if frame.data[1:4] != multiplexer)
+        return r1.slave.tick(now_us, heard)
+
+    device = read_sound(EDS)[0]
+    report = judge(Liar(lie, busy=True), "NMT", "DE-0*", "SY", "HB-01", "OD-1019*", device=device)
+    assert report.count(Verdict.BLOCKED) == 0
+    assert report.count(Verdict.PASS) > 20
+    assert report.findings == ("1019h:00 Synchronous counter overflow value was not answered",)
+
+
+def test_a_conversation_with_a_node_of_chance_ends_and_leaves_nothing_behind() -> None:
+    ended = Counter(judge_conversation(Random(f"conform {n}")) for n in range(2_000))
+    assert ended["restored"] > 1_500
+    assert ended["unrestored"] > 50
+
+
+def test_a_cob_id_of_eight_bytes_is_written_back_as_it_was() -> None:
+    chance = Random(1)
+    table = ObjectTable()
+    table.variable(0x1000, "Device type", DataType.UNSIGNED32, RO)
+    table.variable(0x1005, "COB-ID SYNC", DataType.UNSIGNED32, RW)
+    device = EdsDevice(DeviceInfo(), tuple(table), table.objects)
+    node = FuzzNode(chance, device)
+    node.wild = 0
+    node.values[0x1005, 0] = node.before[0x1005, 0] = bytes.fromhex("8000004001020304")
+    plan = Plan(Level.INTRUSIVE, ("SY-0*", "UE-01"), confirm=yes)
+    report = ConformRun(node, 5, plan, device=device).run()
+    assert report.unrestored == ()
+    assert node.values == node.before
+
+
+def test_what_could_not_be_restored_is_told_with_the_commands_that_would() -> None:
+    r1, spoilt = R1(), list[int]()
+
+    def refuse(receives: int) -> None:
+        if not spoilt and r1.slave.dictionary[0x1017, 0].data == b"\x64\0":
+            spoilt.append(receives)
+            r1.powered.switch(on=False)
+
+    report = r1.judge(Plan(Level.COMMUNICATION, ("HB-01",), confirm=yes), link=SpyLink(r1, refuse))
+    assert report.unrestored == ("1017h:00 was 0000; not verified: the node was lost",)
+    assert report.repairs == ("1017h:00=u16:0x0",)
+    text = text_report(replace(report, source="can0"))
+    assert "canmon net can0 write 5 1017h:00=u16:0x0 --yes\n" in text
+
+
+def test_a_node_that_resets_by_itself() -> None:
+    r1 = R1()
+
+    def lie(now_us: int, rx: Frames) -> Frames:
+        if now_us % 700_000 == 0:
             r1.slave.reset()
         return r1.slave.tick(now_us, rx)
 
