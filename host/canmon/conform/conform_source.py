@@ -40,6 +40,10 @@ RIGS: Final = ExtensionGroup[Any](
 """What opens a rig file: hosts know no emulators, so it is loaded by its name."""
 
 
+LOCAL: Final = ("virtual", "udp_multicast")
+"""Interfaces of python-can whose bus is between processes, most often of one machine."""
+
+
 def _leave() -> None:
     """Leave all as it is."""
 
@@ -58,6 +62,7 @@ class ConformSource:
         adapter: what it is behind, for people.
         bit_rate: in bit/s, None if nobody says it.
         virtual: nobody else is on it, and its time is none of this machine.
+        shared_host: its nodes may be processes of this machine.
         nodes: what is known to be on it, by node-ID.
         eds: what is known of these nodes beforehand.
         stimulus: makes what moves the inputs of a node; None where nobody can.
@@ -70,6 +75,7 @@ class ConformSource:
     adapter: str
     bit_rate: int | None = None
     virtual: bool = False
+    shared_host: bool = False
     nodes: dict[int, str] = field(default_factory=dict)
     eds: dict[int, EdsFile] = field(default_factory=dict)
     stimulus: Callable[[int], Stimulus] | None = None
@@ -147,9 +153,18 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
         name,
         interface,
         given.bitrate,
+        shared_host=_is_local(interface, given.channel),
         close=link.close,
         watch=partial(_watch_errors, link),
     )
+
+
+def _is_local(interface: str, channel: object) -> bool:
+    """Return whether a bus is one between processes of this machine, as vcan."""
+    if interface in LOCAL:
+        return True
+    net = Path("/sys/class/net", str(channel))
+    return interface == "socketcan" and net.exists() and not (net / "device").exists()
 
 
 def _watch_errors(link: CanLink, node_id: int, run: ConformRun) -> None:

@@ -153,6 +153,7 @@ class Conformance:
             seed=options["seed"],
             stimulus=stimulus,
             confirm=consent.confirm,
+            shared_host=source.shared_host,
         )
 
     def _show(self, report: Report) -> int:

@@ -83,6 +83,7 @@ class ConformRun:
             max_load=plan.max_load,
             permit=self._permission.check,
             resolution_us=plan.resolution_us,
+            shared_host=plan.shared_host,
         )
         self._client = SdoClient(self._exchange, node_id)
         self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
@@ -171,6 +172,7 @@ class ConformRun:
         )
         if self._exchange.presence is Presence.TWO:
             raise Disturbed("two nodes answer")
+        self._exchange.played = self._subject.names.peer
         if self._stray.stamps:
             self._stray.compare(self._client.number(*HEARTBEAT))
         self._care.prepare(self._subject.restorable(self._plan.level))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
@@ -22,7 +23,20 @@ from tickrig.host.canopen.conform.verdict import Line, Outcome, Result, Verdict
 LSS_ANSWER: Final = "7E4#"
 """Begins what LSS slaves say: it does not tell which one."""
 HISTORY: Final = (0x1003, 0)
+PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
+
+
+START: Final = "000#01"
+UNPREPARED: Final = "could not be prepared"
+READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
+NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
+
+
+def _enables(step: Mapping[str, Any]) -> bool:
+    """Return whether a step gives a PDO its COB-ID: every device takes its own."""
+    at = step.get("write", (0, 0))
+    return "macro" in step or (at[0] in PDO_PARAMETERS and at[1] == 1)
 
 
 class Judge:
@@ -58,6 +72,8 @@ class Judge:
         if first.verdict is not Verdict.FAIL or self._care.lost:
             return Result(check, first)
         again = self._go(bound)
+        if again.reason.startswith(UNPREPARED) and not self._exchange.disturbances:
+            return Result(check, first)  # the first go has left the node in another state
         if again.verdict is Verdict.PASS:
             reason = f"passed when it was done again; before: {first.reason}"
             again = replace(again, verdict=Verdict.INCONCLUSIVE, reason=reason)
@@ -72,8 +88,8 @@ class Judge:
                 return "needs somebody at the inputs of the device: --stimulus"
         try:
             bound = bind_check(check, subject.names)
-            if (missing := subject.missing(bound.used)) is not None:
-                return missing
+            if lacking := subject.missing(bound.used) or subject.fixed(bound.steps):
+                return lacking
             for index, _ in sorted(bound.changed):
                 self._permission.check_write(index)
             for index, _ in sorted(bound.written - bound.changed):
@@ -90,7 +106,7 @@ class Judge:
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
         """Say what a check would write that could not be written back; empty if all can be."""
-        written = bound.changed | bound.written & subject.values
+        written = bound.changed & subject.has | bound.written & subject.values
         if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
             return ""
         places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)
@@ -110,7 +126,8 @@ class Judge:
         if crashed and verdict is not Verdict.FAIL:
             verdict, reason = Verdict.FAIL, self._crash()
         lines, end_us = self._lines(), self._exchange.now_us
-        if not self._care.tidy(bound, boots) and verdict is Verdict.FAIL and not crashed:
+        unwell = verdict in {Verdict.FAIL, Verdict.INCONCLUSIVE} and not crashed
+        if not self._care.tidy(bound, boots) and unwell:
             verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
         return Outcome(verdict, reason, lines, start_us - begun_us, end_us - begun_us)
 
@@ -130,8 +147,24 @@ class Judge:
         except StepFailed as error:
             if self._exchange.crashes:
                 return Verdict.FAIL, f"{where}: {self._crash()}"
+            if "given" in step:
+                return self._unprepared(step, error, f"{where}: {error}")
             return self._failed(bound, f"{where}: {error}")
         return Verdict.PASS, ""
+
+    def _unprepared(
+        self, step: Mapping[str, Any], error: StepFailed, reason: str
+    ) -> tuple[Verdict, str]:
+        """Say what a check gave that could not be prepared: the clause of another one is told.
+
+        CiA 301 lets many objects be constant, and values be refused that a device does not
+        support.
+        """
+        if self._exchange.disturbances:
+            reason = f"{reason}; {', '.join(self._exchange.disturbances)}"
+        elif error.abort in READ_ONLY or (error.abort in NOT_SUPPORTED and not _enables(step)):
+            return Verdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
+        return Verdict.INCONCLUSIVE, f"{UNPREPARED}: {reason}"
 
     def _end(self, bound: BoundCheck) -> None:
         """Do what is done at the end, however the check went."""
@@ -154,6 +187,10 @@ class Judge:
         if others and any(line.text.startswith(LSS_ANSWER) for line in self._lines()):
             known = ", ".join(map(str, sorted(others)))
             return Verdict.INCONCLUSIVE, f"{reason}; other nodes may have answered: {known}"
+        errors = self._care.errors
+        if errors and any(str(step.get("send", "")).startswith(START) for step in bound.steps):
+            why = f"1001h was {errors:02X}h before: with an error a node may leave Operational"
+            return Verdict.INCONCLUSIVE, f"{reason}; {why}"
         if bound.check.choice:
             return Verdict.IMPLEMENTATION_DEFINED, f"{bound.check.choice}; {reason}"
         return Verdict.FAIL, reason

@@ -31,6 +31,7 @@ class Plan:
         confirm: is asked before what concerns other nodes or cannot be undone; no says no.
         longest_s: after so long no further check is begun.
         resolution_us: of the time stamps of the adapter.
+        shared_host: the node may be a process of this machine, and late when this one is.
     """
 
     level: Level = Level.READ_ONLY
@@ -44,6 +45,7 @@ class Plan:
     confirm: Callable[[str], bool] = lambda question: False
     longest_s: float = 1_800
     resolution_us: int = 1_000
+    shared_host: bool = False
 
     def chooses(self, check: Check) -> bool:
         """Say whether a check was chosen: by its level, and by its name or group."""

@@ -82,6 +82,7 @@ class Binding:
         reasons: for people, by the names that are not bound.
         findings: where EDS and node contradict each other, one a line.
         known: the objects are those of an EDS.
+        entries: the objects by index and sub-index.
     """
 
     device: EdsDevice
@@ -89,6 +90,7 @@ class Binding:
     reasons: Mapping[str, str]
     findings: tuple[str, ...] = ()
     known: bool = True
+    entries: Mapping[Place, EntryDescription] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -140,7 +142,8 @@ def bind(
     search.bound.update(pdos)
     search.reasons.update(missing)
     findings = (*reader.findings, *search.findings)
-    return Binding(found, search.bound, search.reasons, findings, search.known)
+    entries = {(entry.index, entry.sub): entry for entry in found.entries}
+    return Binding(found, search.bound, search.reasons, findings, search.known, entries)
 
 
 def _bind_object(search: _Search, wanted: Wanted) -> None:

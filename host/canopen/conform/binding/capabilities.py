@@ -88,6 +88,8 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
     reasons = dict(_missing(binding))
     if not any(_number(text) for text in dummies.values()):
         reasons["dummy"] = _unsaid(file, "DummyUsage", "dummy objects may be mapped")
+    if _has_constant_heartbeat(binding):
+        reasons["guarding"] = "1017h is constant and not 0: heartbeat takes the place of guarding"
     findings = [*_profile(binding), *_identity(binding, info)]
     if _number(info.get("lss_supported", "")) and not _has_lss_address(binding):
         reasons |= dict.fromkeys(LSS, "1018h has not the four numbers of an LSS address")
@@ -145,6 +147,13 @@ def _has_lss_address(binding: Binding) -> bool:
     """Return whether 1018h has vendor, product, revision and serial number (CiA 305)."""
     present = {(entry.index, entry.sub) for entry in binding.device.entries}
     return present.issuperset((LSS_ADDRESS, sub) for sub in range(1, 5))
+
+
+def _has_constant_heartbeat(binding: Binding) -> bool:
+    bound = binding.bound.get("heartbeat")
+    if not isinstance(bound, BoundObject) or (bound.entry.writable and not bound.entry.low):
+        return False
+    return any(bound.value or b"")
 
 
 def _profile_number(binding: Binding) -> int | None:

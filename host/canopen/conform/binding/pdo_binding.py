@@ -44,6 +44,7 @@ class BoundPdo:
         subs: sub-indices that its communication parameter has.
         remappable: its mapping and its COB-ID may be written.
         places: how many objects can be mapped.
+        restless: it has an inhibit time, or an event timer, that cannot be switched off.
     """
 
     index: int
@@ -53,6 +54,7 @@ class BoundPdo:
     subs: frozenset[int]
     remappable: bool
     places: int
+    restless: bool = False
 
     @property
     def mapping_index(self) -> int:
@@ -102,8 +104,13 @@ def _kinds(way: str) -> Iterator[PdoKind]:
     yield PdoKind(f"{way}_disabled", f"{pdo} that is disabled", lambda pdo: not pdo.enabled)
     yield PdoKind(
         f"{way}_async",
-        f"{pdo} that is enabled, event-driven and has a mapping",
-        lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in EVENT_DRIVEN,
+        f"{pdo} that is enabled, event-driven, has a mapping and no timer that cannot be stopped",
+        lambda pdo: (
+            pdo.enabled
+            and bool(pdo.mapping)
+            and pdo.transmission_type in EVENT_DRIVEN
+            and not pdo.restless
+        ),
     )
     yield PdoKind(
         f"{way}_sync",
@@ -141,7 +148,7 @@ def _carries(address: tuple[int, int], pdo: BoundPdo) -> bool:
 
 
 def _is_remappable(pdo: BoundPdo) -> bool:
-    return pdo.remappable
+    return pdo.remappable and not pdo.restless
 
 
 TPDO_KINDS: Final = (
@@ -216,6 +223,10 @@ def _read(device: EdsDevice, reader: ObjectReader, area: range) -> Iterator[Boun
             *(index, cob_id, kind, mapping, frozenset(head)),
             remappable=changeable,
             places=len(body),
+            restless=any(
+                head.get(sub) is False and reader.number(index, sub)
+                for sub in (INHIBIT, EVENT_TIMER)
+            ),
         )
 
 

@@ -10,9 +10,9 @@ from tickrig.host.canopen.conform.bus.evidence import Evidence
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches
 from tickrig.host.canopen.conform.bus.periods import MS_US, off_period
 from tickrig.host.canopen.conform.bus.presence import MULTIPLEXER, Answers, Presence
-from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
-from tickrig.host.canopen.conform.bus.unlike import unlike, wanted_text
+from tickrig.host.canopen.conform.bus.unlike import abort_of, unlike, wanted_text
 from tickrig.host.canopen.conform.verdict import Direction
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
@@ -65,6 +65,7 @@ class Exchange:
         max_load: share of it that may be used, above 0 to 1.
         permit: looks at each frame before it is sent; raises NotAllowed.
         resolution_us: of the time stamps; a frame may be so much late.
+        shared_host: the node may be a process of this machine.
 
     Attributes:
         evidence: of the check under way.
@@ -74,6 +75,7 @@ class Exchange:
         others: node-IDs of others that were on the bus so far; 0 for what is of no node.
         deadline_us: when the check under way has to have ended.
         transfer: index and sub-index of the last SDO transfer that the node has answered.
+        played: a node-ID that is no other node's: the tester plays it, or gives it to the node.
         unanswered: objects that the node was asked about and has not answered, the first one first.
     """
 
@@ -86,6 +88,7 @@ class Exchange:
         max_load: float,
         permit: Callable[[CanFrame], None],
         resolution_us: int = MS_US,
+        shared_host: bool = False,
     ) -> None:
         self._link, self._node_id, self.resolution_us = link, node_id, resolution_us
         self._allowance, self._foreign = Allowance(bit_rate, max_load), ForeignLoad(bit_rate)
@@ -97,6 +100,8 @@ class Exchange:
         self._multiplexer, self.transfer = b"", (0, 0)
         self.unanswered: list[tuple[int, int]] = []
         self._answers, self._others_by = Answers(), NODES
+        self.played: int | None = None
+        self._shared_host, self._late_us = shared_host, 0
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
@@ -120,7 +125,7 @@ class Exchange:
         self.deadline_us, self._watched = self.now_us + within_us, watched
         self._unread.clear()
         self.evidence, self.disturbances, self.crashes = Evidence(), {}, {}
-        self._busy_us = self.now_us
+        self._busy_us, self._late_us = self.now_us, 0
 
     @property
     def presence(self) -> Presence:
@@ -186,7 +191,7 @@ class Exchange:
             late_ms = (at_us - until_us + self.resolution_us) / MS_US
             raise StepFailed(f"{got} came {late_ms:.1f} ms after the {within_ms} ms allowed")
         if not any(matches(pattern, got) for pattern in patterns):
-            raise StepFailed(unlike(got, patterns))
+            raise StepFailed(unlike(got, patterns), abort_of(got))
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:
@@ -213,6 +218,14 @@ class Exchange:
         """
         stamps = self.collect(pattern, each_ms * (times + 2))
         if wrong := off_period(stamps, each_ms, times, self.resolution_us):
+            late_us = (
+                (stamps[-1] - stamps[0]) // (len(stamps) - 1) - each_ms * MS_US if stamps[1:] else 0
+            )
+            if self._shared_host and 0 < late_us <= self._late_us:
+                late = (
+                    f"this host was late by {self._late_us / MS_US:.1f} ms, and the node runs on it"
+                )
+                raise Disturbed(f"{pattern} {wrong}; {late}")
             raise StepFailed(f"{pattern} {wrong}")
 
     def collect(self, pattern: str, for_ms: int) -> list[int]:
@@ -274,6 +287,8 @@ class Exchange:
         wait_us = max(0, min(until_us - before_us, SLICE_US))
         self._known_us, received = link.receive_stamped(wait_us)
         after_us = link.now_us
+        first_us = received[0][0] if received else before_us + wait_us
+        self._late_us = max(self._late_us, after_us - first_us)
         gap_us = max(before_us - self._busy_us, after_us - before_us - wait_us)
         self._busy_us = after_us
         if gap_us > HOST_GAP_US:
@@ -302,7 +317,7 @@ class Exchange:
                 del self.unanswered[: self.unanswered.index(index_sub(frame.data)) + 1]
             return
         if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
-            self.others.add(frame.can_id & NODE_ID_MASK)
+            self.others.update({frame.can_id & NODE_ID_MASK} - {self.played})
         if can_id in self._reserved:
             self.disturb(f"somebody else sent {text}")
         if self._foreign.add(at_us, frame):

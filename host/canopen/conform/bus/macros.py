@@ -210,6 +210,29 @@ def remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> No
     sdo.write((head, 1), cob_id)
 
 
+def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
+    """Enable a PDO; objects are mapped before if it has none, as it may be refused without."""
+    head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
+    sdo.write((head, 1), cob_id[:3] + bytes([cob_id[3] | 0x80]))
+    if not sdo.read_data((body, 0), 1)[0]:
+        for sub, entry in enumerate(entries, 1):
+            sdo.write((body, sub), bytes.fromhex(entry))
+        sdo.write((body, 0), bytes([len(entries)]))
+    sdo.write((head, 1), cob_id)
+
+
+def refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> None:
+    """Write so many bytes in segments; it is refused at once, or when they have come."""
+    mux = multiplexer(at)
+    aborts = [f"80{mux}{bytes.fromhex(code)[::-1].hex().upper()}" for code in codes]
+    sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
+    if sdo.answer(f"60{mux}00000000", *aborts)[0] == ABORTED:
+        return
+    data = pattern(int(size))
+    sdo.say(bytes([(SEGMENT_BYTES - len(data)) << 1 | 1]) + data.ljust(SEGMENT_BYTES, b"\0"))
+    sdo.answer(*aborts)
+
+
 def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
     """Guard a node: it tells the states in turn, and its toggle bit alternates.
 
@@ -290,6 +313,8 @@ MACROS: Final[dict[str, Callable[..., object]]] = {
     "upload": upload_segmented,
     "blockup": upload_same,
     "map": remap,
+    "enable": enable,
+    "refusesegments": refuse_segments,
     "fastscan": fastscan,
     "guard": guard,
     "follow": follow,

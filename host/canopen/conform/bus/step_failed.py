@@ -9,7 +9,15 @@ from __future__ import annotations
 
 
 class StepFailed(Exception):  # noqa: N818 - what the step did
-    """The node did something else, or nothing; the text says what came and what was allowed."""
+    """The node did something else, or nothing; the text says what came and what was allowed.
+
+    Attributes:
+        abort: the SDO abort code that came, None if none did.
+    """
+
+    def __init__(self, text: str, abort: int | None = None) -> None:
+        super().__init__(text)
+        self.abort = abort
 
 
 class NotAllowed(Exception):  # noqa: N818 - what the step is

@@ -52,6 +52,16 @@ def unlike(got: str, wanted: Sequence[str]) -> str:
     return f"got {_words(got)}{where}, want {wanted_text(wanted)}{of}"
 
 
+def abort_of(got: str) -> int | None:
+    """Return the abort code in a frame, None if it is no SDO abort.
+
+    >>> f"{abort_of('585#8000100002000106'):08X}", abort_of("705#00")
+    ('06010002', None)
+    """
+    match = ABORT.fullmatch(got)
+    return int(_code(match[2]), 16) if match and match[2].isalnum() else None
+
+
 def wanted_text(wanted: Sequence[str]) -> str:
     """Write what may come, of aborts their codes.
 

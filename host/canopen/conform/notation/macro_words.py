@@ -9,6 +9,8 @@ from tickrig.host.canopen.conform.notation.names import Address
 
 DOWNLOADS: Final = frozenset({"segdn", "blkdn"})
 MAP: Final = "map"
+ENABLE: Final = "enable"
+REFUSE_SEGMENTS: Final = "refusesegments"
 FOLLOW: Final = "follow"
 TO_MAPPING: Final = 0x200
 """A mapping parameter is so far behind its communication parameter."""
@@ -24,8 +26,12 @@ def written_by(name: str, *words: Any) -> tuple[Address, ...]:
     >>> written_by("segdn", (0x2008, 0), "1000"), written_by("segup", (0x2008, 0), "1000")
     (((8200, 0),), ())
     """
-    if name in DOWNLOADS or name == FOLLOW:
+    if name in DOWNLOADS or name in {FOLLOW, REFUSE_SEGMENTS}:
         return (words[0],)
+    if name == ENABLE:
+        communication = words[0][0]
+        entries = ((communication + TO_MAPPING, sub) for sub in range(len(words) - 1))
+        return ((communication, 1), *entries)
     if name == MAP:
         communication = words[0][0]
         entries = ((communication + TO_MAPPING, sub) for sub in range(len(words) - 2))
@@ -56,5 +62,7 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
     "fastscan": lambda words: 10_000,
     "guard": lambda words: 1_500 * len(words),
     MAP: lambda words: TRANSFER_MS,
+    ENABLE: lambda words: TRANSFER_MS,
+    REFUSE_SEGMENTS: lambda words: TRANSFER_MS,
     FOLLOW: lambda words: TRANSFER_MS + 4 * int(words[4]),
 }

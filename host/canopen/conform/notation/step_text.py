@@ -17,6 +17,9 @@ from tickrig.host.canopen.conform.check import Step
 FINALLY: Final = "finally "
 """Begins a step that is done at the end, however the check went; it fails no check."""
 
+GIVEN: Final = "given "
+"""Begins a step that prepares: if the node does not do it, the check says nothing of the node."""
+
 ANSWER_MS: Final = 1_000
 """How long is waited for an answer where a check says nothing: CiA 301 gives no time."""
 
@@ -29,6 +32,8 @@ def parse_step(line: str) -> Step:
     """
     if line.startswith(FINALLY):
         return {**parse_step(line.removeprefix(FINALLY)), "finally": True}
+    if line.startswith(GIVEN):
+        return {**parse_step(line.removeprefix(GIVEN)), "given": True}
     for pattern, make in _NOTATIONS:
         match = pattern.fullmatch(line)
         if match is not None:

@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS, FINALLY
+from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS, FINALLY, GIVEN
 
 GROWN: Final = {0: "again", 1: "a byte longer", -1: "a byte shorter"}
 
 
 def step_words(step: Mapping[str, Any]) -> str:
     """Write a step, with names or with the numbers of a node."""
-    return FINALLY * ("finally" in step) + (_of_bus(step) or _of_object(step))
+    head = FINALLY * ("finally" in step) + GIVEN * ("given" in step)
+    return head + (_of_bus(step) or _of_object(step))
 
 
 TEMPLATES: Final = {

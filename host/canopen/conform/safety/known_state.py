@@ -30,6 +30,8 @@ QUIET: Final = (
 )
 """Objects that are 0 when a check begins: no SYNC, guarding or heartbeat by itself."""
 CONSUMERS: Final = 0x1016
+PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+INHIBIT_TIME, EVENT_TIMER = 3, 5
 TEXTS: Final = range(0x1008, 0x100B)
 NUMBERS: Final = range(9)
 """So many bytes are a number, not a text."""
@@ -69,7 +71,7 @@ class KnownState:
     def prepare(self) -> None:
         """Bring what is known into the state in which checks begin."""
         for at, value in self.original.items():
-            if at in QUIET or (at[0] == CONSUMERS and at[1]):
+            if at in QUIET or (at[0] == CONSUMERS and at[1]) or _is_timer(at):
                 self._begin[at] = bytes(len(value))
             elif at == SYNC_COB_ID:
                 number = int.from_bytes(value, "little") & ~FLAG_30
@@ -160,10 +162,10 @@ class KnownState:
             return self._patiently(partial(self._client.upload, *at))
         return None
 
-    def _patiently(self, ask: Callable[[], T]) -> T | None:
+    def _patiently(self, attempt: Callable[[], T]) -> T | None:
         """Ask the node; None if it does not answer this one, SdoTimeout if it is gone."""
         try:
-            answer = ask()
+            answer = attempt()
         except SdoTimeout:
             self._silent += 1
             if self._silent >= PATIENCE:
@@ -175,3 +177,8 @@ class KnownState:
             raise
         self._silent = 0
         return answer
+
+
+def _is_timer(at: Address) -> bool:
+    """Return whether an object lets PDOs be sent, or held back, or missed, by themselves."""
+    return at[0] in PDOS and at[1] in {INHIBIT_TIME, EVENT_TIMER}

@@ -114,14 +114,21 @@ class NodeCare:
         """Return which of these could not be read: nobody could write them back."""
         self._exchange.begin(CARE_US)
         known = self._state.original
-        with suppress(SdoFailed, StepFailed):
+        try:
             self._state.learn(at for at in addresses if at[0] not in STORAGE)
+        except (SdoFailed, StepFailed):
+            return []  # the node is gone, which `begin` will find
         return sorted(at for at in addresses - known.keys() if at[0] not in STORAGE)
 
     @property
     def repairs(self) -> tuple[Write, ...]:
         """What to write to restore what could not be, in this order."""
         return tuple(self._state.repairs)
+
+    @property
+    def errors(self) -> int:
+        """The bits of the error register that were set before the run, and are still."""
+        return self._errors
 
     def held(self, at: Address) -> bytes:
         """Return what an object held before the run; nothing if that is not known."""

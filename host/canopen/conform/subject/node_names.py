@@ -25,6 +25,8 @@ FREE_CAN_ID: Final = 0x6A2
 DRIVE: Final = range(0x603F, 0x6100)
 """Of CiA 402: modes, states and positions."""
 HIGHEST_NODE_ID: Final = 127
+HEARTBEAT: Final = (0x1017, 0)
+BEATS_MS: Final = (100, 90, 110)
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 
 ReadNumber = Callable[[int, int], int | None]
@@ -39,15 +41,21 @@ class NodeNames:
         binding: objects and PDOs by name.
         number: reads the node.
         others: node-IDs that were heard on the bus.
+
+    Attributes:
+        peer: a node-ID that nobody has, None if all are taken.
     """
 
     def __init__(
         self, node_id: int, binding: Binding, number: ReadNumber, others: Collection[int] = ()
     ) -> None:
         self._binding = binding
+        peer = _free_id(node_id, others)
+        self.peer = peer
         self._texts: Mapping[str, str] = {
             **_connection_set(node_id, number),
-            **_peer(node_id, others),
+            **_peer(peer),
+            "beat": _heartbeat_time(binding, number),
             **_identity(number),
         }
 
@@ -108,12 +116,25 @@ def _can_id(cob_id: int | None) -> int:
     return 0 if cob_id is None or cob_id & EXTENDED else cob_id & CAN_ID_MASK
 
 
-def _peer(node_id: int, others: Collection[int]) -> dict[str, str]:
+def _free_id(node_id: int, others: Collection[int]) -> int | None:
     """Choose a node-ID that nobody has: for a node that the tester plays."""
-    free = [n for n in range(HIGHEST_NODE_ID - 1, 0, -1) if n != node_id and n not in others]
-    if not free:
+    free = (n for n in range(HIGHEST_NODE_ID - 1, 0, -1) if n != node_id and n not in others)
+    return next(free, None)
+
+
+def _peer(peer: int | None) -> dict[str, str]:
+    if peer is None:
         return {}
-    return {"peer": f"{free[0]:02X}", "peer_heartbeat": f"{ERROR_CONTROL_COB_ID + free[0]:03X}"}
+    return {"peer": f"{peer:02X}", "peer_heartbeat": f"{ERROR_CONTROL_COB_ID + peer:03X}"}
+
+
+def _heartbeat_time(binding: Binding, number: ReadNumber) -> str:
+    """Choose a heartbeat time, in hex, that the node neither has nor begins with."""
+    bound = binding.bound.get("heartbeat")
+    default = bound.entry.default if isinstance(bound, BoundObject) else b""
+    taken = {number(*HEARTBEAT), int.from_bytes(default, "little")}
+    time_ms = next(time_ms for time_ms in BEATS_MS if time_ms not in taken)
+    return time_ms.to_bytes(2, "little").hex().upper()
 
 
 def _identity(number: ReadNumber) -> dict[str, str]:

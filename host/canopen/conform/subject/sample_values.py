@@ -10,8 +10,13 @@ from tickrig.host.canopen.conform.notation.names import Unbound
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-PATTERNS: Final = (bytes.fromhex("A5345678F1E2D3C4"), bytes.fromhex("5AC3877A1E2D3C4B"))
-"""Two values no byte of which is another's: what is swapped or cut is seen."""
+PATTERNS: Final = tuple(
+    map(
+        bytes.fromhex,
+        ("A5345678F1E2D3C4", "5AC3877A1E2D3C4B", "694B9621D2A57896", "962D4BE127C3B45A"),
+    )
+)
+"""Values no byte of which is another's: what is swapped or cut is seen."""
 TEXTS: Final = (b"conformance", b"tested node")
 BOOLEANS: Final = (b"\x01", b"\x00")
 REALS: Final = (1.5, -2.25)
@@ -23,8 +28,9 @@ def sample_value(name: str, attribute: str, bound: BoundObject) -> str:
 
     Args:
         name: in the check, for the message.
-        attribute: `new` or `other`, two allowed values; `old`, what it held; `low` and `high`;
-            `below` and `above` them; `map`, its mapping entry; `longmap`, one twice as long.
+        attribute: `new` or `other`, two allowed values, which it neither holds nor begins with if
+            there are enough; `old`, what it held; `low` and `high`; `below` and
+            `above` them; `map`, its mapping entry; `longmap`, one twice as long.
         bound: the object.
 
     Raises:
@@ -36,7 +42,8 @@ def sample_value(name: str, attribute: str, bound: BoundObject) -> str:
             bits = entry.data_type.bits << (attribute == "longmap")
             return bytes([bits, entry.sub, *entry.index.to_bytes(2, "little")]).hex().upper()
         case "new" | "other":
-            return _allowed(name, entry, ("new", "other").index(attribute)).hex().upper()
+            number = ("new", "other").index(attribute)
+            return _allowed(name, bound, number).hex().upper()
         case "old" if bound.value is not None:
             return bound.value.hex().upper()
         case "low" | "high" | "below" | "above":
@@ -44,7 +51,8 @@ def sample_value(name: str, attribute: str, bound: BoundObject) -> str:
     raise Unbound(name, f"{entry.index:04X}h:{entry.sub:02X} has no {attribute}")
 
 
-def _allowed(name: str, entry: EntryDescription, number: int) -> bytes:
+def _allowed(name: str, bound: BoundObject, number: int) -> bytes:
+    entry = bound.entry
     kind = entry.data_type
     if kind is DataType.BOOLEAN:
         return BOOLEANS[number]
@@ -53,12 +61,15 @@ def _allowed(name: str, entry: EntryDescription, number: int) -> bytes:
     if not kind.is_integer:
         return TEXTS[number][: entry.max_bytes]
     if entry.low is None and entry.high is None:
-        return PATTERNS[number][: kind.size]
-    low, high = _limits(entry)
-    value = (low, high)[number]
-    if low == high:
-        raise Unbound(name, f"{entry.index:04X}h:{entry.sub:02X} has only the value {low}")
-    return value.to_bytes(kind.size, "little", signed=kind.signed)
+        values = [pattern[: kind.size] for pattern in PATTERNS]
+    else:
+        low, high = _limits(entry)
+        if low == high:
+            raise Unbound(name, f"{entry.index:04X}h:{entry.sub:02X} has only the value {low}")
+        some = dict.fromkeys((low, high, (low + high) // 2, low + 1))
+        values = [value.to_bytes(kind.size, "little", signed=kind.signed) for value in some]
+    unused = [value for value in values if value not in {bound.value, entry.default}]
+    return [*unused, *(value for value in values if value not in unused)][number]
 
 
 def _limits(entry: EntryDescription) -> tuple[int, int]:

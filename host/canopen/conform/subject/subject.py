@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.canopen.conform.binding.binding import Binding, bind
 from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient, SizeOf
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.check import Level, Step
+from tickrig.host.canopen.conform.notation.macro_words import MAP, written_by
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
@@ -18,12 +19,14 @@ from tickrig.host.canopen.errors import SdoFailed
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.eds.standard_objects import standard_object
 
 TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
 MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 COMMUNICATION: Final = 0x1000
+READ_ONLY: Final = "06010002"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +56,27 @@ class Subject:
                 return f"{self._where(index)} {index:04X}h:{sub:02X}"
         return None
 
+    def fixed(self, steps: Collection[Step]) -> str | None:
+        """Return why not all that is written takes its value: CiA 301 lets it be constant.
+
+        None if all does.
+        """
+        for step in steps:
+            for at in _takes(step):
+                entry = self.entries.get(at)
+                if entry is not None and not entry.writable:
+                    return f"{at[0]:04X}h:{at[1]:02X} is read-only"
+            entry = self.entries.get(step.get("write", (0, 0)))
+            if entry is not None and not _within(entry, bytes.fromhex(step["data"])):
+                at = step["write"]
+                return f"{at[0]:04X}h:{at[1]:02X} takes only {entry.low} to {entry.high}"
+        return None
+
+    @property
+    def entries(self) -> Mapping[Address, EntryDescription]:
+        """The descriptions of its objects."""
+        return self.binding.entries
+
     def _where(self, index: int) -> str:
         """Say who has no such object: without an EDS only those of CiA 301 were asked for."""
         if self.binding.known:
@@ -68,6 +92,24 @@ class Subject:
             value = entry.data_type is not DataType.DOMAIN and entry.index not in STORAGE
             if inside and value and entry.readable and entry.writable:
                 yield entry.index, entry.sub
+
+
+def _takes(step: Step) -> Iterator[Address]:
+    """Yield what a step writes, and the node shall take, or refuse for what it is."""
+    if "write" in step:
+        yield step["write"]
+    if "refuse write" in step and READ_ONLY not in step["codes"]:  # another reason is asked for
+        yield step["refuse write"]
+    if step.get("macro", [""])[0] == MAP:
+        yield from written_by(*step["macro"])
+
+
+def _within(entry: EntryDescription, data: bytes) -> bool:
+    """Return whether a value lies within the limits of an object, where it has any."""
+    if not entry.data_type.is_integer or len(data) != entry.size:
+        return True
+    value = int.from_bytes(data, "little", signed=entry.signed)
+    return (entry.low is None or value >= entry.low) and (entry.high is None or value <= entry.high)
 
 
 def examine(  # noqa: PLR0913, PLR0917 - all that is known

@@ -8,21 +8,39 @@ from typing import Final
 import pytest
 
 from tests.device.canopen.actions import SlaveActions
+from tests.device.canopen.profile_objects import make_dictionary
 from tests.device.canopen.reference import NODE_ID
-from tests.host.canopen.conform.defects.defect import Bends, Defect, hears, make_defective, tolerant
+from tests.host.canopen.conform.defects.defect import (
+    Bends,
+    Defect,
+    hears,
+    make_defective,
+    refuses,
+    says,
+    tolerant,
+)
+from tests.host.canopen.conform.defects.of_pdo import BOTH
 from tests.host.canopen.conform.defects.of_sdo import TEXT, clings_to_transfer, row
-from tests.host.canopen.conform.defects.test_found import judge
+from tests.host.canopen.conform.defects.of_services import Slow
+from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tests.host.canopen.conform.test_safety import SpyLink
 from tests.host.canopen.conform.under_test import Judged, not_harmless
+from tickrig.device.canopen.bus.sync import Sync
+from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.nmt.error_control import HeartbeatProducer
+from tickrig.emulators.can.outside.host import CanHost
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Verdict
+from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.links.link import StampedFrames
+from tickrig.wire.can import Frames
+from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.object_table import RW, DeviceInfo
+from tickrig.wire.canopen.eds.object_table import RW, Access, DeviceInfo, EntryDescription
 from tickrig.wire.canopen.sdo.abort import AbortCode
 
 SHORT: Final = row(0x2007, 0, TEXT, RW, "abc", 3)
@@ -110,3 +128,212 @@ def test_an_error_of_before_the_run_that_is_gone_brings_no_reset() -> None:
     report = r1.judge(Plan(Level.INTRUSIVE, ("NMT-11", "HB"), confirm=yes), link=link)
     assert not_harmless(report) == []
     assert sum(frame.can_id == 0 and frame.data[0] == RESET for frame in link.sent) <= 1
+
+
+UNMAPPED: Final = tuple(
+    EntryDescription(index, 0, "number", DataType.UNSIGNED8, RW, default=0)
+    for index in (0x1600, 0x1A00)
+)
+AFTER: Final = frozenset({"PC-16", "PC-23", "PC-24", "PR-10"})
+"""Checks that enable a PDO before they ask what they are about."""
+FIXED: Final = {
+    (0x1005, 0): 0x80,
+    (0x1014, 0): 0x85,
+    (0x1015, 0): 0,
+    **{(0x1016, sub): 0 for sub in range(1, 5)},
+    (0x1017, 0): 1_000,
+    (0x1003, 0): 0,
+    (0x1400, 1): 0x205,
+    (0x1400, 2): 255,
+    (0x1800, 1): 0x4000_0185,
+    (0x1800, 2): 255,
+    (0x1800, 5): 100,
+}
+"""Objects that CiA 301 lets be constant, and what they hold."""
+GROUPS: Final = ("NMT", "HB", "NG", "PC", "PR", "SY", "EM", "ST", "UE", "DE")
+
+
+def wants_a_mapping(slave: CanopenSlave) -> Bends:
+    """Refuse to enable a PDO that has no objects, as CANopenNode does."""
+
+    def guarded(entry: Entry) -> None:
+        before, count = entry.guard, slave.dictionary[entry.index + 0x200, 0]
+
+        def check(entry: Entry, value: Value) -> None:
+            if not count.number and not int(value) & 1 << 31:
+                raise SdoAbort(AbortCode.VALUE_RANGE)
+            if before is not None:
+                before(entry, value)
+
+        entry.guard = check
+
+    for index in (0x1400, 0x1800):
+        guarded(slave.dictionary[index, 1])
+    return Bends()
+
+
+def fixed_row(at: tuple[int, int], value: int) -> EntryDescription:
+    """Describe an object of R1 as constant."""
+    was = next(e for e in make_dictionary(frozenset()).description if (e.index, e.sub) == at)
+    access = was.access & ~Access.WRITE
+    return EntryDescription(*at, was.name, was.data_type, access, default=value)
+
+
+def judge_as_described(defect: Defect, *only: str) -> Report:
+    """Judge a slave with an EDS that says what it has."""
+    slave = make_defective(defect).slave
+    device = EdsDevice(DeviceInfo(), tuple(slave.dictionary.description), slave.dictionary.objects)
+    plan = Plan(Level.INTRUSIVE, only, confirm=yes)
+    return ConformRun(Judged(slave).link, NODE_ID, plan, device=device).run()
+
+
+def test_a_pdo_that_is_not_enabled_without_objects_fails_no_check_of_others() -> None:
+    report = judge(Defect("wants a mapping", (), wants_a_mapping, rows=UNMAPPED), *AFTER)
+    assert not_harmless(report) == []
+    assert report.count(Verdict.PASS) == len(AFTER)
+
+
+def test_a_pdo_that_cannot_be_enabled_at_all_is_told() -> None:
+    stubborn = Defect("never", (), refuses(AbortCode.VALUE_RANGE, "1400:01", "1800:01"))
+    outcomes = {r.check.id: r.outcome for r in judge(stubborn, *AFTER).results}
+    assert {each.verdict for each in outcomes.values()} == {Verdict.INCONCLUSIVE}
+    assert outcomes["PC-23"].reason.startswith("could not be prepared: step 1, given macro enable")
+    assert "abort 0609 0030h" in outcomes["PC-23"].reason
+
+
+@pytest.mark.parametrize(
+    "at", [*FIXED, None], ids=lambda at: f"{at[0]:04X}.{at[1]:02X}" if at else "all"
+)
+def test_a_constant_object_is_legal(at: tuple[int, int] | None) -> None:
+    some = FIXED if at is None else {at: FIXED[at]}
+    constant = Defect("constant", (), rows=tuple(fixed_row(*each) for each in some.items()))
+    assert not_harmless(judge_as_described(constant, *GROUPS)) == []
+
+
+def test_an_object_that_is_constant_only_at_the_node_is_legal() -> None:
+    places = [f"{index:04X}:{sub:02X}" for index, sub in FIXED if index < 0x1400]
+    constant = Defect("constant", (), refuses(AbortCode.READ_ONLY, *places))
+    report = judge(constant, *GROUPS)
+    failed = {r.check.id for r in report.results if r.outcome.verdict is Verdict.FAIL}
+    assert failed <= {"DE-02", "DE-15", "HB-06", "EM-06", "EM-11", "SY-07"}, "they ask that"
+
+
+def test_a_limit_that_leaves_one_value_makes_a_constant() -> None:
+    only = EntryDescription(
+        *(0x1017, 0, "heartbeat", DataType.UNSIGNED16, RW), default=500, low=500, high=500
+    )
+    report = judge_as_described(Defect("one value", (), rows=(only,)), "NMT", "HB", "NG", "ST")
+    assert not_harmless(report) == []
+    reasons = {r.outcome.reason for r in report.results if r.check.id == "HB-01"}
+    assert reasons == {"1017h:00 takes only 500 to 500"}
+
+
+def test_an_event_timer_of_the_node_disturbs_no_check() -> None:
+    timed = EntryDescription(0x1800, 5, "event timer", DataType.UNSIGNED16, RW, default=100)
+    report = judge(Defect("event timer", (), rows=(timed,)), "PR-01", "PR-03", "PR-24", "NMT-14")
+    assert [r.outcome.verdict for r in report.results] == [Verdict.PASS] * 4
+    assert report.unrestored == ()
+
+
+def test_a_value_that_is_there_already_is_not_written_to_see_whether_it_goes() -> None:
+    there = (
+        EntryDescription(0x2001, 0, "u16", DataType.UNSIGNED16, RW | BOTH, default=0x34A5),
+        EntryDescription(0x1017, 0, "heartbeat", DataType.UNSIGNED16, RW, default=100),
+    )
+    report = judge(Defect("there already", (), rows=there), "NMT-10", "NMT-11", "ST-04", "ST-05")
+    assert [r.outcome.verdict for r in report.results] == [Verdict.PASS] * 4
+
+
+def test_the_node_id_that_lss_gives_is_no_other_node() -> None:
+    report = judge(Defect("none", ()), "LS-04", "LS-08")
+    assert report.count(Verdict.PASS) == 2
+    assert report.settings["other nodes"] == "none"
+
+
+def beats_behind_boot_up(slave: CanopenSlave) -> Bends:
+    return says("705#00", "705#00", "705#7F")(slave)
+
+
+def test_a_heartbeat_right_behind_the_boot_up_is_told_under_its_own_clause() -> None:
+    outcomes = {
+        r.check.id: (r.outcome.verdict, r.check.source)
+        for r in judge(Defect("at once", (), beats_behind_boot_up), "NMT-01", "HB-05").results
+    }
+    assert outcomes["NMT-01"][0] is Verdict.PASS
+    assert outcomes["HB-05"] == (Verdict.FAIL, "CiA 301 v4.2.0, 7.2.8.3.2.2")
+
+
+@pytest.mark.parametrize(
+    ("said", "instead", "checks"),
+    [
+        ("585#80......01000405", "00000008", ("US-04", "US-05", "DS-09")),
+        ("585#80......02000106", "00000106", ("DE-07", "DE-16", "DE-17", "DS-08", "BD-07")),
+        ("585#80031000........", "31000906", ("DE-14",)),
+        ("585#80031000........", "00000008", ("DE-14",)),
+    ],
+)
+def test_another_abort_code_that_the_text_allows(
+    said: str, instead: str, checks: tuple[str, ...]
+) -> None:
+    bend = says(f"({said[:12]}){said[12:]}", rf"\g<1>{instead}")
+    assert not_harmless(judge(Defect("another code", (), bend), *checks)) == []
+
+
+def test_a_refusal_when_all_has_come_is_one() -> None:
+    report = judge(Defect("late", (), refuses_late), "DS-08")
+    assert [r.outcome.verdict for r in report.results] == [Verdict.PASS]
+
+
+def refuses_late(slave: CanopenSlave) -> Bends:
+    """Refuse a segmented download of 1000h with its last segment."""
+    begun, told = [False], list[str]()
+
+    def hear(text: str) -> Iterable[str]:
+        if text.startswith("605#21001000"):
+            begun[0] = True
+        elif begun[0] and text.startswith("605#0"):
+            return ("605#2100100004000000",)
+        return (text,)
+
+    def say(text: str) -> Iterable[str]:
+        if begun[0] and text == "585#8000100002000106" and not told:
+            told.append(text)
+            return ("585#6000100000000000",)
+        return (text,)
+
+    return Bends(hear, say)
+
+
+def test_a_busy_host_is_no_slow_producer_of_sync() -> None:
+    slow = Defect("SYNC is late", (), services={Sync: Slow})
+    for shared, verdict in ((True, Verdict.INCONCLUSIVE), (False, Verdict.FAIL)):
+        defective = DefectiveR1(slow)
+        plan = Plan(Level.INTRUSIVE, ("SY-02",), confirm=yes, shared_host=shared)
+        link = Lagging(defective.link)
+        device = EdsDevice(DeviceInfo(), tuple(make_dictionary(frozenset()).description), {})
+        report = ConformRun(link, NODE_ID, plan, device=device).run()
+        assert [r.outcome.verdict for r in report.results] == [verdict]
+
+
+class Lagging:
+    """A link whose frames are read 2 ms after they were on the bus."""
+
+    def __init__(self, link: CanHost) -> None:
+        self._link = link
+
+    @property
+    def now_us(self) -> int:
+        return self._link.now_us
+
+    def send(self, traffic: Frames, /) -> None:
+        self._link.send(traffic)
+
+    def receive(self, timeout_us: int, /) -> Frames:
+        return self._link.receive(timeout_us)
+
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        now_us, frames = self._link.receive_stamped(timeout_us)
+        return now_us, tuple((at_us - 2_000, frame) for at_us, frame in frames)
+
+    def close(self) -> None:
+        self._link.close()
