@@ -263,6 +263,7 @@ class Rrc(Copyable):
             load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
             if self.config.overtime and load.too_far_behind:
                 self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
+                self._drive.step(tick, self.state, self._settings, self.inputs)  # motors stop
 
     def _status(self) -> Status:
         settings, inputs = self._settings, self.inputs

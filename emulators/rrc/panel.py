@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar, Final, NamedTuple
+from typing import ClassVar, Final
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -13,22 +13,16 @@ from textual.widgets import Static
 
 from tickrig.emulators.bench.inbox import EmulatorEnded
 from tickrig.emulators.rrc import panel_text, small_panel_text
-from tickrig.emulators.rrc.panel_text import FAULT_KEYS, View
+from tickrig.emulators.rrc.panel_text import FAULT_KEYS, Observer, View
 from tickrig.host.control.requests import VERSION, Object
-from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import format_time
 from tickrig.host.tui.framed_app import FramedApp
 from tickrig.host.tui.key_footer import KeyFooter
 
-Values = dict[str, int | str]
 SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
 """Makes requests of an emulator, those of the control socket, and brings the answers."""
 
 REFRESH_S: Final = 0.1
 STEP_PCT: Final = 10
-KEPT_LINES: Final = 60
-REPORT_US: Final = 500_000
-"""So long the latest SA line stands; one comes each 10 ms while the status is on."""
 
 HELP: Final = """\
 arrows  move the stick by 10 %; it stays where it is
@@ -108,9 +102,7 @@ class RrcPanel(FramedApp):
     def __init__(self, send: SendRequests, ready: Callable[[], None] = lambda: None) -> None:
         super().__init__()
         self._send, self._when_ready = send, ready
-        self.view = View()
-        self._seen = 0  # number of the latest line
-        self._report = Line(0, -REPORT_US, "", "")  # the latest SA
+        self._observer = Observer()
         self._shown: dict[str, Text] = {}  # what each pane shows: drawing is dear
 
     def compose(self) -> ComposeResult:
@@ -127,6 +119,11 @@ class RrcPanel(FramedApp):
         yield Static(HELP, id="help", markup=False)
         yield Static(id="tiny")
         yield KeyFooter()
+
+    @property
+    def view(self) -> View:
+        """What is shown."""
+        return self._observer.view
 
     @property
     def helps(self) -> bool:
@@ -151,10 +148,10 @@ class RrcPanel(FramedApp):
     async def look(self) -> None:
         """Fetch what there is to see, and show it."""
         answers = await self._request(
-            _request("get"), _request("status"), _request("lines", since=self._seen)
+            _request("get"), _request("status"), _request("lines", since=self._observer.seen)
         )
         if answers and self.query("#wire"):  # the screen may be gone by now
-            self._take(*answers)
+            self._observer.take(*answers)
             self._show()
 
     async def action_stick(self, v_steps: int, w_steps: int) -> None:
@@ -195,26 +192,6 @@ class RrcPanel(FramedApp):
             self.exit()
             return []
 
-    def _take(self, values: Object, status: Object, lines: Object) -> None:
-        fresh = [line for line in _lines(lines) if line.number > self._seen]
-        self._seen = fresh[-1].number if fresh else self._seen
-        now, present = _values(status), _values(values["values"])
-        for line in fresh:
-            if line.is_report:
-                self._report = line
-        events = [(format_time(x.at_us), x.mark, x.text) for x in fresh if not x.is_report]
-        self.view = View(
-            present,
-            now,
-            (*self.view.lines, *events)[-KEPT_LINES:],
-            self._report.text if self._reports(now, present) else "",
-        )
-
-    def _reports(self, status: Values, values: Values) -> bool:
-        """Whether SA lines come: VR2 runs, and the latest one is fresh."""
-        fresh = self._report.at_us + REPORT_US > int(status["now_us"])
-        return fresh and bool(values["vr2_power"])
-
     def _show(self) -> None:
         view, roomy = self.view, self.size.width >= ROOMY[0] and self.size.height >= ROOMY[1]
         panes = panel_text if roomy else small_panel_text
@@ -234,20 +211,6 @@ class RrcPanel(FramedApp):
                 self.query_one(f"#{name}", Static).update(text)
 
 
-class Line(NamedTuple):
-    """A line on the wire."""
-
-    number: int
-    at_us: int
-    mark: str
-    text: str
-
-    @property
-    def is_report(self) -> bool:
-        """Whether it is one of a stream of SA lines."""
-        return self.mark == Mark.FROM_DEVICE and self.text.startswith("SA:")
-
-
 def _pane(name: str, title: str) -> Static:
     pane = Static(id=name, classes="pane")
     pane.border_title = title
@@ -256,16 +219,3 @@ def _pane(name: str, title: str) -> Static:
 
 def _request(do: str, **fields: object) -> Object:
     return {"v": VERSION, "do": do, **fields}
-
-
-def _values(answer: object) -> Values:
-    if not isinstance(answer, dict):
-        return {}
-    return {name: value for name, value in answer.items() if isinstance(value, int | str)}
-
-
-def _lines(answer: Object) -> list[Line]:
-    lines = answer["lines"]
-    if not isinstance(lines, list):
-        return []
-    return [Line(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]

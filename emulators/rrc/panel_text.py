@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from rich.text import Text
 
+from tickrig.host.control.requests import Object
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import format_time
 from tickrig.wire.errors import WireError
 from tickrig.wire.rrc.load import SAFE_PCT
 from tickrig.wire.rrc.replies import StatusA, parse_reply
 
 Value = int | str
+Values = dict[str, Value]
 
 FAULT_KEYS: Final = {
     "1": "bus_noise",
@@ -39,6 +43,10 @@ LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
 ON: Final = "bold yellow"
 FAULT: Final = "bold white on red"
 DIM: Final = "bright_black"
+KEPT_LINES: Final = 60
+REPORT_US: Final = 100_000
+"""So long the latest SA line stands; one comes each 10 ms while the status is on."""
+
 HALF: Final = 15  # cells of a bar on each side of zero
 
 
@@ -76,6 +84,67 @@ class View:
     def faults(self) -> tuple[str, ...]:
         """Names of the faults that are present."""
         return tuple(str(self.status.get("faults", "")).split())
+
+
+class Line(NamedTuple):
+    """A line on the wire."""
+
+    number: int
+    at_us: int
+    mark: str
+    text: str
+
+    @property
+    def is_report(self) -> bool:
+        """Whether it is one of a stream of SA lines."""
+        return self.mark == Mark.FROM_DEVICE and self.text.startswith("SA:")
+
+
+class Observer:
+    """Makes a `View` of what an emulator answers to `get`, `status` and `lines`.
+
+    Attributes:
+        view: what is known now.
+        seen: number of the latest line on the wire; ask for those after it.
+    """
+
+    def __init__(self) -> None:
+        self.view, self.seen = View(), 0
+        self._report = Line(0, -REPORT_US, "", "")  # the latest SA
+
+    def take(self, values: Object, status: Object, lines: Object) -> None:
+        """Take three answers in, asked for at the same time."""
+        fresh = [line for line in _lines(lines) if line.number > self.seen]
+        self.seen = fresh[-1].number if fresh else self.seen
+        now, present = _values(status), _values(values["values"])
+        for line in fresh:
+            if line.is_report:
+                self._report = line
+        events = [(format_time(x.at_us), x.mark, x.text) for x in fresh if not x.is_report]
+        self.view = View(
+            present,
+            now,
+            (*self.view.lines, *events)[-KEPT_LINES:],
+            self._report.text if self._reports(now, present) else "",
+        )
+
+    def _reports(self, status: Values, values: Values) -> bool:
+        """Whether SA lines come: VR2 runs, and the latest one is fresh."""
+        fresh = self._report.at_us + REPORT_US > int(status["now_us"])
+        return fresh and bool(values["vr2_power"])
+
+
+def _values(answer: object) -> Values:
+    if not isinstance(answer, dict):
+        return {}
+    return {name: value for name, value in answer.items() if isinstance(value, int | str)}
+
+
+def _lines(answer: Object) -> list[Line]:
+    lines = answer["lines"]
+    if not isinstance(lines, list):
+        return []
+    return [Line(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]
 
 
 STICK_HINTS: Final = {

@@ -510,6 +510,7 @@ class ReferenceRrc:
             self.costs = [*self.costs[-9:], self.cost]
             if self.backlog >= 300:
                 self.force_off("OverTime")
+                self.drive()
         if self.state not in DRIVING:
             self.backlog = 0
             self.costs = [0] * 10

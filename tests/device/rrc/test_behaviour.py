@@ -306,3 +306,14 @@ def test_two_lines_with_check_and_status_are_exactly_all_that_it_can() -> None:
             bench.step(*["output00001"] * 2)
             assert bench.rrc.read("backlog_pct") == backlog
     assert bench.rrc.read("load_pct") == 100
+
+
+@pytest.mark.parametrize("command", ["limit6464ffffff", "output3200"])
+def test_too_much_work_stops_the_motors_in_the_tick_that_tells_it(command: str) -> None:
+    bench = RrcBench().enter("Standby")
+    bench.set(stick_v_pct=50)
+    bench.step(command)
+    assert bench.rrc.read("out_v_pct") == 50
+    bench.set(extra_load_pct=400)
+    assert bench.step() == ["EV:PowerOffWaitByOverTime"]
+    assert [bench.rrc.read(name) for name in ("out_v_pct", "stick_drives")] == [0, 0]

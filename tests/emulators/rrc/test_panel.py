@@ -301,7 +301,7 @@ def test_the_sa_line_is_told_in_words_and_goes_with_the_stream() -> None:
         told = "stick -100 -100  out -100 -100  gauge 10  speed 1  up 0 down 0 alarm 2"
         assert shown(panel, "report").strip() == told
         emulator.send(emulator.rig.now_us, b"statusA0\n")
-        pass_time(emulator, 600_000)
+        pass_time(emulator, 120_000)
         await panel.look()
         assert not shown(panel, "report")
 
