@@ -27,7 +27,7 @@ _HINTS: Final = {
     ),
     COMMAND_UNKNOWN: "allowed are the 12 commands of the manual: noise on the line?",
     RECEIVE_BUFFER_OVERFLOW: (
-        "allowed are about 2 commands in 10 ms, and 1 in 20 ms while VR2 is off"
+        "send at most 160 lines a second with stablemode, 100 without, and 45 while VR2 is off"
     ),
     **dict.fromkeys(("limit", "output", "poweroff"), _ONLY_WHILE_ON),
 }

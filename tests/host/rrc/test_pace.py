@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from tests.host.rigs import standby_bench
 from tests.host.spy_link import SpyLink
-from tickrig.host.rrc import RrcClient, RrcLoad
+from tickrig.host.rrc import RrcClient, RrcLoad, RrcRefused
+from tickrig.wire.rrc.load import PACE_WITHOUT_VR2, pace_lines_s
 
 
 class FastClock(SpyLink):
@@ -84,6 +87,12 @@ def test_a_client_at_its_pace_sends_so_many_lines() -> None:
     while bench.client.now_us < until_us:
         bench.client.output(1, 0)
     assert len(bench.link.sent) == pytest.approx(bench.client.load.pace_lines_s, abs=1)
+
+
+def test_an_overflow_is_refused_with_the_pace_of_the_rrc() -> None:
+    refused = str(RrcRefused("device", "ReceiveBufferOverflow"))
+    paces = [pace_lines_s(stable=stable, status=True) for stable in (True, False)]
+    assert [int(number) for number in re.findall(r"\b\d+", refused)] == [*paces, PACE_WITHOUT_VR2]
 
 
 def test_a_client_waits_for_the_work_of_an_overflow() -> None:
