@@ -164,7 +164,8 @@ def dummy_usage(document: Document) -> Iterator[RuleFinding]:
     """Judge [DummyUsage]."""
     for line in document.lines_of("DummyUsage"):
         match = DUMMY.fullmatch(line.key.lower())
-        if match is None or int(match[1], 16) not in DUMMY_TYPES or line.value not in ("0", "1"):
+        said = without_comment(line.value)
+        if match is None or int(match[1], 16) not in DUMMY_TYPES or said not in ("0", "1"):
             what = f"{shorten(line.content)} is not Dummy0001=0 to Dummy001F=1"
             yield document.found("dummy-usage", what, "DummyUsage", line.number)
     file, title = document.file, "DummyUsage"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 import pytest
@@ -151,6 +152,15 @@ def test_what_is_not_utf_8_becomes_utf_8_and_its_letter_is_told(page: str) -> No
     assert text.startswith(
         f"not UTF-8, which the canopen library and dcf-tools need; byte {byte}h is 'ö' in {page}, "
     )
+
+
+def test_a_comment_behind_a_number_is_one_finding() -> None:
+    numbers = re.findall(
+        r"^(?:Dummy000\w|Lines|Granularity|NrOf.XPDO|SupportedObjects|1)=.*", GOOD, re.MULTILINE
+    )
+    for line in numbers:
+        made = Document(NAME, GOOD.replace(f"{line}\n", f"{line} # one\n").encode())
+        assert rules(made) <= {"inline-comment"}, line
 
 
 def test_the_encoding_that_is_named_is_that_of_the_file() -> None:
