@@ -125,7 +125,11 @@ def _free_id(node_id: int, others: Collection[int]) -> int | None:
 def _peer(peer: int | None) -> dict[str, str]:
     if peer is None:
         return {}
-    return {"peer": f"{peer:02X}", "peer_heartbeat": f"{ERROR_CONTROL_COB_ID + peer:03X}"}
+    return {
+        "peer": f"{peer:02X}",
+        "peer_heartbeat": f"{ERROR_CONTROL_COB_ID + peer:03X}",
+        "peer_request": f"{REQUEST_COB_ID + peer:03X}",
+    }
 
 
 def _heartbeat_time(binding: Binding, number: ReadNumber) -> str:
@@ -140,8 +144,8 @@ def _heartbeat_time(binding: Binding, number: ReadNumber) -> str:
 def _identity(number: ReadNumber) -> dict[str, str]:
     numbers = {name: number(0x1018, sub) for sub, name in enumerate(IDENTITY, 1)}
     texts = {name: _u32(value) for name, value in numbers.items() if value is not None}
-    if (serial := numbers["serial"]) is not None:
-        texts["other_serial"] = _u32(serial ^ 1)
+    others = {name: value for name, value in numbers.items() if value is not None}
+    texts |= {f"other_{name}": _u32(value ^ 1) for name, value in others.items()}
     return texts
 
 

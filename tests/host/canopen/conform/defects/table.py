@@ -6,6 +6,7 @@ from typing import Final
 
 from tests.host.canopen.conform.defects import (
     of_blocks,
+    of_clauses,
     of_error_control,
     of_nmt,
     of_pdo,
@@ -23,4 +24,5 @@ DEFECTS: Final[tuple[Defect, ...]] = (
     *of_pdo.DEFECTS,
     *of_services.DEFECTS,
     *of_profiles.DEFECTS,
+    *of_clauses.DEFECTS,
 )
