@@ -21,6 +21,7 @@ KINDS: Final[Mapping[str, str]] = {
     ".html": "--html",
     ".xml": "--junit",
     ".svg": "--badge",
+    ".md": "--issue",
     ".txt": "--write-baseline",
 }
 JSON: Final = ".json"
@@ -48,7 +49,8 @@ def write_conformance(
     Args:
         report: of `conformance`.
         path: its ending says what is written: `.html` one page with all frames, `.xml` JUnit,
-            `.svg` a badge, `.json`, or `.txt` the failures as a baseline.
+            `.svg` a badge, `.md` the failures to file as issues, `.json`, or `.txt` the failures
+            as a baseline.
         baseline: a file of known failures.
 
     Raises:

@@ -40,7 +40,7 @@ from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 
-FILES: Final = ("html", "junit", "badge", "write_baseline")
+FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
 
 
 class Conformance:

@@ -10,6 +10,7 @@ from typing import Final
 from tickrig.host.canopen.conform.report.badge import badge
 from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
 from tickrig.host.canopen.conform.report.evidence import ShowFrames
+from tickrig.host.canopen.conform.report.issue import issue_text
 from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.cli.messages import say
@@ -77,7 +78,7 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
     """Return what the file that an option names holds.
 
     Args:
-        option: `--html`, `--junit`, `--badge`, else the failures as a baseline.
+        option: `--html`, `--junit`, `--badge`, `--issue`, else the failures as a baseline.
         report: the run.
         baseline: failures that are known.
         show: writes frames.
@@ -93,5 +94,7 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
             return report_junit(report, baseline, show)
         case "--badge":
             return badge(report, baseline)
+        case "--issue":
+            return issue_text(report, baseline, show)
         case _:
             return baseline_text(report)

@@ -91,6 +91,9 @@ _reports: Final[Decorator] = add_options(
     click.option("--junit", type=PATH, metavar="FILE", help="JUnit, for CI."),
     click.option("--html", type=PATH, metavar="FILE", help="One page with all frames."),
     click.option("--badge", type=PATH, metavar="FILE", help="SVG for a README."),
+    click.option(
+        "--issue", type=PATH, metavar="FILE", help="Markdown: failures to file, with scripts."
+    ),
     click.option("--baseline", type=PATH, metavar="FILE", help="Failures that are known."),
     click.option("--write-baseline", type=PATH, metavar="FILE", help="Write those of this run."),
 )

@@ -120,6 +120,7 @@ class Judge:
         boots = self._exchange.boots
         self._exchange.begin(bound.within_us, bound.can_ids)
         start_us, begun_us = self._exchange.now_us, self._exchange.start_us
+        self._wanted: tuple[str, ...] = ()
         verdict, reason = self._play(bound)
         self._end(bound)
         crashed = bool(self._exchange.crashes)
@@ -129,7 +130,8 @@ class Judge:
         unwell = verdict in {Verdict.FAIL, Verdict.INCONCLUSIVE} and not crashed
         if not self._care.tidy(bound, boots) and unwell:
             verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
-        return Outcome(verdict, reason, lines, start_us - begun_us, end_us - begun_us)
+        times = start_us - begun_us, end_us - begun_us
+        return Outcome(verdict, reason, lines, *times, self._wanted)
 
     def _play(self, bound: BoundCheck) -> tuple[Verdict, str]:
         where = ""
@@ -145,6 +147,7 @@ class Judge:
         except Disturbed as error:
             return Verdict.INCONCLUSIVE, str(error)
         except StepFailed as error:
+            self._wanted = error.wanted
             if self._exchange.crashes:
                 return Verdict.FAIL, f"{where}: {self._crash()}"
             if "given" in step:

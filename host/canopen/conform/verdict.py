@@ -55,6 +55,7 @@ class Outcome:
         evidence: what was on the bus.
         start_us: bus time since the start of the run.
         end_us: the same, of its end.
+        wanted: patterns of the frame that should have come, one of them, where it failed by that.
     """
 
     verdict: Verdict
@@ -62,6 +63,7 @@ class Outcome:
     evidence: tuple[Line, ...] = ()
     start_us: int = 0
     end_us: int = 0
+    wanted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

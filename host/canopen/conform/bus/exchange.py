@@ -185,13 +185,14 @@ class Exchange:
         while not queue and self._known_us < until_us:
             self._listen(until_us)
         if not queue:
-            raise StepFailed(f"no {wanted_text(patterns)} within {within_ms} ms")
+            text = f"no {wanted_text(patterns)} within {within_ms} ms"
+            raise StepFailed(text, wanted=patterns)
         at_us, got = queue.popleft()
         if at_us > until_us:
             late_ms = (at_us - until_us + self.resolution_us) / MS_US
             raise StepFailed(f"{got} came {late_ms:.1f} ms after the {within_ms} ms allowed")
         if not any(matches(pattern, got) for pattern in patterns):
-            raise StepFailed(unlike(got, patterns), abort_of(got))
+            raise StepFailed(unlike(got, patterns), abort_of(got), patterns)
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:

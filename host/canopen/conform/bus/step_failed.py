@@ -7,17 +7,20 @@ Disturbed       nothing can be said: the host, the bus or another node was in th
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class StepFailed(Exception):  # noqa: N818 - what the step did
     """The node did something else, or nothing; the text says what came and what was allowed.
 
     Attributes:
         abort: the SDO abort code that came, None if none did.
+        wanted: patterns of the frame that should have come, one of them; none if none should.
     """
 
-    def __init__(self, text: str, abort: int | None = None) -> None:
+    def __init__(self, text: str, abort: int | None = None, wanted: Iterable[str] = ()) -> None:
         super().__init__(text)
-        self.abort = abort
+        self.abort, self.wanted = abort, tuple(wanted)
 
 
 class NotAllowed(Exception):  # noqa: N818 - what the step is

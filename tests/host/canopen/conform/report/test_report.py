@@ -9,14 +9,21 @@ from xml.etree.ElementTree import fromstring
 import pytest
 
 from tests.emulators.testing.report.html_tree import parse_page
+from tests.host.canopen.conform.defects.defect import Defect
+from tests.host.canopen.conform.defects.table import DEFECTS
+from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.report.sample import EVIDENCE, HOSTILE, SAMPLE, result
 from tickrig.host.canopen.conform.report.badge import badge
 from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
+from tickrig.host.canopen.conform.report.issue import issue_text
 from tickrig.host.canopen.conform.report.page import html_page
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
+from tickrig.host.monitor.frames.record import Record
+from tickrig.host.monitor.sequence.parse_sequence import TomlSequence
+from tickrig.host.monitor.sequence.sequence_run import SequenceRun
 
 KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
 MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", Verdict.FAIL, "no") for n in range(30)))
@@ -340,3 +347,47 @@ def test_what_is_no_baseline_is_refused(tmp_path: Path, data: bytes, why: str) -
 def test_the_same_run_gives_the_same_bytes() -> None:
     for write in (html_page, report_json, report_junit, text_report, badge):
         assert write(SAMPLE, KNOWN) == write(replace(SAMPLE), Baseline(frozenset(KNOWN.known)))
+
+
+def carried_out(text: str, r1: DefectiveR1) -> SequenceRun:
+    """Carry out a script of a report at a slave, as `canmon seq` does."""
+    run, host = SequenceRun(TomlSequence(text, "issue.toml").parse()), r1.link
+    host.send(run.tick(host.now_us))
+    while not run.done:
+        for frame in host.receive(run.due_us - host.now_us):
+            host.send(run.tick(host.now_us, (Record(host.now_us, "can0", frame),)))
+        host.send(run.tick(host.now_us))
+    return run
+
+
+@pytest.mark.parametrize(
+    ("name", "check"),
+    [
+        ("toggle ignored", "US-03"),
+        ("no EMCY on heartbeat loss", "HB-10"),
+        ("high limit unchecked", "DE-11"),
+        ("unknown command is not answered", "SG-01"),
+        ("boot-up missing", "NMT-10"),
+        ("SYNC type 1 counts two", "PR-04"),
+        ("LSS tells another vendor", "LS-02"),
+    ],
+)
+def test_the_script_of_an_issue_shows_the_failure_and_nothing_at_a_sound_slave(
+    name: str, check: str
+) -> None:
+    defect = next(each for each in DEFECTS if each.name == name)
+    text = issue_text(judge(defect, check))
+    assert f"## {check}: " in text
+    script = text.partition("```toml\n")[2].partition("```")[0]
+    assert carried_out(script, DefectiveR1(defect)).missed == 1
+    assert carried_out(script, DefectiveR1(Defect("none", ()))).missed == 0
+
+
+def test_an_issue_tells_clause_and_frames_and_leaves_out_what_is_known() -> None:
+    text = issue_text(SAMPLE)
+    assert text.startswith("# 1 failure of CANopen conformance, node 5\n")
+    assert "- Clause: CiA 301 v4.2, 7.2.3.1\n" in text
+    assert "- What came: got 585#4B01200034120000, want 585#4B0120000000....\n" in text
+    assert " (001.001250)  <  585   [8]  4B 01 20 00 34 12 00 00\n" in text
+    assert "\x1b" not in text
+    assert issue_text(SAMPLE, KNOWN).startswith("# 0 failures of")
