@@ -37,9 +37,9 @@ class PositionInput(RtComponent):
     Attributes:
         finished: how many commands have finished.
         defined_path: the path of the command `path` without a file or points.
-        ask: called with what can be typed each time that it wants a command; the console
+        prompt: called with what can be typed each time that it wants a command; the console
             prints it.
-        tell: called with each command that it sends, and with FINISH.
+        report: called with each command that it sends, and with FINISH.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("PositionInput", "Goals and paths from the console")
@@ -56,11 +56,11 @@ class PositionInput(RtComponent):
         self.status = self.add_port(InPort("status", TimedState))
         self.position = self.add_port(OutPort("position", iis.TimedPose2D))
         self._commands: deque[tuple[iis.TimedPose2D, ...]] = deque()
-        self._running = self._ending = self._asked = False
+        self._running = self._ending = self._prompted = False
         self.finished = 0
         self.defined_path: Sequence[Pose] = DEFINED_PATH
-        self.ask: Callable[[str], None] | None = None
-        self.tell: Callable[[str], None] | None = None
+        self.prompt: Callable[[str], None] | None = None
+        self.report: Callable[[str], None] | None = None
 
     @property
     def idle(self) -> bool:
@@ -127,7 +127,7 @@ class PositionInput(RtComponent):
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Ask anew."""
-        self._asked = False
+        self._prompted = False
         return ReturnCode.RTC_OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
@@ -139,7 +139,7 @@ class PositionInput(RtComponent):
         """Send the next command, or look whether the last one has finished."""
         status = read_newest(self.status)
         if self._running and status is not None and status.data == NavigationState.FINISH:
-            self._running = self._asked = False
+            self._running = self._prompted = False
             self.finished += 1
             self._say("FINISH")
         if self._commands and not self._running:
@@ -148,9 +148,9 @@ class PositionInput(RtComponent):
         if self.idle and self._ending:
             self._say("the end")
             return ReturnCode.RTC_ERROR
-        if self.idle and self.ask is not None and not self._asked:
-            self._asked = True
-            self.ask(USAGE)
+        if self.idle and self.prompt is not None and not self._prompted:
+            self._prompted = True
+            self.prompt(USAGE)
         return ReturnCode.RTC_OK
 
     def _send(self, points: Sequence[iis.TimedPose2D], ec: ExecutionContext) -> None:
@@ -162,8 +162,8 @@ class PositionInput(RtComponent):
         self._say(f"{what} {describe_pose(last)}")
 
     def _say(self, text: str) -> None:
-        if self.tell is not None:
-            self.tell(text)
+        if self.report is not None:
+            self.report(text)
 
 
 def _exactly(count: int, points: Sequence[Pose], line: str) -> Sequence[Pose]:

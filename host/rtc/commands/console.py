@@ -34,8 +34,8 @@ class Console:
     """Shows what components tell, as `ConsoleOut0 5` or `PositionInput0 FINISH`.
 
     A line that is typed goes to each component that takes it. If none does, the console
-    prints why. A component may have the attributes `tell` and `ask`: the console sets `tell`
-    to a function that shows a line, and `ask` to one that shows it to people alone.
+    prints why. A component may have the attributes `report` and `prompt`: the console sets `report`
+    to a function that shows a line, and `prompt` to one that shows it to people alone.
 
     Args:
         manager: whose components.
@@ -55,7 +55,7 @@ class Console:
             name = component.instance_name
             if isinstance(component, ConsoleOut):
                 component.show = partial(self._shown, name)
-            for attribute, printed in (("tell", show), ("ask", warn)):
+            for attribute, printed in (("report", show), ("prompt", warn)):
                 if hasattr(component, attribute):
                     setattr(component, attribute, partial(_prefixed, printed, name))
 

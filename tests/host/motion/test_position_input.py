@@ -170,7 +170,7 @@ def test_a_typed_line_that_is_no_command_says_why(line: str, error: str) -> None
 def test_it_asks_tells_what_it_sends_and_asks_again_after_finish() -> None:
     component = PositionInput("PositionInput0")
     said: list[str] = []
-    component.ask = component.tell = said.append
+    component.prompt = component.report = said.append
     on = PortBench(component)
     on.period(5)
     assert said == [USAGE]
