@@ -26,7 +26,7 @@ from tickrig.emulators.testing.bench.plan_parts import parts_of
 from tickrig.emulators.testing.bench.plan_rig import rig_of
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.emulators.testing.rig_file.summary import bus_text, device_text
-from tickrig.host.cli.messages import say, warnings_shown
+from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
@@ -68,8 +68,7 @@ class BenchRun(EmulatorRun):
         return bench, ScenarioParser(bench.device, bench.operator)
 
     def _open(self, stack: ExitStack) -> BenchRig:
-        with warnings_shown():
-            parts = parts_of(self._plan)
+        parts = parts_of(self._plan)
         self._mounts = list(parts.mounts)
         if not self._options.virtual:
             self._outside = self._open_outside(stack)
