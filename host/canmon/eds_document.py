@@ -39,10 +39,10 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> Documen
     if _is_binary(data):
         raise Refused(f"{what} {path}: a binary file: no EDS")
     if b"[" not in data[:LOOKED_AT] or path.suffix.lower() in YAML_ENDINGS:
-        from tickrig.host.canopen.bus_file.bus_file import is_bus_file  # noqa: PLC0415 - slow
+        from tickrig.host.canopen.bus_file.bus_file import check_of  # noqa: PLC0415 - slow
 
-        if is_bus_file(data):
-            raise Refused(f"{what} {path}: a bus.yml, not an EDS; use: tickrig check {path}")
+        if other := check_of(data, path):
+            raise Refused(f"{what} {path}: no EDS, but {other}")
     if path.suffix.lower() == ".toml":
         raise Refused(f"{what} {path}: TOML, not an EDS; for a rig file use: tickrig check {path}")
     return Document(str(path), data, encoding)

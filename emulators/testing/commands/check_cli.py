@@ -45,22 +45,26 @@ def _check(file: Path, strict: bool) -> int:
     if file.suffix.lower() in EDS_ENDINGS:
         say(f"Error: {file}: an EDS, no rig file or bus.yml; use: canmon eds check {file}")
         return UNREADABLE
+    kind = _kind(file)
+    if "System Definition" in kind:
+        say(f"Error: {file}: no rig file or bus.yml, but {kind}")
+        return UNREADABLE
     try:
-        return _check_bus(file, strict) if _is_bus(file) else _check_rig(file)
+        return _check_bus(file, strict) if kind else _check_rig(file)
     except OSError as error:
         say(f"Error: {file}: {error.strerror}")
         return UNREADABLE
 
 
-def _is_bus(file: Path) -> bool:
-    """Look into a file, not into a pipe, which is read but once."""
-    from tickrig.host.canopen.bus_file.bus_file import is_bus_file  # noqa: PLC0415 - slow
+def _kind(file: Path) -> str:
+    """Say what a file in YAML is, empty for others; a pipe is not looked into: it is read once."""
+    from tickrig.host.canopen.bus_file.bus_file import check_of  # noqa: PLC0415 - slow
 
     with suppress(OSError):
         if file.is_file():
             with file.open("rb") as opened:
-                return is_bus_file(opened.read(LOOKED_AT))
-    return False
+                return check_of(opened.read(LOOKED_AT), file)
+    return ""
 
 
 def _check_bus(file: Path, strict: bool) -> int:

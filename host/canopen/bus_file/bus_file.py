@@ -31,6 +31,9 @@ _SECTION: Final = re.compile(
     r"^(master|nodes|defaults)[ \t]*:|^[ \t]+(dcf|node_id)[ \t]*:", re.MULTILINE
 )
 _TOML: Final = re.compile(r"^[ \t]*\[\[?[\w.\"-]+\]|^[\w.-]+[ \t]*=", re.MULTILINE)
+_LIST_OF_NODES: Final = re.compile(
+    r"^nodes[ \t]*:[ \t]*(?:\[|(?:#[^\n]*)?\n(?:[ \t]*(?:#[^\n]*)?\n)*+[ \t]*-[ \t])", re.MULTILINE
+)
 NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[bus]'"
 
 
@@ -78,6 +81,25 @@ def is_bus_file(data: bytes) -> bool:
     """
     text = data.decode("utf-8", "replace")
     return _SECTION.search(text) is not None and _TOML.search(text) is None
+
+
+def check_of(data: bytes, path: Path) -> str:
+    r"""Say what a file in YAML is, and which command checks it; empty if it is neither of ours.
+
+    Args:
+        data: the file, or its beginning.
+        path: of the file.
+
+    >>> check_of(b"master:\n  node_id: 1\n", Path("bus.yml"))
+    'a bus.yml; use: tickrig check bus.yml'
+    >>> check_of(b"nodes:\n- {id: 1}\n", Path("a.yaml"))
+    'a System Definition; use: rtc-canopen-server --check a.yaml'
+    """
+    if not is_bus_file(data):
+        return ""
+    if _LIST_OF_NODES.search(data.decode("utf-8", "replace")):
+        return f"a System Definition; use: rtc-canopen-server --check {path}"
+    return f"a bus.yml; use: tickrig check {path}"
 
 
 def read_bus_file(path: Path) -> BusFile:

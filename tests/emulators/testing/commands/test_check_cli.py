@@ -80,5 +80,16 @@ def test_an_eds_has_a_check_of_its_own(folder: Path) -> None:
     assert err == "Error: a.eds: an EDS, no rig file or bus.yml; use: canmon eds check a.eds\n"
 
 
+def test_a_system_definition_has_a_check_of_its_own(folder: Path) -> None:
+    (folder / "beego.yaml").write_text("nodes:\n- {id: 1, eds: a.eds}\n")
+    status, out, err = run("beego.yaml")
+    check = "a System Definition; use: rtc-canopen-server --check beego.yaml"
+    assert (status, out, err) == (
+        2,
+        "",
+        f"Error: beego.yaml: no rig file or bus.yml, but {check}\n",
+    )
+
+
 def test_at_least_one_file_is_wanted() -> None:
     assert run()[0] == 2

@@ -128,9 +128,14 @@ def test_a_report_has_a_case_for_each_rule_of_each_file(
         *(
             (
                 (verb, "bus.yml", *more),
-                "FILE bus.yml: a bus.yml, not an EDS; use: tickrig check bus.yml",
+                "FILE bus.yml: no EDS, but a bus.yml; use: tickrig check bus.yml",
             )
             for verb, *more in (("check",), ("fix", "--dry-run"), ("show",), ("diff", "bus.yml"))
+        ),
+        (
+            ("check", "system.yaml"),
+            "FILE system.yaml: no EDS, but a System Definition; use: rtc-canopen-server --check "
+            "system.yaml",
         ),
         (
             ("check", "rig.toml"),
@@ -150,6 +155,7 @@ def test_what_cannot_be_done_is_one_line_and_2(
     write(tmp_path / "empty.eds", "")
     write(tmp_path / "r1.eds", GOOD)
     write(tmp_path / "bus.yml", "master:\n  node_id: 1\n")
+    write(tmp_path / "system.yaml", "nodes:  # two\n\n# a drive\n  - {id: 1, eds: a.eds}\n")
     write(tmp_path / "rig.toml", "[wires.can]\n")
     write(tmp_path / "a.xdd", XDD)
     make_large(tmp_path / "large.eds")
