@@ -51,6 +51,8 @@ def _check(file: Path, strict: bool) -> int:
         return UNREADABLE
     try:
         return _check_bus(file, strict) if kind else _check_rig(file)
+    except BrokenPipeError:  # nobody reads what is printed
+        raise
     except OSError as error:
         say(f"Error: {file}: {error.strerror}")
         return UNREADABLE

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -78,6 +81,16 @@ def test_an_eds_has_a_check_of_its_own(folder: Path) -> None:
     status, out, err = run("a.eds")
     assert (status, out) == (2, "")
     assert err == "Error: a.eds: an EDS, no rig file or bus.yml; use: canmon eds check a.eds\n"
+
+
+def test_a_reader_that_has_gone_is_no_error(folder: Path) -> None:
+    (folder / "rig.toml").write_text(GOOD)
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "wb") as out:
+        program = [sys.executable, "-m", "tickrig", "check", "rig.toml"]
+        ended = subprocess.run(program, cwd=folder, stdout=out, stderr=subprocess.PIPE, check=False)
+    assert ended.stderr == b""
 
 
 def test_a_system_definition_has_a_check_of_its_own(folder: Path) -> None:
