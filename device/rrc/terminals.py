@@ -60,10 +60,10 @@ OUTPUTS: Final = {
         OutputSignal("speed_mode", "speed mode of VR2, 1 to 5"),
         OutputSignal("gear", "imitated gear: N, F or R"),
         OutputSignal("buzzer", "1 while the RRC's buzzer sounds"),
-        OutputSignal("load_pct", "work of the RRC, mean of the latest 100 ms; 0 without VR2", "%"),
-        OutputSignal("margin_pct", "what load_pct leaves of 100; below 0 it falls behind", "%"),
-        OutputSignal("backlog_pct", "work that the RRC is behind, of a period; 300 stop VR2", "%"),
-        OutputSignal("pace_lines_s", "lines that a host may send, a tenth of the time left", "1/s"),
+        OutputSignal("load_pct", "work of the RRC, mean of 100 ms; 0 while VR2 is off", "%"),
+        OutputSignal("margin_pct", "100 minus load_pct; below 0 the RRC falls behind", "%"),
+        OutputSignal("backlog_pct", "work that the RRC is behind, of a period; 300 stops VR2", "%"),
+        OutputSignal("pace_lines_s", "lines a second that a host may send, at 90 % load", "1/s"),
     )
 }
 
