@@ -1,8 +1,8 @@
 """What traffic costs the RRC, and how much of it a host may send (DECISION R27).
 
 Costs are in per cent of the RRC's period of 10 ms. Above 100 % it falls behind, and 300 % behind
-stops VR2. At exactly 100 % nothing drains: a host whose clock is 0.2 % fast stops VR2 after a
-minute, so a host takes at most `SAFE_PCT`.
+stops VR2. At exactly 100 % nothing drains: a host whose clock is 0.1 % fast stops VR2 after 60 s,
+so a host takes at most `SAFE_PCT`.
 """
 
 from __future__ import annotations

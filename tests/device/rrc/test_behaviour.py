@@ -317,3 +317,17 @@ def test_too_much_work_stops_the_motors_in_the_tick_that_tells_it(command: str) 
     bench.set(extra_load_pct=400)
     assert bench.step() == ["EV:PowerOffWaitByOverTime"]
     assert [bench.rrc.read(name) for name in ("out_v_pct", "stick_drives")] == [0, 0]
+
+
+def test_at_exactly_all_that_it_can_a_clock_that_is_fast_stops_vr2_after_a_minute() -> None:
+    bench = RrcBench().enter("Output")
+    bench.step("statusA1")
+    bench.step("stablemode1")
+    bench.run(10)
+    sent = 0
+    for tick in range(1, 6_001):
+        assert bench.state == "Output"
+        due = 2 * tick * 1_001 // 1_000
+        bench.step(*["output00001"] * (due - sent))
+        sent = due
+    assert bench.state == "PowerOffByOthers"
