@@ -10,7 +10,7 @@ from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc_canopen.events import Notify, ServerEventType
 from tickrig.host.rtc_canopen.node.operations import kind_of
-from tickrig.host.rtc_canopen.node.served_node import ServedNode
+from tickrig.host.rtc_canopen.node.served_node import NodePhase, ServedNode
 from tickrig.host.rtc_canopen.proxy.pdo_ports import PdoSink, PdoSource
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.proxy.sdo_ports import SdoSink, SdoSource
@@ -137,7 +137,8 @@ class SdoDataFlow:
                 continue
             if not proxy.passing:
                 self._failed = {at for at in self._failed if at[0] != node_id}
-            if not (proxy.confirmed and proxy.passing) or node_id in self._busy:
+            fit = proxy.confirmed and proxy.passing and node.phase is NodePhase.READY
+            if not fit or node_id in self._busy:
                 continue
             for sink in proxy.sdo_sinks:
                 self._take(node, sink)

@@ -66,7 +66,7 @@ def boot(
 
 
 def set_pdo(index: int, pdo: PdoEntry) -> Script[None]:
-    """Write what is given of a PDO, off meanwhile, and put it on."""
+    """Write what is given of a PDO, off meanwhile, and put it on; without a CAN-ID it stays off."""
     cob_id = pdo.cob_id
     if cob_id is None:
         cob_id = (yield from upload_number(index, COB_ID)) & ~INVALID
@@ -80,7 +80,8 @@ def set_pdo(index: int, pdo: PdoEntry) -> Script[None]:
     ):
         if value is not None:
             yield from download_number(index, sub, value, size)
-    yield from download_number(index, COB_ID, cob_id, 4)
+    if cob_id & CAN_ID_MASK:
+        yield from download_number(index, COB_ID, cob_id, 4)
 
 
 def _set_mapping(index: int, mapping: tuple[MappedObject, ...]) -> Script[None]:

@@ -1,4 +1,4 @@
-"""Ports that SDO carries: texts, and what is wider than a PDO (K5, corrected)."""
+"""Ports that SDO carries, and those of bits, wide characters and a fifth PDO (K5)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,19 @@ from tickrig.emulators.canopen.node.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc import LifeCycleState, ReturnCode
+from tickrig.host.rtc_canopen.connections import check_lengths
+from tickrig.host.rtc_canopen.definition.definition import PdoLink, PdoName
 from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc_canopen.errors import ServerRefused
 from tickrig.host.rtc_canopen.events import ServerEventType
 from tickrig.host.rtc_canopen.offline import check_offline
+from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout, lay_out
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.serve import read_files, serve
 from tickrig.host.rtc_canopen.server import RtcCanopenServer
+from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_canopen.objects import object_table
 from tickrig.wire.rtc_types.basic import (
     Time,
@@ -247,6 +253,30 @@ def test_an_abort_is_told_once_and_holds_up_no_other_port(tmp_path: Path) -> Non
         assert len(logger.heard) > before
     (told,) = bench.events(ServerEventType.SDO_ABORTED)
     assert told.startswith("Wide0.path_out: ")
+
+
+def test_a_pdo_without_a_cob_id_stays_off_whatever_else_is_written(tmp_path: Path) -> None:
+    bench = WideBench(tmp_path, DEFINITION.replace("cob_id: 0x2B5", "event_ms: 50"))
+    assert "tpdo5" in bench.proxy.ports
+    assert "sixth" not in bench.proxy.ports
+    dictionary = bench.node.slave.dictionary
+    assert (dictionary[0x1805, 1].number, dictionary[0x1805, 5].number) == (0x8000_0000, 50)
+
+
+def test_booleans_of_a_tpdo_are_linked_with_those_and_the_dummies_of_an_rpdo() -> None:
+    def layout(index: int, *entries: int) -> PdoLayout:
+        mapping = tuple(map(MappedObject.parse, entries))
+        data_types = {(one.index, one.sub): DataType.BOOLEAN for one in mapping if one.index > 32}
+        return lay_out(index, 0x181, mapping, data_types)
+
+    link = PdoLink(PdoName(1, "tpdo1"), PdoName(2, "rpdo1"))
+    three = layout(0x1800, 0x2100_0101, 0x2100_0201, 0x2100_0301)
+    filled = layout(0x1400, 0x2100_0101, 0x2100_0201, 0x2100_0301, *[0x0001_0001] * 5)
+    nine = layout(0x1400, *[0x2100_0001 | sub << 8 for sub in range(1, 10)])
+    assert (three.bits, filled.bits, filled.unknown) == (3, 8, ())
+    check_lengths(link, three, filled)
+    with pytest.raises(ServerRefused, match="1.tpdo1 has 3 bits, 2.rpdo1 has 9"):
+        check_lengths(link, three, nine)
 
 
 def test_a_node_of_the_canopen_library_has_texts_as_ports(tmp_path: Path) -> None:
