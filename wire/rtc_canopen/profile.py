@@ -202,9 +202,9 @@ def _check_ports(ports: tuple[CanopenPortProfile, ...]) -> None:
     for port in ports:
         _check_port(port)
     for direction in PortDirection:
-        count = sum(port.direction is direction and not port.by_sdo for port in ports)
-        if count > MOST_PDOS:
-            raise ValueError(f"{count} {direction.value}-ports with a PDO, there are {MOST_PDOS}")
+        pdos: int = sum(port.direction is direction and not port.by_sdo for port in ports)
+        if pdos > MOST_PDOS:
+            raise ValueError(f"{pdos} {direction.value}-ports with a PDO, there are {MOST_PDOS}")
     if len(ports) > len(PORT_OBJECTS):
         raise ValueError(f"{len(ports)} ports, there are objects for {len(PORT_OBJECTS)}")
     given = Counter(port.cob_id for port in ports if port.cob_id is not None)

@@ -178,6 +178,19 @@ def test_a_supply_below_60_v_delays_an_angle_and_does_no_more(
     assert (bench.status, bench.emergencies) == (ON | REACHED, [])
 
 
+@pytest.mark.unmeasured
+def test_with_a_velocity_limit_that_the_supply_allows_the_shaft_follows_its_plan(
+    bench: UnitBench,
+) -> None:
+    bench.set("supply_v", 24)
+    bench.begin(ANGLE)
+    bench.refer(16384, velocity_limit=round(32767 * 24 / 60 * 0.98))
+    for _ in range(70):
+        bench.pass_ms(10)
+        assert not bench.status & LIMITED
+    assert (bench.status, round(bench.see("angle_deg"), 2)) == (ON | REACHED, 90.0)
+
+
 @pytest.mark.parametrize("mode", [CURRENT, VELOCITY])
 def test_a_load_that_drives_a_motor_at_its_highest_speed_is_no_open_wire(
     bench: UnitBench, mode: int
