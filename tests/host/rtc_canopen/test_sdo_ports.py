@@ -10,6 +10,7 @@ import pytest
 
 from tests.device.canopen.device_rtc.test_ports import Wide
 from tests.emulators.can.can_bench import Log
+from tests.host.rtc_canopen.bench import Bench
 from tests.host.rtc_canopen.components import add_knob, add_logger
 from tickrig.device.canopen.device_rtc.device import make_device_rtc
 from tickrig.emulators.can.outside.host import CanHost
@@ -277,6 +278,17 @@ def test_booleans_of_a_tpdo_are_linked_with_those_and_the_dummies_of_an_rpdo() -
     check_lengths(link, three, filled)
     with pytest.raises(ServerRefused, match="1.tpdo1 has 3 bits, 2.rpdo1 has 9"):
         check_lengths(link, three, nine)
+
+
+def test_a_text_of_a_device_off_the_shelf_is_a_port() -> None:
+    port = "sdo_ports: {model: {index: 0x1008, direction: out}}"
+    node = f"{{id: 16, name: Palette0, eds: f-palette.eds, role: device, {port}}}"
+    bench = Bench(f"nodes: [{node}]", {16: "f-palette"})
+    bench.boot()
+    logger = add_logger(bench.server.manager, TimedString)
+    bench.server.manager.connect("Palette0.model", "Logger0.in")
+    bench.activate()
+    assert logger.heard[-1][1].data == "f-palette"
 
 
 def test_a_node_of_the_canopen_library_has_texts_as_ports(tmp_path: Path) -> None:
