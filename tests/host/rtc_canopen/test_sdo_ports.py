@@ -276,7 +276,7 @@ def test_booleans_of_a_tpdo_are_linked_with_those_and_the_dummies_of_an_rpdo() -
     nine = layout(0x1400, *[0x2100_0001 | sub << 8 for sub in range(1, 10)])
     assert (three.bits, filled.bits, filled.unknown) == (3, 8, ())
     check_lengths(link, three, filled)
-    with pytest.raises(ServerRefused, match="1.tpdo1 has 3 bits, 2.rpdo1 has 9"):
+    with pytest.raises(ServerRefused, match=r"1\.tpdo1 has 3 bits, 2\.rpdo1 has 9"):
         check_lengths(link, three, nine)
 
 
