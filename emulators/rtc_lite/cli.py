@@ -50,7 +50,7 @@ def _complete_node(context: click.Context, option: click.Parameter, word: str) -
     default=Checksum.SUM8.value,
     help="How frames are summed up.  [sum8]",
 )
-@line_options("flip, drop, dup, cut, noise, ping", "tickrig.device.rtc_lite.terminals:INPUTS")
+@line_options("flip, drop, dup, cut, noise, ping, radio", "tickrig.device.rtc_lite.terminals:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.
@@ -62,7 +62,8 @@ def main(context: click.Context, /, **options: Any) -> None:
 
     \b
     Faults: power_cut the supply, slow_answer; on the line noise=0.01 bytes of
-    chance, flip=0.001 bits turned over, ping=0.5 every second PING unanswered.
+    chance, flip=0.001 bits turned over, ping=0.5 every second PING unanswered,
+    radio=0.05 a lossy radio link.
 
     \b
     rtc-lite-emu --link /tmp/lite-a --node lite-a
