@@ -22,8 +22,9 @@ from tickrig.host.control.server import ControlServer
 from tickrig.host.engines.engines_joined import engines_joined
 from tickrig.host.motion.chain import MotionChain
 from tickrig.host.motion.drive import PERIOD_US, BaseConnection, stop
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.motion.geometry import Pose, Twist
 from tickrig.host.motion.path_file import in_degrees
+from tickrig.host.rtc import connect
 from tickrig.host.rtc.commands.console import Console
 from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.remote.call_queue import CallQueue
@@ -162,7 +163,7 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
     Lines typed on standard input are commands of PositionInput. When standard input ends and
     nobody else can reach the cart, the run ends after the last command.
 
-    Where velocities come from a topic, it obeys these, and not PathFollower.
+    Where velocities come from a topic, it obeys these while no command of PositionInput runs.
 
     Raises:
         Refused: there is no cart, or an engine or control socket cannot be.
@@ -184,7 +185,7 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
                 )
             say(f"{names}. Ctrl-C ends.")
             _open_console(cart, chain, reachable=reachable)
-            _let_peers_drive(chain)
+            _share_the_helm(cart, chain)
             cart.run()
         clock.serve = None
         failed = not reachable and chain.ref_hard.instance_name in chain.in_error
@@ -212,11 +213,20 @@ def _open_console(cart: ServedCart, chain: MotionChain, *, reachable: bool) -> N
     cart.after_tick.append(read)
 
 
-def _let_peers_drive(chain: MotionChain) -> None:
-    """Where velocities come from a peer, take none from PathFollower."""
-    connectors = chain.ref_hard.velocity.connectors
-    if all(connector.joins_components for connector in connectors):
+def _share_the_helm(cart: ServedCart, chain: MotionChain) -> None:
+    """Where velocities come from a peer, let PathFollower drive only while a command runs."""
+    follower, base = chain.path_follower.velocity, chain.ref_hard.velocity
+    if all(connector.joins_components for connector in base.connectors):
         return
-    for connector in connectors:
-        if connector.joins_components:
+
+    def steer(now_us: int) -> None:
+        connector = follower.connector_to(base)
+        stands = chain.path_follower.twist == Twist()
+        if not (chain.position_input.idle and stands):
+            if connector is None:
+                connect(follower, base)
+        elif connector is not None:
             connector.end()
+
+    steer(0)
+    cart.after_tick.append(steer)

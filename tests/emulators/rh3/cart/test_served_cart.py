@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from tickrig.emulators.commands.cli import main
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.motion_cli import main as rh3
 from tickrig.emulators.rh3.cart.served_cart import CartClock, CartControl, ServedCart
+from tickrig.host.control.client import ControlClient
 from tickrig.host.motion.drive import start
 from tickrig.host.motion.geometry import Pose
 
@@ -168,6 +170,25 @@ def test_at_a_terminal_it_asks_drives_and_asks_again() -> None:
     terminal.sendintr()
     terminal.expect_exact("ran ")
     terminal.expect(pexpect.EOF)
+
+
+@pytest.mark.realtime
+def test_in_the_background_of_a_terminal_it_leaves_what_is_typed_to_the_shell(
+    tmp_path: Path,
+) -> None:
+    control = tmp_path / "cart"
+    command = shlex.join([*RH3, "serve", "--pace", "50", "--control", str(control)])
+    shell = pexpect.spawn("bash", ["--norc", "-i"], timeout=60, echo=False)
+    shell.sendline(f"{command} &")
+    shell.expect_exact("Ctrl-C ends")
+    shell.sendline("echo he''re")
+    shell.expect_exact("here")
+    with ControlClient(control) as cart:  # a process that the terminal had stopped would be silent
+        cart.request("goal", pose=[0.1, 0, 0])
+        shell.expect_exact("FINISH")
+        cart.request("stop")
+    shell.expect_exact("ran ")
+    shell.close(force=True)
 
 
 def test_with_nobody_to_command_it_the_run_ends_at_once() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 from tests.host.engines.ros2.extra import CYCLONE
 from tests.host.engines.ros2.joined import DEADLINE_S, Peer, command, own_domain
 from tickrig.emulators.rh3.cart.motion_cli import main
+from tickrig.host.control.client import ControlClient
 
 READ = {
     "odom": "Odometry",
@@ -72,6 +74,33 @@ def test_a_peer_drives_the_cart_and_it_stands_when_the_peer_is_gone() -> None:
             finally:
                 driver.end()
                 watcher.end()
+
+
+@CYCLONE
+@pytest.mark.realtime
+def test_a_command_of_the_console_drives_a_cart_that_peers_may_drive(tmp_path: Path) -> None:
+    control = tmp_path / "cart"
+    with own_domain() as domain:
+        words = ["serve", "--ros2", "--ros2-domain", str(domain), "--control", str(control)]
+        with command("rh3", *words):
+            peer = Peer(domain)
+            try:
+                peer.say("read odom Odometry")
+                end_s = time.monotonic() + DEADLINE_S
+                while not control.exists():
+                    assert time.monotonic() < end_s
+                    peer.heard("odom", 0.05)
+                with ControlClient(control) as cart:
+                    cart.request("goal", pose=[0.2, 0, 0])
+                    while cart.request("status")["finished"] != 1:
+                        assert time.monotonic() < end_s
+                        peer.heard("odom", 0.05)
+                while _ahead_m(peer) < 0.3:  # the command has finished: the peer drives
+                    assert time.monotonic() < end_s
+                    peer.say("write cmd_vel Twist 0.2 0 0 0 0 0")
+                    peer.heard("odom", 0.05)
+            finally:
+                peer.end()
 
 
 def _stamp(message: dict[str, Any]) -> tuple[int, int]:
