@@ -70,6 +70,10 @@ def read_device(file: EdsFile) -> EdsDevice:
         objects[rows[0].index] = described
         added = {row.key for row in rows}
         entries = [row for row in entries if row.key not in added] + rows
+    read = {row.index for row in entries}
+    for index in sorted(objects.keys() - read) if read else ():
+        reason = "there is no sub-index: the object is left out"
+        file.warn(f"{index:04X}", reason, "sub0-missing")
     return EdsDevice(
         _device_info(file),
         tuple(entries),

@@ -331,8 +331,8 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]
     "compact-record": _compact,
 }
 
-OF_LINES: Final = ("inline-comment",)
-"""Rules of the reader that a rule over lines tells of, too, with what mends them."""
+OF_LINES: Final = ("inline-comment", "sub0-missing")
+"""Rules of the reader that a rule over lines or objects tells of, too."""
 OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
 
 

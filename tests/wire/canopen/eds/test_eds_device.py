@@ -161,6 +161,10 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
             "(dcf-key)",
         ),
         (
+            f"{SOUND}[2001]\nParameterName=x\nObjectType=8\nSubNumber=3\n",
+            "a.eds:5: [2001] there is no sub-index: the object is left out (sub0-missing)",
+        ),
+        (
             f"{SOUND}[SupportedModules]\nNrOfEntries=2\n",
             "a.eds:5: [SupportedModules] a modular device: the objects of its modules are left "
             "out, for [ConnectedModules] of a DCF has to say which are there (modules)",
