@@ -8,10 +8,10 @@ import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
 from tickrig.emulators.rh3.base_options import base_options
-from tickrig.host.cli.options import Program
+from tickrig.host.cli.options import HarmlessCommand
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.option(
     "--baud",
     type=click.IntRange(1_200, 4_000_000),

@@ -7,10 +7,10 @@ from typing import Any
 import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.host.cli.options import Program
+from tickrig.host.cli.options import HarmlessCommand
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.option(
     "--power-on-event",
     type=click.Choice(["PowerOnTrigger", "PowerOn"]),

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.host.cli.options import Program
+from tickrig.host.cli.options import HarmlessCommand
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
 
@@ -17,7 +17,7 @@ def _complete_node(context: click.Context, option: click.Parameter, word: str) -
     return [name for name in COMPONENTS if name.startswith(word)]
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.option(
     "--node",
     default="echo",

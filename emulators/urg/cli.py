@@ -7,7 +7,7 @@ from typing import Any, Final
 import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.host.cli.options import NumberRange, Program, add_options
+from tickrig.host.cli.options import HarmlessCommand, NumberRange, add_options
 
 USB_BAUD: Final = 12_000_000
 """As fast as USB at full speed."""
@@ -19,7 +19,7 @@ _WORLD: Final = add_options(
 )
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.option("--serial", default="H0614967", metavar="TEXT", help="Serial number.  [H0614967]")
 @click.option(
     "--noise",

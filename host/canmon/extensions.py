@@ -13,7 +13,7 @@ from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.check.rule import Evidence, FrameSelection
+    from tickrig.host.monitor.check.rule import CheckedTraffic, FrameSelection
     from tickrig.host.monitor.decode.decoded import Decoded
     from tickrig.host.monitor.decode.decoder import Decoder, FrameDecoder
     from tickrig.host.monitor.decode.node_memory import EdsObjects
@@ -117,11 +117,11 @@ class _CheckedRule(Rule):
         if isinstance(self._rule, Rule):
             _called(self.name, self._rule.begin, at_us)
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         known = isinstance(self._rule, Rule)
         return _called(self.name, self._rule.unjudged, evidence) if known else ""
 
-    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+    def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
         known = isinstance(self._rule, Rule)
         return _called(self.name, lambda: list(self._rule.notes(evidence))) if known else ()
 

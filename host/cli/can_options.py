@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.shell_completion import CompletionItem
 
-from tickrig.host.cli.options import Decorator, Program, add_options
+from tickrig.host.cli.options import Decorator, HarmlessCommand, add_options
 from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.cli.start import loading
 from tickrig.host.text.values import parse_setting
@@ -96,7 +96,7 @@ class BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click 
             self.fail(str(error), param, ctx)
 
 
-class BusCommand(Program):
+class BusCommand(HarmlessCommand):
     """A command whose `--timing` and `--bus-kwargs` take all words KEY=VALUE that follow.
 
     It is none for a command that has such words of its own.

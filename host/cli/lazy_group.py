@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from tickrig.host.cli.options import Program
+from tickrig.host.cli.options import HarmlessCommand
 from tickrig.host.cli.start import load
 
 
@@ -25,7 +25,7 @@ class LazyCommand(click.Command):
         self.path = path
 
 
-class LazyGroup(Program, click.Group):
+class LazyGroup(HarmlessCommand, click.Group):
     """A group whose commands live in modules of their own.
 
     Args:

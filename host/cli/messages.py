@@ -33,15 +33,7 @@ def warnings_shown() -> Iterator[None]:
 
 def show_findings(findings: Iterable[Finding]) -> None:
     """Say what is wrong in EDS files; what is so in many sections, once."""
+    from tickrig.wire.canopen.eds.eds_file import finding_lines  # noqa: PLC0415 - a TAB needs none
+
     for line in finding_lines(findings):
         say(line)
-
-
-def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
-    """Give what is wrong in EDS files, a line each; what is so in many sections, once."""
-    alike: dict[tuple[str, str], list[Finding]] = {}
-    for finding in dict.fromkeys(findings):
-        alike.setdefault((finding.file, finding.reason), []).append(finding)
-    for first, *others in alike.values():
-        more = f" (and {len(others)} more like it)" if others else ""
-        yield f"{first}{more}"

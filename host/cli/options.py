@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-class Program(click.Command):
+class HarmlessCommand(click.Command):
     """A console command: nothing that it prints is obeyed by a terminal."""
 
     def main(self, *args: Any, **extra: Any) -> Any:

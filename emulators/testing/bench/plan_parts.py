@@ -35,10 +35,10 @@ from tickrig.emulators.testing.rig_file.plan import (
 )
 from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.signals.signal_spec import SignalSpec
-from tickrig.host.cli.messages import finding_lines
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.log import log_of
 from tickrig.host.text.values import Setting
+from tickrig.wire.canopen.eds.eds_file import finding_lines
 
 _logger = log_of(__name__)
 

@@ -7,12 +7,12 @@ from typing import Any
 import click
 
 from tickrig.host.cli.engine_options import openrtm_options, take_engines
-from tickrig.host.cli.options import PATH, Program, version_option
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
 from tickrig.host.cli.refused import Refused, time_us
 from tickrig.host.cli.start import loading
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.argument("system", type=PATH, required=False)
 @click.option("--urg", metavar="URL", help="Line of a range finder: its component runs here.")
 @click.option("--ucode", metavar="URL", help="Line of a ucode reader: three components run here.")

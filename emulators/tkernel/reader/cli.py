@@ -7,10 +7,10 @@ from typing import Any
 import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.host.cli.options import NumberRange, Program
+from tickrig.host.cli.options import HarmlessCommand, NumberRange
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.option(
     "--marker", "markers", multiple=True, metavar="UCODE,X,Y", help="A marker, place in m."
 )

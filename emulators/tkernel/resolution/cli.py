@@ -7,11 +7,11 @@ from typing import Any
 
 import click
 
-from tickrig.host.cli.options import PATH, Program, version_option
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
 from tickrig.host.cli.start import loading
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.argument("table", type=PATH, required=False)
 @click.option(
     "--port",

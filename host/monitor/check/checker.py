@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from tickrig.host.monitor.check.frame_rules import NoErrorFrames
-from tickrig.host.monitor.check.rule import ONE_TIME, Evidence, Finding, Rule, Seen
+from tickrig.host.monitor.check.rule import ONE_TIME, CheckedTraffic, Finding, Rule, Seen
 from tickrig.host.monitor.check.rules import NO_EDS, NO_LOSS, EdsHeartbeats, Rules
 from tickrig.host.monitor.check.time_rules import MaxLoad
 from tickrig.host.monitor.frames.ident import ERROR, any_ident
@@ -133,7 +133,7 @@ class Checker:
             without_errors: why the source has no error frames whatever happened.
         """
         seen = {key: Seen(*values) for key, values in self._seen.items()}
-        evidence = Evidence(seen, end_us, without_errors)
+        evidence = CheckedTraffic(seen, end_us, without_errors)
         return unjudged(self._rules, self._made, evidence, self._expressions)
 
     def _latest(self) -> dict[int, int]:
@@ -200,7 +200,7 @@ class Unjudged(NamedTuple):
 def unjudged(
     rules: Rules,
     made: Iterable[Rule],
-    evidence: Evidence,
+    evidence: CheckedTraffic,
     written: Iterable[ExpressionRule] = (),
 ) -> Unjudged:
     """Return what was not judged of a source that had a frame."""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tickrig.host.monitor.check.checker import Unjudged, ended, unjudged
 from tickrig.host.monitor.check.rule import (
     NO_GAP_US,
-    Evidence,
+    CheckedTraffic,
     Finding,
     FrameSelection,
     Rule,
@@ -107,7 +107,7 @@ class ColumnChecker:
             for channel, selection in self._selections.items()
             for ident, one in selection.seen()
         }
-        evidence = Evidence(seen, self._last_us, without_errors)
+        evidence = CheckedTraffic(seen, self._last_us, without_errors)
         return unjudged(self._rules, self._made, evidence)
 
     def _too_busy(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Final
 
-from tickrig.host.monitor.check.rule import Evidence, FrameSelection, Rule
+from tickrig.host.monitor.check.rule import CheckedTraffic, FrameSelection, Rule
 from tickrig.host.monitor.check.time_rules import (
     ANSWER_IDS,
     BOOT_UP,
@@ -33,7 +33,7 @@ NAMED_BYTES: Final = 4
 class CanopenRule(Rule):
     """A rule about frames that should not be there, among those that may be of CANopen."""
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say that no frame can be one of CANopen."""
         return evidence.without_canopen
 
@@ -63,7 +63,7 @@ class NoEmcy(CanopenRule):
         length = "" if len(data) == EMCY_BYTES else f" ({len(data)} B, {EMCY_BYTES} are right)"
         return f"node {node}: EMCY {code:04X}h {describe(code)}{length}"
 
-    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+    def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
         """Say how many frames are too short to have an error code."""
         if self._cut:
             yield f"{counted(self._cut, 'frame')} of EMCY without a whole error code"
@@ -114,7 +114,7 @@ class NoErrorFrames(Rule):
         assert isinstance(frame, ErrorFrame)
         return describe_error_frame(frame)
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say that the source has no error frames whatever happened."""
         return evidence.without_errors
 
@@ -143,7 +143,7 @@ class KnownIds(Rule):
         """Tell the first frame."""
         return None if gap_us is not None else f"{_text(record)} is not expected"
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say that there was no identifier."""
         return "" if evidence.seen else "no frame with a CAN-ID came"
 

@@ -109,7 +109,7 @@ class Seen(NamedTuple):
         return self.frames > 1 and self.first_us != self.last_us
 
 
-class Evidence(NamedTuple):
+class CheckedTraffic(NamedTuple):
     """What there was to be judged.
 
     Attributes:
@@ -173,7 +173,7 @@ class Rule:
         """Take the time of the first frame of all, before any is judged."""
         return
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say why it has judged nothing, so that nobody takes it for one that holds.
 
         A rule judges each frame that it wants, error frames also by their absence; one with an
@@ -190,7 +190,7 @@ class Rule:
             return ""
         return "no frame that it is about came"
 
-    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+    def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
         """Say what it could not judge beside what it has judged."""
         return ()
 

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.check.rule import ONE_TIME, Evidence, FrameSelection, Rule
+from tickrig.host.monitor.check.rule import ONE_TIME, CheckedTraffic, FrameSelection, Rule
 from tickrig.host.monitor.frames.ident import REMOTE, ident_text
 from tickrig.host.monitor.frames.quantity import ms_text
 from tickrig.host.monitor.frames.record import Record
@@ -108,7 +108,7 @@ class Heartbeat(Rule):
         elif end_us - latest_us[self._ident] > self._times.high_us:
             yield self._said(end_us - latest_us[self._ident], "at most", self._times.high_us)
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say that no gap was there to be compared: those around boot-ups are free."""
         if evidence.untimed:
             return ONE_TIME
@@ -282,7 +282,7 @@ class NoLostHeartbeat(Rule):
                 since = ms_text(end_us - begin_us)
                 yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say that no period was known, or none has passed."""
         if evidence.untimed:
             return ONE_TIME
@@ -291,7 +291,7 @@ class NoLostHeartbeat(Rule):
             return ""
         return "; ".join(doubts) or "no heartbeat came"
 
-    def notes(self, evidence: Evidence, /) -> Iterable[str]:
+    def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
         """Name the nodes of which nothing was judged."""
         return self._doubts()
 
@@ -340,7 +340,7 @@ class MaxGap(Rule):
         elif end_us - latest_us[self._ident] > self._most_us:
             yield self._said(end_us - latest_us[self._ident])
 
-    def unjudged(self, evidence: Evidence, /) -> str:
+    def unjudged(self, evidence: CheckedTraffic, /) -> str:
         """Say that it came once."""
         if evidence.untimed:
             return ONE_TIME

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.cli.options import PATH, Program, version_option
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
 from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.rtc_canopen.builder.profile_file import EXAMPLE, Project, parse_project
 from tickrig.host.rtc_canopen.builder.skeleton import SKELETON_SUFFIX
 
 
-@click.command(cls=Program)
+@click.command(cls=HarmlessCommand)
 @click.argument("profile", type=PATH, required=False)
 @click.option("--out", type=PATH, metavar="DIR", help="Write the files there; DIR is made.")
 @click.option("--force", is_flag=True, help="Overwrite the skeleton, which is yours to fill.")

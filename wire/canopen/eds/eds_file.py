@@ -52,6 +52,16 @@ class Finding(NamedTuple):
         return f"{place}: {where}{self.reason}" + (f" ({self.rule})" if self.rule else "")
 
 
+def finding_lines(findings: Iterable[Finding]) -> Iterator[str]:
+    """Give what is wrong in EDS files, a line each; what is so in many sections, once."""
+    alike: dict[tuple[str, str], list[Finding]] = {}
+    for finding in dict.fromkeys(findings):
+        alike.setdefault((finding.file, finding.reason), []).append(finding)
+    for first, *others in alike.values():
+        more = f" (and {len(others)} more like it)" if others else ""
+        yield f"{first}{more}"
+
+
 class EdsError(ValueError):
     """An EDS that cannot be used: all that is wrong with it, a line each."""
 

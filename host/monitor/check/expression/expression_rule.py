@@ -8,7 +8,7 @@ from typing import Final
 from tickrig.host.monitor.check.expression.demand import Demand
 from tickrig.host.monitor.check.expression.scope import Scope
 from tickrig.host.monitor.check.expression.slice_parser import Slice, with_slices
-from tickrig.host.monitor.check.rule import ONE_TIME, Evidence, Finding
+from tickrig.host.monitor.check.rule import ONE_TIME, CheckedTraffic, Finding
 from tickrig.host.monitor.decode.decoded import Decoded
 from tickrig.host.monitor.decode.filter_terms import KINDS, MissingSignals, signal_place
 from tickrig.host.monitor.frames.record import Record
@@ -92,7 +92,7 @@ class ExpressionRule:
         hint = "" if self._demand.came or not self._unmapped else NO_MAPPING
         return [Finding(end_us, self.name, text + hint) for text in texts]
 
-    def unjudged(self, evidence: Evidence) -> str:
+    def unjudged(self, evidence: CheckedTraffic) -> str:
         """Say why it has judged nothing; empty if it has."""
         if not self._forced:
             return f"it was never in force: {' '.join(scope.text for scope in self._scopes)}"

@@ -4,7 +4,7 @@ import pytest
 
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_file import EdsFile, Finding, finding_lines
 from tickrig.wire.canopen.eds.eds_value import parse_number
 from tickrig.wire.canopen.eds.object_table import RO, RW, WO, EntryDescription
 
@@ -526,3 +526,12 @@ def test_long_texts_are_shortened() -> None:
 def test_what_python_alone_takes_is_no_number(text: str) -> None:
     with pytest.raises(ValueError, match="is no number"):
         parse_number(text)
+
+
+def test_what_is_so_in_many_sections_is_one_line() -> None:
+    alike = [Finding("a.eds", section, "no DataType", 3) for section in ("1000", "1000", "1001")]
+    other = Finding("b.eds", "", "empty")
+    assert list(finding_lines([*alike, other])) == [
+        "a.eds:3: [1000] no DataType (and 1 more like it)",
+        "b.eds: empty",
+    ]
