@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 
-from tickrig.host import RrcClient, RrcEvent
+from tickrig.host import DeviceRefused, RrcClient, RrcEvent
 
 
 def main(url: str) -> None:
@@ -16,9 +17,10 @@ def main(url: str) -> None:
         client.watchdog(100_000)
         client.status()
         client.drive_by_host(v_pct=0, w_pct=0)
-        for status in client.statuses(timeout_us=50_000):
-            stick = status.value
-            client.output(int(stick.in_v_pct / 2), int(stick.in_w_pct / 2))
+        with suppress(DeviceRefused):  # outputs that are on their way while VR2 stops
+            for status in client.statuses(timeout_us=50_000):
+                stick = status.value
+                client.output(int(stick.in_v_pct / 2), int(stick.in_w_pct / 2))
         for event in client.events(timeout_us=1_000_000):
             print(f"EV:{event.value.name}")
 
