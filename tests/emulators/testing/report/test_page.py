@@ -130,8 +130,8 @@ def test_the_fault_plan_tells_what_came_of_each_order() -> None:
 def test_the_journal_is_what_the_transcript_said(page: Element) -> None:
     lines = [line.text for line in test_of(page, STOPS).by_class("journal")[0].all("li")]
     assert lines[-3:] == [
-        "0.890000 * state PowerOffByOthers",
-        "0.892865 < EV:PowerOffWaitByNoCommunication",
+        "0.900000 * state PowerOffByOthers",
+        "0.902865 < EV:PowerOffWaitByNoCommunication",
         "1.200000 ! bus_unplugged=0",
     ]
 
