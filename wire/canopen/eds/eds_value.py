@@ -32,6 +32,7 @@ _HEX_BYTES: Final = re.compile(r"0x([0-9a-f]+)", re.IGNORECASE | re.ASCII)
 _LONE_BYTES: Final = re.compile(
     r"0x[0-9a-f]{1,2}(?:[ ,]++0x[0-9a-f]{1,2})++", re.IGNORECASE | re.ASCII
 )
+_WHOLE: Final = re.compile(r"\+?(-?(?:0|[1-9][0-9]*+))(?:\.0++)?", re.ASCII)
 _UNDERSCORE: Final = re.compile(r"(?<=[0-9a-f])_(?=[0-9a-f])", re.IGNORECASE)
 _OCTAL: Final = re.compile(r"0[0-7]+")
 _NO_OCTAL: Final = re.compile(r"\b0++(?=[0-7]*+[89])([0-9]++)\b", re.ASCII)
@@ -130,13 +131,15 @@ def plain_numbers(text: str) -> str:
     """Return numbers as CiA 306 writes them.
 
     What C adds to them goes, blanks and underscores within them, a comment behind them, and zeros
-    that make no octal number; hexadecimal ones of assemblers begin with 0x. Node-IDs are not
-    touched.
+    that make no octal number, a plus before them, and decimals that are 0; hexadecimal ones of
+    assemblers begin with 0x. Node-IDs are not touched.
 
     >>> plain_numbers("0x1234567890ABCDEFLL"), plain_numbers("$NODEID+0x80u"), plain_numbers("0009")
     ('0x1234567890ABCDEF', '$NODEID+0x80', '9')
     >>> plain_numbers("0x 12 34"), plain_numbers("1Ah"), plain_numbers("1_000")
     ('0x1234', '0x1A', '1000')
+    >>> plain_numbers("+5"), plain_numbers("-5.0"), plain_numbers("+0x5")
+    ('5', '-5', '0x5')
     """
     if is_plain_number(text):  # a third of the time of a file
         return text
@@ -144,6 +147,10 @@ def plain_numbers(text: str) -> str:
     if assembler := _ASSEMBLER_HEX.fullmatch(plain):
         return f"0x{assembler[1].replace(' ', '')}"
     plain = _UNDERSCORE.sub("", plain)
+    if whole := _WHOLE.fullmatch(plain):
+        return whole[1]
+    if plain[:3].lower() == "+0x":
+        plain = plain[1:]
     return _SPLIT_HEX.sub(lambda match: "0x" + match[1].replace(" ", ""), plain)
 
 

@@ -484,6 +484,9 @@ CORPUS: Final = (
     Deviation("number-form", within("1018sub1", "0x0000AB01", "0x0000AB01UL")),
     Deviation("number-form", within("1018sub1", "0x0000AB01", "0x 0000 AB01")),
     Deviation("number-form", within("1018sub1", "0x0000AB01", "0AB01h")),
+    Deviation("number-form", within("1018sub1", "0x0000AB01", "+0x0000AB01")),
+    Deviation("number-form", within("1018sub1", "0x0000AB01", "+43777")),
+    Deviation("number-form", within("1018sub1", "0x0000AB01", "43777.0")),
     Deviation(
         "number-form", within("2006", "0x10", "0018"), True, entry(0x2006, 0, default=b"\x12")
     ),
