@@ -150,6 +150,27 @@ def test_all_errors_of_a_file_are_told_at_once() -> None:
             "a.eds:5: [2000] DefaultValue=0x0102FF is no hexadecimal bytes: 01 02 FF is taken "
             "(byte-form)",
         ),
+        *(
+            (
+                f"[2000]\nParameterName=x\nDataType=0xA\nAccessType=rw\nDefaultValue={text}\n",
+                f"a.eds:5: [2000] DefaultValue={text} is no hexadecimal bytes: 01 FF is taken "
+                "(byte-form)",
+            )
+            for text in ("0x1 0xFF", "0x01, 0xFF", "01 FF # two")
+        ),
+        *(
+            (
+                f"[2000]\n{U8}DefaultValue={text}\n",
+                f"a.eds:5: [2000] DefaultValue={text} is no number of CiA 306: {taken} is taken "
+                "(number-form)",
+            )
+            for text, taken in (("+5", "5"), ("5.0", "5"), ("+0x5", "0x5"))
+        ),
+        (
+            f"[2000]\n{U8}LowLimit=$NODEID+1\n",
+            "a.eds:5: [2000] LowLimit=$NODEID+1 depends on the node-ID: no limit is taken "
+            "(limit-value)",
+        ),
         (
             "[2000]\nParameterName=x\nDataType=0xF\nAccessType=rw\nDefaultValue=hello\n",
             "a.eds:5: [2000] DefaultValue=hello is no hexadecimal bytes: its text is taken "
