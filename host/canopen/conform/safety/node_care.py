@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from contextlib import suppress
 from typing import Final
 
@@ -110,7 +110,7 @@ class NodeCare:
         except (SdoFailed, StepFailed):
             self._recover()
 
-    def unread(self, addresses: frozenset[Address]) -> list[Address]:
+    def unread(self, addresses: Set[Address]) -> list[Address]:
         """Return which of these could not be read: nobody could write them back."""
         self._exchange.begin(CARE_US)
         known = self._state.original

@@ -254,7 +254,7 @@ DEFECTS: Final = (
         ("LS-10",),
         hears("7E5#43.{8}(.*)", r"7E5#4378560000\1"),
     ),
-    Defect("LSS identify does not answer", ("LS-11",), says("7E4#4F.*")),
+    Defect("LSS identify does not answer", ("LS-11",), says("7E4#4F.*"), left=True),
     Defect(
         "LSS identify answers outside of its range",
         ("LS-12",),
@@ -269,5 +269,5 @@ DEFECTS: Final = (
     Defect("LSS fastscan is not answered", ("LS-16", "LS-17"), says("7E4#4F.*")),
     Defect("LSS fastscan finds nobody", ("LS-17",), hears("7E5#51.{8}00.*")),
     Defect("no boot-up with a node-ID of LSS", ("LS-18",), says("7(?!05|E4)..#00")),
-    Defect("LSS not configured is not told", ("LS-19",), says("7E4#50.*")),
+    Defect("LSS not configured is not told", ("LS-19",), says("7E4#50.*"), left=True),
 )
