@@ -25,7 +25,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import RO, RW, DeviceInfo, Element, ObjectTable
 
 NODE_ID: Final = 5
-LONGEST_CHECK_MS: Final = 600
+LONGEST_CHECK_MS: Final = 150
 
 
 def _lasts_ms(check: Check) -> int:
@@ -201,7 +201,7 @@ def dictionary(chance: Random) -> EdsDevice:
     table.variable(0x1000, "Device type", DataType.UNSIGNED32, RO)
     table.variable(0x1001, "Error register", DataType.UNSIGNED8, RO)
     for index, kind in PLAIN.items():
-        if chance.random() < 0.2:
+        if chance.random() < 0.15:
             access = RW if chance.random() < 0.8 else RO
             table.variable(index, "object", _kind(chance, kind), access)
     for index, kinds in RECORDS.items():
@@ -227,7 +227,7 @@ def converse(chance: Random) -> tuple[FuzzNode, Report]:
     level = chance.choice((Level.COMMUNICATION, Level.INTRUSIVE))
     only = (chance.choice((*CHECKS, "OD-1*-long")),)
     plan = Plan(level, only, confirm=lambda question: True, bit_rate=1_000_000, max_load=1)
-    known = device if chance.random() < 0.95 else None
+    known = device if chance.random() < 0.98 else None
     return node, ConformRun(node, NODE_ID, plan, device=known).run()
 
 

@@ -436,7 +436,11 @@ DEFECTS: Final = (
     Defect("no boot-up after reset communication", ("NMT-10", "NMT-23"), boots_once),
     Defect("boot-up with Enter Pre-operational", ("NMT-24",), on_hearing("000#80", "705#00")),
     Defect("boot-up with Start", ("NMT-24",), on_hearing("000#01", "705#00")),
-    Defect("Operational after reset communication", ("NMT-23",), services={NmtSlave: BusyAgain}),
+    Defect(
+        *("Operational after reset communication", ("NMT-28",)),
+        services={NmtSlave: BusyAgain},
+        left=True,
+    ),
     Defect("RPDO is applied in Stopped", ("NMT-26",), applies(NmtState.STOPPED)),
     Defect("TPDO in Stopped", ("NMT-27",), sends_in_stopped),
     # heartbeat and guarding
