@@ -20,6 +20,8 @@ WORDS: Final = {
 REASONS: Final[Mapping[tuple[str, str], str]] = {
     ("LocalNode", "SG-01"): "a fresh LocalNode cannot abort, as it has no object yet to name; here"
     " it was asked for others before",
+    ("LocalNode", "DS-08"): "it refuses a download in segments when all has come, which CiA 301"
+    " allows",
 }
 """Why a verdict differs."""
 
