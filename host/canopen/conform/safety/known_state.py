@@ -80,6 +80,10 @@ class KnownState:
         for at in left:
             self._begin[at] = self.original[at]
 
+    def is_quieted(self, at: Address) -> bool:
+        """Return whether checks begin with another value than was there before the run."""
+        return self._begin.get(at) != self.original.get(at)
+
     def write(self, addresses: Collection[Address]) -> None:
         """Take note of what may change."""
         self.written.update(addresses)

@@ -130,6 +130,10 @@ class NodeCare:
         """The bits of the error register that were set before the run, and are still."""
         return self._errors
 
+    def is_quieted(self, at: Address) -> bool:
+        """Return whether the tester has written another value than was there, to begin checks."""
+        return self._state.is_quieted(at)
+
     def held(self, at: Address) -> bytes:
         """Return what an object held before the run; nothing if that is not known."""
         return self._state.original.get(at, b"")

@@ -32,7 +32,8 @@ def _lasts_ms(check: Check) -> int:
     """Return how long a check waits, beside answers."""
     waits = sum(step.get("wait", 0) + step.get("for", 0) for step in check.steps)
     periods = sum(step.get("each", 0) * step.get("times", 0) for step in check.steps)
-    return waits + periods + sum(step.get("in", 0) // 2_000 * 1_000 for step in check.steps)
+    long_ms: int = sum(step.get("in", 0) // 2_000 * 1_000 for step in check.steps)
+    return int(waits + periods) + long_ms
 
 
 CHECKS: Final = tuple(
