@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rrc.bench import RrcBench
+from tickrig.wire.rrc.check import check_digit
 
 
 def sounds(bench: RrcBench, ticks: int) -> str:
@@ -238,6 +239,45 @@ def test_a_joystick_command_takes_effect_at_once_in_limit_mode() -> None:
     assert out(bench) == (-50, 0)
     bench.step("joystick00006464001051e2d")
     assert out(bench) == (0, 0)
+
+
+def test_in_output_mode_a_joystick_command_is_taken_and_has_no_effect() -> None:
+    bench = RrcBench().enter("Output")
+    bench.set(stick_v_pct=-80, stick_w_pct=60)
+    bench.step("output9c1e")
+    assert bench.step("joystick00006464001051e2d") == ["OK:joystick"]
+    bench.step()
+    assert (bench.state, out(bench)) == ("Output", (-100, 30))
+    bench.step("limit6464ffffff")
+    assert out(bench) == (0, 60)  # reverse mode 1 was kept
+
+
+def test_in_standby_nothing_drives_until_limit_or_output() -> None:
+    bench = RrcBench().power_on()
+    bench.set(stick_v_pct=80)
+    bench.step("joystick00006464000051e2d", "speedmode50")
+    bench.run(1_000)
+    assert (bench.state, out(bench)) == ("Standby", (0, 0))
+    bench.step("limit6464ffffff")
+    assert (bench.state, out(bench)) == ("Limit", (80, 0))
+
+
+@pytest.mark.parametrize("stable", [False, True])
+def test_a_refused_command_changes_no_setting(stable: bool) -> None:
+    bench = RrcBench().enter("Output")
+    for line in ("watchdogff", "speedmode30", "joystick0a0a5a5aff2051e2d", f"stablemode{stable:d}"):
+        bench.step(line)
+    before = repr(bench.rrc._settings)
+    for line in (
+        *("limit65643232ff", "output6500", "speedmode61", "joystick32320a0a000651e2d"),
+        *("joystick0a0a5a5aff0651e2g", "watchdog0", "stablemode2", "statusB1", "statusA2"),
+        *("poweroff1", "speedmodeg0", "Speedmode10"),
+    ):
+        ends = [check_digit(line.encode()).decode(), "g"] if stable else [""]
+        for end in ends:
+            (reply,) = bench.step(line + end)
+            assert reply.startswith("ER:")
+            assert (bench.state, repr(bench.rrc._settings)) == ("Output", before)
 
 
 @pytest.mark.parametrize(

@@ -107,3 +107,9 @@ def test_the_example_of_check_is_right() -> None:
     assert found
     for line, check in found:
         assert check_digit(line.encode()) == check.encode()
+
+
+def test_the_supply_and_its_warning_stand_there() -> None:
+    page = " ".join(PAGE.read_text("utf-8").split())
+    assert "24 V, 6.5 mA from the VR2 battery, or 5 V, 20 mA from USB" in page
+    assert "must not be plugged into a USB port that delivers power" in page

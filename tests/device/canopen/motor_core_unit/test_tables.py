@@ -110,6 +110,7 @@ def test_every_number_of_tables_5_and_6_is_met_and_on_the_page() -> None:
         number, within = row.close
         assert number == pytest.approx(row.expected, rel=within), row
         assert f"| {row.said} | {row.measured} |" in page, row
+    assert "(70 mm x 80 mm and 1132 g; 75 x 55 x 24 mm and 97 g)" in page
 
 
 @pytest.mark.parametrize("supply_v", range(10, 67, 4))
