@@ -89,7 +89,9 @@ def requirements() -> Iterator[tuple[str, str, str]]:
 def test_each_requirement_of_the_sources_names_what_shows_it_or_says_why_not() -> None:
     there: Counter[str] = Counter()
     for path in (ROOT / "tests").rglob("test_*.py"):
-        tests = set(re.findall(r"^(?:async )?def (test_\w+)", path.read_text("utf-8"), re.M))
+        tests = set(
+            re.findall(r"^(?:async )?def (test_\w+)", path.read_text("utf-8"), re.MULTILINE)
+        )
         there.update(tests)
         there.update(f"{path.relative_to(ROOT).as_posix()}::{test}" for test in tests)
     numbers: list[str] = []
