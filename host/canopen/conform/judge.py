@@ -96,7 +96,7 @@ class Judge:
                 return "needs somebody at the inputs of the device: --stimulus"
         try:
             bound = bind_check(check, subject.names)
-            if lacking := subject.missing(bound.used) or subject.fixed(bound.steps):
+            if lacking := subject.missing(bound) or subject.fixed(bound.steps):
                 return lacking
             for index, _ in sorted(bound.changed):
                 self._permission.check_write(index)

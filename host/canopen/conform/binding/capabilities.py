@@ -54,6 +54,8 @@ PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
 LSS: Final = ("lss", "lssident", "unconfigured")
 IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
 DEVICE_TYPE: Final = 0x1000
+ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
+"""What a node need not do that has the object: bit 0 of its first sub-index tells."""
 LSS_ADDRESS: Final = 0x1018
 
 
@@ -88,6 +90,10 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
     reasons = dict(_missing(binding))
     if not any(_number(text) for text in dummies.values()):
         reasons["dummy"] = _unsaid(file, "DummyUsage", "dummy objects may be mapped")
+    for word, index in ON_COMMAND.items():
+        said = client.number(index, 1)
+        if said is not None and not said & 1:
+            reasons[word] = f"{index:04X}h:01 says that the node does not do it on command (bit 0)"
     if _has_constant_heartbeat(binding):
         reasons["guarding"] = "1017h is constant and not 0: heartbeat takes the place of guarding"
     findings = [*_profile(binding), *_identity(binding, info)]

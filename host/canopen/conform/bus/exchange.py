@@ -18,6 +18,7 @@ from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.canopen.sdo.sdo_command import (
+    BLOCK_ENDED,
     REQUEST_COB_ID,
     RESPONSE_COB_ID,
     SPECIFIER,
@@ -34,6 +35,10 @@ HOST_GAP_US: Final = 10_000
 
 HELD_US: Final = 20_000
 """A frame that is sent so much later than its check wants it may change what the node does."""
+PAUSE_US: Final = 10_000
+"""So long nothing is asked behind an SDO request that has no answer: a server may take one frame
+at a time, and CiA 301 does not say how fast it is ready for the next one."""
+UNANSWERED: Final = (ClientCommand.ABORT, BLOCK_ENDED)
 TOO_LOW: Final = "your --max-load is too low for this check"
 
 NODE_ID_MASK: Final = 0x7F
@@ -97,7 +102,7 @@ class Exchange:
         self._reserved = frozenset(("000", f"{REQUEST_COB_ID + node_id:03X}"))
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
         self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
-        self._multiplexer, self.transfer = b"", (0, 0)
+        self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
         self.unanswered: list[tuple[int, int]] = []
         self._answers, self._others_by = Answers(), NODES
         self.played: int | None = None
@@ -158,13 +163,18 @@ class Exchange:
         now_us = self._link.now_us
         if now_us > self._known_us:  # never in virtual time: half of all looks at the bus
             self._listen(now_us)
+        is_request = frame.can_id == self._request
+        if is_request:
+            self._listen_until(self._ready_us)
         held_us = self._allowance.wait_us(self._link.now_us)
         self._listen_until(self._link.now_us + held_us)
         if held_us > HELD_US and self._allowance.slowness > 1:
             self.disturb(TOO_LOW)
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
         self._allowance.use(self.now_us, frame)
-        if frame.can_id == self._request:
+        if is_request:
+            if frame.data[:1] and frame.data[0] in UNANSWERED:
+                self._ready_us = self.now_us + PAUSE_US
             self._multiplexer = frame.data[MULTIPLEXER]
             self._answers.count_request(frame.data)
             if len(frame.data) >= MULTIPLEXER.stop and frame.data[0] & SPECIFIER in BEGINNING:

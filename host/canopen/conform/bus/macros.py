@@ -31,6 +31,10 @@ ABORT_MS: Final = 5
 
 SCAN_MS: Final = 10
 FOUND: Final = "7E4#4F00000000000000"
+STORE_LSS: Final = "7E5#1700000000000000"
+LSS_STORED: Final = "7E4#1700000000000000"
+LSS_STORES_NOTHING: Final = "7E4#1701000000000000"
+"""CiA 305, store configuration, error code 1: the device does not support it."""
 
 
 def pattern(size: int) -> bytes:
@@ -306,6 +310,13 @@ def _compare(got: bytes, wanted: bytes) -> None:
         raise StepFailed(f"{len(got)} bytes, not the {len(wanted)} that were wanted")
 
 
+def lss_store(sdo: SdoFrames) -> None:
+    """Store the configuration of LSS; NotAllowed if the node answers that it stores none."""
+    sdo.exchange.send(CanFrame.parse(STORE_LSS))
+    if sdo.exchange.expect([LSS_STORED, LSS_STORES_NOTHING], ANSWER_MS) == LSS_STORES_NOTHING:
+        raise NotAllowed("the node stores no LSS configuration: error code 1")
+
+
 MACROS: Final[dict[str, Callable[..., object]]] = {
     "sync": sync,
     "syncperiod": sync_period,
@@ -320,6 +331,7 @@ MACROS: Final[dict[str, Callable[..., object]]] = {
     "enable": enable,
     "refusesegments": refuse_segments,
     "fastscan": fastscan,
+    "lssstore": lss_store,
     "guard": guard,
     "follow": follow,
 }

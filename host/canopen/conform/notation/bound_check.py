@@ -171,7 +171,7 @@ def _questions(step: Mapping[str, Any], sync: str) -> Iterator[str]:
     macro = step.get("macro", [""])
     if can_id == NMT and data[2:4] == "00":
         yield NMT_TO_ALL
-    if can_id == LSS or macro[0] == "fastscan":
+    if can_id == LSS or macro[0] in ("fastscan", "lssstore"):
         yield LSS_TO_ALL
     if can_id == sync or macro[0] in ("sync", "syncperiod"):
         yield SYNC_TO_ALL

@@ -60,6 +60,7 @@ _LONGEST_MS: Final[dict[str, Callable[[Sequence[Any]], int]]] = {
     "room": lambda words: TRANSFER_MS,
     "blockup": lambda words: 2 * TRANSFER_MS,
     "fastscan": lambda words: 10_000,
+    "lssstore": lambda words: 1_000,
     "guard": lambda words: 1_500 * len(words),
     MAP: lambda words: TRANSFER_MS,
     ENABLE: lambda words: TRANSFER_MS,

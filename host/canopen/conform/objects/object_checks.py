@@ -39,6 +39,13 @@ ERROR_FIELD: Final = 0x1003
 CONSTANTS: Final = (0x1000, 0x1018)
 """Objects that hold what the EDS says wherever the bus cannot write them."""
 PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+IN_USE: Final = (*(0x1005, 0x1006, 0x1012, 0x1014), *range(0x1200, 0x1300), *range(0x1400, 0x1C00))
+"""Objects that CiA 301 keeps from being changed while what they set up exists."""
+KEPT: Final = (
+    *("06010000", "06010001", "06010002", "06040041", "06040042", "06040043", "06040047"),
+    *("06090030", "08000000", "08000021", "08000022"),
+)
+"""Codes of that: a server need not look at the value before."""
 RESERVED_SUB: Final = 4
 """Of a PDO parameter: CiA 301 keeps it free, and files describe it."""
 SERIAL_NUMBER: Final = (0x1018, 4)
@@ -166,7 +173,7 @@ def _refused(
     entry: EntryDescription, suffix: str, title: str, grow: int, codes: Sequence[str]
 ) -> Check:
     """Make a check that writes what it has read, so many bytes longer: it must be refused."""
-    step = {"refuse rewrite": _place(entry), "grow": grow, "codes": list(codes)}
+    step = {"refuse rewrite": _place(entry), "grow": grow, "codes": _codes(entry, codes)}
     return _check(entry, suffix, title, ABORTS, step, Level.COMMUNICATION)
 
 
@@ -180,15 +187,21 @@ def _of_sizes(entry: EntryDescription) -> Iterator[Check]:
 def _of_limits(entry: EntryDescription) -> Iterator[Check]:
     """Write the numbers just outside of the limits, as far as the data type has them."""
     lowest, highest = entry.data_type.limits
-    for suffix, limit, step, codes in (
+    for suffix, limit, beyond, codes in (
         ("high", entry.high, 1, TOO_HIGH),
         ("low", entry.low, -1, TOO_LOW),
     ):
-        if isinstance(limit, int) and lowest <= limit + step <= highest:
-            data = (limit + step).to_bytes(entry.size, "little", signed=entry.signed)
-            title = f"{limit + step} is beyond its limit {limit}: refused"
-            row = {"refuse write": _place(entry), "data": data.hex().upper(), "codes": list(codes)}
-            yield _check(entry, suffix, title, ABORTS, row, Level.COMMUNICATION)
+        if isinstance(limit, int) and lowest <= limit + beyond <= highest:
+            data = (limit + beyond).to_bytes(entry.size, "little", signed=entry.signed)
+            title = f"{limit + beyond} is beyond its limit {limit}: refused"
+            row = {"refuse write": _place(entry), "data": data.hex().upper()}
+            step = {**row, "codes": _codes(entry, codes)}
+            yield _check(entry, suffix, title, ABORTS, step, Level.COMMUNICATION)
+
+
+def _codes(entry: EntryDescription, codes: Sequence[str]) -> list[str]:
+    """Return the codes with which a write is refused: those of the value, or of what is in use."""
+    return [*dict.fromkeys([*codes, *(KEPT if entry.index in IN_USE else ())])]
 
 
 def _refuse_read(entry: EntryDescription) -> Step:

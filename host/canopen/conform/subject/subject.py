@@ -10,6 +10,7 @@ from tickrig.host.canopen.conform.binding.binding import Binding, bind
 from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient, SizeOf
 from tickrig.host.canopen.conform.check import Level, Step
+from tickrig.host.canopen.conform.notation.bound_check import BoundCheck
 from tickrig.host.canopen.conform.notation.macro_words import MAP, written_by
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.plan import Plan
@@ -24,7 +25,9 @@ from tickrig.wire.canopen.eds.standard_objects import standard_object
 
 TEXTS: Final = {0x1008: "name", 0x1009: "hardware version", 0x100A: "software version"}
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
-MANDATORY: Final = (0x1000, 0x1001, 0x1018)
+MANDATORY: Final = {(0x1000, 0): "UE-01", (0x1001, 0): "UE-02", (0x1018, 0): "UE-05"}
+"""Objects of each node, and the check that fails where one is not there."""
+INDICES: Final = {index for index, _ in MANDATORY}
 COMMUNICATION: Final = 0x1000
 READ_ONLY: Final = "06010002"
 
@@ -40,6 +43,7 @@ class Subject:
         about: what it says of itself, by name, for people.
         has: its objects by index and sub-index; made once, a tenth of a run.
         values: those that can be read and written.
+        refused: the mandatory objects that the node does not let be read.
     """
 
     binding: Binding
@@ -48,12 +52,19 @@ class Subject:
     about: dict[str, str]
     has: frozenset[Address]
     values: frozenset[Address]
+    refused: frozenset[Address]
 
-    def missing(self, addresses: Collection[Address]) -> str | None:
-        """Return why not all of these can be used: the first that is not there; None if all are."""
-        for index, sub in sorted(addresses):
-            if (index, sub) not in self.has and index not in MANDATORY:
-                return f"{self._where(index)} {index:04X}h:{sub:02X}"
+    def missing(self, bound: BoundCheck) -> str | None:
+        """Return why not all that a check uses can be used: what is not there; None if all is.
+
+        Where the node lacks a mandatory object, one check fails, and others do not use it.
+        """
+        for at in sorted(bound.written & self.refused | bound.used):
+            judge, where = MANDATORY.get(at, ""), f"{at[0]:04X}h:{at[1]:02X}"
+            if at in self.refused and judge != bound.check.id:
+                return f"the node has no {where}: {judge}"
+            if at not in self.has and at[0] not in INDICES:
+                return f"{self._where(at[0])} {where}"
         return None
 
     def fixed(self, steps: Collection[Step]) -> str | None:
@@ -132,7 +143,8 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     entries = binding.device.entries
     has = frozenset((entry.index, entry.sub) for entry in entries)
     values = frozenset((e.index, e.sub) for e in entries if e.readable and e.writable)
-    return Subject(binding, features, names, dict(_about(client)), has, values)
+    refused = frozenset(at for at in MANDATORY if client.number(*at) is None)
+    return Subject(binding, features, names, dict(_about(client)), has, values, refused)
 
 
 def _sizes(device: EdsDevice) -> SizeOf:

@@ -437,7 +437,8 @@ DEFECTS: Final = (
     Defect("boot-up with Enter Pre-operational", ("NMT-24",), on_hearing("000#80", "705#00")),
     Defect("boot-up with Start", ("NMT-24",), on_hearing("000#01", "705#00")),
     Defect(
-        *("Operational after reset communication", ("NMT-28",)),
+        "Operational after reset communication",
+        ("NMT-28",),
         services={NmtSlave: BusyAgain},
         left=True,
     ),
@@ -607,6 +608,7 @@ DEFECTS: Final = (
         "1011h says that it cannot restore",
         ("ST-08",),
         says("585#43111001.*", "585#4311100100000000"),
+        left=True,
     ),
     Defect(
         "reset communication loads no stored RPDO type", ("NMT-21",), loses(range(0x1400, 0x1600))

@@ -107,8 +107,8 @@ DEFECTS: Final = (
         hears("000#(..)(?!00|05)..", r"000#\g<1>05"),
     ),
     Defect("unknown command is obeyed", ("NMT-08",), hears("000#(?!0[12]|8[012])..05", "000#0105")),
-    Defect("NMT length is not looked at", ("NMT-09",), hears("000#(..05).+", r"000#\1")),
-    Defect("a short command is obeyed", ("NMT-09",), hears("000#(..)", r"000#\g<1>05")),
+    Defect("NMT length is not looked at", ("NMT-09",), hears("000#(..05).+", r"000#\1"), left=True),
+    Defect("a short command is obeyed", ("NMT-09",), hears("000#(..)", r"000#\g<1>05"), left=True),
     Defect(
         *("reset communication keeps 1017h", ("NMT-10",)),
         keeps(0x1017, command="000#8205"),

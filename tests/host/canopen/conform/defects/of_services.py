@@ -225,6 +225,7 @@ DEFECTS: Final = (
         "1010h says that it cannot store",
         ("ST-01",),
         says("585#43101001.*", "585#4310100100000000"),
+        left=True,
     ),
     Defect("store without signature", ("ST-02",), unguarded("1010:01")),
     Defect("store does not store", ("ST-03", "HB-05"), stores_nothing),

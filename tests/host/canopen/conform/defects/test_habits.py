@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Final
 
 import pytest
@@ -19,25 +20,29 @@ from tests.host.canopen.conform.defects.defect import (
     says,
     tolerant,
 )
+from tests.host.canopen.conform.defects.of_nmt import BusyAtStart
 from tests.host.canopen.conform.defects.of_pdo import BOTH
 from tests.host.canopen.conform.defects.of_sdo import TEXT, clings_to_transfer, row
 from tests.host.canopen.conform.defects.of_services import Slow
 from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
-from tests.host.canopen.conform.r1 import R1, Stimulus, yes
+from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
 from tests.host.canopen.conform.test_safety import SpyLink
 from tests.host.canopen.conform.under_test import Judged, not_harmless
 from tickrig.device.canopen.bus.sync import Sync
 from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.core.dictionary import Dictionary
 from tickrig.device.canopen.core.entry import Entry
 from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.nmt.error_control import HeartbeatProducer
+from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
+from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report, Verdict
 from tickrig.host.links.link import StampedFrames
-from tickrig.wire.can import Frames
+from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import RW, Access, DeviceInfo, EntryDescription
@@ -48,6 +53,7 @@ LONG: Final = row(0x200E, 0, TEXT, RW, "a text that is longer than thirty bytes"
 SIZED: Final = ("DS-02", "DS-03", "DS-05", "DS-06", "DS-07", "DS-10")
 BLOCKS: Final = ("BD-03", "BD-04", "BD-05", "BD-06", "BD-09", "BD-11")
 
+MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 CLEARED: Final = ("5000", "3100")
 """Errors that EM-08 lets go, each told in an EMCY."""
 ZEROS: Final = tolerant(AbortCode.NO_OBJECT, "1A00:00", "1A00:01")
@@ -76,8 +82,25 @@ def clears_by_an_rpdo(slave: CanopenSlave) -> Bends:
     return Bends(hear)
 
 
+class OneAtATime(SpyLink):
+    """A link to a node that does not know a request less than 5 ms behind one without an answer."""
+
+    _ready_us = 0
+
+    def send(self, frames: Frames, /) -> None:
+        for frame in frames:
+            sent, asked = frame, frame.can_id == 0x600 + NODE_ID
+            if asked and self.now_us < self._ready_us:
+                sent = CanFrame(frame.can_id, b"\xe0" + frame.data[1:])
+            if asked and frame.data[0] in {0x80, 0xA1}:
+                self._ready_us = self.now_us + 5_000
+            super().send((sent,))
+
+
 RESET: Final = 0x82
 """Reset communication; one is told to learn whether the error goes."""
+UNSAVED: Final = ("585#4310100101000000", "585#4310100100000000")
+UNLOADED: Final = ("585#4311100101000000", "585#4311100100000000")
 PROMPT: Final[dict[ServiceMaker, ServiceMaker]] = {HeartbeatProducer: Prompt}
 
 
@@ -90,6 +113,11 @@ PROMPT: Final[dict[ServiceMaker, ServiceMaker]] = {HeartbeatProducer: Prompt}
         (Defect("zeros for dummies", (), ZEROS), ("PC-29",)),
         (Defect("a heartbeat at once", (), services=PROMPT), ("NMT-10", "NMT-11", "ST-05")),
         (Defect("EMCY 0000h with an RPDO", (), clears_by_an_rpdo), ("PR-16",)),
+        (Defect("self-starting", (), services={NmtSlave: BusyAtStart}), ("NMT-23", "NMT-28")),
+        (Defect("longer NMT commands", (), hears("000#(..05).+", r"000#\1")), ("NMT-09",)),
+        (Defect("no LSS configuration is stored", (), says("7E4#1700", "7E4#1701")), ("LS-08",)),
+        (Defect("stores nothing on command", (), says(*UNSAVED)), ("ST-01", "ST-02", "ST-03")),
+        (Defect("restores nothing on command", (), says(*UNLOADED)), ("ST-05", "ST-08")),
     ],
     ids=lambda value: value.name if isinstance(value, Defect) else "",
 )
@@ -112,6 +140,41 @@ def test_the_string_that_holds_most_is_taken() -> None:
     plan = Plan(Level.INTRUSIVE, (*SIZED, *BLOCKS), confirm=yes)
     report = ConformRun(Judged(slave).link, NODE_ID, plan, device=device).run()
     assert report.count(Verdict.PASS) == len(SIZED + BLOCKS)
+
+
+def test_a_server_that_takes_one_request_at_a_time_fails_nothing() -> None:
+    r1 = R1()
+    plan = Plan(Level.INTRUSIVE, ("US", "BU", "DS", "BD"), confirm=yes)
+    report = r1.judge(plan, link=OneAtATime(r1))
+    assert report.count(Verdict.PASS) > 20
+    assert not_harmless(report) == []
+
+
+def test_a_mandatory_object_that_is_not_there_fails_one_check() -> None:
+    slave = make_defective(Defect("R1", ())).slave
+    entries = [e for e in slave.dictionary.description if e.index not in MANDATORY]
+    bare = make_slave(Dictionary(entries, slave.dictionary.objects), NODE_ID)
+    device = EdsDevice(DeviceInfo(), tuple(entries), slave.dictionary.objects)
+    plan = Plan(Level.INTRUSIVE, confirm=yes)
+    report = ConformRun(Judged(bare).link, NODE_ID, plan, device=device).run()
+    failed = [one.check.id for one in report.results if one.outcome.verdict is Verdict.FAIL]
+    assert failed == ["UE-01", "UE-02", "UE-05"]
+    reasons = {result.check.id: result.outcome.reason for result in report.results}
+    assert reasons["DE-17"] == "the node has no 1018h:00: UE-05"
+
+
+@pytest.mark.parametrize("level", [Level.COMMUNICATION, Level.INTRUSIVE])
+def test_a_pdo_that_exists_keeps_its_mapping_whatever_is_written(
+    tmp_path: Path, level: Level
+) -> None:
+    eds, head = tmp_path / "limits.eds", "[1600sub0]\n"
+    text = EDS.read_text("utf-8").replace("\r", "")
+    assert head in text
+    eds.write_text(text.replace(head, f"{head}LowLimit=0\nHighLimit=8\n"), "utf-8")
+    plan = Plan(level, ("OD-1600.00-*",), confirm=yes)
+    report = Judged.of(eds).judge(plan, eds)
+    assert "OD-1600.00-high" in {result.check.id for result in report.results}
+    assert not_harmless(report) == []
 
 
 def test_what_the_inhibit_time_holds_back_does_not_come_in_the_next_check() -> None:
