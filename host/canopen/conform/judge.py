@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -29,15 +30,21 @@ EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
 
 
 START: Final = "000#01"
+UPLOADS: Final = ("UE", "US", "BU", "OD")
+"""Groups whose checks fail where an upload goes wrong; others only look at values by it."""
+UNSEEN: Final = "could not be read back, see the checks of group US"
 UNPREPARED: Final = "could not be prepared"
+SEGMENT: Final = re.compile("got [0-9A-F]{3}#([01][0-9A-F])")
+"""An answer of a segmented upload."""
 READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
 NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
 
 
-def _is_standard(at: Address) -> bool:
-    """Return whether CiA 301 has an object there."""
-    known = standard_object(at[0])
-    return known is not None and at[1] in known.types
+def _is_misread(error: StepFailed) -> bool:
+    """Return whether a segment came with another toggle bit, n or c than was wanted."""
+    got = SEGMENT.search(str(error))
+    wanted = {pattern.partition("#")[2][:2] for pattern in error.wanted}
+    return got is not None and got[1] not in wanted and any(w[:1] in "01" for w in wanted if w)
 
 
 def _enables(step: Mapping[str, Any]) -> bool:
@@ -171,7 +178,8 @@ class Judge:
                 return Verdict.FAIL, f"{where}: {self._crash()}"
             if "given" in step:
                 return self._unprepared(step, error, f"{where}: {error}")
-            return self._failed(bound, f"{where}: {error}")
+            misread = "read" in step and bound.check.group not in UPLOADS and _is_misread(error)
+            return self._failed(bound, f"{where}: {error}", misread=misread)
         return Verdict.PASS, ""
 
     def _unprepared(
@@ -202,7 +210,11 @@ class Judge:
     def _lines(self) -> tuple[Line, ...]:
         return self._exchange.evidence.lines()
 
-    def _failed(self, bound: BoundCheck, reason: str) -> tuple[Verdict, str]:
+    def _failed(
+        self, bound: BoundCheck, reason: str, *, misread: bool = False
+    ) -> tuple[Verdict, str]:
+        if misread:
+            return Verdict.INCONCLUSIVE, f"{UNSEEN}: {reason}"
         if self._exchange.disturbances:
             return Verdict.INCONCLUSIVE, f"{reason}; {', '.join(self._exchange.disturbances)}"
         others = self._permission.others

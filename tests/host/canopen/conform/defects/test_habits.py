@@ -150,6 +150,13 @@ def test_a_server_that_takes_one_request_at_a_time_fails_nothing() -> None:
     assert not_harmless(report) == []
 
 
+def test_a_wrong_segment_of_an_upload_fails_no_download() -> None:
+    never_last = Defect("c is not set", (), says("585#054142434445(.*)", r"585#044142434445\1"))
+    (result,) = judge(never_last, "DS-03").results
+    assert result.outcome.verdict is Verdict.INCONCLUSIVE
+    assert result.outcome.reason.startswith("could not be read back, see the checks of group US")
+
+
 def test_a_mandatory_object_that_is_not_there_fails_one_check() -> None:
     slave = make_defective(Defect("R1", ())).slave
     entries = [e for e in slave.dictionary.description if e.index not in MANDATORY]
