@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -205,6 +206,57 @@ def test_a_full_disk_is_one_line(words: str) -> None:
         )
     assert process.stderr == "Error: standard output: No space left on device\n"
     assert process.returncode == 3
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize("words", ["tickrig check rig.toml", "tickrig check bus.yml"])
+def test_a_full_disk_is_not_blamed_on_the_file_that_is_read(words: str, tmp_path: Path) -> None:
+    assert run_onto_full_disk(words, tmp_path, "stdout") == (
+        3,
+        "Error: standard output: No space left on device\n",
+    )
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
+@pytest.mark.parametrize(
+    ("words", "status"),
+    [
+        ("canmon check a.log --no-emcy", 0),
+        ("canmon check emcy.log --no-emcy", 1),
+        ("canmon eds check good.eds", 0),
+        ("canmon check a.log", 2),
+        ("canmon dump nowhere.log", 3),
+        ("tickrig check --fast rig.toml", 2),
+        ("tickrig run rig.toml --virtual --for 1ms", 0),
+    ],
+)
+def test_standard_error_on_a_full_disk_leaves_the_status_as_it_is(
+    words: str, status: int, tmp_path: Path
+) -> None:
+    assert run_onto_full_disk(words, tmp_path, "stderr")[0] == status
+
+
+def run_onto_full_disk(words: str, folder: Path, stream: str) -> tuple[int, str]:
+    """Run a command one of whose streams lies on a full disk; return its status and errors."""
+    (folder / "a.log").write_text(LOG)
+    (folder / "emcy.log").write_text("(1.000000) can0 085#0010010000000000\n")
+    shutil.copy(ROOT / "examples" / "eds" / "epos.eds", folder / "good.eds")
+    (folder / "bus.yml").write_text("master: {node_id: 1}\nx: {dcf: good.eds, node_id: 5}\n")
+    (folder / "rig.toml").write_text(
+        '[wire.can]\ntype = "can"\n[device.node]\ntype = "f-palette"\nwire = "can"\nnode_id = 5\n'
+    )
+    script, *more = words.split()
+    function = SCRIPTS[script].partition(":")[2]
+    with Path("/dev/full").open("w", encoding="ascii") as full:
+        process = subprocess.run(
+            [sys.executable, "-c", f"from tickrig.commands import {function}; {function}()", *more],
+            stdout=full if stream == "stdout" else subprocess.PIPE,
+            stderr=full if stream == "stderr" else subprocess.PIPE,
+            text=True,
+            check=False,
+            cwd=folder,
+        )
+    return process.returncode, process.stderr or ""
 
 
 def test_the_package_is_the_command() -> None:

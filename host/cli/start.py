@@ -118,13 +118,14 @@ class HarmlessStream(io.TextIOWrapper):
 
     Args:
         stream: what is written to; both may be used.
+        drops: what a full disk does not take is dropped; otherwise it raises OSError.
 
     Attributes:
         as_is: that stream.
     """
 
-    def __init__(self, stream: TextIO) -> None:
-        self.as_is = stream
+    def __init__(self, stream: TextIO, *, drops: bool = False) -> None:
+        self.as_is, self._drops = stream, drops
         encoding = stream.encoding or "utf-8"
         super().__init__(
             stream.buffer,
@@ -140,7 +141,13 @@ class HarmlessStream(io.TextIOWrapper):
             from tickrig.host.text.page_text import harmless  # noqa: PLC0415 - seldom wanted
 
             text = harmless(text)
-        return super().write(text)
+        try:
+            return super().write(text)
+        except OSError as error:
+            if not self._drops or error.errno not in FULL:
+                raise
+            _to_nowhere(self.fileno())
+            return len(text)
 
 
 def paint(stream: TextIO, text: str) -> None:
@@ -158,13 +165,20 @@ def as_is(stream: TextIO) -> TextIO:
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Have all three while the block runs; what it prints is harmless to the terminal."""
+    """Have all three while the block runs; what it prints is harmless to the terminal.
+
+    Standard error on a full disk ends nothing: what it does not take is dropped, and the exit
+    status stays as it is.
+    """
     open_closed_streams()
     before = sys.stdout, sys.stderr
     if isinstance(sys.stdout, HarmlessStream):
         yield
         return
-    ours = [HarmlessStream(one) if hasattr(one, "buffer") else one for one in before]
+    ours = [
+        HarmlessStream(one, drops=one is before[1]) if hasattr(one, "buffer") else one
+        for one in before
+    ]
     sys.stdout, sys.stderr = ours
     try:
         yield

@@ -10,7 +10,7 @@ import click
 
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import loading, raise_of_output
 
 MISTAKES: Final = 1
 UNREADABLE: Final = 2
@@ -51,9 +51,8 @@ def _check(file: Path, strict: bool) -> int:
         return UNREADABLE
     try:
         return _check_bus(file, strict) if kind else _check_rig(file)
-    except BrokenPipeError:  # nobody reads what is printed
-        raise
     except OSError as error:
+        raise_of_output(error)
         say(f"Error: {file}: {error.strerror}")
         return UNREADABLE
 
