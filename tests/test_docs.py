@@ -77,6 +77,18 @@ def test_every_link_and_named_test_is_there(page: Path) -> None:
         assert (ROOT / named).exists(), f"{page.name} names {named}"
 
 
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_nothing_stands_twice_on_a_page(page: Path) -> None:
+    """Neither a line of text, nor a row of a table; programs and what they show may repeat."""
+    text = re.sub(r"```.*?```", "", page.read_text("utf-8"), flags=re.DOTALL)
+    table: list[str] = []
+    for line in text.splitlines():
+        table = [*table, line] if line.startswith("|") else []
+        assert line not in table[:-1], f"{page.name} has a row twice: {line}"
+    prose = Counter(line for line in text.splitlines() if len(line) > 60 and line[0] != "|")
+    assert [line for line, count in prose.items() if count > 1] == []
+
+
 def requirements() -> Iterator[tuple[str, str, str]]:
     """Yield number, state and evidence of each requirement of the sources."""
     for line in (ROOT / "docs/reference/seeds.md").read_text("utf-8").splitlines():
