@@ -74,9 +74,12 @@ def run(lite_boot: str, **options: Any) -> None:
     """Run the system of a file in real time, until Ctrl-C.
 
     SYSTEM is a .toml file of ours, or an RTSProfile .xml as rtcryo and RT
-    System Editor write it; without it there is no component at first. Known
-    types: ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample. What arrives at
-    a ConsoleOut is printed.
+    System Editor write it; without it there is no component at first. What
+    arrives at a ConsoleOut is printed.
+
+    Types: ConsoleIn, ConsoleOut, SeqIn, SeqOut, ConfigSample, RefHardRh3,
+    Odometry, PositionInput, OmniTo2WD, Navigation, PathFollower and others; an
+    unknown type is refused with a list of all.
 
     \b
     tickrig rtc run system.toml

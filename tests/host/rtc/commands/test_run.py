@@ -21,6 +21,7 @@ from tickrig.host.control.client import ControlClient
 from tickrig.host.motion.chain import CONNECTIONS, MotionChain
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.commands.request import default_path
+from tickrig.host.rtc.component_types import COMPONENT_TYPES
 from tickrig.host.rtc.system.system_toml import parse_toml
 
 EXAMPLE = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"
@@ -273,6 +274,15 @@ def test_a_device_takes_part_by_its_proxy_and_is_not_left_active(folder: Path) -
 
 
 CART = Path(__file__).parents[4] / "examples" / "rh3_cart.toml"
+
+
+def test_help_names_types_and_says_how_to_list_all() -> None:
+    told = " ".join(CliRunner().invoke(main, ["rtc", "run", "--help"]).output.split())
+    types = told.partition("Types: ")[2].partition(" and others")[0].split(", ")
+    assert set(types) < set(COMPONENT_TYPES.built_in)
+    chain = [component.spec.type_name for component in MotionChain(Manager()).components]
+    assert {"ConsoleIn", "ConsoleOut", *chain} <= set(types)
+    assert "an unknown type is refused with a list of all" in told
 
 
 def test_the_cart_of_the_example_is_joined_as_the_motion_chain() -> None:
