@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
 from tickrig.host.canopen.dialogue import SdoRequest, Step
@@ -19,6 +20,7 @@ from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout
 from tickrig.host.rtc_canopen.proxy.proxy import ProxyRtc
 from tickrig.host.rtc_canopen.proxy.sdo_ports import lay_out_sdo_ports
 from tickrig.host.rtc_canopen.server import RtcCanopenServer
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import (
     Abort,
@@ -68,7 +70,7 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Return what will be refused on the bus, where devices are as their EDS says.
 
-    A node whose EDS leaves values out is not judged, nor is a component that is not there.
+    PDOs that several nodes send with one COB-ID are told, too, which no node refuses. A node whose EDS leaves values out is not judged, nor is a component that is not there.
 
     Args:
         server: it gets proxies of devices that are none, and is of no other use any more.
@@ -79,6 +81,7 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
             layouts[node_id] = on
     return (
         *_proxies(server, layouts),
+        *_sent_twice(server, layouts),
         *(text for link in server.definition.pdo_links for text in _link(link, layouts)),
         *_connections(server),
     )
@@ -93,6 +96,21 @@ def _proxies(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[
             server.manager.add(ProxyRtc(node.entry, on, made))
         except RtcRefused as error:
             yield f"nodes: {error}"
+
+
+def _sent_twice(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
+    senders = defaultdict[int, list[str]](list)
+    for node_id, on in layouts.items():
+        file = server.nodes[node_id].file
+        for pdo in on:
+            default = int.from_bytes(file.defaults.get((pdo.index, 1), b""), "little")
+            kept = (pdo.index, 1) in file.relative and pdo.cob_id == default & CAN_ID_MASK
+            if pdo.sends:
+                senders[pdo.cob_id + kept * node_id].append(f"{node_id}.{pdo.name}")
+    for cob_id, names in senders.items():
+        if len(names) > 1:
+            which = f"{' and '.join(names)} are {'both' if len(names) == 2 else 'all'}"
+            yield f"pdos: {which} sent as {cob_id:03X}h; give each a cob_id of its own"
 
 
 def _link(link: PdoLink, layouts: dict[int, Layouts]) -> Iterator[str]:

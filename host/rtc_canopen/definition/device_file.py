@@ -29,6 +29,7 @@ class DeviceFile:
         defaults: bytes of the power-on values that it gives; a node-ID is not added.
         data_types: data type by index and sub-index.
         pdos: communication parameters that it has.
+        relative: those of `defaults` to which a device adds its node-ID.
         findings: what is wrong in the file, whose objects are then not used.
     """
 
@@ -36,6 +37,7 @@ class DeviceFile:
     data_types: Mapping[tuple[int, int], int]
     pdos: tuple[int, ...]
     defaults: Mapping[tuple[int, int], bytes]
+    relative: frozenset[tuple[int, int]] = frozenset()
     findings: tuple[Finding, ...] = ()
 
 
@@ -56,6 +58,7 @@ def read_device_file(path: Path) -> DeviceFile:
         {(row.index, row.sub): row.data_type for row in device.entries},
         tuple(index for index in device.objects if index in RPDOS or index in TPDOS),
         defaults,
+        frozenset((row.index, row.sub) for row in device.entries if row.relative),
         findings,
     )
 

@@ -68,6 +68,17 @@ def test_a_pdo_that_the_definition_puts_on_is_on() -> None:
     assert check_offline(server) == ("pdo_links: 16.tpdo1 has 8 bits, 32.rpdo1 has 16",)
 
 
+def test_two_pdos_that_are_sent_with_one_cob_id_are_told() -> None:
+    definition = PALETTE_AND_MOTOR.replace(
+        "unit.eds,", "unit.eds, pdos: {tpdo2: {cob_id: 0x290}, rpdo2: {cob_id: 0x190}},"
+    )
+    checked = parse_definition(definition)
+    server = RtcCanopenServer(checked, read_files(checked, EDS))
+    assert check_offline(server) == (
+        "pdos: 16.tpdo2 and 32.tpdo2 are both sent as 290h; give each a cob_id of its own",
+    )
+
+
 @pytest.mark.parametrize("name", ["fig120", "beego", "fourx", "followers"])
 def test_the_examples_have_no_mistake(name: str) -> None:
     assert check_offline(open_server(SYSTEMS / f"{name}.yaml")) == ()
