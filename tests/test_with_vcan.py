@@ -244,6 +244,21 @@ def test_a_guest_that_is_only_tried_ends_with_it(tmp_path: Path, elsewhere: dict
         assert process.wait() == 143
 
 
+@guest
+@pytest.mark.realtime
+@pytest.mark.timeout(600)
+def test_a_guest_that_never_begins_is_given_up(tmp_path: Path, elsewhere: dict[str, str]) -> None:
+    elsewhere |= kernel(tmp_path, "echo it stands still; exec sleep 1000")
+    status, out, err = run("--way", "uml", "true", **elsewhere)
+    assert (status, out) == (125, "")
+    assert re.search(
+        r"^it stands still\nwith-vcan: the guest did not begin within \d+ s; above is the end of what"
+        r" its kernel said\n\Z",
+        err,
+        re.MULTILINE,
+    )
+
+
 INTERRUPTED = """
 import math, signal
 

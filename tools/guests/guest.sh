@@ -30,10 +30,15 @@ lacks() { # say what a way lacks; false if it lacks nothing
 found() { PATH=$SYSTEM_PATH type -P "$1"; }
 
 # --- probes ----------------------------------------------------------------------------
-works() { # run `true` in the guest of a way; others who want the processors make it slower
-    local load limit_s
+patience() { # seconds for `true` in the guest of a way: more where others want the processors
+    local load
     read -r load _ </proc/loadavg
-    limit_s=$((PROBE_S[$1] * (1 + ${load%.*} / $(nproc))))
+    echo $((PROBE_S[$1] * (1 + ${load%.*} / $(nproc))))
+}
+
+works() { # run `true` in the guest of a way
+    local limit_s
+    limit_s=$(patience "$1")
     WITH_VCAN_PROBE=1 timeout --foreground -k 5 "$limit_s" \
         "$self" --way "$1" --timeout "$limit_s" true >/dev/null 2>&1 &
     probe_pid=$!
@@ -106,6 +111,7 @@ if ((multicast = $multicast)); then
     ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo &&
         ip route add local ff00::/8 dev lo table local || echo multicast on lo >>$dir/no_bus
 fi
+echo >$dir/begun
 if [[ ! -e $dir/no_bus ]]; then
     # The lines lead outside, but COMMAND gets pipes: it must not take them for a terminal.
     $open_lines
@@ -146,10 +152,15 @@ end_guest() { # one that outlived the guest's kernel would go on, untraced, on t
 } 2>/dev/null
 
 wait_for_guest() {
-    # The guest keeps COMMAND's time; this one is for a guest that hangs.
-    local ticks
-    for ((ticks = (seconds + 60) * 10; ticks > 0; ticks--)); do
+    # The guest keeps COMMAND's time; these are for a guest that hangs, or never begins.
+    local ticks begins_s failed="did not finish"
+    begins_s=$(($(patience "$way") + 20))
+    for ((ticks = 0; ticks < (seconds + 60) * 10; ticks++)); do
         kill -0 "$guest" 2>/dev/null || break
+        if ((ticks >= begins_s * 10)) && [[ ! -e $dir/begun ]]; then
+            failed="did not begin within $begins_s s"
+            break
+        fi
         sleep 0.1
     done
     end_guest
@@ -157,7 +168,7 @@ wait_for_guest() {
     [[ -s $dir/status ]] || {
         [[ -n $only ]] || forget
         cat "$dir"/log* | tail -n 20 >&2
-        die "the guest did not finish; above is the end of what its kernel said"
+        die "the guest $failed; above is the end of what its kernel said"
     }
     wait "${pumps[@]}"
 }
