@@ -252,8 +252,8 @@ def test_a_guest_that_never_begins_is_given_up(tmp_path: Path, elsewhere: dict[s
     status, out, err = run("--way", "uml", "true", **elsewhere)
     assert (status, out) == (125, "")
     assert re.search(
-        r"^it stands still\nwith-vcan: the guest did not begin within \d+ s; above is the end of what"
-        r" its kernel said\n\Z",
+        r"^it stands still\nwith-vcan: the guest did not begin within \d+ s; above is the end of"
+        r" what its kernel said\n\Z",
         err,
         re.MULTILINE,
     )
