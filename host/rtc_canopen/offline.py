@@ -70,7 +70,8 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Return what will be refused on the bus, where devices are as their EDS says.
 
-    PDOs that several nodes send with one COB-ID are told, too, which no node refuses. A node whose EDS leaves values out is not judged, nor is a component that is not there.
+    PDOs that several nodes send with one COB-ID are told, too; no node refuses them. A node whose
+    EDS leaves values out is not judged, nor is a component that is not there.
 
     Args:
         server: it gets proxies of devices that are none, and is of no other use any more.
