@@ -54,7 +54,7 @@ from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import encode_request
 from tickrig.wire.modbus.rtu import encode_frame
 
-ONE_HASH: Final = "1382b8a8b11abc640465ad2f3975678713319c27015fe25f181480f7b6aa87df"
+ONE_HASH: Final = "1a10df6f27058796123e8c8222bb641057d296d30a067dcec125f617f99e357d"
 """Renew it where a device is meant to do something else than before."""
 
 LIBM: Final = "574a9963050bcfdf2120e6d203e0430883376a31cfa780fdc74e39ea730c6536"

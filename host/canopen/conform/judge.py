@@ -13,14 +13,13 @@ from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, 
 from tickrig.host.canopen.conform.bus.steps import Player
 from tickrig.host.canopen.conform.check import STIMULUS, Check, Level
 from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
-from tickrig.host.canopen.conform.notation.names import Address, Unbound
+from tickrig.host.canopen.conform.notation.names import Unbound
 from tickrig.host.canopen.conform.notation.step_words import step_head
 from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.safety.node_care import NodeCare
 from tickrig.host.canopen.conform.safety.permission import Permission
 from tickrig.host.canopen.conform.subject.subject import Subject
 from tickrig.host.canopen.conform.verdict import Line, Outcome, Result, Verdict
-from tickrig.wire.canopen.eds.standard_objects import standard_object
 
 LSS_ANSWER: Final = "7E4#"
 """Begins what LSS slaves say: it does not tell which one."""
@@ -130,9 +129,7 @@ class Judge:
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
         """Say what a check would write that could not be written back; empty if all can be."""
-        written = bound.changed & subject.has | {
-            at for at in bound.written if at in subject.values or _is_standard(at)
-        }
+        written = bound.changed & subject.has | bound.written & subject.values
         if self._plan.level is Level.READ_ONLY or not (unread := self._care.unread(written)):
             return ""
         places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)

@@ -148,7 +148,7 @@ def test_a_port_that_is_not_there_or_does_not_fit_costs_a_line(
     for _ in range(200):
         kept.system.step()
     (record,) = caplog.records
-    known = "known: out, in, provides, requires"
+    known = "known: out, in, path_out, path_in, provides, requires"
     expected = f"Far0.none: it has no port 'none'; {known}; asked again every second"
     assert record.getMessage() == expected
 
