@@ -255,7 +255,7 @@ SLOW = Passage(530 * MS_US)
 def test_a_conformance_test_reads_no_value_of_before_its_question() -> None:
     late = Late([SLOW, *[IN_TIME] * 99])
     client = SdoClient(exchange_on(late.link), NODE_ID)
-    assert client.number(*CLOCK) is None
+    assert (client.number(*CLOCK) or 0) >= 500, "the answer to the question that was repeated"
     for _ in range(5):
         asked_ms = late.link.now_us // MS_US
         assert (client.number(*CLOCK) or 0) >= asked_ms
