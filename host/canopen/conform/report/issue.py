@@ -117,7 +117,7 @@ def merged(patterns: Sequence[str]) -> str:
     """Return one pattern of `canmon seq` for several of a check.
 
     >>> merged(["585#80......01000405", "585#80......00000008"])
-    '585#80??????0?0004??'
+    '585#80??????0?000?0?'
     """
     plain = [GROUP.sub("..", CLASS.sub(".", pattern)).replace(".", "?") for pattern in patterns]
     if len({len(each) for each in plain}) > 1 or any("*" in each for each in plain):
