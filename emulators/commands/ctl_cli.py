@@ -11,7 +11,7 @@ import click
 
 from tickrig.host.cli.control import request
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path, time_us
+from tickrig.host.cli.refused import Refused, time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
 from tickrig.host.text.page_text import json_text
@@ -240,8 +240,6 @@ def path(file: Path | None) -> Object:
         return {}
     try:
         points = read_path(file)
-    except OSError as error:
-        refuse_path("path", error)
     except ValueError as error:
         raise Refused(str(error)) from None
     return {"points": [[x, y, degrees(heading)] for x, y, heading in points]}

@@ -23,11 +23,14 @@ def read_path(path: Path) -> list[Pose]:
     """Return the points; `#` begins a comment, commas count as spaces.
 
     Raises:
-        OSError: the file cannot be read.
-        ValueError: a line that is no point, or no point at all; it says which.
+        ValueError: the file cannot be read, a line is no point, or there is none; it says which.
     """
+    try:
+        text = path.read_text("utf-8", "replace")
+    except OSError as error:
+        raise ValueError(f"path {path}: {error.strerror or error}") from None
     points = []
-    for number, line in enumerate(path.read_text("utf-8", "replace").splitlines(), 1):
+    for number, line in enumerate(text.splitlines(), 1):
         if words := line.partition("#")[0].replace(",", " ").split():
             points.append(_point(f"{path}:{number}", words))
     if not points:

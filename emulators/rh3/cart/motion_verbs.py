@@ -43,8 +43,6 @@ def go_along(file: Path, options: dict[str, Any]) -> None:
     """Drive along the points of a file."""
     try:
         points = read_path(file)
-    except OSError as error:
-        refuse_path("path", error)
     except ValueError as error:
         raise Refused(str(error)) from None
     _drive(_checked(options), points, f"rh3 path {file.name}")

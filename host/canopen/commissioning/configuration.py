@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Final
 
-from tickrig.host.canopen.conform.safety.write_order import PDOS, Write, in_order, is_standard
+from tickrig.host.canopen.conform.safety.write_order import PDOS, Write, in_order, is_too_long
 from tickrig.wire.canopen.cob_id import INVALID
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
@@ -19,8 +19,6 @@ COMMANDS: Final = (0x1003, 0x1010, 0x1011, *range(0x1F50, 0x1F58))
 """Error history, store, restore, programs: to write them commands something."""
 CONFIGURED: Final = 0x1020
 """Verify configuration: date and time are written when all else is."""
-MAPPED: Final = 0x1600
-"""The first object whose sub-index 0 is a number of mapped objects."""
 COB_ID: Final = 1
 """Sub-index of the communication parameter of a PDO."""
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING)
@@ -105,9 +103,8 @@ def writes(
     last = {at: data for at, data in values.items() if at[0] == CONFIGURED}
     first = {at: values[at] for at in sorted(values) if at not in last}
     try:
-        for at, data in first.items():
-            if not is_standard(at, data):
-                int.from_bytes(data, "little").to_bytes(4 if at[1] or at[0] < MAPPED else 1)
+        if any(is_too_long(at, data) for at, data in first.items()):
+            raise OverflowError
         found = [(at, data) for at, data in in_order(first, number) if at in writable]
     except (OverflowError, ValueError):
         reason = "a COB-ID of more than 32 bits, or more than 255 mapped objects"

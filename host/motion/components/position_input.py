@@ -110,7 +110,7 @@ class PositionInput(RtComponent):
             case "path", "":
                 self.path(self.defined_path)
             case "path", text:
-                self.path(parse_points(text) if "," in text else _read(text))
+                self.path(parse_points(text) if "," in text else read_path(Path(text).expanduser()))
             case "end", "":
                 self.end()
             case _:
@@ -170,13 +170,6 @@ def _exactly(count: int, points: Sequence[Pose], line: str) -> Sequence[Pose]:
     if len(points) != count:
         raise ValueError(f"{line!r} is not a command: {USAGE}")
     return points
-
-
-def _read(file: str) -> list[Pose]:
-    try:
-        return read_path(Path(file).expanduser())
-    except OSError as error:
-        raise ValueError(f"path {file}: {error.strerror or error}") from None
 
 
 def _points(poses: Sequence[Pose]) -> tuple[iis.TimedPose2D, ...]:

@@ -49,12 +49,21 @@ def in_order(values: Mapping[Address, bytes], number: Number) -> Iterator[Write]
 
 def is_standard(at: Address, value: bytes) -> bool:
     """Say whether a COB-ID or a number of mapped objects is as long as CiA 301 has it."""
+    return len(value) == (_bytes_of(at) or len(value))
+
+
+def is_too_long(at: Address, value: bytes) -> bool:
+    """Say whether a COB-ID or a number of mapped objects does not fit into its object."""
+    return bool((size := _bytes_of(at)) and value[size:].strip(b"\0"))
+
+
+def _bytes_of(at: Address) -> int:
+    """Return the length of a COB-ID or a number of mapped objects, 0 for other objects."""
     index, sub = at
     if any(index in area for area in MAPPINGS) and not sub:
-        return len(value) == 1
+        return 1
     pdo_cob_id = sub == 1 and any(index in area for area in PDOS)
-    is_cob_id = pdo_cob_id or at in {(SYNC, 0), (EMCY, 0)} or _is_server(at)
-    return len(value) == COB_ID_BYTES or not is_cob_id
+    return COB_ID_BYTES if pdo_cob_id or at in {(SYNC, 0), (EMCY, 0)} or _is_server(at) else 0
 
 
 def _is_server(at: Address) -> bool:
