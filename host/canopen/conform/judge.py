@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import Any, Final
 from tickrig.host.canopen.conform.bus.exchange import Exchange
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.steps import Player
+from tickrig.host.canopen.conform.bus.unlike import abort_of
 from tickrig.host.canopen.conform.check import STIMULUS, Check, Level
 from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
 from tickrig.host.canopen.conform.notation.names import Unbound
@@ -33,17 +33,19 @@ UPLOADS: Final = ("UE", "US", "BU", "OD")
 """Groups whose checks fail where an upload goes wrong; others only look at values by it."""
 UNSEEN: Final = "could not be read back, see the checks of group US"
 UNPREPARED: Final = "could not be prepared"
-SEGMENT: Final = re.compile("got [0-9A-F]{3}#([01][0-9A-F])")
-"""An answer of a segmented upload."""
 READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
 NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
 
 
 def _is_misread(error: StepFailed) -> bool:
     """Return whether a segment came with another toggle bit, n or c than was wanted."""
-    got = SEGMENT.search(str(error))
-    wanted = {pattern.partition("#")[2][:2] for pattern in error.wanted}
-    return got is not None and got[1] not in wanted and any(w[:1] in "01" for w in wanted if w)
+    came, *wanted = (frame.partition("#")[2][:2] for frame in (error.got, *error.wanted))
+    return _is_segment(came) and came not in wanted and any(map(_is_segment, wanted))
+
+
+def _is_segment(command: str) -> bool:
+    """Return whether a command byte is that of an answer in a segmented upload."""
+    return command[:1] in {"0", "1"}
 
 
 def _enables(step: Mapping[str, Any]) -> bool:
@@ -189,7 +191,9 @@ class Judge:
         """
         if self._exchange.disturbances:
             reason = f"{reason}; {', '.join(self._exchange.disturbances)}"
-        elif error.abort in READ_ONLY or (error.abort in NOT_SUPPORTED and not _enables(step)):
+            return Verdict.INCONCLUSIVE, f"{UNPREPARED}: {reason}"
+        code = abort_of(error.got)
+        if code in READ_ONLY or (code in NOT_SUPPORTED and not _enables(step)):
             return Verdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
         return Verdict.INCONCLUSIVE, f"{UNPREPARED}: {reason}"
 

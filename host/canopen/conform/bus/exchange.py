@@ -12,7 +12,7 @@ from tickrig.host.canopen.conform.bus.periods import MS_US, off_period
 from tickrig.host.canopen.conform.bus.presence import MULTIPLEXER, Answers, Presence
 from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
 from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
-from tickrig.host.canopen.conform.bus.unlike import abort_of, unlike, wanted_text
+from tickrig.host.canopen.conform.bus.unlike import unlike, wanted_text
 from tickrig.host.canopen.conform.verdict import Direction
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame
@@ -202,7 +202,7 @@ class Exchange:
             late_ms = (at_us - until_us + self.resolution_us) / MS_US
             raise StepFailed(f"{got} came {late_ms:.1f} ms after the {within_ms} ms allowed")
         if not any(matches(pattern, got) for pattern in patterns):
-            raise StepFailed(unlike(got, patterns), abort_of(got), patterns)
+            raise StepFailed(unlike(got, patterns), got, patterns)
         return got
 
     def none(self, can_id: str, for_ms: int) -> None:

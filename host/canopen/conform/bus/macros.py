@@ -26,9 +26,6 @@ STATE_MS: Final = 20
 TOO_LONG: Final = ("12000706", "10000706", "05000405")
 """Codes with which a download is refused that is longer than the object can hold."""
 
-ABORT_MS: Final = 5
-"""So long after an abort a server is ready again, of which only the latest request is kept."""
-
 SCAN_MS: Final = 10
 FOUND: Final = "7E4#4F00000000000000"
 STORE_LSS: Final = "7E5#1700000000000000"
@@ -112,7 +109,6 @@ def room(sdo: SdoFrames, at: Address, size: str) -> None:
     if answer[0] == ABORTED:
         raise NotAllowed(f"{at[0]:04X}h:{at[1]:02X} holds less than {size} bytes")
     sdo.say(bytes([ABORTED, *_mux(at)]) + AbortCode.GENERAL.to_bytes(4, "little"))
-    sdo.exchange.wait(ABORT_MS)
 
 
 def upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:

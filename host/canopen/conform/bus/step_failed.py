@@ -14,13 +14,13 @@ class StepFailed(Exception):  # noqa: N818 - what the step did
     """The node did something else, or nothing; the text says what came and what was allowed.
 
     Attributes:
-        abort: the SDO abort code that came, None if none did.
+        got: the frame that came, as candump writes it; empty if none did.
         wanted: patterns of the frame that should have come, one of them; none if none should.
     """
 
-    def __init__(self, text: str, abort: int | None = None, wanted: Iterable[str] = ()) -> None:
+    def __init__(self, text: str, got: str = "", wanted: Iterable[str] = ()) -> None:
         super().__init__(text)
-        self.abort, self.wanted = abort, tuple(wanted)
+        self.got, self.wanted = got, tuple(wanted)
 
 
 class NotAllowed(Exception):  # noqa: N818 - what the step is
