@@ -70,7 +70,7 @@ def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None
 def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     """Return what will be refused on the bus, where devices are as their EDS says.
 
-    PDOs that several nodes send with one COB-ID are told, too; no node refuses them. A node whose
+    It also names PDOs that several nodes send with one COB-ID; no node refuses them. A node whose
     EDS leaves values out is not judged, nor is a component that is not there.
 
     Args:

@@ -104,7 +104,7 @@ class PlacedPort:
     def cob_id(self) -> int | None:
         """CAN-ID of RPDO n for an in-port, of TPDO n for an out-port.
 
-        Without the node-ID if `relative`; None if nobody has named one: the PDO is off.
+        Without the node-ID if `relative`; None if none is named: the PDO is off.
         """
         if not self.relative:
             return self.profile.cob_id

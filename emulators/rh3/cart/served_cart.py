@@ -161,7 +161,7 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
     """Run a cart until Ctrl-C, or until a peer ends it; then its components are deactivated.
 
     Lines typed on standard input are commands of PositionInput. When standard input ends and
-    nobody else can reach the cart, the run ends after the last command.
+    no other program can reach the cart, the run ends after the last command.
 
     Where velocities come from a topic, it obeys these while no command of PositionInput runs.
 
@@ -197,7 +197,7 @@ def serve_cart(options: MotionOptions, engines: EngineOptions, control: Path | N
 
 
 def _open_console(cart: ServedCart, chain: MotionChain, *, reachable: bool) -> None:
-    """Read standard input after each period; stop the cart where nobody can command it any more."""
+    """Read standard input after each period; stop the cart when no command can come."""
     console = Console(chain.manager, click.echo, say)
     try:
         descriptor = sys.stdin.fileno()

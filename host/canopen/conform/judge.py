@@ -184,8 +184,9 @@ class Judge:
     def _unprepared(
         self, step: Mapping[str, Any], error: StepFailed, reason: str
     ) -> tuple[Verdict, str]:
-        """Say what a check gave that could not be prepared: the clause of another one is told.
+        """Return the verdict of a check whose preparation the node refused.
 
+        The clause of the check says nothing of what only prepares it.
         CiA 301 lets many objects be constant, and values be refused that a device does not
         support.
         """

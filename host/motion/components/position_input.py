@@ -117,7 +117,7 @@ class PositionInput(RtComponent):
                 raise ValueError(f"{line!r} is not a command: {USAGE}")
 
     def require_open(self) -> None:
-        """Raise ValueError if `end` was called, and nobody has reset it since."""
+        """Raise ValueError if `end` was called and the component was not reset since."""
         if self._ending:
             raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
 
@@ -126,7 +126,7 @@ class PositionInput(RtComponent):
         self._ending = True
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Ask anew."""
+        """Ask again."""
         self._prompted = False
         return ReturnCode.RTC_OK
 

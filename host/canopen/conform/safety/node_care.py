@@ -111,7 +111,7 @@ class NodeCare:
             self._recover()
 
     def unread(self, addresses: Set[Address]) -> list[Address]:
-        """Return which of these could not be read: nobody could write them back."""
+        """Return which of these could not be read, so that they cannot be written back."""
         self._exchange.begin(CARE_US)
         known = self._state.original
         try:

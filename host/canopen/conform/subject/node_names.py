@@ -43,7 +43,7 @@ class NodeNames:
         others: node-IDs that were heard on the bus.
 
     Attributes:
-        peer: a node-ID that nobody has, None if all are taken.
+        peer: a node-ID that no node has, None if all are taken.
     """
 
     def __init__(
