@@ -26,13 +26,15 @@ LSS_ANSWER: Final = "7E4#"
 HISTORY: Final = (0x1003, 0)
 PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
 EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
-
-
 START: Final = "000#01"
 UPLOADS: Final = ("UE", "US", "BU", "OD")
 """Groups whose checks fail where an upload goes wrong; others only look at values by it."""
 UNSEEN: Final = "could not be read back, see the checks of group US"
 UNPREPARED: Final = "could not be prepared"
+MAY_BE_CONSTANT: Final = frozenset(
+    (0x1003, 0x1005, 0x1014, 0x1015, 0x1016, 0x1017, *PDO_PARAMETERS)
+)
+"""Objects that are "rw; const, if not changeable" (CiA 301 v4.2.0, 7.5.2)."""
 READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
 NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
 
@@ -52,6 +54,12 @@ def _enables(step: Mapping[str, Any]) -> bool:
     """Return whether a step gives a PDO its COB-ID: every device takes its own."""
     at = step.get("write", (0, 0))
     return "macro" in step or (at[0] in PDO_PARAMETERS and at[1] == 1)
+
+
+def _is_constant(step: Mapping[str, Any], error: StepFailed) -> bool:
+    """Return whether the node keeps an object constant that CiA 301 lets be so."""
+    index, _ = step.get("write", (0, 0))
+    return index in MAY_BE_CONSTANT and abort_of(error.got) in READ_ONLY
 
 
 class Judge:
@@ -175,7 +183,7 @@ class Judge:
             self._wanted = error.wanted
             if self._exchange.crashes:
                 return Verdict.FAIL, f"{where}: {self._crash()}"
-            if "given" in step:
+            if "given" in step or _is_constant(step, error):
                 return self._unprepared(step, error, f"{where}: {error}")
             misread = "read" in step and bound.check.group not in UPLOADS and _is_misread(error)
             return self._failed(bound, f"{where}: {error}", misread=misread)
@@ -184,7 +192,7 @@ class Judge:
     def _unprepared(
         self, step: Mapping[str, Any], error: StepFailed, reason: str
     ) -> tuple[Verdict, str]:
-        """Return the verdict of a check whose preparation the node refused.
+        """Return the verdict of a check that the node did not let come to its question.
 
         The clause of the check says nothing of what only prepares it.
         CiA 301 lets many objects be constant, and values be refused that a device does not
