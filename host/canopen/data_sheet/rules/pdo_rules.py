@@ -132,9 +132,16 @@ def halves(document: Document) -> Iterator[RuleFinding]:
 
 def reserved(document: Document) -> Iterator[RuleFinding]:
     """Find the sub-index 4 of communication parameters: a device must refuse it."""
+    described = set[int]()
     for section, index, sub in document.file.objects():
+        described.add(index)
         if sub == RESERVED and (index in RPDO or index in TPDO):
             yield document.found("pdo-reserved", "sub-index 4 is reserved", section)
+    implied = {*RPDO, *TPDO} & document.device.objects.keys() - described
+    if any(row.sub == RESERVED for index in implied for row in document.entries(index)):
+        title, key = "DeviceInfo", "CompactPDO"
+        what = f"CompactPDO=0x{number(document, title, key):X} implies the reserved sub-index 4"
+        yield document.found("pdo-reserved", what, title, key)
 
 
 def mappings(document: Document) -> Iterator[RuleFinding]:

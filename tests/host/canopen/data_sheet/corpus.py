@@ -168,7 +168,7 @@ def compact(text: str) -> str:
     return f"{head}[1A02]{COMPACT}\n{rest[rest.index('[1A03]') :]}"
 
 
-COUNTED: Final = put_in("DeviceInfo", "CompactPDO=0x3F")
+COUNTED: Final = put_in("DeviceInfo", "CompactPDO=0x37")
 """PDOs that are not described are implied."""
 
 
@@ -626,6 +626,12 @@ CORPUS: Final = (
         ),
         False,
         entry(0x1800, 4, default=b"\0"),
+    ),
+    Deviation(
+        "pdo-reserved",
+        all_of(counted_only, put("CompactPDO=0x37", "CompactPDO=0x3F")),
+        False,
+        entry(0x1803, 4, default=b"\0"),
     ),
     Deviation(
         "mapping-count", within("1A00sub0", "DefaultValue=0x02", "DefaultValue=9"), False, anything
