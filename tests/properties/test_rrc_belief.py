@@ -311,7 +311,8 @@ def stream(story: Story, talk: Talk, at_ms: int) -> None:
     with suppress(RrcStopped):
         while stage.now_us < start_us + 800 * MS:
             client.output(10, 0, confirm=False)
-    listen(stage, start_us + 1_000 * MS)
+    with suppress(RrcStopped):  # the answers of the last outputs may be what stops it
+        listen(stage, start_us + 1_000 * MS)
     if client.stopped:
         client.resume()
     while not stage.quiet:
