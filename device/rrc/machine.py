@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
@@ -104,21 +105,7 @@ class Rrc(Copyable):
         Raises:
             KeyError: there is none of that name.
         """
-        return {
-            "state": self.state.value,
-            "vr2_power": int(self.state in POWERED_ON),
-            "error_led": int(self.state is RrcState.POWER_OFF_BY_OTHERS),
-            "stick_drives": int(self._drive.by_stick),
-            "out_v_pct": self._drive.out_pct[0],
-            "out_w_pct": self._drive.out_pct[1],
-            "speed_mode": self._settings.speed_mode,
-            "gear": self._drive.gearbox.gear.value,
-            "buzzer": int(self._buzzer.sounding),
-            "load_pct": self._load.load_pct,
-            "margin_pct": PERIOD_PCT - self._load.load_pct,
-            "backlog_pct": self._load.backlog_pct,
-            "pace_lines_s": self._pace_lines_s,
-        }[name]
+        return _READERS[name](self)
 
     @property
     def _pace_lines_s(self) -> int:
@@ -319,3 +306,21 @@ class Rrc(Copyable):
         if running and settings.watchdog_ticks:
             due = min(due, self._renewed + settings.watchdog_ticks)
         return due
+
+
+_READERS: Final[dict[str, Callable[[Rrc], int | str]]] = {
+    "state": lambda rrc: rrc.state.value,
+    "vr2_power": lambda rrc: int(rrc.state in POWERED_ON),
+    "error_led": lambda rrc: int(rrc.state is RrcState.POWER_OFF_BY_OTHERS),
+    "stick_drives": lambda rrc: int(rrc._drive.by_stick),
+    "out_v_pct": lambda rrc: rrc._drive.out_pct[0],
+    "out_w_pct": lambda rrc: rrc._drive.out_pct[1],
+    "speed_mode": lambda rrc: rrc._settings.speed_mode,
+    "gear": lambda rrc: rrc._drive.gearbox.gear.value,
+    "buzzer": lambda rrc: int(rrc._buzzer.sounding),
+    "load_pct": lambda rrc: rrc._load.load_pct,
+    "margin_pct": lambda rrc: PERIOD_PCT - rrc._load.load_pct,
+    "backlog_pct": lambda rrc: rrc._load.backlog_pct,
+    "pace_lines_s": lambda rrc: rrc._pace_lines_s,
+}
+"""What `RrcMachine.read` gives for each of `outputs`; only what is asked for is reckoned."""
