@@ -70,7 +70,7 @@ def tree(tmp_path: Path) -> Path:
     tree = tmp_path / "tree"
     package = tree / "src" / "tickrig"
     package.mkdir(parents=True)
-    (package / "__init__.py").write_text('__version__ = "0.2.0"\n')
+    (package / "_version.py").write_text('__version__ = "0.2.0"\n')
     shutil.copytree(ROOT / "tools" / "releasing", tree / "tools" / "releasing", ignore=STALE)
     shutil.copy(ROOT / "tools" / "release", tree / "tools")
     (tree / "CHANGELOG.md").write_text(CHANGES)
@@ -123,7 +123,7 @@ def with_empty_notes(tree: Path) -> None:
 
 
 def without_version(tree: Path) -> None:
-    (tree / "src" / "tickrig" / "__init__.py").write_text("")
+    (tree / "src" / "tickrig" / "_version.py").write_text("")
     commit(tree)
     git(tree, "tag", "--force", "v0.2.0")
 
@@ -135,8 +135,8 @@ def without_version(tree: Path) -> None:
         (without_tag, "v0.2.0", "there is no tag v0.2.0; there are: none"),
         (go_on, "v0.2.0", ": git checkout v0.2.0"),
         (edit, "v0.2.0", "this tree is not that of v0.2.0: M CHANGELOG.md, ?? new"),
-        (tag_another, "v0.3.0", "v0.3.0 is the tag, but src/tickrig/__init__.py says 0.2.0"),
-        (without_version, "v0.2.0", "src/tickrig/__init__.py has no __version__"),
+        (tag_another, "v0.3.0", "v0.3.0 is the tag, but src/tickrig/_version.py says 0.2.0"),
+        (without_version, "v0.2.0", "src/tickrig/_version.py has no __version__"),
         (
             without_notes,
             "v0.2.0",
@@ -168,7 +168,7 @@ def test_what_is_unreleased_becomes_the_section_of_a_version(unreleased: Path) -
     assert text == UNRELEASED.replace(
         "## [Unreleased]\n", f"## [Unreleased]\n\n## [0.3.0] - {date}\n"
     )
-    package = unreleased / "src" / "tickrig" / "__init__.py"
+    package = unreleased / "src" / "tickrig" / "_version.py"
     assert package.read_text() == '__version__ = "0.3.0"\n'
 
 

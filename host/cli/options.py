@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig import __version__
+from tickrig._version import __version__
 from tickrig.host.cli.start import standard_streams
 
 if TYPE_CHECKING:

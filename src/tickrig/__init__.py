@@ -1,8 +1,7 @@
 """A rig on your desk for robot electronics you do not have."""
 
 from tickrig._lazy import lazy, tell_pyserial
-
-__version__ = "0.1.0"
+from tickrig._version import __version__ as __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:

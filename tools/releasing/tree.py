@@ -11,7 +11,7 @@ from typing import Final
 from releasing.process import ReleaseError
 
 ROOT: Final = Path(__file__).resolve().parents[2]
-PACKAGE: Final = Path("src", "tickrig", "__init__.py")
+PACKAGE: Final = Path("src", "tickrig", "_version.py")
 SHOWN: Final = 3
 """So many changed files of a tree are named."""
 

@@ -16,6 +16,7 @@ from uuid import uuid4
 from distributed import Client, KilledWorker, Worker, WorkerPlugin, get_worker
 from distributed.core import rpc
 
+from tickrig._version import __version__
 from tickrig.emulators.testing.campaign.crew import Crew
 from tickrig.emulators.testing.campaign.order import Order, Refusal, Run, Verdict, verdicts_of
 from tickrig.emulators.testing.campaign.plan import Plan
@@ -166,8 +167,6 @@ def be_quiet() -> None:
 
 def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[Verdict] | str:
     """Do runs on the worker that this is called on; a text is a refusal."""
-    from tickrig import __version__  # noqa: PLC0415 - it is above all rooms
-
     worker = get_worker()
     if __version__ != version:
         return f"{worker.address}: there is tickrig {__version__}, here {version}"

@@ -10,6 +10,8 @@ from itertools import pairwise
 from math import isfinite
 from typing import ClassVar, Final, NamedTuple
 
+from tickrig._version import __version__
+
 VERSION: Final = 1
 """Of the JSON form; it changes when a field changes its meaning or goes."""
 
@@ -61,8 +63,6 @@ class RunEnvironment:
 
     def of_this_machine(self) -> RunEnvironment:
         """Return it with the versions and the system of the Python that runs."""
-        from tickrig import __version__  # noqa: PLC0415 - it is above all rooms
-
         return replace(
             self,
             tickrig=__version__,
