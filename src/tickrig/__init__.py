@@ -1,11 +1,11 @@
 """A rig on your desk for robot electronics you do not have."""
 
 from tickrig._lazy import lazy, tell_pyserial
-from tickrig._version import __version__ as __version__
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig._compiled import compiled as compiled
+    from tickrig._version import __version__ as __version__
     from tickrig.device.core import Device as Device
     from tickrig.device.physical import InputBank as InputBank
     from tickrig.device.physical import InputSignal as InputSignal
@@ -46,6 +46,7 @@ else:
         __name__,
         {
             "tickrig._compiled": ("compiled",),
+            "tickrig._version": ("__version__",),
             "tickrig.device.core": ("Device",),
             "tickrig.device.physical": (
                 "InputBank",

@@ -19,7 +19,7 @@ def lazy(
         names: what it offers of each module.
 
     Returns:
-        Its `__all__`, `__getattr__` and `__dir__`.
+        Its `__all__`, `__getattr__` and `__dir__`; `__version__` is found, and is in no list.
     """
     modules = {name: module for module, offered in names.items() for name in offered}
 
@@ -34,7 +34,8 @@ def lazy(
         found: object = getattr(home, name)
         return found
 
-    return sorted(modules), find, lambda: sorted(modules)
+    listed = sorted(modules.keys() - {"__version__"})
+    return listed, find, lambda: listed
 
 
 def tell_pyserial() -> None:
