@@ -9,6 +9,7 @@ from tests.host.canopen.conform.defects import (
     of_clauses,
     of_error_control,
     of_nmt,
+    of_others,
     of_pdo,
     of_profiles,
     of_sdo,
@@ -25,4 +26,5 @@ DEFECTS: Final[tuple[Defect, ...]] = (
     *of_services.DEFECTS,
     *of_profiles.DEFECTS,
     *of_clauses.DEFECTS,
+    *of_others.DEFECTS,
 )

@@ -9,6 +9,7 @@ import pytest
 from tests.device.canopen.actions import DriveActions, GenericIoActions, SlaveActions
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.canopen.reference import NODE_ID
+from tests.host.canopen.conform.defects import of_others
 from tests.host.canopen.conform.defects.defect import Defect, make_defective
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
@@ -66,3 +67,13 @@ def finds(defect: Defect, check: str) -> bool:
 @pytest.mark.parametrize("defect", DEFECTS, ids=lambda defect: defect.name)
 def test_a_planted_defect_is_found(defect: Defect) -> None:
     assert any(finds(defect, check) for check in defect.breaks)
+
+
+def test_all_but_one_of_40_defects_made_from_the_text_are_found() -> None:
+    assert len(of_others.DEFECTS) == 39
+    assert sum(defect.left for defect in of_others.DEFECTS) == 3
+
+
+def test_a_node_that_names_other_objects_in_aborts_blocks_the_run() -> None:
+    report = judge(of_others.BLOCKS, "UE-07")
+    assert {result.outcome.verdict for result in report.results} == {Verdict.BLOCKED}
