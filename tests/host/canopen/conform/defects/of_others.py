@@ -35,6 +35,7 @@ from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload
 from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
@@ -156,10 +157,7 @@ class GuardsWithoutAct(NodeGuarding):
     """Reports a life guarding event and stays Operational."""
 
     def tick(self, now_us: int) -> None:
-        error = self.node.communication_error
-        self.node.communication_error = lambda: None  # type: ignore[method-assign] - one call
-        super().tick(now_us)
-        self.node.communication_error = error  # type: ignore[method-assign] - back
+        self.node.emergency(EmcyCode.HEARTBEAT, ErrorRegister.COMMUNICATION)
 
 
 # SDO
