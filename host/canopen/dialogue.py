@@ -16,6 +16,11 @@ Answers that come twice. CAN repeats a frame whose sender saw its last bit wrong
 is repeated is answered twice. Such a copy is sent right after its original. So the dialogue waits
 before it asks about the object that was answered last: as long as that answer took, but at least
 `LEAST_COPY_US` and at most `MOST_COPY_US`.
+
+Answers that name another object. A dialogue ignores them, unless its holder asks for them: then
+an answer about an object that nobody has asked about ends the question, if the right answer does
+not come: within `MISNAMED_US` if no other question is open, else until the time-out. Ask for them
+only if no other client uses the server.
 """
 
 from __future__ import annotations
@@ -25,7 +30,13 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
-from tickrig.host.canopen.errors import SdoFailed, SdoTimeout, StateTimeout, WrongIdentity
+from tickrig.host.canopen.errors import (
+    SdoFailed,
+    SdoMisnamed,
+    SdoTimeout,
+    StateTimeout,
+    WrongIdentity,
+)
 from tickrig.wire.canopen.nmt import (
     ERROR_CONTROL_COB_ID,
     NMT_COB_ID,
@@ -55,6 +66,8 @@ SDO_TIMEOUT_US: Final = 500_000
 LEAST_COPY_US: Final = 2_000
 """How long a copy of an answer may take: an error frame and the frame again, at 125 kbit/s."""
 MOST_COPY_US: Final = 20_000
+MISNAMED_US: Final = 100_000
+"""How long the right answer may follow one that names another object, as a late copy does."""
 
 Object = tuple[int, int]
 """Index and sub-index."""
@@ -148,6 +161,10 @@ def _nothing() -> None:
     """Tell nobody."""
 
 
+Misnamed = Callable[[Object, bytes], object]
+"""Takes the object that was asked for, and the answer that names another one."""
+
+
 def _guard_nobody(can_id: int) -> None:
     """Send no remote frame: this host guards no node."""
 
@@ -228,6 +245,8 @@ class Dialogue:
         send: takes CAN-ID and data.
         guard: takes the CAN-ID of a remote frame.
         sdo_timeout_us: how long to wait for an SDO response.
+        on_misnamed: called with each answer that ends a question and names another object; None
+            ignores such answers.
 
     Attributes:
         sdo_timeout_us: as given; a new one counts from the next request on.
@@ -241,7 +260,9 @@ class Dialogue:
         send: Send,
         guard: Callable[[int], None] = _guard_nobody,
         sdo_timeout_us: int = SDO_TIMEOUT_US,
+        on_misnamed: Misnamed | None = None,
     ) -> None:
+        self._on_misnamed = on_misnamed
         self._node_id, self._send, self._guard = node_id, send, guard
         self.sdo_timeout_us = sdo_timeout_us
         self._now_us, self.due_us = 0, NEVER
@@ -252,7 +273,7 @@ class Dialogue:
         self._transfer: Object | None = None
         self._expected: Object | None = None  # about which an answer is waited for, a fence too
         self._sent_us = self._settled_us = 0
-        self._answer = b""
+        self._answer = self._misnamed = b""
 
     @property
     def moves(self) -> bool:
@@ -306,11 +327,39 @@ class Dialogue:
         if self._expected != (step.index, step.sub):
             if named == self._expected:
                 self._pass_fence(step, answer)
+            else:
+                self._keep_misnamed(now_us, named, data)
         elif self._is_answer(step, answer, data):
             self._unanswered.clear()
             took_us = max(LEAST_COPY_US, now_us - self._sent_us)
             self._answer, self._settled_us = data, now_us + min(took_us, MOST_COPY_US)
             self._go_on(answer)
+        else:
+            self._keep_misnamed(now_us, named, data)
+
+    def _keep_misnamed(self, now_us: int, named: Object | None, data: bytes) -> None:
+        """Keep an answer that names another object; it counts if the right one does not follow."""
+        if self._on_misnamed is None or named is None or named in self._unanswered:
+            return
+        self._misnamed = data
+        if len(self._unanswered) == 1:
+            self.due_us = min(self.due_us, now_us + MISNAMED_US)
+
+    def _end_misnamed(self, step: SdoRequest) -> Abort | SdoMisnamed:
+        """Return what an answer that names another object says about the one that was asked for.
+
+        An abort ends the only open transfer, whatever it names. A value may be that of another
+        object.
+        """
+        at, data, alone = (step.index, step.sub), self._misnamed, len(self._unanswered) == 1
+        self._unanswered.clear()
+        if self._on_misnamed is not None:
+            self._on_misnamed(self._expected or at, data)
+        answer = parse_response(data)
+        if isinstance(answer, Abort) and alone:
+            return Abort(*at, answer.code)
+        self._say(Abort(*at, AbortCode.GENERAL).encode())
+        return SdoMisnamed(*at)
 
     def _is_answer(self, step: SdoRequest, answer: Response, data: bytes) -> bool:
         """Say whether a response can be the answer to a step, and to nothing else.
@@ -352,6 +401,9 @@ class Dialogue:
             case SdoRequest() as step:
                 if self._expected is None:
                     self._send_request((step.index, step.sub), step.request)
+                    return
+                if self._misnamed:
+                    self._go_on(self._end_misnamed(step))
                     return
                 self._say(Abort(*self._expected, AbortCode.TIMEOUT).encode())
                 self._go_on(SdoTimeout(step.index, step.sub, self.sdo_timeout_us))
@@ -421,6 +473,7 @@ class Dialogue:
 
     def _send_request(self, at: Object, request: bytes) -> None:
         self._transfer = self._expected = at
+        self._misnamed = b""
         self._unanswered.add(at)
         self._say(request)
         self._sent_us, self.due_us = self._now_us, self._now_us + self.sdo_timeout_us

@@ -3,6 +3,7 @@
 SdoFailed
  +-- SdoAborted                 the device or we aborted a transfer
  +-- SdoTimeout (TimeoutError)  the device did not answer
+ +-- SdoMisnamed                the device answered, and named another object
 StateTimeout (TimeoutError)     a device did not report a state in time
 WrongIdentity                   a device is none of those that its EDS describes
 """
@@ -46,6 +47,14 @@ class SdoTimeout(SdoFailed, TimeoutError):  # noqa: N818 - a timeout, as the bui
     def __init__(self, index: int, sub: int, timeout_us: int = 0) -> None:
         super().__init__(f"{index:04X}h:{sub:02X} was not answered", index, sub)
         self.timeout_us = timeout_us
+
+
+class SdoMisnamed(SdoFailed):
+    """A transfer to which the device gave an answer that names another object."""
+
+    def __init__(self, index: int, sub: int) -> None:
+        message = f"{index:04X}h:{sub:02X} was answered with the name of another object"
+        super().__init__(message, index, sub)
 
 
 class StateTimeout(TimeoutError):  # noqa: N818 - a timeout, as the built-in calls it

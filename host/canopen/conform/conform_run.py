@@ -230,7 +230,7 @@ class ConformRun:
         subject = self._subject
         findings = (*subject.binding.findings, *subject.features.findings) if subject else ()
         stray = [self._stray.finding] if self._stray.finding else []
-        findings = tuple(dict.fromkeys((*self._crashes, *stray, *findings)))
+        findings = tuple(dict.fromkeys((*self._crashes, *self._client.misnamed, *stray, *findings)))
         repairs = tuple(f"{i:04X}h:{s:02X}={_typed(data)}" for (i, s), data in self._care.repairs)
         gone = (self._stray.unrestored,) if self._stray.unrestored else ()
         return Report(

@@ -24,7 +24,7 @@ from tickrig.host.canopen.dialogue import (
     Script,
     Unanswered,
 )
-from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.canopen.errors import SdoFailed, SdoMisnamed
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.instant import NEVER
@@ -516,3 +516,54 @@ def test_the_time_out_of_sdo_may_be_another() -> None:
     assert dialogue.due_us == 100
     dialogue.tick(100)
     assert str(failures[0]) == "1000h:00 was not answered"
+
+
+ABORT_OF_1000 = bytes.fromhex("8000100000000206")
+VALUE_OF_1000 = bytes.fromhex("4300100091010700")
+
+
+def misnamed_talk() -> tuple[Dialogue, list[object], list[tuple[tuple[int, int], bytes]]]:
+    """Ask for 5FFDh in a dialogue that takes answers that name other objects."""
+    ended: list[object] = []
+    misnamed: list[tuple[tuple[int, int], bytes]] = []
+    dialogue = Dialogue(
+        5, lambda can_id, data: None, on_misnamed=lambda at, data: misnamed.append((at, data))
+    )
+    dialogue.start(0, QueuedScript("test", upload(0x5FFD, 0), ended.append, ended.append))
+    return dialogue, ended, misnamed
+
+
+def test_an_abort_that_names_another_object_ends_the_only_question() -> None:
+    dialogue, ended, misnamed = misnamed_talk()
+    dialogue.receive_sdo(1_000, ABORT_OF_1000)
+    dialogue.tick(100_999)
+    assert ended == []
+    dialogue.tick(101_000)
+    assert [str(error) for error in ended] == ["5FFDh:00 aborted: 06020000h NO_OBJECT"]
+    assert misnamed == [((0x5FFD, 0), ABORT_OF_1000)]
+
+
+def test_a_value_that_names_another_object_is_no_value_of_the_one_asked_for() -> None:
+    dialogue, ended, misnamed = misnamed_talk()
+    dialogue.receive_sdo(1_000, VALUE_OF_1000)
+    dialogue.tick(101_000)
+    assert [type(error) for error in ended] == [SdoMisnamed]
+    assert misnamed == [((0x5FFD, 0), VALUE_OF_1000)]
+
+
+def test_the_right_answer_counts_behind_one_that_names_another_object() -> None:
+    dialogue, ended, misnamed = misnamed_talk()
+    dialogue.receive_sdo(1_000, ABORT_OF_1000)
+    dialogue.receive_sdo(90_000, bytes.fromhex("43FD5F0001020304"))
+    assert (ended, misnamed) == ([b"\1\2\3\4"], [])
+
+
+def test_an_abort_that_names_another_object_is_ignored_while_others_are_open() -> None:
+    dialogue, ended, misnamed = misnamed_talk()
+    dialogue.remember((0x2000, 0))
+    dialogue.receive_sdo(1_000, ABORT_OF_1000)
+    dialogue.tick(101_000)
+    assert ended == []
+    dialogue.tick(500_000)
+    assert [type(error) for error in ended] == [SdoMisnamed]
+    assert misnamed == [((0x5FFD, 0), ABORT_OF_1000)]

@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
 from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
-from tickrig.host.canopen.errors import SdoTimeout
+from tickrig.host.canopen.errors import SdoMisnamed, SdoTimeout
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.sdo.abort import AbortCode
@@ -112,9 +112,12 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
 
 def has_block_upload(client: SdoClient) -> bool:
     """Return whether a node begins a block upload of 1000h, which is then aborted."""
-    with suppress(SdoTimeout):
+    try:
         return client.run(_try_block_upload())
-    return False
+    except SdoMisnamed:
+        return True  # the checks of the block upload tell what it names
+    except SdoTimeout:
+        return False
 
 
 def _try_block_upload() -> Script[bool]:

@@ -56,6 +56,9 @@ BEGINNING: Final = (
 )
 """Requests that name an object; some others of a block look like them, and do no harm."""
 
+NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
+"""Commands of answers that name an object; segments of a block look like them, and do no harm."""
+
 UNREAD_FRAMES: Final = 2_000
 """So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""
 
@@ -324,8 +327,8 @@ class Exchange:
             answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
             if answered and frame.data[MULTIPLEXER] == self._multiplexer:
                 self.transfer = index_sub(frame.data)
-            if answered and index_sub(frame.data) in self.unanswered:  # and those asked before it
-                del self.unanswered[: self.unanswered.index(index_sub(frame.data)) + 1]
+            if answered:
+                self._settle(frame.data)
             return
         if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
             self.others.update({frame.can_id & NODE_ID_MASK} - {self.played})
@@ -333,6 +336,14 @@ class Exchange:
             self.disturb(f"somebody else sent {text}")
         if self._foreign.add(at_us, frame):
             self.disturb("other nodes load the bus too much")
+
+    def _settle(self, data: bytes) -> None:
+        """Drop the objects that the node has answered about, or will not answer about any more."""
+        at = index_sub(data)
+        if at in self.unanswered:  # and those asked before it
+            del self.unanswered[: self.unanswered.index(at) + 1]
+        elif data[0] in NAMING:  # the node names another object
+            del self.unanswered[:1]
 
 
 def _queue() -> deque[tuple[int, str]]:

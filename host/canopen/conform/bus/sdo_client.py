@@ -14,7 +14,7 @@ from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo.abort import AbortCode
 from tickrig.wire.canopen.sdo.sdo import Abort
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID, index_sub
 
 T = TypeVar("T")
 
@@ -24,6 +24,8 @@ SizeOf = Callable[[int, int], int]
 
 NUMBER_BYTES: Final = range(1, 5)
 """No number that the tester asks for is longer; a node may send anything."""
+MOST_MISNAMED: Final = 20
+"""So many answers that name another object are kept."""
 
 
 def number_of(data: bytes) -> int | None:
@@ -41,12 +43,14 @@ class SdoClient:
         node_id: of the node, 1..127.
 
     Attributes:
+        misnamed: answers that name another object than the one that was asked for, one a line.
         size_of: so many bytes are taken of what the node sends without saying how many.
     """
 
     def __init__(self, exchange: Exchange, node_id: int) -> None:
         self._exchange, self._node_id = exchange, node_id
-        self._talk = Dialogue(node_id, self._send)
+        self._talk = Dialogue(node_id, self._send, on_misnamed=self._keep_misnamed)
+        self.misnamed: dict[str, None] = {}
         self.size_of: SizeOf = lambda index, sub: 0
 
     def upload(self, index: int, sub: int) -> bytes:
@@ -55,6 +59,7 @@ class SdoClient:
         Raises:
             SdoAborted: the node refuses.
             SdoTimeout: it does not answer.
+            SdoMisnamed: it answers, and names another object.
             LinkClosed: the bus is gone.
         """
         return self._twice(lambda: upload(index, sub, self.size_of(index, sub)))
@@ -91,6 +96,13 @@ class SdoClient:
         finally:
             talk.clear()
             exchange.unanswered.clear()
+
+    def _keep_misnamed(self, at: tuple[int, int], data: bytes) -> None:
+        """Keep an answer that names another object."""
+        asked, named = (f"{index:04X}h:{sub:02X}" for index, sub in (at, index_sub(data)))
+        frame = data_frame(RESPONSE_COB_ID + self._node_id, data)
+        if len(self.misnamed) < MOST_MISNAMED:
+            self.misnamed[f"{asked} was answered with {frame}, which names {named}"] = None
 
     def _send(self, can_id: int, data: bytes) -> None:
         self._exchange.send(data_frame(can_id, data))

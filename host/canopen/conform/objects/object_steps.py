@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from tickrig.host.canopen.conform.bus.step_failed import StepFailed
 from tickrig.host.canopen.conform.bus.unlike import codes_text
-from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
+from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.sdo.abort import describe_abort
 
@@ -16,11 +16,11 @@ class Client(Protocol):
     """Reads and writes objects of the node under test."""
 
     def upload(self, index: int, sub: int, /) -> bytes:
-        """Read an object; raises SdoAborted and SdoTimeout."""
+        """Read an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
         ...
 
     def download(self, index: int, sub: int, data: bytes, /) -> None:
-        """Write an object; raises SdoAborted and SdoTimeout."""
+        """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
 
 
 def play_object_step(client: Client, step: Mapping[str, Any]) -> bool:
@@ -49,7 +49,7 @@ def play_object_step(client: Client, step: Mapping[str, Any]) -> bool:
                 _rewrite(client, index, sub, grow, codes)
             case _:
                 return False
-    except SdoTimeout as error:
+    except (SdoMisnamed, SdoTimeout) as error:
         raise StepFailed(str(error)) from error
     return True
 

@@ -13,7 +13,7 @@ from tickrig.host.canopen.conform.bus.sdo_client import SdoClient, number_of
 from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.safety.write_order import Values, Write, in_order, is_standard
-from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
+from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
 from tickrig.wire.canopen.cob_id import FLAG_30
 
 T = TypeVar("T")
@@ -161,13 +161,13 @@ class KnownState:
         return number_of(held if held and is_standard(at, held) else target[at])
 
     def _read(self, at: Address) -> bytes | None:
-        """Read an object; None if the node refuses, or does not answer this one."""
+        """Read an object; None if the node refuses, or gives no answer about this one."""
         with suppress(SdoAborted):
             return self._patiently(partial(self._client.upload, *at))
         return None
 
     def _patiently(self, attempt: Callable[[], T]) -> T | None:
-        """Ask the node; None if it does not answer this one, SdoTimeout if it is gone."""
+        """Ask the node; None if it gives no answer about this one, SdoTimeout if it is gone."""
         try:
             answer = attempt()
         except SdoTimeout:
@@ -175,6 +175,9 @@ class KnownState:
             if self._silent >= PATIENCE:
                 self._silent = 0
                 raise
+            return None
+        except SdoMisnamed:
+            self._silent = 0
             return None
         except SdoAborted:
             self._silent = 0

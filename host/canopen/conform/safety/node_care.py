@@ -15,7 +15,7 @@ from tickrig.host.canopen.conform.notation.bound_check import BoundCheck
 from tickrig.host.canopen.conform.notation.names import Address
 from tickrig.host.canopen.conform.safety.known_state import KnownState
 from tickrig.host.canopen.conform.safety.write_order import Write
-from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
+from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoMisnamed, SdoTimeout
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand, NmtState
 
@@ -179,7 +179,7 @@ class NodeCare:
         """Store what was there before, in place of what a check has stored."""
         try:
             self._client.download(*STORE, SAVE)
-        except SdoAborted as error:
+        except (SdoAborted, SdoMisnamed) as error:
             self._state.unrestored[f"what a check stored is still stored: {error}"] = None
 
     def _tidy(self, addresses: Iterable[Address] | None) -> None:
@@ -207,7 +207,7 @@ class NodeCare:
 
     def _probe(self) -> None:
         """Raise SdoTimeout if the node is gone; one without 1000h is there."""
-        with suppress(SdoAborted):
+        with suppress(SdoAborted, SdoMisnamed):
             self._client.upload(*DEVICE_TYPE)
 
     def _recover(self) -> None:
@@ -230,7 +230,7 @@ class NodeCare:
         while True:
             try:
                 self._client.upload(*DEVICE_TYPE)
-            except SdoAborted:
+            except (SdoAborted, SdoMisnamed):
                 return True
             except SdoTimeout:
                 if self._exchange.now_us >= until_us:

@@ -610,6 +610,7 @@ DEFECTS: Final[tuple[Defect, ...]] = (
     Defect(
         "life guarding leaves Operational", ("NG-08",), services={NodeGuarding: GuardsWithoutAct}
     ),
+    Defect("an abort names the transfer before", ("UE-06", "UE-07"), abort_names_the_one_before),
     Defect("a refused transmission type is stored", ("PC-19",), stores_refused_types),
     Defect(
         "a wrong toggle repeats the segment", ("US-11",), at_wrong_toggle(lambda last, named: last)
@@ -661,6 +662,3 @@ DEFECTS: Final[tuple[Defect, ...]] = (
     ),
     Defect("a shorter string keeps the tail", ("DE-18",), keeps_the_tail),
 )
-
-BLOCKS: Final = Defect("an abort names the transfer before", (), abort_names_the_one_before)
-"""Ends a run before the first check: the object that the tester asks for never gets an answer."""
