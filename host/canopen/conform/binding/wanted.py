@@ -131,6 +131,14 @@ WANTED: Final[tuple[Wanted, ...]] = (
         ),
     ),
     Wanted(
+        "rpdo_bool",
+        "BOOLEAN that may be read, written and mapped into RPDOs",
+        Use.WRITE,
+        lambda entry: (
+            _both(entry) and Access.RPDO in entry.access and entry.data_type is DataType.BOOLEAN
+        ),
+    ),
+    Wanted(
         "rw_bool",
         "BOOLEAN that may be read and written",
         Use.WRITE,

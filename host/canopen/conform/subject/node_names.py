@@ -25,6 +25,8 @@ FREE_CAN_ID: Final = 0x6A2
 DRIVE: Final = range(0x603F, 0x6100)
 """Of CiA 402: modes, states and positions."""
 HIGHEST_NODE_ID: Final = 127
+BIT_7: Final = 0x80
+"""No node-ID has it: what is behind 127 is none."""
 HEARTBEAT: Final = (0x1017, 0)
 BEATS_MS: Final = (100, 90, 110)
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
@@ -94,6 +96,7 @@ def _connection_set(node_id: int, number: ReadNumber) -> dict[str, str]:
     emcy_id, sync_id = _can_id(emcy) or EMCY_COB_ID + node_id, _can_id(sync) or SYNC_COB_ID
     return {
         "node": f"{node_id:02X}",
+        "beyond": f"{node_id | BIT_7:02X}",
         "request_cob": _u32(REQUEST_COB_ID + node_id),
         "response_cob": _u32(RESPONSE_COB_ID + node_id),
         "rpdo1_cob": _u32(RPDO1 + node_id),

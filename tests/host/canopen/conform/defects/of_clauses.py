@@ -199,14 +199,14 @@ class BusyAgain(NmtSlave):
             self.node.enter(NmtState.OPERATIONAL)
 
 
-def loses(*areas: range) -> Plant:
-    """Do not load what was stored of some objects when communication is reset."""
+def loses(*areas: range, command: str = "82") -> Plant:
+    """Do not load what was stored of some objects with a reset, by its NMT command."""
 
     def plant(slave: CanopenSlave) -> Bends:
         reset = [False]
 
         def hear(text: str) -> Iterable[str]:
-            reset[0] = reset[0] or text.startswith("000#82")
+            reset[0] = reset[0] or text.startswith(f"000#{command}")
             return (text,)
 
         def say(text: str) -> Iterable[str]:
@@ -306,17 +306,17 @@ def sends_in_stopped(slave: CanopenSlave) -> Bends:
 
 def forgets(*places: str) -> Plant:
     """Confirm what is written, and keep what was there."""
-    return together(*(_keeping(place, lambda new, old: old) for place in places))
+    return together(*(keeping(place, lambda new, old: old) for place in places))
 
 
 def takes_low_byte(*places: str) -> Plant:
     """Take of a number its low byte only."""
     return together(
-        *(_keeping(place, lambda new, old: new[:1].ljust(len(new), b"\0")) for place in places)
+        *(keeping(place, lambda new, old: new[:1].ljust(len(new), b"\0")) for place in places)
     )
 
 
-def _keeping(place: str, keep: Callable[[bytes, bytes], bytes]) -> Plant:
+def keeping(place: str, keep: Callable[[bytes, bytes], bytes]) -> Plant:
     def plant(slave: CanopenSlave) -> Bends:
         index, sub = place.split(":")
         entry = slave.dictionary[int(index, 16), int(sub, 16)]

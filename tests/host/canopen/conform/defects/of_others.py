@@ -7,13 +7,22 @@ from collections.abc import Callable, Iterable, Iterator
 from operator import eq, gt, lt
 from typing import Any, ClassVar, Final
 
-from tests.host.canopen.conform.defects.defect import Bends, Defect, Plant, hears, says
-from tickrig.device.canopen.bus.lss_slave import LssSlave, MessageSequence
-from tickrig.device.canopen.bus.parameter_store import ParameterStore
+from tests.host.canopen.conform.defects.defect import (
+    Bends,
+    Defect,
+    Plant,
+    hears,
+    says,
+    together,
+)
+from tests.host.canopen.conform.defects.of_clauses import keeping, loses
+from tickrig.device.canopen.bus.lss_slave import SELECTIVE, FastScanner, LssSlave, MessageSequence
+from tickrig.device.canopen.bus.parameter_store import STORE_PARAMETERS, ParameterStore
 from tickrig.device.canopen.bus.sync import Sync
+from tickrig.device.canopen.bus.time_stamp import TimeStamp
 from tickrig.device.canopen.core.abort import SdoAbort
 from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.service import Handler
+from tickrig.device.canopen.core.service import ALIVE, Handler
 from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
 from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
 from tickrig.device.canopen.errors.error_behaviour import ErrorBehaviour
@@ -34,9 +43,12 @@ from tickrig.device.canopen.pdo.tpdo_modes import (
 from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload
 from tickrig.device.canopen.sdo.sdo_servers import SdoServers
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
+from tickrig.wire.canopen.lss import FastScan, LssAddress, LssMode
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.canopen.sdo.sdo_block import crc16
 from tickrig.wire.instant import NEVER
 
 TOGGLE: Final = 0x10
@@ -588,6 +600,435 @@ def _keep_tail(entry: Entry) -> None:
     entry.guard, entry.written = guard, written
 
 
+# The second set: written, as the first, before the checks were read.
+
+
+class KeepsDefaultsOnce(ParameterStore):
+    """Has the stored values again behind the first reset after "load"."""
+
+    _forgotten: ClassVar[dict[int, bytes]] = {}
+
+    def _load(self, area: range) -> None:
+        stored = self.node.nonvolatile.parameters
+        self._forgotten = {key: data for key, data in stored.items() if key >> 8 in area}
+        super()._load(area)
+
+    def start(self) -> None:
+        super().start()
+        self.node.nonvolatile.parameters.update(self._forgotten)
+        self._forgotten = {}
+
+
+class ShowsSignature(ParameterStore):
+    """Reads "save" in 1010h once it was written."""
+
+    def _act(self, entry: Entry) -> None:
+        signature = entry.data
+        super()._act(entry)
+        if entry.index == STORE_PARAMETERS:
+            entry.assign(signature)
+
+
+def stores_later_changes(slave: CanopenSlave) -> Bends:
+    """Store with a reset what was changed since "save"."""
+    saved = [False]
+
+    def hear(text: str) -> Iterable[str]:
+        if re.match("605#231[01]1001(73617665|6C6F6164)", text):
+            saved[0] = text[7] == "0"
+        elif saved[0] and re.match("000#8[12]0[05]", text):
+            ParameterStore.of(slave)._save(range(0x1_0000))
+        return (text,)
+
+    return Bends(hear)
+
+
+def answers_later(slave: CanopenSlave) -> Bends:
+    """Keep an SDO request that came in Stopped, and answer it when Stopped is left."""
+    kept: list[str] = []
+
+    def hear(text: str) -> Iterable[str]:
+        if slave.state is NmtState.STOPPED and text.startswith(REQUEST):
+            kept[:] = [text]
+        elif kept and re.match("000#(01|80)0[05]", text):
+            return (text, kept.pop())
+        elif text.startswith("000#8"):
+            kept.clear()
+        return (text,)
+
+    return Bends(hear)
+
+
+def of_block_upload(change: Callable[[str, int, list[str]], str]) -> Plant:
+    """Change the segments and the end of block uploads.
+
+    Args:
+        change: makes a frame of a frame, the block size, and the segments of the block so far;
+            with these and the frame itself if it is a segment.
+    """
+
+    def plant(slave: CanopenSlave) -> Bends:
+        size, block, running = [0], list[str](), [False]
+
+        def hear(text: str) -> Iterable[str]:
+            if re.match("605#A[04]", text):
+                size[0], running[0] = _byte(text, 4), False
+            elif text.startswith("605#A3"):
+                running[0] = True
+                block.clear()
+            elif text.startswith("605#A2"):
+                size[0] = _byte(text, 2)
+            elif text.startswith(REQUEST):
+                running[0] = False
+            return (text,)
+
+        def say(text: str) -> Iterable[str]:
+            if not running[0] or not text.startswith(RESPONSE):
+                return (text,)
+            if text.startswith("585#80"):
+                running[0] = False
+                return (text,)
+            ended = bool(block) and _byte(block[-1], 0) >= 0x80
+            if _byte(text, 0) & 0x7F == 1:
+                block.clear()
+                ended = False
+            if not ended:
+                block.append(text)
+            return (change(text, size[0], block),)
+
+        return Bends(hear, say)
+
+    return plant
+
+
+def _crc_of_block(text: str, size: int, block: list[str]) -> str:
+    head = _byte(text, 0)
+    if text in block or head & 0xE3 != 0xC1 or text[6:10] == "0000":
+        return text
+    data = b"".join(bytes.fromhex(segment[6:]) for segment in block)
+    crc = crc16(data[: len(data) - (head >> 2 & 7)])
+    return f"{text[:6]}{crc.to_bytes(2, 'little').hex().upper()}{text[10:]}"
+
+
+def _last_of_each_block(text: str, size: int, block: list[str]) -> str:
+    head = _byte(text, 0)
+    return _with_byte(text, 0, head | 0x80) if text in block and head == size else text
+
+
+def counts_on(slave: CanopenSlave) -> Bends:
+    """Go on with the sequence number in the next block of an upload."""
+    before, latest = [0], [0]
+
+    def change(text: str, size: int, block: list[str]) -> str:
+        head = _byte(text, 0)
+        if text not in block:
+            return text
+        if head & 0x7F == 1:
+            before[0] = latest[0]
+        latest[0] = (before[0] + (head & 0x7F) - 1) % 127 + 1
+        return _with_byte(text, 0, head & 0x80 | latest[0])
+
+    def hear(text: str) -> Iterable[str]:
+        if text.startswith("605#A3"):
+            before[0] = latest[0] = 0
+        return (text,)
+
+    return together(lambda slave: Bends(hear), of_block_upload(change))(slave)
+
+
+def switches_above(slave: CanopenSlave) -> Bends:
+    """Switch from block to segmented upload above the threshold, not below."""
+
+    def hear(text: str) -> Iterable[str]:
+        threshold = _byte(text, 5)
+        if re.match("605#A[04]", text) and threshold > 0:
+            entry = slave.dictionary.find(int(text[8:10] + text[6:8], 16), int(text[10:12], 16))
+            above = entry is not None and len(entry.data) > threshold
+            return (_with_byte(text, 5, 0xFF if above else 0),)
+        return (text,)
+
+    return Bends(hear)
+
+
+def loses_one_byte(slave: CanopenSlave) -> Bends:
+    """Take a last segment with one byte for an empty one."""
+
+    def hear(text: str) -> Iterable[str]:
+        transfer = getattr(SdoServers.of(slave).default._state, "__self__", None)
+        if isinstance(transfer, SegmentedDownload) and re.match("605#[01]D", text):
+            transfer._size.announced = (transfer._size.announced or 1) - 1
+            return (_with_byte(text, 0, _byte(text, 0) | 0x0E),)
+        return (text,)
+
+    return Bends(hear)
+
+
+def keeps_over(command: str, *areas: range) -> Plant:
+    """Keep what was written to communication objects over a reset."""
+
+    def plant(slave: CanopenSlave) -> Bends:
+        kept: dict[Entry, bytes] = {}
+
+        def hear(text: str) -> Iterable[str]:
+            if re.match(f"000#{command}0[05]", text):
+                kept.update(
+                    (entry, entry.data)
+                    for entry in slave.dictionary
+                    if entry.description.writable and any(entry.index in area for area in areas)
+                )
+            return (text,)
+
+        def say(text: str) -> Iterable[str]:
+            if text == "705#00":
+                for entry, data in kept.items():
+                    entry.force(data)
+                kept.clear()
+            return (text,)
+
+        return Bends(hear, say)
+
+    return plant
+
+
+class ToggleStands(NodeGuarding):
+    """Keeps the toggle bit in Stopped."""
+
+    def _receive(self, frame: CanFrame) -> None:
+        before = self._toggle
+        super()._receive(frame)
+        if self.node.state is NmtState.STOPPED:
+            self._toggle = before
+
+
+class HeartbeatForEver(NodeGuarding):
+    """Answers no guarding request once 1017h was set."""
+
+    _set = False
+
+    def start(self) -> None:
+        self._set = False
+        super().start()
+
+    def _changed(self, entry: Entry) -> None:
+        super()._changed(entry)
+        self._set = self._set or super()._heartbeat_instead
+
+    @property
+    def _heartbeat_instead(self) -> bool:
+        return self._set or super()._heartbeat_instead
+
+
+class LosesEvents(EventDriven):
+    """Loses events within the inhibit time."""
+
+    def request(self, entry: Entry | None = None) -> None:
+        if self.sender._node.now_us >= self._free_us:
+            super().request(entry)
+
+
+class TimerForEver(EventDriven):
+    """Goes on with the event timer when 0 is written."""
+
+    _event_us = 0
+
+    def _time_anew(self, now_us: int) -> None:
+        super()._time_anew(now_us)
+        self._event_us = self.sender.parameters.event_us or self._event_us
+        if self._event_us:
+            self.due_us = now_us + self._event_us
+
+
+def event_driven(mode: type[EventDriven]) -> type[PdoProducer]:
+    """Return a producer whose event-driven TPDOs are others."""
+
+    class Producer(PdoProducer):
+        def _collect(self) -> None:
+            for tpdo in self.tpdos:
+                if type(tpdo.mode) is EventDriven:
+                    for entry in tpdo._watched:
+                        entry.unwatch(tpdo.mode.request)
+                    tpdo.mode = mode(tpdo)
+                    tpdo._watch(tpdo.entries)
+            super()._collect()
+
+    return Producer
+
+
+def _from_its_end(data: bytes, slots: tuple[Any, ...]) -> bytes:
+    length = (total_bits(slots) + 7) // 8
+    over = len(data) - length
+    return data[over:] + bytes(over) if over > 0 else data
+
+
+def _short_dummies(data: bytes, slots: tuple[Any, ...]) -> bytes:
+    if any(slot.bits % 8 for slot in slots):
+        return data
+    made, at = b"", 0
+    for slot in slots:
+        size = slot.bits // 8
+        taken = 1 if slot.entry is None and size == 2 else size
+        made += data[at : at + taken].ljust(size, b"\0")
+        at += taken
+    return made[: len(data)]
+
+
+def _bits_from_the_top(data: bytes, slots: tuple[Any, ...]) -> bytes:
+    if not any(slot.bits % 8 for slot in slots):
+        return data
+    return bytes(int(f"{byte:08b}"[::-1], 2) for byte in data)
+
+
+class AnswersAlive(PdoProducer):
+    """Answers remote requests in Pre-operational too."""
+
+    def changed(self, tpdo: Tpdo) -> None:
+        super().changed(tpdo)
+        self.node.rewire()
+
+    def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        yield from super().remote_handlers(state)
+        if state is NmtState.PRE_OPERATIONAL:
+            for tpdo in self.tpdos:
+                if tpdo.parameters.valid and tpdo.parameters.answers_rtr:
+                    yield tpdo.parameters.can_id, _sends_once(tpdo)
+
+
+def _sends_once(tpdo: Tpdo) -> Handler:
+    def handler(frame: CanFrame) -> None:
+        tpdo.begin()
+        tpdo.send()
+        tpdo.end()
+
+    return handler
+
+
+class ShortWindow(PdoConsumer):
+    """Has a synchronous window of a tenth of 1007h."""
+
+    def _window_changed(self, window: Entry) -> None:
+        self._window_us = window.number // 10
+
+
+class WrapsToZero(Sync):
+    """Counts 0 behind the overflow value."""
+
+    def tick(self, now_us: int) -> None:
+        if self._due_us == NEVER or not self.overflow:
+            super().tick(now_us)
+            return
+        self._due_us += self.period_us
+        self.schedule(self._due_us)
+        self._counter = (self._counter + 1) % (self.overflow + 1)
+        self.node.send(self.can_id, bytes([self._counter]))
+        self._announce(self._counter)
+
+
+class NotesResets(EmcyProducer):
+    """Has in 1003h that an error is gone, too."""
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        before = len(self._active)
+        super().emergency_clear(code, text)
+        for _ in range(before - len(self._active)):
+            self._history.note(EmcyCode.NO_ERROR, b"")
+
+
+class ActsOnEach(ErrorBehaviour):
+    """Acts on each error as on one of communication."""
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        if not register & ErrorRegister.COMMUNICATION:
+            self.communication_error()
+
+
+class StoresActive(LssSlave):
+    """Stores the node-ID that it has, not the one it was given."""
+
+    def _receive(self, frame: CanFrame) -> None:
+        stored = self.node.nonvolatile.node_id
+        super()._receive(frame)
+        if self.node.nonvolatile.node_id != stored:
+            self.node.nonvolatile.node_id = self.node.node_id
+
+
+class _AnyPart(FastScanner):
+    """Answers for every part of the LSS address at any time."""
+
+    def take(self, request: FastScan, address: LssAddress) -> LssMode | None:
+        self._sub = request.sub & 3
+        return super().take(request, address)
+
+
+class _Waits(FastScanner):
+    """Does not go to configuration at the end."""
+
+    def take(self, request: FastScan, address: LssAddress) -> LssMode | None:
+        mode = super().take(request, address)
+        return None if mode is None else LssMode.WAITING
+
+
+class _WithoutVendor(MessageSequence):
+    """Does without its first message."""
+
+    def take(self, step: int, address: LssAddress, number: int) -> bool:
+        if step == 1 and self._step != 1:
+            self._step = 1
+        return super().take(step, address, number)
+
+
+class ScansAnyPart(LssSlave):
+    """Answers fastscan for every part of the LSS address."""
+
+    def start(self) -> None:
+        self._fastscan = _AnyPart()
+        super().start()
+
+
+class ScansAndWaits(LssSlave):
+    """Stays in waiting at the end of a fastscan."""
+
+    def start(self) -> None:
+        self._fastscan = _Waits()
+        super().start()
+
+
+class SwitchesWithoutVendor(LssSlave):
+    """Switches to configuration without the vendor-ID."""
+
+    def start(self) -> None:
+        self._selective = _WithoutVendor(SELECTIVE)
+        super().start()
+
+
+class StaysInConfiguration(LssSlave):
+    """Does not go back to waiting with a reset."""
+
+    def power_on(self) -> None:
+        super().power_on()
+        self._mode = LssMode.WAITING
+
+    def start(self) -> None:
+        mode = self._mode
+        super().start()
+        self._mode = mode
+
+
+class AlwaysTime(TimeStamp):
+    """Consumes TIME without bit 31 of 1012h."""
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        if state in ALIVE:
+            yield self._number & CAN_ID_MASK, self._receive
+
+
+class TimeOn100h(TimeStamp):
+    """Consumes TIME on 100h alone."""
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        for _, receive in super().handlers(state):
+            yield 0x100, receive
+
+
 DEFECTS: Final[tuple[Defect, ...]] = (
     Defect("reset communication of all nodes is ignored", ("NMT-22",), hears("000#8200")),
     Defect(
@@ -661,4 +1102,84 @@ DEFECTS: Final[tuple[Defect, ...]] = (
         "LSS identify excludes the bounds", ("LS-23",), services={LssSlave: OpenRange}, left=True
     ),
     Defect("a shorter string keeps the tail", ("DE-18",), keeps_the_tail),
+    # The second set.
+    Defect(
+        "1010h takes the signature of 1011h",
+        ("ST-02",),
+        hears("605#231010016C6F6164", "605#2310100173617665"),
+    ),
+    Defect(
+        "load holds for one reset",
+        ("ST-09",),
+        services={ParameterStore: KeepsDefaultsOnce},
+        left=True,
+    ),
+    Defect("reset node loads nothing stored", ("ST-10",), loses(range(0x1_0000), command="81")),
+    Defect("1010h reads the signature", ("ST-11",), services={ParameterStore: ShowsSignature}),
+    Defect("what changes behind save is stored", ("ST-12",), stores_later_changes),
+    Defect("a request in Stopped is answered later", ("NMT-13",), answers_later),
+    Defect(
+        "a block download without its size is refused",
+        ("BD-13",),
+        hears("605#C([04])(.{6}).*", r"605#C2\2FFFFFFFF"),
+    ),
+    Defect(
+        "the CRC of an upload is that of its last block", ("BU-09",), of_block_upload(_crc_of_block)
+    ),
+    Defect("seqno goes on in the next block of an upload", ("BU-09",), counts_on),
+    Defect("each block of an upload is its last", ("BU-09",), of_block_upload(_last_of_each_block)),
+    Defect("the threshold of a block upload is the least size", ("BU-15",), switches_above),
+    Defect("a last segment of one byte is lost", ("DS-12",), loses_one_byte),
+    Defect(
+        "a string of 0 bytes is confirmed and not taken",
+        ("DS-13",),
+        keeping("2007:00", lambda new, old: new or old),
+        left=True,
+    ),
+    Defect(
+        "a time-out names no object", ("US-12",), says("585#80.{6}(00000405)", r"585#80000000\1")
+    ),
+    Defect("NMT commands for 85h are obeyed", ("NMT-07",), hears("000#(..)85", r"000#\g<1>05")),
+    Defect(
+        "reset communication keeps mappings",
+        ("NMT-29",),
+        keeps_over("82", range(0x1600, 0x1800), range(0x1A00, 0x1C00)),
+    ),
+    Defect("reset node keeps 1000h to 1FFFh", ("NMT-11",), keeps_over("81", range(0x1005, 0x1029))),
+    Defect(
+        "the guarding toggle stands in Stopped", ("NG-09",), services={NodeGuarding: ToggleStands}
+    ),
+    Defect("no guarding once 1017h was set", ("NG-10",), services={NodeGuarding: HeartbeatForEver}),
+    Defect(
+        "an event within the inhibit time is lost",
+        ("PR-03",),
+        services={PdoProducer: event_driven(LosesEvents)},
+    ),
+    Defect("a long RPDO is taken from its end", ("PR-15",), _rpdo_data(_from_its_end)),
+    Defect("a dummy of 16 bits takes 8", ("PC-31",), _rpdo_data(_short_dummies)),
+    Defect("bits of an RPDO begin at the top", ("PR-36",), _rpdo_data(_bits_from_the_top)),
+    Defect("remote requests in Pre-operational", ("PR-34",), services={PdoProducer: AnswersAlive}),
+    Defect("event timer 0 goes on", ("PR-35",), services={PdoProducer: event_driven(TimerForEver)}),
+    Defect("a tenth of the synchronous window", ("SY-18",), services={PdoConsumer: ShortWindow}),
+    Defect("the SYNC counter wraps to 0", ("SY-03",), services={Sync: WrapsToZero}),
+    Defect("1003h has error resets", ("EM-20",), services={EmcyProducer: NotesResets}, left=True),
+    Defect(
+        "1029h acts on each error", ("EM-21",), services={ErrorBehaviour: ActsOnEach}, left=True
+    ),
+    Defect("LSS stores the active node-ID", ("LS-08",), services={LssSlave: StoresActive}),
+    Defect("fastscan of any part", ("LS-24",), services={LssSlave: ScansAnyPart}),
+    Defect("fastscan ends in waiting", ("LS-17",), services={LssSlave: ScansAndWaits}),
+    Defect(
+        "LSS selective without vendor-ID", ("LS-22",), services={LssSlave: SwitchesWithoutVendor}
+    ),
+    Defect(
+        "LSS configuration survives a reset",
+        ("LS-25",),
+        services={LssSlave: StaysInConfiguration},
+        left=True,
+    ),
+    Defect("TIME without bit 31 of 1012h", ("SY-19",), services={TimeStamp: AlwaysTime}),
+    Defect("TIME on 100h alone", ("SY-20",), services={TimeStamp: TimeOn100h}),
 )
+BLOCKS: Final = Defect("an abort names the transfer before", (), abort_names_the_one_before)
+"""Ends a run before the first check: the object that the tester asks for never gets an answer."""

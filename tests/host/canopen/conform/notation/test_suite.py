@@ -14,7 +14,7 @@ from tickrig.host.canopen.conform.plan import Plan
 
 CHECKS = suite_checks()
 SOURCE = re.compile(r"(practice: .+; )?CiA \d{3}(-\d)? v\d\.\d\.\d, .+|practice: .+")
-READS = {"read", "refuse read", "send", "expect", "none", "wait", "forget", "macro"}
+READS = {"read", "refuse read", "send", "expect", "none", "count", "wait", "forget", "macro"}
 
 
 def words_of(check: Check) -> str:
