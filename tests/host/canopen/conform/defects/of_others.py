@@ -606,7 +606,9 @@ def _keep_tail(entry: Entry) -> None:
 class KeepsDefaultsOnce(ParameterStore):
     """Has the stored values again behind the first reset after "load"."""
 
-    _forgotten: ClassVar[dict[int, bytes]] = {}
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self._forgotten: dict[int, bytes] = {}
 
     def _load(self, area: range) -> None:
         stored = self.node.nonvolatile.parameters
@@ -822,7 +824,8 @@ class LosesEvents(EventDriven):
     """Loses events within the inhibit time."""
 
     def request(self, entry: Entry | None = None) -> None:
-        if self.sender._node.now_us >= self._free_us:
+        sender = self.sender
+        if isinstance(sender, Tpdo) and sender._node.now_us >= self._free_us:
             super().request(entry)
 
 
