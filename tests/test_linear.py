@@ -325,21 +325,25 @@ def uses(name: str, text: str) -> list[Use]:
                 pattern: re.Pattern[Any] = re.compile(str(call.args[0].value), flags)
                 found.append(Use(pattern, frozenset([call.func.attr])))
     for key, value in vars(importlib.import_module(f"tickrig.{name}")).items():
-        for pattern in _patterns(value):
+        for pattern in _patterns(value, set()):
             found.append(Use(pattern, frozenset(ways.get(key, {"match"}))))
     return found
 
 
-def _patterns(value: object) -> Iterator[re.Pattern[Any]]:
+def _patterns(value: object, seen: set[int]) -> Iterator[re.Pattern[Any]]:
+    """Give the patterns in a value; tables of states hold each other."""
+    if id(value) in seen:
+        return
+    seen.add(id(value))
     match value:
         case re.Pattern():
             yield value
         case dict():
             for pair in value.items():
-                yield from _patterns(pair)
+                yield from _patterns(pair, seen)
         case tuple() | list():
             for each in value:
-                yield from _patterns(each)
+                yield from _patterns(each, seen)
 
 
 def attacks(tree: Any, begin: str = "") -> Iterator[tuple[str, str]]:
