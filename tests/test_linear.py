@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from re import _constants, _parser  # type: ignore[attr-defined]  # how Python reads a pattern
 from typing import Any, Final, NamedTuple
@@ -339,8 +340,8 @@ def _patterns(value: object, seen: set[int]) -> Iterator[re.Pattern[Any]]:
         case re.Pattern():
             yield value
         case dict():
-            for pair in value.items():
-                yield from _patterns(pair, seen)
+            for each in chain(value, value.values()):
+                yield from _patterns(each, seen)
         case tuple() | list():
             for each in value:
                 yield from _patterns(each, seen)
