@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from tickrig.device.rh3.parameters import BaseParameters  # internal
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop  # internal
-from tickrig.host.motion.drive import drive, start  # internal
-from tickrig.host.motion.geometry import Pose  # internal
+from tickrig.host.rtc.motion.drive import drive, start  # internal
+from tickrig.host.rtc.motion.geometry import Pose  # internal
 
 GOAL = Pose(1.0, 0.5, 1.57)
 

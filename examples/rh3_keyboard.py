@@ -8,9 +8,9 @@ from __future__ import annotations
 import sys
 
 from tickrig import RealClock
-from tickrig.host.motion.chain import MotionChain  # internal
-from tickrig.host.motion.options.game_pad import GamePad  # internal
-from tickrig.host.motion.options.switch_input import SwitchInput  # internal
+from tickrig.host.rtc.motion.chain import MotionChain  # internal
+from tickrig.host.rtc.motion.options.game_pad import GamePad  # internal
+from tickrig.host.rtc.motion.options.switch_input import SwitchInput  # internal
 from tickrig.host.rtc.system.real_time import RealTime  # internal
 from tickrig.rtc import Manager
 

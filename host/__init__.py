@@ -11,9 +11,9 @@ if TYPE_CHECKING:
     from tickrig.host.links.errors import LinkTimeout as LinkTimeout
     from tickrig.host.links.recording_link import RecordingLink as RecordingLink
     from tickrig.host.links.serial_link import SerialLink as SerialLink
-    from tickrig.host.motion.modbus_master import ModbusMaster as ModbusMaster
     from tickrig.host.rrc.client import RrcClient as RrcClient
-    from tickrig.host.rtc_lite.proxy import RtcLiteProxy as RtcLiteProxy
+    from tickrig.host.rtc.lite.proxy import RtcLiteProxy as RtcLiteProxy
+    from tickrig.host.rtc.motion.modbus_master import ModbusMaster as ModbusMaster
     from tickrig.host.urg.client import UrgClient as UrgClient
     from tickrig.wire.rrc.replies import RrcEvent as RrcEvent
 else:
@@ -29,9 +29,9 @@ else:
             ),
             "tickrig.host.links.recording_link": ("RecordingLink",),
             "tickrig.host.links.serial_link": ("SerialLink",),
-            "tickrig.host.motion.modbus_master": ("ModbusMaster",),
+            "tickrig.host.rtc.motion.modbus_master": ("ModbusMaster",),
             "tickrig.host.rrc.client": ("RrcClient",),
-            "tickrig.host.rtc_lite.proxy": ("RtcLiteProxy",),
+            "tickrig.host.rtc.lite.proxy": ("RtcLiteProxy",),
             "tickrig.host.urg.client": ("UrgClient",),
             "tickrig.wire.rrc.replies": ("RrcEvent",),
         },

@@ -15,9 +15,9 @@ from random import Random
 from typing import Final
 
 from tests.device.rtc_lite.reference_model import checked
+from tests.host.canmon.model.logs import mutations as logs
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tests.host.canopen.data_sheet import mutations as eds
-from tests.host.monitor.logs import mutations as logs
 from tests.mutators import damaged, with_piece
 from tests.properties import test_devices as known
 from tickrig import Bench

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 from tests.device.canopen.reference import make_dictionary
 from tests.emulators.testing.campaign.test_table import TABLE
 from tests.emulators.testing.report.test_report_json import REPORT
-from tests.host.rtc_canopen.bench import PALETTE_AND_MOTOR
+from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR
 from tickrig.emulators.canopen.cli import main as canopen_slave_emu
 from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.commands.cli import main as tickrig
@@ -30,10 +30,10 @@ from tickrig.emulators.testing.report.report_file import write_run
 from tickrig.host.canmon.cli import main as canmon
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
 from tickrig.host.cli.refused import Refused
+from tickrig.host.rtc.canopen.commands.builder import main as rtc_canopen_builder
+from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition.definition_writer import save_definition
 from tickrig.host.rtc.commands.system_file import write_system
-from tickrig.host.rtc_canopen.commands.builder import main as rtc_canopen_builder
-from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.definition.definition_writer import save_definition
 from tickrig.host.text.whole_file import replacing, write_whole
 
 ROOT = Path(__file__).parents[1]
@@ -250,9 +250,9 @@ STREAMS = {
     "emulators/testing/campaign/journal.py": "verdicts as they come, one line each",
     "emulators/testing/campaign/worker.py": "/dev/null",
     "host/cli/start.py": "standard streams that were closed",
-    "host/monitor/logs/log_file.py": "a recording, or a new file of `whole_log`",
-    "host/monitor/recorder/index.py": "the index of a recording",
-    "host/rtc_canopen/commands/opening.py": "events as they come",
+    "host/canmon/model/logs/log_file.py": "a recording, or a new file of `whole_log`",
+    "host/canmon/model/recorder/index.py": "the index of a recording",
+    "host/rtc/canopen/commands/opening.py": "events as they come",
     "host/text/line_file.py": "a recording",
 }
 """Modules that open files for writing themselves, and why."""

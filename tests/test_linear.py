@@ -41,6 +41,16 @@ from tickrig.emulators.testing.signals.formula_parser import parse_formula
 from tickrig.emulators.testing.signals.table_file import read_points
 from tickrig.emulators.tkernel.resolution.table import parse_table as parse_ucodes
 from tickrig.host.canmon.eds_document import read_document
+from tickrig.host.canmon.model.check.expression.parse_rule import parse_rule
+from tickrig.host.canmon.model.check.rule_file import parse_rule_file
+from tickrig.host.canmon.model.decode.dbc_file import DbcFile
+from tickrig.host.canmon.model.decode.filter import parse_filter
+from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.logs.log_reader import read_log
+from tickrig.host.canmon.model.recorder.index import _objects
+from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
+from tickrig.host.canmon.model.sequence.variables import evaluate, fill_in
+from tickrig.host.canmon.model.transmit.transmit_list import parse_row_text
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.canopen.bus_file.bus_file import decode_bus_file
 from tickrig.host.canopen.conform.report.baseline import Baseline
@@ -50,26 +60,16 @@ from tickrig.host.canopen.gateway.gateway_error import GatewayError
 from tickrig.host.canopen.gateway.request import parse_request
 from tickrig.host.cli.refused import Refused
 from tickrig.host.control.requests import RequestDispatcher
-from tickrig.host.engines.ros2.table_reader import parse_table as parse_topics
-from tickrig.host.monitor.check.expression.parse_rule import parse_rule
-from tickrig.host.monitor.check.rule_file import parse_rule_file
-from tickrig.host.monitor.decode.dbc_file import DbcFile
-from tickrig.host.monitor.decode.filter import parse_filter
-from tickrig.host.monitor.graph.signal_spec import parse_signal
-from tickrig.host.monitor.logs.log_reader import read_log
-from tickrig.host.monitor.recorder.index import _objects
-from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.variables import evaluate, fill_in
-from tickrig.host.monitor.transmit.transmit_list import parse_row_text
-from tickrig.host.motion.components.odometry import read_conf
-from tickrig.host.motion.path_file import read_path
+from tickrig.host.rtc.canopen.builder.profile_file import parse_project
+from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.engines.ros2.table_reader import parse_table as parse_topics
+from tickrig.host.rtc.motion.components.odometry import read_conf
+from tickrig.host.rtc.motion.path_file import read_path
 from tickrig.host.rtc.parameter import Constraint
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system_toml import parse_toml
 from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
-from tickrig.host.rtc_canopen.builder.profile_file import parse_project
-from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
 from tickrig.host.text.byte_text import unescape
 from tickrig.host.text.names import near
 from tickrig.host.text.toml_reader import read_toml
@@ -171,7 +171,7 @@ READERS: Final = {
     "host.canopen.bus_file.yaml_tree": Reader(
         lambda text: decode_bus_file(text.encode(), Path("bus.yml")), ("nodes: ",), SLOW
     ),
-    "host.rtc_canopen.definition.marked_yaml": Reader(parse_definition, ("nodes: ",), SLOW),
+    "host.rtc.canopen.definition.marked_yaml": Reader(parse_definition, ("nodes: ",), SLOW),
     "emulators.testing.rig_file": Reader(
         lambda text: parse_rig_file(text, Path("rig.toml")), ("[device.a]\ntype = ", "# ")
     ),
@@ -202,42 +202,46 @@ READERS: Final = {
     "emulators.tkernel.resolution.table": Reader(parse_ucodes, ("x = ", "a.")),
     "host.canmon.workspace": Reader(Workspace, ("x = ",)),
     "host.canopen.conform.report.baseline": Reader(of_file(Baseline.read, "b.txt")),
-    "host.engines.ros2.table_reader": Reader(
+    "host.rtc.engines.ros2.table_reader": Reader(
         lambda text: parse_topics(text, "t.toml"), ('[[topic]]\nname = "',)
     ),
-    "host.monitor.check.rule_file": Reader(
+    "host.canmon.model.check.rule_file": Reader(
         lambda text: parse_rule_file(text, no_rule), ('rules = ["', "x = ", "a.")
     ),
-    "host.monitor.check.expression": Reader(parse_rule, ("never ", "node 1 of ", "not ")),
-    "host.monitor.decode.filter": Reader(parse_filter, ("node=", "not ")),
-    "host.monitor.decode.dbc_file": Reader(
+    "host.canmon.model.check.expression": Reader(parse_rule, ("never ", "node 1 of ", "not ")),
+    "host.canmon.model.decode.filter": Reader(parse_filter, ("node=", "not ")),
+    "host.canmon.model.decode.dbc_file": Reader(
         of_file(DbcFile, "a.dbc"), ("BO_ 1 A: 8 X\n SG_ a : ", 'CM_ "')
     ),
-    "host.monitor.graph.signal_spec": Reader(parse_signal, ("123[0]*", "123[0]-", "1.")),
-    "host.monitor.logs.log_reader": log("log", "(1.000000) can0 ", "  can0  123   [1]  "),
-    "host.monitor.logs.can_log": log("asc", "base hex timestamps absolute\n0.1 1 123 Rx d 8 "),
-    "host.monitor.logs.trc": log("trc", ";$FILEVERSION=2.1\n", "1) 1.0 Rx 0123 8 "),
-    "host.monitor.logs.notation": log("jsonl", '{"v":1,"t":1,"ch":"', '{"a":'),
-    "host.monitor.logs.csv": log("csv", "0.000000,can0,123,rx,1,"),
-    "host.monitor.logs.trace_log": log("trace", "# tickrig-trace v2 "),
+    "host.canmon.model.graph.signal_spec": Reader(parse_signal, ("123[0]*", "123[0]-", "1.")),
+    "host.canmon.model.logs.log_reader": log("log", "(1.000000) can0 ", "  can0  123   [1]  "),
+    "host.canmon.model.logs.can_log": log("asc", "base hex timestamps absolute\n0.1 1 123 Rx d 8 "),
+    "host.canmon.model.logs.trc": log("trc", ";$FILEVERSION=2.1\n", "1) 1.0 Rx 0123 8 "),
+    "host.canmon.model.logs.notation": log("jsonl", '{"v":1,"t":1,"ch":"', '{"a":'),
+    "host.canmon.model.logs.csv": log("csv", "0.000000,can0,123,rx,1,"),
+    "host.canmon.model.logs.trace_log": log("trace", "# tickrig-trace v2 "),
     "host.text.bench_header": log("trace", "# tickrig-trace v2 {"),
-    "host.monitor.recorder.index": Reader(lambda text: list(_objects(text)), ('{"a": ',)),
-    "host.monitor.sequence.parse_sequence": Reader(
+    "host.canmon.model.recorder.index": Reader(lambda text: list(_objects(text)), ('{"a": ',)),
+    "host.canmon.model.sequence.parse_sequence": Reader(
         lambda text: TomlSequence(text, "s.toml").parse(), ('[[step]]\nsend = "', "x = ", "a.")
     ),
-    "host.monitor.sequence.lines": Reader(lambda text: parse_lines(text, "s.txt"), ("+1 123#",)),
-    "host.monitor.sequence.variables": Reader(lambda text: fill_in(f"{{{text}}}", {}), ("- ",)),
-    "host.monitor.sequence.evaluate": Reader(lambda text: evaluate(text, {}), ("1+", "-")),
-    "host.monitor.transmit.transmit_list": Reader(
+    "host.canmon.model.sequence.lines": Reader(
+        lambda text: parse_lines(text, "s.txt"), ("+1 123#",)
+    ),
+    "host.canmon.model.sequence.variables": Reader(
+        lambda text: fill_in(f"{{{text}}}", {}), ("- ",)
+    ),
+    "host.canmon.model.sequence.evaluate": Reader(lambda text: evaluate(text, {}), ("1+", "-")),
+    "host.canmon.model.transmit.transmit_list": Reader(
         parse_row_text, ("123#", "123#00 --every "), SLOW
     ),
-    "host.motion.components.odometry": Reader(of_file(read_conf, "a.conf"), ("conf.a.b: ",)),
-    "host.motion.path_file": Reader(of_file(read_path, "p.txt"), ("1 2 ",)),
+    "host.rtc.motion.components.odometry": Reader(of_file(read_conf, "a.conf"), ("conf.a.b: ",)),
+    "host.rtc.motion.path_file": Reader(of_file(read_path, "p.txt"), ("1 2 ",)),
     "host.rtc.parameter": Reader(Constraint, ("x<", "(")),
     "host.rtc.system.rts_profile": Reader(parse_rts_profile, ("<a>",)),
     "host.rtc.system.system_toml": Reader(parse_toml, ('[[component]]\nname = "', "x = ", "a.")),
     "host.rtc.ucode.contents_interpretation": Reader(parse_contents, ('{"a": ',)),
-    "host.rtc_canopen.builder.profile_file": Reader(parse_project, ("x = ", "a.")),
+    "host.rtc.canopen.builder.profile_file": Reader(parse_project, ("x = ", "a.")),
 }
 """Each by its module, or by a name beside it where a module reads several kinds."""
 
@@ -272,7 +276,7 @@ ELSEWHERE: Final = {
     "host.canmon.tui.tasks.sequence_task": "`TomlSequence`",
     "host.control.client": "of our own emulator",
     "host.links.serial_link": "of the kernel",
-    "host.monitor.check.sarif": "our own findings",
+    "host.canmon.model.check.sarif": "our own findings",
     "host.rtc.commands.verbs": "a word of the command line",
     "host.text.steps": "`parse_steps`, `parse_scenario`",
 }

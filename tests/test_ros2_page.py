@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.host.engines.ros2.extra import CYCLONE
-from tests.host.engines.ros2.joined import DEADLINE_S, Peer, own_domain
-from tickrig.host.engines.ros2.conversions import MESSAGES
-from tickrig.host.engines.ros2.table_reader import parse_table
+from tests.host.rtc.engines.ros2.extra import CYCLONE
+from tests.host.rtc.engines.ros2.joined import DEADLINE_S, Peer, own_domain
+from tickrig.host.rtc.engines.ros2.conversions import MESSAGES
+from tickrig.host.rtc.engines.ros2.table_reader import parse_table
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/howto/ros2.md").read_text("utf-8")

@@ -28,7 +28,7 @@ RUNS = {
     "emulators/testing/bench/modes/hardware/power_switch.py": "`power` of a rig file",
     "emulators/testing/campaign/worker_process.py": "a worker of a campaign: pytest",
     "host/canmon/conform/stimulus.py": "`--stimulus CMD`",
-    "host/engines/openrtm/stubs.py": "omniidl, and the stubs that it makes",
+    "host/rtc/engines/openrtm/stubs.py": "omniidl, and the stubs that it makes",
     "host/text/user_file.py": "`FILE.py:Class`",
     "wire/rtc_types/idl.py": "methods of value types, made of our own IDL",
 }

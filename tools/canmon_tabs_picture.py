@@ -20,13 +20,13 @@ from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import Described, describe_device, make_bench, make_nodes
+from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
+from tickrig.host.canmon.model.frames.record import AnyRecord, Record
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.tabs import make_panels
 from tickrig.host.canmon.tui.tasks.session import Model, Session
-from tickrig.host.monitor.decode.node_memory import read_eds_objects
-from tickrig.host.monitor.frames.record import AnyRecord, Record
 from tickrig.wire.can import CanFrame
 
 SIZES: Final = ((80, 24), (120, 40), (200, 60))

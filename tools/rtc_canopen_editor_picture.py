@@ -15,9 +15,9 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
 from tickrig.emulators.canopen.rig_file import read_rig
-from tickrig.host.rtc_canopen.editor.app import SystemEditor
-from tickrig.host.rtc_canopen.editor.session import EditorSession
-from tickrig.host.rtc_canopen.serve import open_server
+from tickrig.host.rtc.canopen.editor.app import SystemEditor
+from tickrig.host.rtc.canopen.editor.session import EditorSession
+from tickrig.host.rtc.canopen.serve import open_server
 
 FONTS: Final = re.compile(r"\s*@font-face \{.*?\}", re.DOTALL)
 """Textual names fonts of another site; without them a reader's own are taken."""

@@ -234,7 +234,7 @@ def goal(x: float, y: float, deg: float) -> Object:
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
     """Let it drive along the points of FILE, as 'rh3 path', or along its defined path."""
-    from tickrig.host.motion.path_file import read_path  # noqa: PLC0415 - a TAB needs none
+    from tickrig.host.rtc.motion.path_file import read_path  # noqa: PLC0415 - a TAB needs none
 
     if file is None:
         return {}

@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from tickrig.host.canmon.model.check.rule import Rule
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.check.rule import Rule
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.check.rule import CheckedTraffic, FrameSelection
-    from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.decode.decoder import Decoder, FrameDecoder
-    from tickrig.host.monitor.decode.node_memory import EdsObjects
-    from tickrig.host.monitor.frames.record import Record
+    from tickrig.host.canmon.model.check.rule import CheckedTraffic, FrameSelection
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.decode.decoder import Decoder, FrameDecoder
+    from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+    from tickrig.host.canmon.model.frames.record import Record
 
 T = TypeVar("T")
 
@@ -45,7 +45,7 @@ def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Dec
         OSError: a DBC file cannot be read.
         DbcError: it is malformed, or cantools is not there.
     """
-    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - slow
 
     made: list[FrameDecoder] = []
     for name, found in DECODERS.load_foreign(say).items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from tickrig.host.monitor.decode.node_memory import Entry
+from tickrig.host.canmon.model.decode.node_memory import Entry
 from tickrig.wire.canopen.nmt import NmtCommand
 
 DRIVE_AREA: Final = range(0x6000, 0xA000)

@@ -41,7 +41,7 @@ _MOTION: Final[dict[str, str]] = {
     "PositiveHeading": "iis.adapters:PositiveHeading",
     "WrappedHeading": "iis.adapters:WrappedHeading",
 }
-"""The motion chain of RH3, what is around it, and the interfaces of IIS, in `host.motion`."""
+"""The motion chain of RH3, what is around it, and the interfaces of IIS, in `host.rtc.motion`."""
 
 
 def is_component_type(found: object) -> bool:
@@ -61,7 +61,7 @@ COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
         for name in ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample")
     }
     | {name: f"tickrig.host.rtc.ucode.{module}:{name}" for module, name in _UCODE.items()}
-    | {name: f"tickrig.host.motion.{place}" for name, place in _MOTION.items()},
+    | {name: f"tickrig.host.rtc.motion.{place}" for name, place in _MOTION.items()},
     is_component_type,
     "an RtComponent with a spec",
 )

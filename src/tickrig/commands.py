@@ -78,14 +78,14 @@ def canopen_slave_emu() -> None:
 
 def rtc_canopen_server() -> None:
     """Call `rtc-canopen-server`."""
-    _start("rtc-canopen-server", "tickrig.host.rtc_canopen.commands.server")
+    _start("rtc-canopen-server", "tickrig.host.rtc.canopen.commands.server")
 
 
 def rtc_canopen_builder() -> None:
     """Call `rtc-canopen-builder`."""
-    _start("rtc-canopen-builder", "tickrig.host.rtc_canopen.commands.builder")
+    _start("rtc-canopen-builder", "tickrig.host.rtc.canopen.commands.builder")
 
 
 def rtc_canopen_editor() -> None:
     """Call `rtc-canopen-editor`."""
-    _start("rtc-canopen-editor", "tickrig.host.rtc_canopen.commands.editor")
+    _start("rtc-canopen-editor", "tickrig.host.rtc.canopen.commands.editor")

@@ -16,7 +16,7 @@ import pytest
 
 from tests.interop.buses import Bus
 from tests.interop.slave import EDS, running
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_reader import read_log
 
 pytestmark = [
     pytest.mark.realtime,

@@ -13,7 +13,7 @@ from tests.interop.slave import Slave, running
 
 pytestmark = pytest.mark.realtime
 
-PROGRAM = "from tickrig.host.rtc_canopen.commands.editor import main; main()"
+PROGRAM = "from tickrig.host.rtc.canopen.commands.editor import main; main()"
 EDS = Path(__file__).parents[2] / "examples" / "eds"
 DEFINITION = f"""
 nodes:

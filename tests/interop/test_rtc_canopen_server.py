@@ -22,7 +22,7 @@ from tickrig.emulators.commands.ctl_cli import ctl
 pytestmark = pytest.mark.realtime
 
 PROGRAM = (
-    "from tickrig.host.rtc_canopen.commands.server import main;"
+    "from tickrig.host.rtc.canopen.commands.server import main;"
     " main(prog_name='rtc-canopen-server')"
 )
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -48,8 +48,8 @@ from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.device_bench import DeviceBench
 from tickrig.emulators.testing.properties.strategies import Act
-from tickrig.host.motion.drive import drive, start
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.rtc.motion.drive import drive, start
+from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus.requests import encode_request
 from tickrig.wire.modbus.rtu import encode_frame
@@ -284,7 +284,12 @@ def test_sums_of_integers_are_let_through(source: str) -> None:
     assert unsafe_sums(source) == []
 
 
-EXACT: Final = ("tickrig.wire", "tickrig.device", "tickrig.host.motion", "tickrig.emulators.rig")
+EXACT: Final = (
+    "tickrig.wire",
+    "tickrig.device",
+    "tickrig.host.rtc.motion",
+    "tickrig.emulators.rig",
+)
 """Where numbers come from that reach traces."""
 
 

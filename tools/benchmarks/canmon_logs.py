@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 import can
 
 from benchmarks.table import RUNS, row
-from tickrig.host.monitor.columns.column_reader import read_columns
-from tickrig.host.monitor.logs.log_reader import read_log
-from tickrig.host.monitor.logs.log_writer import write_log
+from tickrig.host.canmon.model.columns.column_reader import read_columns
+from tickrig.host.canmon.model.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_writer import write_log
 
 FRAMES = 1_000_000
 PEER_FRAMES = 100_000

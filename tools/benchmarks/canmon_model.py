@@ -17,17 +17,17 @@ import pexpect
 
 from benchmarks.canmon_decode import seconds
 from benchmarks.table import rates, row
+from tickrig.host.canmon.model.check.column_check import ColumnChecker
+from tickrig.host.canmon.model.check.rules import parse_rules
+from tickrig.host.canmon.model.columns.column_reader import read_columns
+from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic
+from tickrig.host.canmon.model.columns.columns import Columns
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.traffic.traffic import Snapshot, Traffic
+from tickrig.host.canmon.model.views.top_model import TopModel, View, render
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.links.can_message import to_message
-from tickrig.host.monitor.check.column_check import ColumnChecker
-from tickrig.host.monitor.check.rules import parse_rules
-from tickrig.host.monitor.columns.column_reader import read_columns
-from tickrig.host.monitor.columns.column_traffic import ColumnTraffic
-from tickrig.host.monitor.columns.columns import Columns
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
-from tickrig.host.monitor.views.top_model import TopModel, View, render
 from tickrig.wire.can import CanFrame
 
 FRAMES = 1_000_000

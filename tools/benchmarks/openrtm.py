@@ -12,14 +12,14 @@ from typing import Any
 from benchmarks.table import RUNS, row
 from tickrig.host.cli.openrtm_options import Endpoint
 from tickrig.host.control.clock import ServingClock
-from tickrig.host.engines.openrtm.orb import Orb
-from tickrig.host.engines.openrtm.ports.cdr import InPortClient
-from tickrig.host.engines.openrtm.ports.component_ports import ComponentPorts, SystemPorts
-from tickrig.host.engines.openrtm.ports.data_end import INPORT_IOR
-from tickrig.host.engines.openrtm.ports.properties import texts
-from tickrig.host.engines.openrtm.stubs import stubs
 from tickrig.host.rtc import ExecutionContext, InPort, Manager, ModuleSpec, OutPort, ReturnCode
 from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.engines.openrtm.orb import Orb
+from tickrig.host.rtc.engines.openrtm.ports.cdr import InPortClient
+from tickrig.host.rtc.engines.openrtm.ports.component_ports import ComponentPorts, SystemPorts
+from tickrig.host.rtc.engines.openrtm.ports.data_end import INPORT_IOR
+from tickrig.host.rtc.engines.openrtm.ports.properties import texts
+from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.remote.call_queue import CallQueue
 from tickrig.host.rtc.remote.out_port import OutPortPushConnector
 from tickrig.host.rtc.remote.peer_end import PeerEnd, cdr

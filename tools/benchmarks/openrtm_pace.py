@@ -128,7 +128,7 @@ def reference(port: int) -> Any:
     """Wait for the manager at a port."""
     from omniORB import CORBA  # noqa: PLC0415 - an extra
 
-    from tickrig.host.engines.openrtm.stubs import stubs  # noqa: PLC0415
+    from tickrig.host.rtc.engines.openrtm.stubs import stubs  # noqa: PLC0415
 
     idl, orb = stubs(), CORBA.ORB_init([], CORBA.ORB_ID)
     while True:
@@ -141,8 +141,8 @@ def reference(port: int) -> Any:
 
 def join(first: System, second: System, names: Sequence[str]) -> None:
     """Join OutPorts of a system with the InPorts of another one."""
-    from tickrig.host.engines.openrtm.ports.properties import nvlist  # noqa: PLC0415
-    from tickrig.host.engines.openrtm.stubs import stubs  # noqa: PLC0415
+    from tickrig.host.rtc.engines.openrtm.ports.properties import nvlist  # noqa: PLC0415
+    from tickrig.host.rtc.engines.openrtm.stubs import stubs  # noqa: PLC0415
 
     values = {
         "dataport.interface_type": "corba_cdr",

@@ -13,10 +13,10 @@ from itertools import pairwise
 from math import copysign, cos, hypot, sin, sqrt
 from typing import ClassVar, Final
 
-from tickrig.host.motion.control_laws import VelocityLimits
-from tickrig.host.motion.geometry import Pose, Twist, wrap
-from tickrig.host.motion.ports import read_newest, to_pose
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.control_laws import VelocityLimits
+from tickrig.host.rtc.motion.geometry import Pose, Twist, wrap
+from tickrig.host.rtc.motion.ports import read_newest, to_pose
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 

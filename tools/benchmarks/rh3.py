@@ -9,8 +9,8 @@ from math import pi, sqrt
 from benchmarks.pursuit import Pursuit, Tolerance, beside
 from benchmarks.table import RUNS, row
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.host.motion.drive import SETTLE_US, drive, start
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.rtc.motion.drive import SETTLE_US, drive, start
+from tickrig.host.rtc.motion.geometry import Pose
 
 GOAL = (Pose(1.0, 0.5, pi / 2),)
 SQUARE = (Pose(2.0), Pose(2.0, 2.0), Pose(0.0, 2.0), Pose())

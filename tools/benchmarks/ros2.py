@@ -19,7 +19,6 @@ import cyclonedds  # noqa: F401 - without it this suite is left out
 from tickrig.host.cli.engine_options import EngineOptions
 from tickrig.host.cli.ros2_options import Ros2Options
 from tickrig.host.control.clock import ServingClock
-from tickrig.host.engines.engines_joined import engines_joined
 from tickrig.host.rtc import (
     ExecutionContext,
     InPort,
@@ -29,6 +28,7 @@ from tickrig.host.rtc import (
     ReturnCode,
     RtComponent,
 )
+from tickrig.host.rtc.engines.engines_joined import engines_joined
 from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedLong
@@ -43,9 +43,9 @@ SETTLE_S: Final = 2.0
 PEER: Final = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
-from tickrig.host.engines.ros2.participant import Participant
-from tickrig.host.engines.ros2.message_types import message_type
-from tickrig.host.engines.ros2.topic_entry import TopicEntry
+from tickrig.host.rtc.engines.ros2.participant import Participant
+from tickrig.host.rtc.engines.ros2.message_types import message_type
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 kind, does, seconds = sys.argv[2], sys.argv[3], float(sys.argv[4])
 participant, count = Participant({domain}), 0
 entries = [TopicEntry("", f"C{{n}}/port", kind) for n in range({ports})]

@@ -15,11 +15,11 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, RtComponent
-from tickrig.host.rtc_canopen.definition.definition import NodeEntry, Role, SystemDefinition
-from tickrig.host.rtc_canopen.definition.device_file import read_device_file
-from tickrig.host.rtc_canopen.node.served_node import NodePhase
-from tickrig.host.rtc_canopen.proxy.pdo_layout import PdoLayout, lay_out
-from tickrig.host.rtc_canopen.server import RtcCanopenServer
+from tickrig.host.rtc.canopen.definition.definition import NodeEntry, Role, SystemDefinition
+from tickrig.host.rtc.canopen.definition.device_file import read_device_file
+from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout, lay_out
+from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState

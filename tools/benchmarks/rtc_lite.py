@@ -17,7 +17,7 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect
-from tickrig.host.rtc_lite import RtcLiteProxy
+from tickrig.host.rtc.lite import RtcLiteProxy
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 
 BAUD = 57_600

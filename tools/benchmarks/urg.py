@@ -12,8 +12,8 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.options.collision_guard import CollisionGuard
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.options.collision_guard import CollisionGuard
 from tickrig.host.urg.client import UrgClient
 
 SCANS = 100

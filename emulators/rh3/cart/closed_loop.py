@@ -20,9 +20,9 @@ from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.control.clock import RealClock
-from tickrig.host.motion.chain import MotionChain
-from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import Manager
+from tickrig.host.rtc.motion.chain import MotionChain
+from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.instant import NEVER
 
 BAUD: Final = 115_200

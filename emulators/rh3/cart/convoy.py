@@ -10,10 +10,10 @@ from tickrig.device.body.omni_body import OmniBody, OmniParameters, Velocity
 from tickrig.device.body.pose import Pose as BodyPose
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import Cart, ClosedLoop
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.options.follower import Follower
-from tickrig.host.motion.ports import plausible, read_newest, to_pose_2d
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.options.follower import Follower
+from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose_2d
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 

@@ -22,12 +22,12 @@ from tickrig.emulators.rh3.cart.topics import SCAN, TOPICS
 from tickrig.emulators.rh3.cart.track_plot import write_track
 from tickrig.host.cli.engine_options import take_engines
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.motion.drive import drive, stop
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.path_file import FARTHEST_M, read_path, within_reach
-from tickrig.host.motion.ports import plausible
-from tickrig.host.motion.run_report import limits_of, table
-from tickrig.host.motion.umbmark import SIDE_M
+from tickrig.host.rtc.motion.drive import drive, stop
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.path_file import FARTHEST_M, read_path, within_reach
+from tickrig.host.rtc.motion.ports import plausible
+from tickrig.host.rtc.motion.run_report import limits_of, table
+from tickrig.host.rtc.motion.umbmark import SIDE_M
 
 
 def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:

@@ -22,13 +22,13 @@ from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.cli.start import INTERRUPTED, paint
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.motion.chain import RATE_HZ, MotionChain
-from tickrig.host.motion.drive import BaseConnection, start
-from tickrig.host.motion.geometry import Pose, Wheels
-from tickrig.host.motion.motion_run import MotionRun, Sample
-from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg
-from tickrig.host.motion.track_map import WIDTH, LiveMap, TrackMap
 from tickrig.host.rtc import Manager
+from tickrig.host.rtc.motion.chain import RATE_HZ, MotionChain
+from tickrig.host.rtc.motion.drive import BaseConnection, start
+from tickrig.host.rtc.motion.geometry import Pose, Wheels
+from tickrig.host.rtc.motion.motion_run import MotionRun, Sample
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
+from tickrig.host.rtc.motion.track_map import WIDTH, LiveMap, TrackMap
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.real_time import RealTime
 

@@ -19,14 +19,14 @@ from tickrig.host.cli.serving import serving_control, stopped_by_signals
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.control.requests import Object, short
 from tickrig.host.control.server import ControlServer
-from tickrig.host.engines.engines_joined import engines_joined
-from tickrig.host.motion.chain import MotionChain
-from tickrig.host.motion.drive import PERIOD_US, BaseConnection, stop
-from tickrig.host.motion.geometry import Pose, Twist
-from tickrig.host.motion.path_file import in_degrees
 from tickrig.host.rtc import connect
 from tickrig.host.rtc.commands.console import Console
 from tickrig.host.rtc.commands.system_control import SystemControl
+from tickrig.host.rtc.engines.engines_joined import engines_joined
+from tickrig.host.rtc.motion.chain import MotionChain
+from tickrig.host.rtc.motion.drive import PERIOD_US, BaseConnection, stop
+from tickrig.host.rtc.motion.geometry import Pose, Twist
+from tickrig.host.rtc.motion.path_file import in_degrees
 from tickrig.host.rtc.remote.call_queue import CallQueue
 from tickrig.host.rtc.system.real_time import LATE_US
 

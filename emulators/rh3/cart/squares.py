@@ -10,9 +10,9 @@ import click
 from tickrig.emulators.rh3.cart.options import MotionOptions, RunWatcher, watched
 from tickrig.host.cli.options import NumberRange
 from tickrig.host.cli.refused import refuse_path
-from tickrig.host.motion.drive import BaseConnection, stop
-from tickrig.host.motion.geometry import Pose, Wheels
-from tickrig.host.motion.umbmark import Umbmark, run_umbmark, square
+from tickrig.host.rtc.motion.drive import BaseConnection, stop
+from tickrig.host.rtc.motion.geometry import Pose, Wheels
+from tickrig.host.rtc.motion.umbmark import Umbmark, run_umbmark, square
 from tickrig.host.text.whole_file import write_whole
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tickrig.emulators.commands.picture import new_figure, write_figure
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.motion_run import MotionRun
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.motion_run import MotionRun
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,8 @@ from tickrig.emulators.rtc_lite.demo.setup import NODES, DemoSetup
 from tickrig.emulators.rtc_lite.frame_log import MonitoredLink
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.lite import ProxyEvent, ProxyEventType, ProxySettings, attach
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc_lite import ProxyEvent, ProxyEventType, ProxySettings, attach
 from tickrig.wire.rtc_types.basic import TimedLong
 
 Echo = Callable[[str], None]

@@ -23,6 +23,7 @@ from tickrig.emulators.testing.conformance.conformance import (
     node_id_of,
 )
 from tickrig.emulators.testing.conformance.written import known_failures
+from tickrig.host.canmon.model.views.conform_frames import decoded_frames
 from tickrig.host.canopen.conform.notation.suite import suite_checks
 from tickrig.host.canopen.conform.objects.object_checks import object_checks
 from tickrig.host.canopen.conform.plan import Plan
@@ -31,7 +32,6 @@ from tickrig.host.canopen.conform.report.evidence import cut
 from tickrig.host.canopen.conform.report.hints import hint
 from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
 from tickrig.host.canopen.eds import open_eds
-from tickrig.host.monitor.views.conform_frames import decoded_frames
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 

@@ -9,11 +9,11 @@ from warnings import warn
 
 from tickrig.host.canmon.conform.chosen import unknown
 from tickrig.host.canmon.conform.report_files import file_text
+from tickrig.host.canmon.model.views.conform_frames import decoded_frames
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Report
-from tickrig.host.monitor.views.conform_frames import decoded_frames
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.whole_file import write_whole
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.graph.chart import ticks
+from tickrig.host.canmon.model.graph.chart import ticks
 
 WIDE: Final = 25
 """Per cent of the axis on which a text has room, even on a phone."""

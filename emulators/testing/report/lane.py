@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.emulators.testing.report.axis import Axis, Span
 from tickrig.emulators.testing.report.bench_report import SignalSeries, Value
 from tickrig.emulators.testing.report.thinning import Point, thinned
-from tickrig.host.monitor.graph.chart import widened
+from tickrig.host.canmon.model.graph.chart import widened
 from tickrig.host.text.page_text import DASH
 
 WIDTH: Final = 1000

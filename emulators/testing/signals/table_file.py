@@ -86,9 +86,9 @@ def _read_trace(path: Path, column: str | None) -> Points:
 
 def _read_log(path: Path, column: str | None) -> Points:
     """Return the values in frames of a CAN log, from its first frame on."""
-    from tickrig.host.monitor.graph.collector import Collector  # noqa: PLC0415 - seldom wanted
-    from tickrig.host.monitor.graph.signal_spec import SignalSpec, parse_slice  # noqa: PLC0415
-    from tickrig.host.monitor.logs.log_reader import read_log  # noqa: PLC0415
+    from tickrig.host.canmon.model.graph.collector import Collector  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.canmon.model.graph.signal_spec import SignalSpec, parse_slice  # noqa: PLC0415
+    from tickrig.host.canmon.model.logs.log_reader import read_log  # noqa: PLC0415
 
     if column is None:
         raise ValueError("column is missing: bits of a frame, as 181[2:6]s*0.001")

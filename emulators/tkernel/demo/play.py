@@ -9,7 +9,7 @@ from typing import Final
 
 from tickrig.emulators.tkernel.demo.stage import BACK_M, LENGTH_M, Stage
 from tickrig.emulators.tkernel.node.applications import SETTLEMENT
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.rtc.motion.geometry import Pose
 
 Echo = Callable[[str], None]
 

@@ -7,7 +7,7 @@ from typing import Final, Protocol
 
 from tickrig.emulators.tkernel.node.node_manager import NodeManager
 from tickrig.host.links.link import Link
-from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.ucode.contents_interpretation import ContentsInterpretation
 from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
 from tickrig.host.rtc.ucode.source import OpenSource, Source

@@ -28,10 +28,10 @@ from tickrig.host.cli.serving import serving_control, stopped_by_signals
 from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.commands.system_file import read_system
 from tickrig.host.rtc.components import EXAMPLES
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.remote.call_queue import CallQueue
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.real_time import RealTime
@@ -40,7 +40,7 @@ from tickrig.host.rtc.system.system import System, restore
 from tickrig.host.rtc.ucode.http_source import HttpSource
 from tickrig.host.rtc.ucode.infrared_rays_reader import OPEN_SERIAL
 
-JOIN_ENGINES: Final = "tickrig.host.engines.engines_joined:engines_joined"
+JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 NAMES: Final = f"{HOST}.host_cxt/%n.rtc"
 """Where its components stand in a name server."""
 

@@ -20,6 +20,7 @@ from tickrig.host.canmon.conform.report_files import check_files, keep_inputs, w
 from tickrig.host.canmon.conform.stimulus import CONTROL, open_stimulus
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.model.views.conform_frames import decoded_frames
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
@@ -35,7 +36,6 @@ from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import VERSION
 from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import INTERRUPTED
-from tickrig.host.monitor.views.conform_frames import decoded_frames
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile

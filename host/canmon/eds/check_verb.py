@@ -10,12 +10,12 @@ import click
 
 from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.model.check.junit import junit
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rule_table import RULES
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.check.junit import junit
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole

@@ -9,19 +9,19 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
+from tickrig.host.canmon.model.decode.object_text import (
+    ObjectText,
+    describe_drive,
+    describe_standard,
+)
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
 from tickrig.host.canmon.net.session import NetSession, NodeFailed
 from tickrig.host.canmon.net.standard_names import standard_names
 from tickrig.host.canopen.conform.subject.other_device import TOLD, other_device
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.decode.node_memory import NodeMemory, eds_objects
-from tickrig.host.monitor.decode.object_text import (
-    ObjectText,
-    describe_drive,
-    describe_standard,
-)
-from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import read_device

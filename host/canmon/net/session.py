@@ -11,6 +11,7 @@ import click
 
 from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
@@ -19,7 +20,6 @@ from tickrig.host.cli.messages import say
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.decode.sdo.transfer import write_entry
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.sdo.abort import AbortCode, describe_abort
 

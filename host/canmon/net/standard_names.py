@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Final
 
-from tickrig.host.monitor.decode.object_text import slug
+from tickrig.host.canmon.model.decode.object_text import slug
 from tickrig.wire.canopen.eds.communication_profile import (
     OFF,
     CommunicationProfile,

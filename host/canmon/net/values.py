@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Final
 
+from tickrig.host.canmon.model.decode.object_text import ObjectText, drive_state
+from tickrig.host.canmon.model.dictionary.node_dictionary import encode_value
 from tickrig.host.canmon.net.node_objects import TYPES, Entry, NodeObjects
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.decode.object_text import ObjectText, drive_state
-from tickrig.host.monitor.dictionary.node_dictionary import encode_value
 from tickrig.wire.canopen.datatypes import DataType
 
 STATUSWORD: Final = (0x6041, 0)

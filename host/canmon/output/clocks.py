@@ -8,10 +8,10 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.canmon.model.frames.record import Record
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import LineRecord
+    from tickrig.host.canmon.model.frames.record import LineRecord
 
 
 class Stopwatch:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.canmon.model.frames.record import Record
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.decode.decoder import Decoder
-    from tickrig.host.monitor.decode.filter import Filter
-    from tickrig.host.monitor.decode.filter_terms import MissingSignals
-    from tickrig.host.monitor.frames.record import AnyRecord
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.decode.decoder import Decoder
+    from tickrig.host.canmon.model.decode.filter import Filter
+    from tickrig.host.canmon.model.decode.filter_terms import MissingSignals
+    from tickrig.host.canmon.model.frames.record import AnyRecord
 
 DecodedFrame = tuple["AnyRecord", "Decoded | None"]
 """A frame or a line of a serial port, and what it means where somebody asked."""
@@ -30,7 +30,7 @@ class FilteredDecoder:
         self._decoder, self._wanted = decoder, wanted
         self._missing: MissingSignals | None = None
         if wanted is not None and wanted.signals:
-            from tickrig.host.monitor.decode.filter_terms import (  # noqa: PLC0415 - slow
+            from tickrig.host.canmon.model.decode.filter_terms import (  # noqa: PLC0415 - slow
                 MissingSignals,
             )
 

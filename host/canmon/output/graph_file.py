@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import BinaryIO, Final, TextIO
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.graph.chart import Chart, Curve, chart
+from tickrig.host.canmon.model.graph.series import Series, View
+from tickrig.host.canmon.model.graph.svg import COLOURS, html_page, svg
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.graph.chart import Chart, Curve, chart
-from tickrig.host.monitor.graph.series import Series, View
-from tickrig.host.monitor.graph.svg import COLOURS, html_page, svg
 from tickrig.host.text.whole_file import replacing, write_whole
 
 

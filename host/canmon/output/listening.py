@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final, ParamSpec, TypeVar
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.traffic.bit_rates import BitRates
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.sources.block_log import BlockLog
 from tickrig.host.canmon.sources.source import AnySource
@@ -19,13 +20,12 @@ from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import time_option
 from tickrig.host.cli.start import Interrupter, give_up_terminals, taking_signals
-from tickrig.host.monitor.traffic.bit_rates import BitRates
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.columns.columns import Columns
-    from tickrig.host.monitor.frames.record import AnyRecord
-    from tickrig.host.monitor.traffic.traffic import Snapshot
+    from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.traffic.traffic import Snapshot
 
 
 Given = ParamSpec("Given")
@@ -185,7 +185,7 @@ def count_blocks(log: BlockLog | None) -> Snapshot | None:
     """Return the statistics of a log; None where it is to be read frame by frame."""
     if log is None:
         return None
-    from tickrig.host.monitor.columns.column_traffic import ColumnTraffic  # noqa: PLC0415 - numpy
+    from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic  # noqa: PLC0415 - numpy
 
     traffic = ColumnTraffic()
     return traffic.snapshot() if take_blocks(log, traffic.take) else None

@@ -11,22 +11,22 @@ from typing import TYPE_CHECKING
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, log_format
+from tickrig.host.canmon.model.logs.log_writer import write_log
+from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.recorder.plan import Plan
+from tickrig.host.canmon.model.recorder.recorder import Recorder
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogError, LogFormatError, log_format
-from tickrig.host.monitor.logs.log_writer import write_log
-from tickrig.host.monitor.logs.mark import Mark
-from tickrig.host.monitor.recorder.plan import Plan
-from tickrig.host.monitor.recorder.recorder import Recorder
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import AnyRecord
-    from tickrig.host.monitor.recorder.trigger import FilterTrigger, Trigger
+    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
 
 class LogFile:

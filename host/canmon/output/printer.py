@@ -8,20 +8,20 @@ from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
+from tickrig.host.canmon.model.frames.dump_line import DumpLines, Stamp, decoded_text
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_writer import comment, log_line
+from tickrig.host.canmon.model.logs.mark import Mark, dropped
+from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.cli.start import as_is
-from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_writer import comment, log_line
-from tickrig.host.monitor.logs.mark import Mark, dropped
-from tickrig.host.monitor.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.decoded import Decoded
-    from tickrig.host.monitor.frames.record import AnyRecord
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.frames.record import AnyRecord
 
 Printer = Callable[["AnyRecord", "Decoded | None"], str]
 """Writes a frame, or a line of a serial port, and what it means, where that is known."""
@@ -73,7 +73,7 @@ def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
 def _error_meaning(record: AnyRecord) -> Decoded | None:
     if not isinstance(record.frame, ErrorFrame):
         return None
-    from tickrig.host.monitor.decode.services import (  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.canmon.model.decode.services import (  # noqa: PLC0415 - seldom wanted
         decode_error,
     )
 
@@ -87,7 +87,7 @@ def text_printer(lines: DumpLines) -> Printer:
         text = one_line(decoded_text(decoded))
         if isinstance(record, Record):
             return lines.line(record, text)
-        from tickrig.host.monitor.frames.dump_line import line_text  # noqa: PLC0415 - seldom wanted
+        from tickrig.host.canmon.model.frames.dump_line import line_text  # noqa: PLC0415 - seldom wanted
 
         return f"{lines.stamp(record.at_us)}  {line_text(record, text)}"
 

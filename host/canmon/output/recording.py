@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.canmon.model.recorder.plan import AtLimit, Plan, read_plan
 from tickrig.host.canmon.output.log_file import LogFile
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.recorder.plan import AtLimit, Plan, read_plan
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.filter import Filter
-    from tickrig.host.monitor.recorder.trigger import FilterTrigger, Trigger
+    from tickrig.host.canmon.model.decode.filter import Filter
+    from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
 RULE_FILE: Final = ".toml"
 
@@ -134,7 +134,7 @@ def read_recording_plan(path: Path, options: dict[str, Any], parts: bool = False
 
 def filter_trigger(text: str, wanted: Filter) -> FilterTrigger:
     """Return a filter as a trigger."""
-    from tickrig.host.monitor.recorder.trigger import FilterTrigger  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.recorder.trigger import FilterTrigger  # noqa: PLC0415 - slow
 
     return FilterTrigger(text, wanted)
 
@@ -142,9 +142,9 @@ def filter_trigger(text: str, wanted: Filter) -> FilterTrigger:
 def _trigger(word: str, bit_rate: int | None) -> Trigger:
     if word.endswith(RULE_FILE):
         return _rules(word, bit_rate)
-    from tickrig.host.monitor.check.expression.error_resets import errors_alone  # noqa: PLC0415 - slow
-    from tickrig.host.monitor.decode.filter import FilterError, parse_filter  # noqa: PLC0415
-    from tickrig.host.monitor.frames.tokens import tokens_of  # noqa: PLC0415
+    from tickrig.host.canmon.model.check.expression.error_resets import errors_alone  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter  # noqa: PLC0415
+    from tickrig.host.canmon.model.frames.tokens import tokens_of  # noqa: PLC0415
 
     try:
         wanted = parse_filter(word)
@@ -156,10 +156,10 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
 
 def _rules(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
-    from tickrig.host.monitor.check.alarms import Alarms  # noqa: PLC0415
-    from tickrig.host.monitor.check.rule_file import parse_rule_file  # noqa: PLC0415
-    from tickrig.host.monitor.check.rules import Rules, parse_rules  # noqa: PLC0415
-    from tickrig.host.monitor.recorder.trigger import RuleTrigger  # noqa: PLC0415
+    from tickrig.host.canmon.model.check.alarms import Alarms  # noqa: PLC0415
+    from tickrig.host.canmon.model.check.rule_file import parse_rule_file  # noqa: PLC0415
+    from tickrig.host.canmon.model.check.rules import Rules, parse_rules  # noqa: PLC0415
+    from tickrig.host.canmon.model.recorder.trigger import RuleTrigger  # noqa: PLC0415
 
     try:
         words = parse_rule_file(Path(word).read_text("utf-8"), load_rule)

@@ -9,6 +9,7 @@ from typing import Final
 import can
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.canmon.sources.bus_source import (
     BusReader,
     BusSource,
@@ -22,7 +23,6 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of
 from tickrig.host.links.can_message import to_message
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 

@@ -9,10 +9,10 @@ from functools import partial
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.monitor.check.checker import Unjudged
-from tickrig.host.monitor.check.rule import Finding
-from tickrig.host.monitor.frames.dump_line import DumpLines, Stamp, decoded_text
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.canmon.model.check.checker import Unjudged
+from tickrig.host.canmon.model.check.rule import Finding
+from tickrig.host.canmon.model.frames.dump_line import DumpLines, Stamp, decoded_text
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
 

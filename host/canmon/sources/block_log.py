@@ -7,14 +7,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.file_source import check_readable
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import FileSpec, parse_source
-from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.columns.columns import Columns
+    from tickrig.host.canmon.model.columns.columns import Columns
 
 SMALL_BYTES: Final = 1 << 20
 """Below it a log is read frame by frame sooner than numpy is imported."""
@@ -33,7 +33,7 @@ class BlockLog(AnySource["Columns"]):
     no_columns = False
 
     def __init__(self, path: Path) -> None:
-        from tickrig.host.monitor.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
+        from tickrig.host.canmon.model.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
 
         check_readable(path)
         self._path, self._reader = path, read_columns(path)
@@ -45,7 +45,7 @@ class BlockLog(AnySource["Columns"]):
 
     def poll(self, timeout_us: int, /) -> list[Columns]:
         """Return the next block; it never waits."""
-        from tickrig.host.monitor.columns.columns import NoColumnsError  # noqa: PLC0415 - numpy
+        from tickrig.host.canmon.model.columns.columns import NoColumnsError  # noqa: PLC0415 - numpy
 
         try:
             return [next(self._blocks)]

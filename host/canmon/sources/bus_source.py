@@ -9,6 +9,10 @@ import can
 from can.util import load_config
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.can_log import channel_name
+from tickrig.host.canmon.model.logs.can_record import to_record
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.socket_reader import SocketReader, let_fd
 from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
@@ -16,10 +20,6 @@ from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
 from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.links.can_link import BusReceiver, close_bus
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.can_log import channel_name
-from tickrig.host.monitor.logs.can_record import to_record
-from tickrig.host.monitor.logs.tally import Tally
 
 BATCH: Final = 1_024
 """So that a bus that never falls silent cannot keep its reader."""

@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Final, cast
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames.ident import flagged_id
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
+from tickrig.host.canmon.model.logs.mark import DROP, Mark
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import FileSpec
 from tickrig.host.links.ready import ready
-from tickrig.host.monitor.frames.ident import flagged_id
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_reader import Item, LogLines, among, read_log
-from tickrig.host.monitor.logs.mark import DROP, Mark
-from tickrig.host.monitor.logs.tally import Tally
 
 BATCH: Final = 1_024
 """Frames of one poll."""

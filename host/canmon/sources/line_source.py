@@ -12,12 +12,12 @@ from functools import partial
 from pathlib import PurePath
 from typing import Final
 
+from tickrig.host.canmon.model.decode.serial.rrc_lines import RrcLines
+from tickrig.host.canmon.model.decode.serial.rtc_lite_lines import RtcLiteLine
+from tickrig.host.canmon.model.frames.record import LineRecord
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.source_spec import LineSpec
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
-from tickrig.host.monitor.decode.serial.rtc_lite_lines import RtcLiteLine
-from tickrig.host.monitor.frames.record import LineRecord
-from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.rtc_lite.frame import Checksum
 
 Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]

@@ -10,17 +10,17 @@ from itertools import repeat
 from queue import Empty
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
+from tickrig.host.canmon.model.frames.ident import CandumpFilter, flagged_id
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.reopening_reader import ReopeningReader
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.waiting_queue import WaitingQueue
-from tickrig.host.monitor.frames.ident import CandumpFilter, flagged_id
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.mark import Mark
-from tickrig.host.monitor.logs.tally import Tally
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import LineRecord
+    from tickrig.host.canmon.model.frames.record import LineRecord
 
 QUEUE_FRAMES: Final = 200_000
 """Ten seconds of the busiest bus of 1 Mbit/s."""

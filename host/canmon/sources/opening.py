@@ -16,9 +16,9 @@ from tickrig.host.cli.refused import Refused
 from tickrig.host.links.errors import LinkClosed
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.frames.record import AnyRecord
     from tickrig.host.canmon.sources.bus_source import OpenBus
     from tickrig.host.canmon.sources.live_source import LiveSource, Reader
-    from tickrig.host.monitor.frames.record import AnyRecord
 
 
 def open_source(words: Sequence[str], options: BusOptions | None = None) -> Source:

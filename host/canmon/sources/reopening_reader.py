@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.logs.mark import Mark, back, gone
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.logs.mark import Mark, back, gone
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.frames.record import LineRecord, Record
     from tickrig.host.canmon.sources.live_source import Reader
-    from tickrig.host.monitor.frames.record import LineRecord, Record
 
 REOPEN_US: Final = 500_000
 """How long to wait before it is tried again."""

@@ -13,11 +13,11 @@ import struct
 from contextlib import suppress
 from typing import Any, Final
 
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.tally import CAN_XL, Tally
 from tickrig.host.links.can_link import close_bus
 from tickrig.host.links.errors import LinkClosed
 from tickrig.host.links.ready import ready
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
 from tickrig.wire.can_fd import BRS, ESI, FdFrame

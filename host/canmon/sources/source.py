@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from tickrig.host.monitor.frames.record import Record
+from tickrig.host.canmon.model.frames.record import Record
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.logs.mark import Mark
-    from tickrig.host.monitor.logs.tally import Tally
+    from tickrig.host.canmon.model.logs.mark import Mark
+    from tickrig.host.canmon.model.logs.tally import Tally
 
 Taken_co = TypeVar("Taken_co", covariant=True)
 

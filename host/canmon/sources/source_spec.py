@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from tickrig.host.canmon.model.frames.ident import CandumpFilter
+from tickrig.host.canmon.model.logs.log_file import COMPRESSED, SUFFIXES, LogFormatError, log_format
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.ident import CandumpFilter
-from tickrig.host.monitor.logs.log_file import COMPRESSED, SUFFIXES, LogFormatError, log_format
 
 INTERFACES: Final = {"udp": "udp_multicast", "sim": "tickrig"}
 """Short names of python-can's interfaces."""

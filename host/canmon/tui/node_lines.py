@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from textwrap import wrap
 from typing import Final, NamedTuple
 
-from tickrig.host.monitor.decode.board_text import emcy_history
-from tickrig.host.monitor.decode.node_board import NodeStatus
-from tickrig.host.monitor.views.node_card import identity_words, maker_text, pdo_contents
+from tickrig.host.canmon.model.decode.board_text import emcy_history
+from tickrig.host.canmon.model.decode.node_board import NodeStatus
+from tickrig.host.canmon.model.views.node_card import identity_words, maker_text, pdo_contents
 from tickrig.host.tui.line_view import Line, line_width, plain
 from tickrig.wire.canopen.emcy import describe
 from tickrig.wire.canopen.nmt import NmtState

@@ -10,9 +10,9 @@ from textual.events import Click
 from textual.strip import Strip
 from textual.widget import Widget
 
+from tickrig.host.canmon.model.frames.quantity import load_text
 from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask
 from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.monitor.frames.quantity import load_text
 from tickrig.host.tui.line_view import Line
 
 ARMED: Final = (" ARMED ", "bold white on red")

@@ -1,6 +1,6 @@
 """Rows of the trace as lines with styles.
 
->>> from tickrig.host.monitor.frames.record import Record
+>>> from tickrig.host.canmon.model.frames.record import Record
 >>> from tickrig.wire.can import CanFrame
 >>> row = TraceRow(7, Record(1_250_000, "can0", CanFrame.parse("185#3702")), 50_000, 100_000, 0xFF)
 >>> line = TraceLines(origin_us=1_000_000).line(row)
@@ -18,12 +18,12 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Final
 
-from tickrig.host.monitor.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
-from tickrig.host.monitor.frames.ident import any_ident, ident_text
-from tickrig.host.monitor.frames.quantity import ms_text
-from tickrig.host.monitor.frames.record import ARROWS, Record
-from tickrig.host.monitor.views.top_model import meaning_text
-from tickrig.host.monitor.views.trace import TraceRow
+from tickrig.host.canmon.model.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
+from tickrig.host.canmon.model.frames.ident import any_ident, ident_text
+from tickrig.host.canmon.model.frames.quantity import ms_text
+from tickrig.host.canmon.model.frames.record import ARROWS, Record
+from tickrig.host.canmon.model.views.top_model import meaning_text
+from tickrig.host.canmon.model.views.trace import TraceRow
 from tickrig.host.tui.line_view import Line, line_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame

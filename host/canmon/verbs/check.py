@@ -10,6 +10,21 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.extensions import load_rule
+from tickrig.host.canmon.model.check.decoded_check import DecodedCheck
+from tickrig.host.canmon.model.check.junit import junit
+from tickrig.host.canmon.model.check.rule import Finding
+from tickrig.host.canmon.model.check.rule_file import parse_rule_file
+from tickrig.host.canmon.model.check.rules import (
+    SWITCHES,
+    VALUES,
+    EdsHeartbeats,
+    Rules,
+    RuleValues,
+    joined,
+    parse_rules,
+)
+from tickrig.host.canmon.model.frames.dump_line import Stamp
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.listening import (
     bit_rate_of,
@@ -30,26 +45,11 @@ from tickrig.host.canmon.verbs.source_command import reopen_option, source_comma
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.check.decoded_check import DecodedCheck
-from tickrig.host.monitor.check.junit import junit
-from tickrig.host.monitor.check.rule import Finding
-from tickrig.host.monitor.check.rule_file import parse_rule_file
-from tickrig.host.monitor.check.rules import (
-    SWITCHES,
-    VALUES,
-    EdsHeartbeats,
-    Rules,
-    RuleValues,
-    joined,
-    parse_rules,
-)
-from tickrig.host.monitor.frames.dump_line import Stamp
-from tickrig.host.monitor.frames.record import Record
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.check.column_check import ColumnChecker
-    from tickrig.host.monitor.columns.columns import Columns
+    from tickrig.host.canmon.model.check.column_check import ColumnChecker
+    from tickrig.host.canmon.model.columns.columns import Columns
 
 _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
@@ -279,7 +279,7 @@ def _one_by_one(
 def _column_checker(
     rules: Rules, bit_rate: int | None, eds_heartbeats: EdsHeartbeats
 ) -> ColumnChecker:
-    from tickrig.host.monitor.check.column_check import ColumnChecker  # noqa: PLC0415 - numpy
+    from tickrig.host.canmon.model.check.column_check import ColumnChecker  # noqa: PLC0415 - numpy
 
     return ColumnChecker(rules, bit_rate, eds_heartbeats)
 
@@ -298,6 +298,6 @@ def _write(option: str, path: Path | None, text: Callable[..., str], judged: Jud
 
 
 def _sarif(*judged: Any) -> str:
-    from tickrig.host.monitor.check.sarif import sarif  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.canmon.model.check.sarif import sarif  # noqa: PLC0415 - seldom wanted
 
     return sarif(*judged)

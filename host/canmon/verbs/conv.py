@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from tickrig.host.canmon.model.recorder.plan import Plan
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.listening import report, until_interrupted
 from tickrig.host.canmon.output.log_file import LogFile, whole_log
@@ -22,7 +23,6 @@ from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import INTERRUPTED
-from tickrig.host.monitor.recorder.plan import Plan
 
 
 @click.command()

@@ -18,9 +18,9 @@ from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused, refuse_path
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.decoder import Decoder
-    from tickrig.host.monitor.decode.filter import Filter
-    from tickrig.host.monitor.decode.node_memory import EdsObjects
+    from tickrig.host.canmon.model.decode.decoder import Decoder
+    from tickrig.host.canmon.model.decode.filter import Filter
+    from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 
 _EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
 
@@ -78,7 +78,7 @@ def decoder_of(objects: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> D
 @contextmanager
 def refusing_dbc() -> Iterator[None]:
     """Refuse, as `--dbc` does, files that are no DBC."""
-    from tickrig.host.monitor.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
 
     try:
         yield
@@ -97,7 +97,7 @@ def read_filter(text: str | None) -> Filter | None:
     """Read what `-F` says; Refused with the column if it is no filter."""
     if text is None:
         return None
-    from tickrig.host.monitor.decode.filter import FilterError, parse_filter  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter  # noqa: PLC0415 - slow
 
     try:
         return parse_filter(text)
@@ -114,7 +114,7 @@ def _split(word: str) -> tuple[int, Path]:
 
 
 def _read(node: int, path: Path) -> EdsObjects:
-    from tickrig.host.monitor.decode.node_memory import read_eds_objects  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.decode.node_memory import read_eds_objects  # noqa: PLC0415 - slow
     from tickrig.wire.canopen.eds.eds_file import EdsError  # noqa: PLC0415
 
     try:

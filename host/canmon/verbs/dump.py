@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.model.frames.dump_line import Stamp
 from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.listening import (
     bit_rate_of,
@@ -40,12 +41,11 @@ from tickrig.host.canmon.verbs.source_command import reopen_option, source_comma
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.frames.dump_line import Stamp
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.logs.mark import Mark
     from tickrig.host.canmon.output.log_file import LogFile
-    from tickrig.host.monitor.frames.record import AnyRecord
-    from tickrig.host.monitor.logs.mark import Mark
 
 POLL_US: Final = 100_000
 

@@ -14,6 +14,10 @@ from typing import Any, Final
 
 import click
 
+from tickrig.host.canmon.model.graph.collector import Collector
+from tickrig.host.canmon.model.graph.plot import render
+from tickrig.host.canmon.model.graph.series import Series, View
+from tickrig.host.canmon.model.graph.signal_spec import ObjectName, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
 from tickrig.host.canmon.sources.block_log import BlockLog, block_log
@@ -24,10 +28,6 @@ from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.options import PATH, time_option
 from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import paint
-from tickrig.host.monitor.graph.collector import Collector
-from tickrig.host.monitor.graph.plot import render
-from tickrig.host.monitor.graph.series import Series, View
-from tickrig.host.monitor.graph.signal_spec import ObjectName, parse_signal
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")
 _RANGE: Final = re.compile(r"([1-9])=((?:(?!\.\.)[0-9.eE+-])++)\.\.([0-9.eE+-]+)")

@@ -13,9 +13,7 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.logs.log_file import (
+from tickrig.host.canmon.model.logs.log_file import (
     COMPRESSED,
     TEXT,
     LogError,
@@ -23,8 +21,10 @@ from tickrig.host.monitor.logs.log_file import (
     LogFormatError,
     log_format,
 )
-from tickrig.host.monitor.logs.log_reader import LogLines, read_log
-from tickrig.host.monitor.logs.tally import Tally
+from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
+from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.cli.options import PATH
+from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import json_text
 
 HEAD_FRAMES: Final = 1_000

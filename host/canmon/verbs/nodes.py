@@ -10,6 +10,10 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
+from tickrig.host.canmon.model.decode.board_text import board_json, render_board
+from tickrig.host.canmon.model.decode.node_board import NodeBoard
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
 from tickrig.host.canmon.sources.block_log import BlockLog, block_log
@@ -17,14 +21,10 @@ from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.board_text import board_json, render_board
-from tickrig.host.monitor.decode.node_board import NodeBoard
-from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Record
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.columns.column_nodes import ColumnNodes
-    from tickrig.host.monitor.columns.columns import Columns
+    from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes
+    from tickrig.host.canmon.model.columns.columns import Columns
 
 MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
@@ -94,7 +94,7 @@ class NodesView:
     def take_block(self, columns: Columns) -> None:
         """Take a block of a log."""
         if self._columns is None:
-            from tickrig.host.monitor.columns.column_nodes import ColumnNodes  # noqa: PLC0415 - numpy
+            from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes  # noqa: PLC0415 - numpy
 
             self._columns = ColumnNodes(self.decoder, self._board)
         self._columns.take(columns)

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.errors import SourceFailed, until_unread
+from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
+from tickrig.host.canmon.model.replay.replay_plan import FOREVER, Due, Lateness, ReplayPlan
 from tickrig.host.canmon.output.clocks import Pace
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canmon.sources.opening import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_reader import LogReader, read_log
-from tickrig.host.monitor.replay.replay_plan import FOREVER, Due, Lateness, ReplayPlan
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import FieldError, WireError

@@ -11,15 +11,10 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
-from tickrig.host.canmon.output.clocks import Pace
-from tickrig.host.canmon.output.listening import until_interrupted
-from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_and_rest, bus_options
-from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import (
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
+from tickrig.host.canmon.model.sequence.sequence_run import (
     DecodedCondition,
     EventType,
     FrameCondition,
@@ -27,9 +22,14 @@ from tickrig.host.monitor.sequence.sequence_run import (
     event_line,
     outline,
 )
-from tickrig.host.monitor.sequence.sequence_run import Sequence as Steps
-from tickrig.host.monitor.sequence.variables import parse_variable
-from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
+from tickrig.host.canmon.model.sequence.sequence_run import Sequence as Steps
+from tickrig.host.canmon.model.sequence.variables import parse_variable
+from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
+from tickrig.host.canmon.output.clocks import Pace
+from tickrig.host.canmon.output.listening import until_interrupted
+from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_and_rest, bus_options
+from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 

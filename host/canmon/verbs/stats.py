@@ -8,6 +8,18 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.traffic.bit_rates import BitRates
+from tickrig.host.canmon.model.traffic.traffic import Snapshot, Traffic
+from tickrig.host.canmon.model.views.statistics import (
+    bus_json,
+    bus_lines,
+    by_id,
+    by_node,
+    id_json,
+    node_json,
+    node_rows,
+)
 from tickrig.host.canmon.output.listening import (
     bit_rates_of,
     count_blocks,
@@ -20,18 +32,6 @@ from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.verbs.source_command import source_command
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.traffic.bit_rates import BitRates
-from tickrig.host.monitor.traffic.traffic import Snapshot, Traffic
-from tickrig.host.monitor.views.statistics import (
-    bus_json,
-    bus_lines,
-    by_id,
-    by_node,
-    id_json,
-    node_json,
-    node_rows,
-)
 
 
 @source_command(

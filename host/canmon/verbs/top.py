@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.model.views.top_model import TopModel
 from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
 from tickrig.host.canmon.output.listening import (
     bit_rates_of,
@@ -27,10 +28,9 @@ from tickrig.host.canmon.verbs.decode_options import (
 )
 from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.views.top_model import TopModel
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.frames.record import AnyRecord
+    from tickrig.host.canmon.model.frames.record import AnyRecord
 
 Take = Callable[["Sequence[AnyRecord]"], None]
 

@@ -31,9 +31,9 @@ from tickrig.host.rtc.system.real_time import RealTime
 from tickrig.host.rtc.system.system import System, restore, with_remotes
 from tickrig.host.text.user_file import explain_error, find_class
 
-ATTACH_LITE: Final = "tickrig.host.rtc_lite.lite_option:attach_lite"
+ATTACH_LITE: Final = "tickrig.host.rtc.lite.lite_option:attach_lite"
 """Named by its path, as a command is: that room is made of this one's components."""
-JOIN_ENGINES: Final = "tickrig.host.engines.engines_joined:engines_joined"
+JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 """The same."""
 
 

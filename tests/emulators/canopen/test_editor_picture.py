@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import runpy
 
-from tests.host.rtc_canopen.bench import EXAMPLES
+from tests.host.rtc.canopen.bench import EXAMPLES
 
 TOOL = EXAMPLES.parent / "tools" / "rtc_canopen_editor_picture.py"
 

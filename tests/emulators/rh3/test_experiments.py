@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.rh3.cart.convoy import Convoy, OmniCart
-from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import Manager, OutPort, connect
+from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 

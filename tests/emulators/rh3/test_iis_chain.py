@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.iis.interfaces import GoalInterface, RunningInformation
-from tickrig.host.motion.iis.path_interface import PASSED, STOPPED, PathInterface
-from tickrig.host.motion.ports import read_all, to_pose_2d
 from tickrig.host.rtc import InPort, OutPort, connect
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.iis.interfaces import GoalInterface, RunningInformation
+from tickrig.host.rtc.motion.iis.path_interface import PASSED, STOPPED, PathInterface
+from tickrig.host.rtc.motion.ports import read_all, to_pose_2d
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 

@@ -6,12 +6,12 @@ from math import hypot, nan
 
 import pytest
 
-from tests.host.motion.port_bench import at
+from tests.host.rtc.motion.port_bench import at
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.host.motion.components.ref_hard import RefHardRh3
-from tickrig.host.motion.geometry import Pose
 from tickrig.host.rtc import OutPort
+from tickrig.host.rtc.motion.components.ref_hard import RefHardRh3
+from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.wire.modbus.rh3 import Status
 from tickrig.wire.rtc_types import iis

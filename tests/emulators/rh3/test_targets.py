@@ -13,11 +13,11 @@ import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.host.motion.components.omni_to_2wd import plan
-from tickrig.host.motion.control_laws import VelocityLimits
-from tickrig.host.motion.drive import drive, set_latency, start
-from tickrig.host.motion.geometry import Pose
-from tickrig.host.motion.motion_run import MotionRun, least_time_s
+from tickrig.host.rtc.motion.components.omni_to_2wd import plan
+from tickrig.host.rtc.motion.control_laws import VelocityLimits
+from tickrig.host.rtc.motion.drive import drive, set_latency, start
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.motion_run import MotionRun, least_time_s
 
 Points = tuple[Pose, ...]
 GOAL: Points = (Pose(1.0, 0.5, pi / 2),)

@@ -8,9 +8,9 @@ import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.host.motion.drive import drive, start
-from tickrig.host.motion.geometry import Pose, Wheels
-from tickrig.host.motion.umbmark import run_umbmark, square
+from tickrig.host.rtc.motion.drive import drive, start
+from tickrig.host.rtc.motion.geometry import Pose, Wheels
+from tickrig.host.rtc.motion.umbmark import run_umbmark, square
 
 SIDE_M = 2.0
 """Half of UMBmark's, for half the time."""

@@ -13,9 +13,9 @@ from click.testing import CliRunner, Result
 from tests.host.canmon.tui.pilot import drive_session, on_monitor
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.extensions import make_decoder
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.tabs import TABS, make_panels
-from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 
 PAGE = Path(__file__).parents[3] / "docs" / "howto/extending.md"

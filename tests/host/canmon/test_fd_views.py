@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.views.trace import Trace
 from tickrig.host.canmon.sources import block_log
 from tickrig.host.canmon.tui.trace_line import TraceLines, line_text
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.views.trace import Trace
 from tickrig.wire.can_fd import FdFrame
 
 WIDE = "00" * 63

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.model.columns import column_reader
 from tickrig.host.canmon.sources import block_log
-from tickrig.host.monitor.columns import column_reader
 
 EMCY = "".join(f"({n}.000000) can0 083#3081110000000000\n" for n in range(1, 9))
 FD = "(9.000000) can0 123##1AABB\n(10.000000) can0 083#3081110000000000\n"

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.host.monitor.decode.drive_trace import GOLDEN
+from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
 
 PROGRAM = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")

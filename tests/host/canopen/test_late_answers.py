@@ -21,9 +21,10 @@ from tests.host.canopen.late_node import (
     Passage,
     clock_slave,
 )
-from tests.host.rtc_canopen.bench import EDS
+from tests.host.rtc.canopen.bench import EDS
 from tests.soak import examples
 from tickrig import Bench
+from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
 from tickrig.host.canopen.block_download import download_blocks
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
@@ -36,11 +37,10 @@ from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
 from tickrig.host.canopen.sdo_transfer import upload
 from tickrig.host.links.link import StampedFrames, StampedLink
-from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.rtc_canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc_canopen.node.served_node import NodePhase
-from tickrig.host.rtc_canopen.serve import read_files, serve
-from tickrig.host.rtc_canopen.server import RtcCanopenServer
+from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.serve import read_files, serve
+from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.wire.can import CanFrame
 
 MS_US = 1_000

@@ -18,7 +18,7 @@ from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.errors import FramingError
 
 if TYPE_CHECKING:
-    from tickrig.host.monitor.decode.decoder import Decoder
+    from tickrig.host.canmon.model.decode.decoder import Decoder
 
 
 def buses_of(bench: Bench) -> tuple[str, ...]:
@@ -36,7 +36,7 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 
     What PDOs carry is known, too, if it was written before the lines that are kept.
     """
-    from tickrig.host.monitor.decode.decoder import Decoder  # noqa: PLC0415 - not for each test
+    from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - not for each test
 
     decoder, buses = Decoder(), buses_of(bench)
     for line in bench._mode.mappings():
@@ -70,6 +70,6 @@ def frame_of(line: WireLine) -> CanFrame | ErrorFrame:
 
 
 def _meaning(decoder: Decoder, line: WireLine) -> str:
-    from tickrig.host.monitor.frames.record import Record  # noqa: PLC0415 - as the decoder
+    from tickrig.host.canmon.model.frames.record import Record  # noqa: PLC0415 - as the decoder
 
     return decoder.take(Record(line.at_us, line.source, frame_of(line))).text

@@ -8,6 +8,7 @@ from typing import Final
 
 import click
 
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import Entry
 from tickrig.host.canmon.net.progress_bar import ProgressBar
@@ -16,7 +17,6 @@ from tickrig.host.canopen.commissioning.program import COMMANDS, Program, Progra
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.monitor.decode.sdo.transfer import write_entry
 
 MOST_BYTES: Final = 256 << 20
 """A larger file is no firmware."""

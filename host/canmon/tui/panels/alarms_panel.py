@@ -12,12 +12,12 @@ from textual.content import Content
 from textual.widgets import Static, TabbedContent, TextArea
 
 from tickrig.host.canmon.extensions import load_rule
+from tickrig.host.canmon.model.check.alarms import RULE, Alarms, State, render_alarms
+from tickrig.host.canmon.model.check.rules import SWITCHES, VALUES, Rules, parse_rules
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.check.alarms import RULE, Alarms, State, render_alarms
-from tickrig.host.monitor.check.rules import SWITCHES, VALUES, Rules, parse_rules
 from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.tui.line_view import Line, LineView, plain
 from tickrig.wire.can import Frames

@@ -8,6 +8,12 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.canmon.model.dictionary.node_dictionary import (
+    ObjectRow,
+    encode_value,
+    render_dictionary,
+)
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
@@ -15,12 +21,6 @@ from tickrig.host.canmon.tui.settings import text_of
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask, Node
 from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.monitor.dictionary.node_dictionary import (
-    ObjectRow,
-    encode_value,
-    render_dictionary,
-)
 from tickrig.host.tui.line_view import Line, plain
 
 MARK: Final = "* "

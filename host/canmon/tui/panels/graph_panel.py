@@ -16,16 +16,16 @@ import click
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
+from tickrig.host.canmon.model.graph.plot import LABEL_WIDTH
+from tickrig.host.canmon.model.graph.series import LEAST_US
+from tickrig.host.canmon.model.graph.signal_spec import SignalSpec, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import below, text_of, texts_of
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
-from tickrig.host.monitor.graph.plot import LABEL_WIDTH
-from tickrig.host.monitor.graph.series import LEAST_US
-from tickrig.host.monitor.graph.signal_spec import SignalSpec, parse_signal
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.host.tui.line_view import Line
 from tickrig.wire.can import Frames

@@ -9,6 +9,8 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import TabbedContent, TabPane
 
+from tickrig.host.canmon.model.decode.node_board import NodeStatus
+from tickrig.host.canmon.model.decode.node_memory import DEVICE_TYPE
 from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.node_lines import board_lines, card_lines
@@ -16,8 +18,6 @@ from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.tasks.node_task import NodeTask
 from tickrig.host.canmon.tui.tasks.session import Model, Session
-from tickrig.host.monitor.decode.node_board import NodeStatus
-from tickrig.host.monitor.decode.node_memory import DEVICE_TYPE
 from tickrig.host.tui.line_view import Line, LineView, line_text, plain
 from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand
 

@@ -12,6 +12,13 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
+from tickrig.host.canmon.model.sequence.sequence_run import (
+    EventType,
+    Sequence,
+    SequenceEvent,
+    event_line,
+    outline,
+)
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
 from tickrig.host.canmon.tui.tasks.sequence_task import (
@@ -22,13 +29,6 @@ from tickrig.host.canmon.tui.tasks.sequence_task import (
     texts_settings,
 )
 from tickrig.host.canmon.tui.tasks.session import Model, Session
-from tickrig.host.monitor.sequence.sequence_run import (
-    EventType,
-    Sequence,
-    SequenceEvent,
-    event_line,
-    outline,
-)
 from tickrig.host.text.steps import StepError
 from tickrig.host.text.whole_file import write_whole
 from tickrig.host.tui.line_view import Line, LineView, plain

@@ -13,12 +13,12 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.model.views.top_columns import PLAIN, REVERSE
+from tickrig.host.canmon.model.views.top_model import UNBOUNDED, Order
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.settings import choice, truth
 from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.canmon.tui.trace_line import CHANGED
-from tickrig.host.monitor.views.top_columns import PLAIN, REVERSE
-from tickrig.host.monitor.views.top_model import UNBOUNDED, Order
 from tickrig.host.tui.line_view import Line, LineView, plain
 
 

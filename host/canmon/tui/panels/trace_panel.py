@@ -11,6 +11,10 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import Input, Static
 
+from tickrig.host.canmon.model.decode.filter import Filter, FilterError, parse_filter
+from tickrig.host.canmon.model.frames.dump_line import Stamp
+from tickrig.host.canmon.model.logs.log_file import SUFFIXES
+from tickrig.host.canmon.model.views.trace import DisplayFilter, Latest, Ring
 from tickrig.host.canmon.output.log_file import write_records
 from tickrig.host.canmon.tui.controls import PromptLine
 from tickrig.host.canmon.tui.panels.panel import Panel
@@ -18,10 +22,6 @@ from tickrig.host.canmon.tui.settings import choice, text_of, truth
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.decode.filter import Filter, FilterError, parse_filter
-from tickrig.host.monitor.frames.dump_line import Stamp
-from tickrig.host.monitor.logs.log_file import SUFFIXES
-from tickrig.host.monitor.views.trace import DisplayFilter, Latest, Ring
 from tickrig.host.tui.line_view import Line, LineView, line_text
 from tickrig.wire.can import Frames
 

@@ -12,13 +12,9 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import SendingPanel
-from tickrig.host.canmon.tui.settings import below, tables, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
-from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
-from tickrig.host.monitor.transmit.transmit_list import (
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
+from tickrig.host.canmon.model.transmit.transmit_list import (
     ON,
     AnyFrames,
     RowText,
@@ -26,6 +22,10 @@ from tickrig.host.monitor.transmit.transmit_list import (
     parse_row_text,
     render_transmit,
 )
+from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
+from tickrig.host.canmon.tui.panels.panel import SendingPanel
+from tickrig.host.canmon.tui.settings import below, tables, text_of, texts_of
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
 from tickrig.host.tui.line_view import plain
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.node_memory import Entry
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.canmon.model.dictionary.node_dictionary import NodeDictionary
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Task
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
-from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_memory import Entry
-from tickrig.host.monitor.decode.sdo.transfer import write_entry
-from tickrig.host.monitor.dictionary.node_dictionary import NodeDictionary
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
 from tickrig.wire.instant import NEVER

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from tickrig.host.canmon.model.recorder.recorder import Recorder, State
 from tickrig.host.canmon.output.recording import read_recording
 from tickrig.host.canmon.tui.settings import text_of
 from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Session, Task
 from tickrig.host.cli.refused import Refused
-from tickrig.host.monitor.recorder.recorder import Recorder, State
 from tickrig.host.text.values import counted
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER

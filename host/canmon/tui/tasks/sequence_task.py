@@ -13,18 +13,18 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from tickrig.host.canmon.tui.settings import below, tables, text_of
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Task
-from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.monitor.sequence.sequence_run import (
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
+from tickrig.host.canmon.model.sequence.sequence_run import (
     DecodedCondition,
     EventType,
     SequenceEvent,
     SequenceRun,
 )
-from tickrig.host.monitor.sequence.sequence_run import Sequence as Steps
-from tickrig.host.monitor.transmit.pdo_frames import PdoFrames
+from tickrig.host.canmon.model.sequence.sequence_run import Sequence as Steps
+from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
+from tickrig.host.canmon.tui.settings import below, tables, text_of
+from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Task
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 

@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING, Final, Protocol
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.extensions import make_decoder
+from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.node_board import NodeBoard
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.frames.record import AnyRecord, Record
+from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.traffic.bit_rates import BitRates
+from tickrig.host.canmon.model.transmit.transmit_list import AnyFrames
+from tickrig.host.canmon.model.views.top_model import TopModel
+from tickrig.host.canmon.model.views.trace import Trace
 from tickrig.host.canmon.output.clocks import Stopwatch
 from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
 from tickrig.host.canmon.sources.opening import open_any, open_live
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.sources.source_spec import BusSpec, LineSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.monitor.decode.decoded import Decoded
-from tickrig.host.monitor.decode.node_board import NodeBoard
-from tickrig.host.monitor.decode.node_memory import EdsObjects
-from tickrig.host.monitor.frames.record import AnyRecord, Record
-from tickrig.host.monitor.logs.mark import Mark
-from tickrig.host.monitor.traffic.bit_rates import BitRates
-from tickrig.host.monitor.transmit.transmit_list import AnyFrames
-from tickrig.host.monitor.views.top_model import TopModel
-from tickrig.host.monitor.views.trace import Trace
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 from tickrig.wire.instant import NEVER

@@ -19,8 +19,8 @@ from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.motion_cli import main as rh3
 from tickrig.emulators.rh3.cart.options import MotionOptions, require_arrival
 from tickrig.emulators.rh3.cart.squares import SquarePlan, run_squares
-from tickrig.host.motion.drive import BaseConnection, drive, start
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.rtc.motion.drive import BaseConnection, drive, start
+from tickrig.host.rtc.motion.geometry import Pose
 
 CORNERS = "0.5, 0  # first\n\n0.5 0.5 9\n0 0 0\n"
 

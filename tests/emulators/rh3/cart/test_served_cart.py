@@ -16,8 +16,8 @@ from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.cart.motion_cli import main as rh3
 from tickrig.emulators.rh3.cart.served_cart import CartClock, CartControl, ServedCart
 from tickrig.host.control.client import ControlClient
-from tickrig.host.motion.drive import start
-from tickrig.host.motion.geometry import Pose
+from tickrig.host.rtc.motion.drive import start
+from tickrig.host.rtc.motion.geometry import Pose
 
 ASKS = "PositionInput0 goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
 RH3 = [sys.executable, "-c", "from tickrig.commands import rh3; rh3()"]

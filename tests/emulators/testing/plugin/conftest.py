@@ -12,7 +12,7 @@ import serial
 
 from tickrig.emulators.testing.plugin import benched_test, pytest_plugin
 from tickrig.emulators.testing.plugin.evidence import journal_text
-from tickrig.host.monitor.decode import decoder
+from tickrig.host.canmon.model.decode import decoder
 
 Run = Callable[..., pytest.RunResult]
 

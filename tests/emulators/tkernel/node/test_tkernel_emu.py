@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from tests.host.engines.openrtm.extra import OMNIORB
+from tests.host.rtc.engines.openrtm.extra import OMNIORB
 from tests.host.rtc.ucode.bench import DOOR
 from tickrig.emulators.bench.child import Child, running
 from tickrig.emulators.commands.cli import main as tickrig
@@ -136,7 +136,7 @@ def test_a_system_beyond_its_limits_is_refused_at_boot(tmp_path: Path) -> None:
 @pytest.mark.realtime
 @OMNIORB
 def test_its_components_are_in_the_context_tkernel_of_a_name_server(tmp_path: Path) -> None:
-    from tests.host.engines.openrtm.live_system import live_system  # noqa: PLC0415 - an extra
+    from tests.host.rtc.engines.openrtm.live_system import live_system  # noqa: PLC0415 - an extra
 
     words = ("--boot", "100ms", "--connectors", "1", str(chain(tmp_path)))
     with live_system(tmp_path, *words, command="tkernel-emu") as node:

@@ -2,11 +2,11 @@ from __future__ import annotations
 
 import pytest
 
+from tickrig.host.canmon.model.decode.serial.rrc_lines import RrcLines
+from tickrig.host.canmon.model.frames.dump_line import Stamp
+from tickrig.host.canmon.model.frames.record import LineRecord
+from tickrig.host.canmon.model.logs.log_reader import LogLines
 from tickrig.host.canmon.output.printer import Output, printer_of
-from tickrig.host.monitor.decode.serial.rrc_lines import RrcLines
-from tickrig.host.monitor.frames.dump_line import Stamp
-from tickrig.host.monitor.frames.record import LineRecord
-from tickrig.host.monitor.logs.log_reader import LogLines
 
 
 def line(data: bytes) -> LineRecord:

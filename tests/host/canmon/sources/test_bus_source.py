@@ -13,6 +13,8 @@ from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
@@ -21,8 +23,6 @@ from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.refused import Refused
 from tickrig.host.links.can_message import to_message
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import AnyFrame, Record
-from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 

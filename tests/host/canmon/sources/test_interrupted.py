@@ -8,10 +8,10 @@ from queue import SimpleQueue
 from types import FrameType
 from typing import Any
 
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.live_source import LiveSource
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.tally import Tally
 
 PATIENCE_S = 10.0
 

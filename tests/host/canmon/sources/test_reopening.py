@@ -16,14 +16,14 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames.ident import CandumpFilter
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.can_log import channel_name
+from tickrig.host.canmon.model.logs.mark import BACK, GONE, Mark
+from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.sources.live_source import LiveSource
 from tickrig.host.canmon.sources.reopening_reader import REOPEN_US, ReopeningReader
 from tickrig.host.links.errors import LinkClosed
-from tickrig.host.monitor.frames.ident import CandumpFilter
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.logs.can_log import channel_name
-from tickrig.host.monitor.logs.mark import BACK, GONE, Mark
-from tickrig.host.monitor.logs.tally import Tally
 from tickrig.wire.can import CanFrame
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")

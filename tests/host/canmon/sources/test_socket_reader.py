@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 import pytest
 
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.canmon.sources.socket_reader import SO_TIMESTAMPNS, SocketReader
-from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 from tickrig.wire.can_fd import BRS, ESI, FdFrame

@@ -10,10 +10,10 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
+from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
+from tickrig.host.canmon.model.frames.record import Record
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.tasks.session import Model, Session
-from tickrig.host.monitor.decode.node_memory import read_eds_objects
-from tickrig.host.monitor.frames.record import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 

@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.host.monitor.record_log import hear
+from tests.host.canmon.model.record_log import hear
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.node_board import NodeBoard
 from tickrig.host.canmon.tui.node_lines import (
     BAD,
     GOOD,
@@ -13,8 +15,6 @@ from tickrig.host.canmon.tui.node_lines import (
     card_lines,
     heartbeat_line,
 )
-from tickrig.host.monitor.decode.decoder import Decoder
-from tickrig.host.monitor.decode.node_board import NodeBoard
 from tickrig.host.tui.line_view import Line, line_text, line_width
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"

@@ -5,19 +5,19 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.host.monitor.decode.test_noise import CAN_IDS, ERRORS, REMOTE, SDO, WIDE
-from tests.host.monitor.strategies import data_frame
+from tests.host.canmon.model.decode.test_noise import CAN_IDS, ERRORS, REMOTE, SDO, WIDE
+from tests.host.canmon.model.strategies import data_frame
+from tickrig.host.canmon.model.check.alarms import render_alarms
+from tickrig.host.canmon.model.check.rules import parse_rules
+from tickrig.host.canmon.model.dictionary.node_dictionary import render_dictionary
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
+from tickrig.host.canmon.model.graph.signal_spec import parse_signal
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmTask
 from tickrig.host.canmon.tui.panels.graph_panel import GraphTask
 from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
 from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
 from tickrig.host.canmon.tui.tasks.session import Model
-from tickrig.host.monitor.check.alarms import render_alarms
-from tickrig.host.monitor.check.rules import parse_rules
-from tickrig.host.monitor.dictionary.node_dictionary import render_dictionary
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.graph.live_graph import LiveGraph, ViewMode
-from tickrig.host.monitor.graph.signal_spec import parse_signal
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_error import ErrorFrame
 

@@ -10,6 +10,9 @@ import pytest
 
 from tests.host.canmon.tui.pilot import drive_session, on_monitor, wire_session
 from tests.host.canmon.wire import Wire, new_wire
+from tickrig.host.canmon.model.frames.record import AnyRecord
+from tickrig.host.canmon.model.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.mark import Mark, gone
 from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
 from tickrig.host.canmon.sources.source import AnySource
 from tickrig.host.canmon.tui.app import Monitor
@@ -17,9 +20,6 @@ from tickrig.host.canmon.tui.status_line import StatusLine
 from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask
 from tickrig.host.canmon.tui.tasks.session import Model, Session
 from tickrig.host.canmon.workspace import Workspace
-from tickrig.host.monitor.frames.record import AnyRecord
-from tickrig.host.monitor.logs.log_reader import read_log
-from tickrig.host.monitor.logs.mark import Mark, gone
 from tickrig.host.tui.line_view import line_text
 from tickrig.wire.can import CanFrame
 

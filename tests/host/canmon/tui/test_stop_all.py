@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from tests.host.canmon.tui.rig_session import BUS, RigSession
 from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.transmit.transmit_list import parse_row_text
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
-from tickrig.host.monitor.transmit.transmit_list import parse_row_text
 from tickrig.wire.can import CanFrame
 from tickrig.wire.can_fd import FdFrame
 

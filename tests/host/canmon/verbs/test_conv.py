@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_reader import read_log
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 

@@ -9,9 +9,9 @@ import can
 import pytest
 from click.testing import CliRunner, Result
 
-from tests.host.monitor.decode.drive_trace import GOLDEN
+from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_reader import read_log
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 

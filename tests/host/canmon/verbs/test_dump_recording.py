@@ -18,8 +18,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.monitor.logs.log_file import LogError
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_reader import read_log
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
 PATIENCE_S = 20.0

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from tests.host.canmon.model.decode.drive_trace import TRACE
 from tests.host.canmon.terminal import PROGRAM
-from tests.host.monitor.decode.drive_trace import TRACE
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.sources import block_log
 

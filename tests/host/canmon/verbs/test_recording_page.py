@@ -13,9 +13,9 @@ from typing import Final
 import pytest
 from click.testing import CliRunner
 
-from tests.host.monitor.decode.drive_trace import GOLDEN
+from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
-from tickrig.host.monitor.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_reader import read_log
 
 PAGE: Final = (
     Path(__file__).parents[4] / "docs" / "reference/canmon/canmon-recording.md"

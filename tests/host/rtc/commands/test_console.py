@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import pytest
 
 from tests.host.rtc.chain import PERIOD_US, Chain
-from tickrig.host.motion.components.position_input import USAGE, PositionInput
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.commands.console import Console
+from tickrig.host.rtc.motion.components.position_input import USAGE, PositionInput
 
 
 class Bench(Chain):

@@ -18,10 +18,10 @@ from click.testing import CliRunner
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
 from tickrig.host.control.client import ControlClient
-from tickrig.host.motion.chain import CONNECTIONS, MotionChain
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.commands.request import default_path
 from tickrig.host.rtc.component_types import COMPONENT_TYPES
+from tickrig.host.rtc.motion.chain import CONNECTIONS, MotionChain
 from tickrig.host.rtc.system.system_toml import parse_toml
 
 EXAMPLE = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"

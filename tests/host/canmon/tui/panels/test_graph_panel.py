@@ -7,10 +7,10 @@ import pytest
 
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.graph.live_graph import ViewMode
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.graph.live_graph import ViewMode
 from tickrig.wire.can import CanFrame
 
 S = 1_000_000

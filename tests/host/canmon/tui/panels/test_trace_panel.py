@@ -17,11 +17,11 @@ from tests.host.canmon.tui.pilot import (
     wire_session,
 )
 from tests.host.canmon.wire import Wire, new_wire
+from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.tui.app import Monitor
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.monitor.logs.log_reader import read_log
 from tickrig.host.tui.line_view import LineView
 
 

@@ -13,6 +13,9 @@ from tests.host.canopen.conform.defects.defect import Defect
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.report.sample import EVIDENCE, HOSTILE, SAMPLE, result
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence
+from tickrig.host.canmon.model.sequence.sequence_run import SequenceRun
 from tickrig.host.canopen.conform.report.badge import badge
 from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
 from tickrig.host.canopen.conform.report.issue import issue_text
@@ -21,9 +24,6 @@ from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
-from tickrig.host.monitor.frames.record import Record
-from tickrig.host.monitor.sequence.parse_sequence import TomlSequence
-from tickrig.host.monitor.sequence.sequence_run import SequenceRun
 
 KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
 MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", Verdict.FAIL, "no") for n in range(30)))

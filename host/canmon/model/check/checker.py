@@ -1,0 +1,223 @@
+"""Rules against frames, one by one.
+
+>>> from tickrig.wire.can import CanFrame
+>>> checker = Checker(Rules(no_emcy=True))
+>>> for finding in checker.take(Record(5, "can0", CanFrame.parse("083#3081110000000000"))):
+...     print(finding)
+(0.000005) no-emcy: node 3: EMCY 8130h life guard error or heartbeat error [can0 083#3081110000000000]
+"""  # noqa: E501 - as it is printed
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+from tickrig.host.canmon.model.check.frame_rules import NoErrorFrames
+from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, Finding, Rule, Seen
+from tickrig.host.canmon.model.check.rules import NO_EDS, NO_LOSS, EdsHeartbeats, Rules
+from tickrig.host.canmon.model.check.time_rules import MaxLoad
+from tickrig.host.canmon.model.frames.ident import ERROR, any_ident
+from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.traffic.bit_rates import BitRates
+from tickrig.host.canmon.model.traffic.traffic import Load, Window
+from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can_fd import FdFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.check.expression.expression_rule import ExpressionRule
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+
+
+class Checker:
+    """Holds frames against rules; what it keeps grows with identifiers, not with frames.
+
+    Args:
+        rules: what must hold. Those that are written as expressions want decoded frames.
+        bit_rate: bits a second, for the load.
+        data_bit_rate: of data of CAN FD frames with BRS; without it these count as slow.
+        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+
+    Raises:
+        ValueError: a limit of the load without a bit rate.
+    """
+
+    def __init__(
+        self,
+        rules: Rules,
+        bit_rate: int | None = None,
+        data_bit_rate: int | None = None,
+        eds_heartbeats: EdsHeartbeats = NO_EDS,
+    ) -> None:
+        self._rules, self._made = rules, rules.make(eds_heartbeats)
+        self._load = rules.load(bit_rate)
+        self._wanting: dict[int, list[Rule]] = {}
+        self._seen: dict[tuple[str, int], list[int]] = {}  # first and last time, and how many
+        self._begun = False
+        self._loads: dict[str, Load] = {}
+        self._expressions = [rule for one in rules.expressions for rule in one.make()]
+        self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
+
+    def take(self, record: Record, decoded: Decoded | None = None) -> list[Finding]:
+        """Return what is wrong with a frame, and with the second that it ended.
+
+        Args:
+            record: the frame.
+            decoded: what it says, for rules that are expressions.
+        """
+        if decoded is None or not self._expressions:
+            return self._taken(record)
+        found = self.advance(record.at_us) + self._taken(record)
+        for rule in self._expressions:
+            finding = rule.take(record, decoded)
+            if finding is not None:
+                found.append(finding)
+        return found
+
+    def advance(self, now_us: int) -> list[Finding]:
+        """Return what has not come in time, where no frame tells the time."""
+        late = [rule for rule in self._expressions if rule.due_us < now_us]
+        return [one for rule in late for one in rule.advance(now_us)]
+
+    def _taken(self, record: Record) -> list[Finding]:
+        at_us, channel, frame, _ = record
+        if not self._begun:
+            self._begun = True
+            for rule in self._made:
+                rule.begin(at_us)
+        found = self._too_busy(at_us, channel, frame) if self._load else []
+        if isinstance(frame, ErrorFrame):
+            return found + self._judged(ERROR, record, None)
+        ident = any_ident(frame)
+        key = channel, ident
+        seen, gap_us = self._seen.get(key), None
+        if seen is None:
+            self._seen[key] = [at_us, at_us, 1]
+        else:
+            gap_us = max(0, at_us - seen[1])
+            seen[1] = at_us
+            seen[2] += 1
+        return found + self._judged(ident, record, gap_us)
+
+    def end(
+        self,
+        end_us: int,
+        lost: Iterable[str] = (),
+        judged_us: int | None = None,
+        errors: Iterable[str] = (),
+    ) -> list[Finding]:
+        """Return what is missing.
+
+        Args:
+            end_us: when listening ended.
+            lost: what the source says was lost or is no frame.
+            judged_us: until when expressions are judged; None for `end_us`.
+            errors: what the source says of errors beside its error frames.
+        """
+        windows = [(channel, load.end()) for channel, load in sorted(self._loads.items())]
+        found = [one for channel, window in windows for one in self.judge_window(channel, window)]
+        found += ended(self._rules, self._made, self._latest(), end_us, lost, errors)
+        judged_us = end_us if judged_us is None else judged_us
+        return found + self.advance(judged_us) + self._written_ended(judged_us)
+
+    def missing(self, now_us: int) -> list[Finding]:
+        """Return what is missing until now; listening goes on."""
+        found = ended(self._rules, self._made, self._latest(), now_us, (), ())
+        return found + self._written_ended(now_us)
+
+    def unjudged(self, end_us: int, without_errors: str = "") -> Unjudged:
+        """Return what was not judged until a time.
+
+        Args:
+            end_us: when listening ended.
+            without_errors: why the source has no error frames whatever happened.
+        """
+        seen = {key: Seen(*values) for key, values in self._seen.items()}
+        evidence = CheckedTraffic(seen, end_us, without_errors)
+        return unjudged(self._rules, self._made, evidence, self._expressions)
+
+    def _latest(self) -> dict[int, int]:
+        latest: dict[int, int] = {}
+        for (_, ident), (_, at_us, _) in self._seen.items():
+            latest[ident] = max(at_us, latest.get(ident, at_us))
+        return latest
+
+    def _written_ended(self, end_us: int) -> list[Finding]:
+        return [one for rule in self._expressions for one in rule.end(end_us)]
+
+    def judge_window(self, channel: str, window: Window) -> list[Finding]:
+        """Return what is wrong with a second of a bus."""
+        text = self._load.judge(channel, window) if self._load else None
+        return [] if text is None else [Finding(window.at_us, "max-load", text)]
+
+    def _judged(self, ident: int, record: Record, gap_us: int | None) -> list[Finding]:
+        wanting = self._wanting.get(ident)
+        if wanting is None:
+            wanting = self._wanting[ident] = [rule for rule in self._made if rule.wants(ident)]
+        texts = ((rule.name, rule.judge(record, gap_us)) for rule in wanting)
+        return [Finding(record.at_us, name, text, record) for name, text in texts if text]
+
+    def _too_busy(self, at_us: int, channel: str, frame: AnyFrame) -> list[Finding]:
+        load = self._loads.get(channel)
+        if load is None:
+            load = self._loads[channel] = Load(at_us)
+        if isinstance(frame, ErrorFrame):
+            return []
+        bits = self._rates.bits(frame) if isinstance(frame, FdFrame) else frame_bits(frame)
+        window = load.take(at_us, bits)
+        return [] if window is None else self.judge_window(channel, window)
+
+
+def ended(  # noqa: PLR0913, PLR0917 - all that there is at the end
+    rules: Rules,
+    made: Iterable[Rule],
+    latest_us: dict[int, int],
+    end_us: int,
+    lost: Iterable[str],
+    errors: Iterable[str],
+) -> list[Finding]:
+    """Return what rules miss at the end, and what the source says that they forbid."""
+    found = [
+        Finding(end_us, rule.name, text) for rule in made for text in rule.end(latest_us, end_us)
+    ]
+    if rules.no_error_frames:
+        found += [Finding(end_us, NoErrorFrames.name, text) for text in errors]
+    return found + [Finding(end_us, NO_LOSS, text) for text in lost if rules.no_loss]
+
+
+class Unjudged(NamedTuple):
+    """What rules could not judge.
+
+    Attributes:
+        rules: why, by the names of those that judged nothing.
+        notes: what others could not judge beside what they have.
+    """
+
+    rules: Mapping[str, str]
+    notes: tuple[str, ...] = ()
+
+
+def unjudged(
+    rules: Rules,
+    made: Iterable[Rule],
+    evidence: CheckedTraffic,
+    written: Iterable[ExpressionRule] = (),
+) -> Unjudged:
+    """Return what was not judged of a source that had a frame."""
+    why = [(rule.name, rule.unjudged(evidence)) for rule in made]
+    why += [(rule.name, rule.unjudged(evidence)) for rule in written]
+    if rules.max_load is not None:
+        no_load = "no frame came" if not evidence.seen else ONE_TIME * evidence.untimed
+        why.append((MaxLoad.name, no_load))
+    by_name: dict[str, list[str]] = {}
+    for name, reason in why:
+        by_name.setdefault(name, []).append(reason)
+    none = {name: "; ".join(dict.fromkeys(said)) for name, said in by_name.items() if all(said)}
+    notes = [
+        f"{rule.name}: {text}"
+        for rule in made
+        if rule.name not in none
+        for text in rule.notes(evidence)
+    ]
+    notes += [f"{name}: {text}" for name, text in why if text and name not in none]
+    return Unjudged(none, tuple(notes))

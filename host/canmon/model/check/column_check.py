@@ -1,0 +1,220 @@
+"""Rules against a log in blocks: only frames that can break one are looked at; needs numpy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import starmap
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from tickrig.host.canmon.model.check.checker import Unjudged, ended, unjudged
+from tickrig.host.canmon.model.check.rule import (
+    NO_GAP_US,
+    CheckedTraffic,
+    Finding,
+    FrameSelection,
+    Rule,
+    Seen,
+)
+from tickrig.host.canmon.model.check.rules import NO_EDS, EdsHeartbeats, Rules
+from tickrig.host.canmon.model.check.time_rules import MaxLoad
+from tickrig.host.canmon.model.columns.column_bits import column_bits
+from tickrig.host.canmon.model.columns.column_load import ColumnLoad
+from tickrig.host.canmon.model.columns.columns import Columns, Ints, by_channel, records, select
+from tickrig.host.canmon.model.columns.runs import Identifiers, Runs, grown
+from tickrig.host.canmon.model.frames.ident import ERROR
+
+Flags = npt.NDArray[np.bool_]
+
+NEVER_US: Final = np.iinfo(np.int64).max
+
+Placed = tuple[int, int, Finding]
+"""A finding with its row, and its place among those of the row: the order of `Checker`."""
+
+
+class ColumnChecker:
+    """Holds blocks of frames against rules, with the findings that `Checker` has frame by frame.
+
+    What it keeps grows with identifiers, not with frames.
+
+    Args:
+        rules: what must hold.
+        bit_rate: bits a second, for the load.
+        eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+
+    Raises:
+        ValueError: a limit of the load without a bit rate.
+    """
+
+    def __init__(
+        self,
+        rules: Rules,
+        bit_rate: int | None = None,
+        eds_heartbeats: EdsHeartbeats = NO_EDS,
+    ) -> None:
+        self._rules, self._made = rules, rules.make(eds_heartbeats)
+        self._limit = rules.load(bit_rate)
+        self._wanting: dict[int, list[tuple[int, Rule]]] = {}
+        self._selections: dict[str, BusSelection] = {}
+        self._loads: dict[str, ColumnLoad] = {}
+        self._last_us, self._begun = 0, False
+
+    def take(self, columns: Columns) -> list[Finding]:
+        """Return what is wrong with a block of frames, and with the seconds that they ended."""
+        if len(columns) and not self._begun:
+            self._begun = True
+            for rule in self._made:
+                rule.begin(int(columns.at_us[0]))
+        placed: list[Placed] = []
+        found, gaps_us = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+        for channel, rows, frames in by_channel(columns):
+            if self._limit is not None:
+                placed += self._too_busy(self._limit, channel, rows, frames)
+            places, gaps = self._selections.setdefault(channel, BusSelection(self._made)).take(
+                frames
+            )
+            found.append(rows[places])
+            gaps_us.append(gaps)
+            self._last_us = int(columns.at_us[-1])
+        placed += self._judged(columns, np.concatenate(found), np.concatenate(gaps_us))
+        placed.sort(key=lambda one: one[:2])
+        return [finding for _, _, finding in placed]
+
+    def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[Finding]:
+        """Return what is missing.
+
+        Args:
+            lost: what the source says was lost or is no frame.
+            errors: what the source says of errors beside its error frames.
+        """
+        found = []
+        for channel, seconds in sorted(self._loads.items()):
+            window = seconds.load.end()
+            text = self._limit.judge(channel, window) if self._limit else None
+            found += [Finding(window.at_us, MaxLoad.name, text)] if text else []
+        latest_us: dict[int, int] = {}
+        for selection in self._selections.values():
+            for ident, one in selection.seen():
+                latest_us[ident] = max(one.last_us, latest_us.get(ident, one.last_us))
+        return found + ended(self._rules, self._made, latest_us, self._last_us, lost, errors)
+
+    def unjudged(self, without_errors: str = "") -> Unjudged:
+        """Return what was not judged; see `Checker.unjudged`."""
+        seen = {
+            (channel, ident): one
+            for channel, selection in self._selections.items()
+            for ident, one in selection.seen()
+        }
+        evidence = CheckedTraffic(seen, self._last_us, without_errors)
+        return unjudged(self._rules, self._made, evidence)
+
+    def _too_busy(
+        self, limit: MaxLoad, channel: str, rows: Ints, frames: Columns
+    ) -> Iterable[Placed]:
+        if channel not in self._loads:
+            self._loads[channel] = ColumnLoad(int(frames.at_us[0]))
+        plain = np.flatnonzero(frames.ident & ERROR == 0)
+        bits = column_bits(frames.ident[plain], frames.dlc[plain], frames.payload[plain])
+        for window, row in self._loads[channel].take(frames.at_us[plain], bits):
+            if text := limit.judge(channel, window):
+                yield int(rows[plain[row]]), 0, Finding(window.at_us, limit.name, text)
+
+    def _judged(self, columns: Columns, rows: Ints, gaps_us: Ints) -> Iterable[Placed]:
+        """Let the rules see selected frames, in the order of the log."""
+        order = np.argsort(rows, kind="stable")
+        rows, selected = rows[order], select(columns, rows[order])
+        idents = np.where(selected.ident & ERROR, ERROR, selected.ident)
+        seen = zip(
+            rows.tolist(),
+            idents.tolist(),
+            gaps_us[order].tolist(),
+            records(selected),
+            strict=True,
+        )
+        for row, ident, gap_us, record in seen:
+            wanting = self._wanting.get(ident)
+            if wanting is None:
+                made = enumerate(self._made, 1)
+                wanting = [(place, rule) for place, rule in made if rule.wants(ident)]
+                self._wanting[ident] = wanting
+            for place, rule in wanting:
+                text = rule.judge(record, None if gap_us == NO_GAP_US else gap_us)
+                if text:
+                    yield row, place, Finding(record.at_us, rule.name, text, record)
+
+
+class BusSelection:
+    """Tells which frames of a bus rules must see: by their gaps, first bytes and places.
+
+    Args:
+        rules: that say it; no frame but these can change what they find.
+    """
+
+    def __init__(self, rules: Sequence[Rule]) -> None:
+        self._rules, self._errors = rules, any(rule.wants(ERROR) for rule in rules)
+        self._idents = Identifiers()
+        self._below_us, self._above_us = np.empty(0, np.int64), np.empty(0, np.int64)
+        self._all, self._firsts = np.empty(0, np.bool_), np.empty(0, np.bool_)
+        self._bytes = np.empty((0, 256), np.bool_)
+        self._frames = np.empty(0, np.int64)
+
+    def take(self, frames: Columns) -> tuple[Ints, Ints]:
+        """Return the rows of selected frames and error frames, and the gap before each."""
+        errors = frames.ident & ERROR != 0
+        plain = np.flatnonzero(~errors)
+        found = np.flatnonzero(errors) if self._errors else plain[:0]
+        if not len(plain):
+            return found, np.full(len(found), NO_GAP_US)
+        runs = self._idents.take(frames.ident[plain], frames.at_us[plain])
+        self._extend(len(self._idents))
+        self._frames[runs.numbers] += runs.lengths
+        places = np.flatnonzero(self._selected(runs, frames.payload[plain]))
+        gaps_us = runs.gaps_us
+        gaps_us[runs.begins[runs.fresh]] = NO_GAP_US
+        rows = np.concatenate((found, plain[runs.order[places]]))
+        return rows, np.concatenate((np.full(len(found), NO_GAP_US), gaps_us[places]))
+
+    def seen(self) -> Iterable[tuple[int, Seen]]:
+        """Give each identifier and when it was heard."""
+        idents = self._idents
+        values = zip(
+            idents.first_us.tolist(), idents.last_us.tolist(), self._frames.tolist(), strict=True
+        )
+        return zip(idents.idents.tolist(), starmap(Seen, values), strict=True)
+
+    def _extend(self, count: int) -> None:
+        """Ask the rules what they suspect of identifiers that are new; there are `count` now."""
+        before = len(self._all)
+        self._below_us, self._above_us = grown(self._below_us, count), grown(self._above_us, count)
+        self._all, self._firsts = grown(self._all, count), grown(self._firsts, count)
+        self._bytes, self._frames = grown(self._bytes, count), grown(self._frames, count)
+        self._above_us[before:] = NEVER_US
+        for number in range(before, count):
+            ident = int(self._idents.idents[number])
+            for rule in self._rules:
+                if rule.wants(ident):
+                    self._add(number, rule.selection(ident))
+
+    def _add(self, number: int, selection: FrameSelection) -> None:
+        below_us, above_us, first_bytes, firsts = selection
+        self._all[number] |= selection == FrameSelection()
+        self._firsts[number] |= firsts
+        self._bytes[number, sorted(first_bytes)] = True
+        if below_us is not None:
+            self._below_us[number] = max(self._below_us[number], below_us)
+        if above_us is not None:
+            self._above_us[number] = min(self._above_us[number], above_us)
+
+    def _selected(self, runs: Runs, payload: npt.NDArray[np.uint64]) -> Flags:
+        """Say which frames are selected, in the order of the runs."""
+        numbers, lengths = runs.numbers, runs.lengths
+        selected = np.repeat(self._all[numbers], lengths)
+        selected |= runs.gaps_us < np.repeat(self._below_us[numbers], lengths)
+        selected |= runs.gaps_us > np.repeat(self._above_us[numbers], lengths)
+        selected[runs.begins[runs.fresh & self._firsts[numbers]]] = True
+        if self._bytes[numbers].any():
+            low = (payload[runs.order] & np.uint64(0xFF)).astype(np.int64)
+            selected |= self._bytes[np.repeat(numbers, lengths), low]
+        return selected

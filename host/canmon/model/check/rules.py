@@ -1,0 +1,293 @@
+"""All rules of a check: as values, and as people write them on a command line or in TOML."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from tickrig.host.canmon.model.check.frame_rules import (
+    KnownIds,
+    NodesPresent,
+    NoEmcy,
+    NoErrorFrames,
+    NoReboot,
+    NoSdoAbort,
+)
+from tickrig.host.canmon.model.check.rule import Rule
+from tickrig.host.canmon.model.check.time_rules import (
+    Heartbeat,
+    HeartbeatTimes,
+    MaxGap,
+    MaxLoad,
+    NoLostHeartbeat,
+)
+from tickrig.host.canmon.model.frames.ident import FD, REMOTE, ident_text, parse_ident
+from tickrig.host.text.names import closest
+from tickrig.host.text.values import parse_time_with_unit_us
+from tickrig.wire.can import EXTENDED_MAX
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.check.expression.parse_rule import Expression
+
+NO_LOSS: Final = "no-loss"
+"""The rule that no frame was lost and every line of a log is one."""
+
+
+EdsHeartbeats = Mapping[int, int]
+NO_EDS: Final[EdsHeartbeats] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Rules:
+    """What traffic must keep.
+
+    Attributes:
+        max_load: percent of the bit rate in any second, None for no limit.
+        bit_rate: bits a second, where nothing else tells it; no rule by itself.
+        no_emcy: no EMCY but error reset.
+        no_sdo_abort: no aborted SDO transfer.
+        no_error_frames: no error frame.
+        no_reboot: no boot-up of a node that was heard, without an NMT reset.
+        no_lost_heartbeat: no node that sent heartbeats falls silent.
+        no_loss: no frame lost, no line of a log that is none.
+        heartbeats: when those of some nodes come.
+        nodes: nodes that must be heard.
+        max_gaps: identifiers and the longest gap of each, microseconds.
+        known: all identifiers that may come, None for any.
+        others: what makes further rules, those of installed packages.
+        expressions: rules about what frames mean. `Checker` holds them where it is given decoded
+            frames; a whole log at once is not held against them.
+    """
+
+    max_load: float | None = None
+    bit_rate: int | None = None
+    no_emcy: bool = False
+    no_sdo_abort: bool = False
+    no_error_frames: bool = False
+    no_reboot: bool = False
+    no_lost_heartbeat: bool = False
+    no_loss: bool = False
+    heartbeats: tuple[HeartbeatTimes, ...] = ()
+    nodes: tuple[int, ...] = ()
+    max_gaps: tuple[tuple[int, int], ...] = ()
+    known: frozenset[int] | None = None
+    others: tuple[Callable[[], Rule], ...] = ()
+    expressions: tuple[Expression, ...] = ()
+
+    def names(self) -> list[str]:
+        """Return the names of all rules, for a report."""
+        names = ["max-load"] * (self.max_load is not None) + [NO_LOSS] * self.no_loss
+        names += [rule.name for rule in self.make()]
+        return list(dict.fromkeys([*names, *(one.name for one in self.expressions)]))
+
+    def make(self, eds_heartbeats: EdsHeartbeats = NO_EDS) -> list[Rule]:
+        """Return new rules about frames.
+
+        Args:
+            eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
+        """
+        made: list[Rule] = []
+        made += [NoEmcy()] * self.no_emcy
+        made += [NoSdoAbort()] * self.no_sdo_abort
+        made += [NoErrorFrames()] * self.no_error_frames
+        made += [NoReboot()] * self.no_reboot
+        made += [NoLostHeartbeat(eds_heartbeats)] if self.no_lost_heartbeat else []
+        made += [Heartbeat(times) for times in self.heartbeats]
+        made += [NodesPresent(self.nodes)] * bool(self.nodes)
+        made += [MaxGap(*gap) for gap in self.max_gaps]
+        made += [KnownIds(self.known)] if self.known is not None else []
+        made += [make() for make in self.others]
+        return made
+
+    def load(self, bit_rate: int | None) -> MaxLoad | None:
+        """Return the rule about load; ValueError if it needs a bit rate and there is none."""
+        if self.max_load is None:
+            return None
+        bit_rate = self.bit_rate if bit_rate is None else bit_rate
+        if bit_rate is None:
+            raise ValueError("a limit of the load needs the bit rate: give -b, as -b 500000")
+        return MaxLoad(self.max_load, bit_rate)
+
+
+RuleValues = Mapping[str, object]
+"""Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
+
+LoadRule = Callable[[str], Callable[[], Rule]]
+
+SWITCHES: Final = (
+    "no_emcy",
+    "no_sdo_abort",
+    "no_error_frames",
+    "no_reboot",
+    "no_lost_heartbeat",
+    "no_loss",
+)
+NUMBERS: Final = ("max_load", "bitrate")
+LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
+VALUES: Final = (*NUMBERS, *LISTS)
+
+_HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-9]+)?)(%|s|ms|us)")
+_NAMES: Final = re.compile(r"[\w.-]*(?:\s*,\s*[\w.-]+)*", re.ASCII)
+_NAMED: Final = re.compile(r"(.*\S): (.*)", re.DOTALL)
+ONE_WORD: Final = ("dlc",)
+"""Rules that are written out as one word, and no names."""
+_NODES: Final = re.compile(r"([0-9]{1,9})(?:-([0-9]{1,9}))?")
+_MAX_NODE: Final = 127
+_MAX_IDENTS: Final = 1 << 16
+
+
+def _no_rule(name: str) -> Callable[[], Rule]:
+    raise ValueError(f"no rule {name!r}")
+
+
+def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
+    """Read rules.
+
+    Args:
+        words: the rules.
+        load_rule: returns what makes a rule of another package, by its name under `rule`.
+
+    Raises:
+        ValueError: one that is not known, or not like it must be.
+
+    >>> parse_rules({"no_emcy": True, "heartbeat": ["3=100ms±20%"]}).heartbeats
+    (HeartbeatTimes(node=3, low_us=80000, high_us=120000),)
+    """
+    known = (*SWITCHES, *VALUES)
+    for name in words:
+        if name not in known:
+            meant = "".join(f"; did you mean {word!r}?" for word in closest(name, known))
+            raise ValueError(f"rule {name!r} is none of {', '.join(known)}{meant}")
+    switches = {name: _switch(name, words[name]) for name in SWITCHES if name in words}
+    gaps = (text.partition("=") for text in _texts("max_gap", words))
+    idents = [ident for text in _lists("known", words) for ident in _idents(text)]
+    nodes = {node for text in _lists("nodes", words) for node in _nodes(text)}
+    for name in ("heartbeat", "nodes", "max_gap", "rule"):
+        if name in words and not _texts(name, words):
+            raise ValueError(f"{name} is empty: leave it out, or it is taken for a rule that holds")
+    others, expressions = _named_and_written(_texts("rule", words))
+    return Rules(
+        **switches,
+        max_load=_percent(words.get("max_load")),
+        bit_rate=_bit_rate(words.get("bitrate")),
+        heartbeats=tuple(_heartbeat(text) for text in _texts("heartbeat", words)),
+        nodes=tuple(sorted(nodes)),
+        max_gaps=tuple((parse_ident(ident), _time_us(time)) for ident, _, time in gaps),
+        known=frozenset(idents) if "known" in words else None,
+        others=tuple(map(load_rule, others)),
+        expressions=expressions,
+    )
+
+
+def joined(first: RuleValues, second: RuleValues) -> RuleValues:
+    """Return the rules of both; a number of the second goes before one of the first.
+
+    >>> joined({"known": "181", "max_load": 50}, {"known": ["182"], "max_load": 60})
+    {'known': ['181', '182'], 'max_load': 60}
+    """
+    out = dict(first)
+    for name, value in second.items():
+        both = name in LISTS and name in first
+        out[name] = [*_texts(name, first), *_texts(name, second)] if both else value
+    return out
+
+
+def _named_and_written(texts: Iterable[str]) -> tuple[list[str], tuple[Expression, ...]]:
+    """Tell names of rules of other packages from rules that are written out."""
+    names: list[str] = []
+    expressions: list[Expression] = []
+    for text in texts:
+        if _NAMES.fullmatch(text) and text not in ONE_WORD:
+            names += [part.strip() for part in text.split(",")]
+            continue
+        from tickrig.host.canmon.model.check.expression.parse_rule import (  # noqa: PLC0415 - seldom wanted
+            parse_rule,
+        )
+
+        named = _NAMED.fullmatch(text)
+        expressions.append(parse_rule(named[2], named[1].strip()) if named else parse_rule(text))
+    return names, tuple(expressions)
+
+
+def _switch(name: str, value: object) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"{name} = {value!r} is not true or false")
+    return value
+
+
+def _percent(value: object) -> float | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 100:
+        raise ValueError(f"max_load {value!r} is not 0 to 100 percent")
+    return value
+
+
+def _bit_rate(value: object) -> int | None:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int) or value <= 0:
+        raise ValueError(f"bitrate {value!r} is not a number of bits a second, as 500000")
+    return value
+
+
+def _texts(name: str, words: RuleValues) -> list[str]:
+    """Return what a rule is given as texts; a table is texts with `=`, of `rule` with `: `."""
+    value = words.get(name, ())
+    if isinstance(value, Mapping):
+        sign = ": " if name == "rule" else "="
+        return [f"{key}{sign}{entry}" for key, entry in value.items()]
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [str(entry) for entry in value]
+    return [str(value)]
+
+
+def _lists(name: str, words: RuleValues) -> list[str]:
+    return [part.strip() for text in _texts(name, words) for part in text.split(",")]
+
+
+def _heartbeat(text: str) -> HeartbeatTimes:
+    match = _HEARTBEAT.fullmatch(text)
+    if match is None or not 1 <= int(match[1]) <= _MAX_NODE:
+        raise ValueError(f"heartbeat {text!r} is not like 3=100ms±20% or 3=100ms+-5ms")
+    period_us = _time_us(match[2])
+    if match[4] == "%":
+        off_us = int(period_us * float(match[3]) / 100)
+    else:
+        off_us = _time_us(match[3] + match[4])
+    return HeartbeatTimes(int(match[1]), max(0, period_us - off_us), period_us + off_us)
+
+
+def _time_us(text: str) -> int:
+    return parse_time_with_unit_us(text.strip())
+
+
+def _nodes(text: str) -> range:
+    match = _NODES.fullmatch(text)
+    if match is None:
+        raise ValueError(f"nodes {text!r} is not like 3 or 3-7")
+    first, last = int(match[1]), int(match[2] or match[1])
+    if first > last:
+        raise ValueError(f"nodes {text!r}: the lower node-ID stands first, as {last}-{first}")
+    if first < 1 or last > _MAX_NODE:
+        raise ValueError(f"nodes {text!r}: node-IDs are 1 to {_MAX_NODE}")
+    return range(first, last + 1)
+
+
+def _idents(text: str) -> Iterator[int]:
+    """Give identifiers; those that say nothing of remote frames stand for these, too."""
+    words = text.split("-")
+    if len(words) > 2 or not all(words):
+        raise ValueError(f"known {text!r} is not like 181 or 181-18F")
+    first, last = parse_ident(words[0]), parse_ident(words[-1])
+    if (first ^ last) & ~EXTENDED_MAX:
+        raise ValueError(f"known {text!r}: write both ends alike, as 181-18F or 181R-18FR")
+    if not 0 < last + 1 - first <= _MAX_IDENTS:
+        raise ValueError(f"known {text!r}: {ident_text(first)} is not below the other end")
+    for ident in range(first, last + 1):
+        yield ident
+        if not ident & FD:
+            yield ident | REMOTE

@@ -1,0 +1,288 @@
+"""What SDO traffic and an EDS have told of the objects of one node."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canmon.model.decode.decoded import EDS, SEEN
+from tickrig.host.canmon.model.decode.object_text import (
+    ObjectText,
+    describe_drive,
+    describe_standard,
+    slug,
+)
+from tickrig.host.canmon.model.decode.sdo.transfer import Direction, Outcome, Transfer
+from tickrig.host.canopen.eds import read_sound
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_file import Finding
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES
+from tickrig.wire.canopen.eds.object_table import EntryDescription
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
+
+
+@dataclass(frozen=True, slots=True)
+class EdsObjects:
+    """What a file says of a node.
+
+    Attributes:
+        texts: name, type and unit by index and sub-index.
+        values: power-on values, as bytes on the wire, likewise.
+        name: of the device, empty where the file has none.
+        findings: what is wrong in the file, whose objects are then not used.
+        vendor: who makes the device, empty where the file does not say it.
+    """
+
+    texts: Mapping[Entry, ObjectText] = field(default_factory=dict)
+    values: Mapping[Entry, bytes] = field(default_factory=dict)
+    name: str = ""
+    findings: tuple[Finding, ...] = ()
+    vendor: str = ""
+
+    @property
+    def heartbeat_ms(self) -> int:
+        """What it says of 1017h; 0 where it says nothing."""
+        return int.from_bytes(self.values.get(HEARTBEAT_TIME, b""), "little")
+
+
+def read_eds_objects(path: Path, node_id: int) -> EdsObjects:
+    """Read an EDS or DCF for a node.
+
+    Raises:
+        OSError: the file cannot be read.
+        EdsError: it has no object that can be used.
+    """
+    device, findings = read_sound(path)
+    return eds_objects(device, node_id, path.stem, findings)
+
+
+def eds_objects(
+    device: EdsDevice, node_id: int, name: str, findings: tuple[Finding, ...] = ()
+) -> EdsObjects:
+    """Return what the device of an EDS says of a node; `name` is for one that has none."""
+    return EdsObjects(
+        {(row.index, row.sub): _text(device, row) for row in device.entries},
+        {
+            (row.index, row.sub): row.power_on_data(node_id)
+            for row in device.entries
+            if row.has_default and row.data_type.is_integer
+        },
+        device.info.product_name or name,
+        findings,
+        device.info.vendor_name,
+    )
+
+
+def _text(device: EdsDevice, row: EntryDescription) -> ObjectText:
+    name = slug(row.name)
+    info = device.objects[row.index]
+    if info.code not in VARIABLES:
+        name = f"{slug(info.name)}.{name or row.sub}"
+    return ObjectText(name, row.data_type, row.unit, row.factor, EDS)
+
+
+STORE: Final = 0x1010
+SAVE: Final = b"save"
+DEVICE_TYPE: Final = (0x1000, 0)
+HEARTBEAT_TIME: Final = (0x1017, 0)
+STATUSWORD: Final = (0x6041, 0)
+STATUSWORD_BYTES: Final = 2
+DRIVE_PROFILE: Final = 402
+SEVERAL_PROFILES: Final = 0xFFFF
+DRIVE_WORDS: Final = (0x6040, 0x6041)
+COMMUNICATION: Final = range(0x1000, 0x2000)
+"""Objects that say how the others travel."""
+
+Entry = tuple[int, int]
+
+
+class NodeMemory:
+    """The values of a node's objects, as far as they are known.
+
+    A value that was written lasts until the node boots; then those count that it had
+    before, unless it has stored them (1010h).
+
+    Args:
+        eds: what its file says; power-on values count until traffic says otherwise.
+    """
+
+    def __init__(self, eds: EdsObjects | None = None) -> None:
+        self.eds = eds or EdsObjects()
+        self._power_on: dict[Entry, bytes] = {}
+        self._now: dict[Entry, bytes] = {}
+        self._written: set[Entry] = set()
+        self._has_statusword = False
+
+    def read(self, entry: Entry, data: bytes) -> None:
+        """Learn a value that was uploaded."""
+        self._keep(entry, data)
+        if entry not in self._written:
+            self._power_on[entry] = data
+
+    def written(self, entry: Entry, data: bytes) -> None:
+        """Learn a value that was downloaded and confirmed."""
+        if entry[0] == STORE:
+            if data == SAVE:
+                self._power_on, self._written = dict(self._now), set()
+            return
+        self._keep(entry, data)
+        self._written.add(entry)
+
+    def _keep(self, entry: Entry, data: bytes) -> None:
+        if entry[0] in COMMUNICATION:
+            self._now[entry] = data
+        elif entry == STATUSWORD and len(data) == STATUSWORD_BYTES:
+            self._has_statusword = True
+
+    def learn(self, transfer: Transfer) -> bool:
+        """Learn from a transfer that ended; return whether it tells anything."""
+        entry, data = transfer.entry, transfer.data
+        if entry is None or data is None or transfer.flaws or transfer.outcome is not Outcome.DONE:
+            return False
+        data = self.describe(*entry).fitted(data, sized=transfer.sized)
+        if transfer.direction is Direction.UPLOAD:
+            self.read(entry, data)
+        else:
+            self.written(entry, data)
+        return True
+
+    def boot(self) -> bool:
+        """Go back to power-on values; return whether that changes any."""
+        changed = self._now != self._power_on
+        self._now, self._written = dict(self._power_on), set()
+        return changed
+
+    @property
+    def indices(self) -> set[int]:
+        """The objects of which a value is known."""
+        return {index for values in (self._now, self.eds.values) for index, _ in values}
+
+    def number(self, index: int, sub: int) -> int | None:
+        """Return a value; None where nobody told it."""
+        data = self._now.get((index, sub), self.eds.values.get((index, sub)))
+        return None if data is None else int.from_bytes(data, "little")
+
+    def was_received(self, entry: Entry) -> bool:
+        """Say whether traffic told a value."""
+        return entry in self._now
+
+    def source(self, index: int) -> str:
+        """Say where the values of an object come from: traffic, where it told any."""
+        entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
+        if any(entry in self._now for entry in entries):
+            return SEEN
+        return EDS if any(entry in self.eds.values for entry in entries) else ""
+
+    def maps_statusword(self) -> None:
+        """Learn that a PDO carries 16 bits of 6041h."""
+        self._has_statusword = True
+
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is a drive of CiA 402.
+
+        Its device type says so; where that is not known or has several profiles, 6041h:00 with
+        16 bits does.
+        """
+        device_type = self.number(*DEVICE_TYPE)
+        if device_type is None or device_type >> 16 == SEVERAL_PROFILES:
+            return self._has_statusword
+        return device_type & 0xFFFF == DRIVE_PROFILE
+
+    def describe(self, index: int, sub: int) -> ObjectText:
+        """Return what is known of an object; the words of a drive have the names of CiA 402."""
+        told, standard = self.eds.texts.get((index, sub)), describe_standard(index, sub)
+        if told is None:
+            told = standard
+        elif standard is not None:
+            told = told._replace(in_hex=standard.in_hex)
+        if self.is_drive and (told is None or index in DRIVE_WORDS):
+            text = describe_drive(index, sub) or ObjectText()
+            return text if told is None else text._replace(source=told.source)
+        return told or ObjectText()
+
+
+LATE: Final = 1.5
+"""A heartbeat is late after so many of its periods; the real limit is its consumer's (1016h)."""
+GAPS_KEPT: Final = 9
+
+
+@dataclass(slots=True)
+class Heartbeats:
+    """When the heartbeats of a node come, and the period that they keep.
+
+    Args:
+        memory: what is known of its objects.
+        from_boot: learn the period also from the gap between a boot-up and the first heartbeat.
+
+    Attributes:
+        last_us: when it told its state last, None while it told none.
+        since_us: since when one is waited for; None for never.
+        gaps: between the latest heartbeats, in us. A node that stood still sends all heartbeats
+            of that time at once: a gap shorter than half of the one before makes one with it,
+            their mean, which a burst after a silence brings back to the period.
+    """
+
+    memory: NodeMemory = field(compare=False)
+    from_boot: bool = True
+    last_us: int | None = None
+    since_us: int | None = None
+    gaps: deque[float] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
+    _merged: int = 0  # gaps that the latest of them is the mean of
+    _booted: bool = False
+
+    @property
+    def by_sdo(self) -> bool:
+        """Whether SDO traffic says what 1017h is: that counts more than what is heard."""
+        return self.memory.was_received(HEARTBEAT_TIME)
+
+    @property
+    def period_us(self) -> int | None:
+        """The period: of 1017h where it was written or read, else as heard, else by the EDS."""
+        if self.gaps and not self.by_sdo:
+            return _median(self.gaps)
+        period_ms = self.memory.number(*HEARTBEAT_TIME)
+        return period_ms * 1_000 if period_ms else None
+
+    def is_late(self, now_us: int) -> bool:
+        """Say whether one is missing."""
+        period_us = self.period_us
+        if self.since_us is None or period_us is None:
+            return False
+        return now_us - self.since_us > LATE * period_us
+
+    def boot(self, at_us: int) -> None:
+        """Begin anew with a boot-up."""
+        self.gaps.clear()
+        self._booted = True
+        self.last_us = self.since_us = at_us
+
+    def learn(self, at_us: int, transfer: Transfer) -> None:
+        """Take a transfer of 1017h that the memory has learnt: a new period begins anew."""
+        if transfer.direction is Direction.DOWNLOAD or self.since_us is None:
+            self.gaps.clear()
+            self.since_us = at_us
+
+    def take(self, at_us: int, *, learns: bool = True) -> None:
+        """Take a heartbeat; the period is learnt from it, unless it may answer a request."""
+        learns = learns and (self.from_boot or not self._booted)
+        if learns and self.last_us is not None and at_us > self.last_us:  # logs may repeat a time
+            self._take_gap(at_us - self.last_us)
+        self.last_us = self.since_us = at_us
+        self._booted = False
+
+    def _take_gap(self, gap_us: int) -> None:
+        if self.gaps and 2 * gap_us < self.gaps[-1]:
+            self.gaps[-1] += (gap_us - self.gaps[-1]) / (self._merged + 1)
+            self._merged += 1
+        else:
+            self.gaps.append(gap_us)
+            self._merged = 1
+
+
+def _median(gaps: Collection[float]) -> int:
+    """Return the median, of two the higher one; statistics would take 5 ms to import."""
+    return round(sorted(gaps)[len(gaps) // 2])

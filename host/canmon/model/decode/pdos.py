@@ -1,0 +1,278 @@
+"""PDOs: which CAN-ID carries which of which node, and what their bits mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Final, NamedTuple
+
+from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
+from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, NodeMemory
+from tickrig.host.canmon.model.decode.object_text import ObjectText, drive_state
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.pdo import DAM_MPDO, MAX_MAPPED_OBJECTS, SAM_MPDO, MappedObject, Mpdo
+from tickrig.wire.errors import WireError
+
+MPDO: Final = (SAM_MPDO, DAM_MPDO)
+MPDO_BYTES: Final = 8
+DUMMIES: Final = range(0x0020)
+UNMAPPED: Final = "unmapped"
+
+Write = Callable[[int], str]
+Convert = Callable[[int], Value]
+
+
+class Field(NamedTuple):
+    """Where a signal is and how it is read.
+
+    Attributes:
+        name: of the signal.
+        shift: its lowest bit.
+        mask: of its bits, moved down.
+        sign: its sign bit, 0 if it has none.
+        convert: makes the value of the number, None where that is the value.
+        unit: as `Signal.unit`.
+        write: makes the text, None where that is the value.
+    """
+
+    name: str
+    shift: int
+    mask: int
+    sign: int = 0
+    convert: Convert | None = None
+    unit: str = ""
+    write: Write | None = None
+
+
+class PdoLayout:
+    """Decodes the frames of one PDO.
+
+    Args:
+        pdo: kind, node and source, as of `Decoded`.
+        fields: its signals; none where the mapping is not known.
+        bits: how many are mapped.
+        note: what people must know of the mapping.
+    """
+
+    def __init__(
+        self, pdo: tuple[str, int, str], fields: Sequence[Field] = (), bits: int = 0, note: str = ""
+    ) -> None:
+        self.kind, self.node, self.source = pdo
+        self._fields, self._size, self._note = tuple(fields), (bits + 7) // 8, note
+        self._wanted = None if note else self._size
+
+    def decode(self, at_us: int, frame: CanFrame) -> Decoded:
+        """Return the signals of a frame."""
+        data = frame.data
+        if frame.remote:
+            return Decoded(self.kind, self.node, "asked for by RTR", (), self.source)
+        if len(data) < self._size:
+            text = f"{len(data)} B, {self._size} are mapped: not processed"
+            return Decoded(self.kind, self.node, text, (), self.source, size=self._wanted)
+        number = int.from_bytes(data, "little")
+        signals = []
+        for name, shift, mask, sign, convert, unit, write in self._fields:
+            raw = number >> shift & mask
+            value: Value = (raw ^ sign) - sign if convert is None else convert(raw)
+            signals.append(Signal(name, value, unit, "" if write is None else write(raw)))
+        said = " ".join([*map(str, signals), self._note]) if self._note else None
+        kind, node, told = self.kind, self.node, self._wanted
+        return Decoded(kind, node, said, tuple(signals), self.source, size=told)
+
+
+class MpdoLayout:
+    """Decodes multiplexed PDOs: each frame names its object.
+
+    Args:
+        pdo: kind, node and source, as of `Decoded`.
+        describe: tells the objects of the node.
+    """
+
+    def __init__(
+        self, pdo: tuple[str, int, str], describe: Callable[[int, int], ObjectText]
+    ) -> None:
+        self.kind, self.node, self.source = pdo
+        self._describe = describe
+
+    def decode(self, at_us: int, frame: CanFrame) -> Decoded:
+        """Return the object in a frame."""
+        try:
+            mpdo = Mpdo.parse(frame.data)
+        except WireError as error:
+            return Decoded(self.kind, self.node, str(error), (), self.source, size=MPDO_BYTES)
+        text = self._describe(mpdo.index, mpdo.sub)
+        data = mpdo.data[: text.kind.size] if text.kind and text.kind.size else mpdo.data
+        value, written = text.read(data)
+        name = text.name or write_entry((mpdo.index, mpdo.sub))
+        way = f"to {mpdo.node_id or 'all'}" if mpdo.destination else f"from {mpdo.node_id}"
+        signals = (Signal(name, value, text.unit, written),)
+        said = f"{signals[0]} {way}"
+        return Decoded(self.kind, self.node, said, signals, self.source, size=MPDO_BYTES)
+
+
+def make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
+    """Return how a mapped object is read; a type of another size than mapped is not used."""
+    name = text.name or write_entry((mapped.index, mapped.sub))
+    kind = text.kind if text.kind and _fits(text.kind, mapped.bits) else None
+    field = Field(name, shift, (1 << mapped.bits) - 1, unit=text.unit)
+    digits = (mapped.bits + 3) // 4
+
+    def in_hex(raw: int) -> str:
+        return f"0x{raw:0{digits}X}"
+
+    if kind is None:
+        return field._replace(write=in_hex)
+    if name == "statusword":
+        return field._replace(write=write_statusword)
+    if text.in_hex or name == "controlword":
+        return field._replace(write=in_hex)
+    sign = 1 << mapped.bits - 1 if kind.signed else 0
+    if not kind.is_integer:
+        return field._replace(convert=_converter(kind, text))
+    if text.factor != 1:
+        return field._replace(convert=lambda raw: ((raw ^ sign) - sign) * text.factor)
+    return field._replace(sign=sign)
+
+
+def write_statusword(raw: int) -> str:
+    """Write a statusword with its state."""
+    return f"0x{raw:04X}[{drive_state(raw) or '?'}]"
+
+
+def _fits(kind: DataType, bits: int) -> bool:
+    return kind.bits == bits or (kind.is_integer and not kind.signed and bits <= kind.bits)
+
+
+def _converter(kind: DataType, text: ObjectText) -> Convert:
+    def convert(raw: int) -> Value:
+        value = kind.decode(raw.to_bytes(kind.size, "little"))
+        return value * text.factor if isinstance(value, float) else value
+
+    return convert
+
+
+PDOS: Final = 512
+PREDEFINED: Final = 4
+"""So many PDOs of each direction have a CAN-ID in the pre-defined connection set."""
+PDO_OBJECTS: Final = range(0x1400, 0x1C00)
+
+_TPDO, _RPDO = "tpdo", "rpdo"
+_INDICES: Final = {_TPDO: (0x1800, 0x1A00, 0x180), _RPDO: (0x1400, 0x1600, 0x200)}
+"""First communication parameter, first mapping, pre-defined CAN-ID of the first PDO."""
+
+Layout = PdoLayout | MpdoLayout
+
+
+class Pdo(NamedTuple):
+    """One PDO of one node; those that are sent come first."""
+
+    receives: bool
+    node: int
+    number: int
+
+    @property
+    def kind(self) -> str:
+        """As `Decoded.kind`."""
+        return f"{_RPDO if self.receives else _TPDO}{self.number}"
+
+    @property
+    def parameter(self) -> int:
+        """The index of its communication parameter."""
+        return _INDICES[_RPDO if self.receives else _TPDO][0] + self.number - 1
+
+    @property
+    def mapping(self) -> int:
+        """The index of its mapping."""
+        return self.parameter + 0x200
+
+
+class PdoTable:
+    """PDOs by CAN-ID, as far as anybody said what they are."""
+
+    def __init__(self) -> None:
+        self._by_can_id: dict[int, dict[Pdo, Layout]] = {}
+        self._can_ids: dict[Pdo, int] = {}
+
+    def layout(self, can_id: int) -> Layout | None:
+        """Return what carries this CAN-ID: who sends it, rather than who receives it."""
+        claims = self._by_can_id.get(can_id)
+        return claims[min(claims)] if claims else None
+
+    def update(self, pdo: Pdo, memory: NodeMemory) -> set[int]:
+        """Read again what is known of a PDO; return the CAN-IDs whose meaning may be new."""
+        before = self._can_ids.pop(pdo, None)
+        if before is not None:
+            del self._by_can_id[before][pdo]
+        can_id, layout = can_id_of(pdo, memory), _layout(pdo, memory)
+        if can_id is None or layout is None:
+            return set() if before is None else {before}
+        self._can_ids[pdo] = can_id
+        self._by_can_id.setdefault(can_id, {})[pdo] = layout
+        return {can_id} if before is None else {can_id, before}
+
+    def known(self, node: int) -> tuple[Pdo, ...]:
+        """Return the PDOs of a node that have a CAN-ID."""
+        return tuple(pdo for pdo in self._can_ids if pdo.node == node)
+
+
+def pdo_of(node: int, index: int) -> Pdo:
+    """Return the PDO that an object 1400h to 1BFFh is about."""
+    return Pdo(index < 0x1800, node, index % PDOS + 1)
+
+
+def pdos_of(node: int, indices: Iterable[int]) -> set[Pdo]:
+    """Return the PDOs that some objects are about."""
+    return {pdo_of(node, index) for index in indices if index in PDO_OBJECTS}
+
+
+def can_id_of(pdo: Pdo, memory: NodeMemory) -> int | None:
+    """Return its CAN-ID; None if it is not valid or not known."""
+    predefined = _INDICES[_RPDO if pdo.receives else _TPDO][2]
+    cob_id = memory.number(pdo.parameter, 1)
+    if cob_id is not None:
+        return None if cob_id & (INVALID | EXTENDED) else cob_id & CAN_ID_MASK
+    if pdo.number > PREDEFINED:
+        return None
+    return predefined + 0x100 * (pdo.number - 1) + pdo.node
+
+
+def _layout(pdo: Pdo, memory: NodeMemory) -> Layout | None:
+    mapping = pdo.mapping
+    count, source = memory.number(mapping, 0), memory.source(mapping)
+    if count is None:
+        source = memory.source(pdo.parameter)
+        note = f"{UNMAPPED}: {mapping:04X}h was not heard"
+        return PdoLayout((pdo.kind, pdo.node, source), note=note) if source else None
+    if count in MPDO:
+        return MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
+    entries = mapped_objects(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
+    if (STATUSWORD, 16) in {((item.index, item.sub), item.bits) for item in entries}:
+        memory.maps_statusword()
+    missing = f"and {mapping:04X}h:{len(entries) + 1:02X}, which was not heard"
+    note = missing if len(entries) < count else ""
+    bits = sum(item.bits for item in entries)
+    fields = _fields(memory, entries)
+    return PdoLayout((pdo.kind, pdo.node, source), fields, bits, note)
+
+
+def mapped_objects(memory: NodeMemory, mapping: int, count: int) -> list[MappedObject]:
+    """Return the mapped objects up to the first that is not known."""
+    entries = []
+    for sub in range(1, count + 1):
+        value = memory.number(mapping, sub)
+        if value is None:
+            break
+        entries.append(MappedObject.parse(value))
+    return entries
+
+
+def _fields(memory: NodeMemory, entries: list[MappedObject]) -> list[Field]:
+    fields, shift = [], 0
+    for item in entries:
+        if item.index not in DUMMIES:
+            text = memory.describe(item.index, item.sub)
+            fields.append(make_field(item, shift, text))
+        shift += item.bits
+    return fields

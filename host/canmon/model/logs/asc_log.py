@@ -1,0 +1,279 @@
+"""Vector's ASC logs: whatever header they have, with absolute and with relative times.
+
+>>> lines, tally = AscLines(), Tally()
+>>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
+...     record = lines.read(line, tally)
+>>> record.at_us, record.channel, str(record.frame)
+(200000, 'can0', '705#05')
+"""  # noqa: E501 - as it is in a log
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+from typing import Final
+
+from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
+from tickrig.host.canmon.model.logs.tally import (
+    BAD_FRAMES,
+    CAN_XL,
+    ERRORS_COUNTED,
+    OTHER_LINES,
+    Tally,
+)
+from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame
+from tickrig.wire.can_error import ErrorClass, ErrorFrame
+from tickrig.wire.can_fd import BRS, ESI, FdFrame
+from tickrig.wire.errors import WireError
+
+BUS_ERROR: Final = ErrorFrame(ErrorClass.BUS_ERROR)
+"""What `ErrorFrame` in a line says: it does not name the error as linux/can/error.h does."""
+
+FDF: Final = 0x1000
+"""The flag of a CAN FD frame in a line `CANFD`; the bits above it are BRS and ESI."""
+RTR: Final = 0x10
+DECIMAL_DIGITS: Final = 3
+"""So many a byte has, where it is decimal and filled up with zeros."""
+
+_TIMED: Final = re.compile(r"\s*([0-9]{1,12})\.([0-9]{1,9})\s+(.*\S)\s*", re.ASCII | re.DOTALL)
+_CLASSIC: Final = re.compile(
+    r"([0-9]+)\s+([0-9A-F]{1,10})(x?)\s+(Rx|Tx)\s+([dr])(?:\s+([0-9A-F]{1,2})\b)?(.*)",
+    re.ASCII | re.IGNORECASE | re.DOTALL,
+)
+_ERROR: Final = re.compile(
+    r"(?:CANFD\s+)?([0-9]+)\s+(?:(Rx|Tx)\s+)?ErrorFrame\b", re.ASCII | re.IGNORECASE
+)
+_LONG: Final = re.compile(
+    r"(CANFD|CANXL)\s+([0-9]+)\s+(Rx|Tx)\s+(\S.*)", re.ASCII | re.IGNORECASE | re.DOTALL
+)
+_FRAME: Final = re.compile(
+    r"CAN(?:FD|XL)\b(?!\s+[0-9]+\s+(?:(?:Rx|Tx)\s+)?[A-Z]+Frame\b|\s+[0-9]+\s+TxRq\b)"
+    r"|[0-9]+\s+(?:[0-9A-F]+x?\b(?!\s+TxRq\b)|\S+\s+(?:Rx|Tx)\b)",
+    re.ASCII | re.IGNORECASE,
+)
+"""Begins what was meant as a frame; any other line with a time is an event."""
+
+_SILENT: Final = re.compile(
+    r"(?:$|//|date\b|base\b|(?:no\s+)?internal\s+events|(?:begin|end)\s+triggerblock)",
+    re.IGNORECASE,
+)
+_BASE: Final = re.compile(
+    r"base\s+(hex|dec)(?:\s+timestamps\s+(absolute|relative))?", re.IGNORECASE
+)
+_DATED: Final = re.compile(r"(date|begin\s+triggerblock)\s+(.*\S)", re.IGNORECASE | re.DOTALL)
+_QUIET_EVENT: Final = re.compile(r"(?:Start of measurement|//)", re.IGNORECASE)
+
+_STATE: Final = re.compile(
+    r"CAN\s+[0-9]+\s+Status:\s*chip status (error passive|bus off|warning)", re.IGNORECASE
+)
+_STATES: Final = {
+    "error passive": "that a controller is error passive",
+    "bus off": "that a controller is bus-off",
+    "warning": "that a controller has reached its warning limit",
+}
+_STATISTIC: Final = re.compile(r"[0-9]+\s+Statistic:.*\bE\s+0*[1-9]", re.ASCII | re.IGNORECASE)
+
+_DATE: Final = re.compile(
+    r"(?:\S+\s+)?(?P<month>\D\S{2,8})\s+(?P<day>[0-9]{1,2})\s+"
+    r"(?P<hour>[0-9]{1,2}):(?P<minute>[0-9]{2}):(?P<second>[0-9]{2})(?:\.(?P<part>[0-9]{1,9}))?"
+    r"(?:\s+(?P<half>[ap]m))?(?:\s+(?P<zone>[A-Z]{3,5}))?\s+(?P<year>[0-9]{4})",
+    re.ASCII | re.IGNORECASE,
+)
+_MONTHS: Final = {
+    **{
+        name: number
+        for number, name in enumerate(
+            ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"), 1
+        )
+    },
+    **{"mär": 3, "mrz": 3, "mai": 5, "okt": 10, "dez": 12},
+}
+"""English, and German where that differs: Vector's tools write the names of the machine."""
+
+
+class AscLines:
+    """Reads the lines of an ASC log, in their order.
+
+    Times count from the date of the header or of the trigger block that they stand in, or, with
+    `timestamps relative`, from the line before that has one.
+    """
+
+    def __init__(self) -> None:
+        self._base, self._relative, self._guessed = 16, False, True
+        self._header_us, self._block_us, self._pending = 0, 0, False
+        self._now_us = 0
+
+    def read(self, line: str, tally: Tally) -> Record | str | None:
+        """Return a frame, what the line is instead, or None for a bad line."""
+        timed = _TIMED.fullmatch(line)
+        if timed is None:
+            text = line.strip()
+            return self._head(text, tally) if _SILENT.match(text) else None
+        seconds, fraction, event = timed.groups()
+        self._advance(int(seconds) * 1_000_000 + (int(f"{fraction:0<9}") + 500) // 1_000)
+        try:
+            return self._event(event, tally)
+        except WireError:
+            tally.passed_over[BAD_FRAMES] += 1
+            return BAD_FRAMES
+        except (ValueError, LookupError):
+            return None
+
+    def _head(self, text: str, tally: Tally) -> str:
+        """Take a line without a time: what it says of those that follow."""
+        if base := _BASE.match(text):
+            self._base, self._guessed = 10 if base[1].lower() == "dec" else 16, False
+            self._relative = (base[2] or "").lower() == "relative"
+        elif dated := _DATED.fullmatch(text):
+            at_us = date_us(dated[2])
+            if at_us is None:
+                tally.undated += 1
+            elif dated[1].lower() == "date":
+                self._header_us = self._block_us = self._now_us = at_us
+            else:
+                self._block_us, self._pending = at_us, True
+                self._now_us = max(self._now_us, at_us) if self._relative else at_us
+        return text
+
+    def _advance(self, span_us: int) -> None:
+        """Take the time of a line.
+
+        The first of a trigger block tells whether times go on counting from the header: then
+        they are as late as the block is dated.
+        """
+        if self._relative:
+            self._now_us += span_us
+            return
+        if self._pending:
+            self._pending = False
+            if abs(self._header_us + span_us - self._block_us) < span_us:
+                self._block_us = self._header_us
+        self._now_us = self._block_us + span_us
+
+    def _event(self, event: str, tally: Tally) -> Record | str | None:
+        if classic := _CLASSIC.fullmatch(event):
+            channel, ident, extended, direction, kind, length, rest = classic.groups()
+            frame = self._classic(ident, bool(extended), kind.lower() == "r", length, rest)
+            return self._record(channel, direction, frame)
+        if error := _ERROR.match(event):
+            return self._record(error[1], error[2], BUS_ERROR)
+        if long := _LONG.fullmatch(event):
+            kind, channel, direction, words = long.groups()
+            fd = kind.upper() == "CANFD"
+            frame_or_none = (self._fd if fd else self._xl)(words.split())
+            if frame_or_none is None:
+                tally.passed_over[CAN_XL] += 1
+                return CAN_XL
+            return self._record(channel, direction, frame_or_none)
+        if _FRAME.match(event):
+            return None
+        if not _QUIET_EVENT.match(event):
+            tally.passed_over[OTHER_LINES] += 1
+            _note_errors(event, tally)
+        return event
+
+    def _record(self, channel: str, direction: str | None, frame: AnyFrame) -> Record:
+        sent = (direction or "").lower() == "tx"
+        return Record(self._now_us, bus_name(channel), frame, sent)
+
+    def _classic(
+        self, ident: str, extended: bool, remote: bool, length: str | None, rest: str
+    ) -> CanFrame:
+        """Return a frame; of a length code above 8 it has 8 bytes."""
+        words, size = rest.split(), 0 if length is None else self._length(length)
+        if self._guessed and any(len(word) == DECIMAL_DIGITS for word in words[:size]):
+            self._base = 10  # BUSMASTER does not always write what the base is
+        can_id, extended = self._can_id(ident, extended)
+        if remote:
+            return CanFrame(can_id, b"", True, extended, size).checked()
+        if length is None:
+            raise ValueError("a data frame without its length")
+        return CanFrame(can_id, self._data(words, size), False, extended).checked()
+
+    def _length(self, text: str) -> int:
+        """Read a length code, one hexadecimal digit or more of the base."""
+        return min(MAX_DATA_BYTES, int(text, 16 if len(text) == 1 else self._base))
+
+    def _can_id(self, digits: str, extended: bool) -> tuple[int, bool]:
+        """Read an identifier; some programs leave out the x of one that has 29 bits."""
+        can_id = int(digits, self._base)
+        return can_id, extended or can_id > STANDARD_MAX
+
+    def _data(self, words: list[str], length: int) -> bytes:
+        if len(words) < length:
+            raise ValueError(f"{len(words)} bytes, {length} were announced")
+        return bytes(int(word, self._base) for word in words[:length])
+
+    def _fd(self, words: list[str]) -> AnyFrame:
+        """Read what stands behind the direction of a line CANFD; a name may follow the CAN-ID."""
+        ident, *words = words
+        brs, esi, dlc, size, *rest = words[0 if words[0].isdecimal() else 1 :]
+        length = int(size)
+        data, flags = self._data(rest, length), FDF
+        if len(rest) > length + 2:  # behind the duration and the count of bits
+            flags = int(rest[length + 2], 16)
+        switches = BRS * (brs == "1") | ESI * (esi == "1")
+        return self._flagged(ident, dlc, data, flags, switches)
+
+    def _xl(self, words: list[str]) -> AnyFrame | None:
+        """Read a line CANXL; None for a frame that is one of CAN XL."""
+        kind, _, _, ident, *words = words
+        if kind.upper() == "XLFF":
+            return None
+        dlc, size, *rest = words[0 if re.fullmatch("[0-9A-Fa-f]{1,2}", words[0]) else 1 :]
+        length = int(size)
+        fd = kind.upper().startswith("F")
+        flags = int(rest[length + 1 + fd], 16)  # behind the stuff count of CAN FD, and the CRC
+        switches = BRS * bool(flags & 2 * FDF) | ESI * bool(flags & 4 * FDF)
+        return self._flagged(ident, dlc, self._data(rest, length), flags, switches)
+
+    def _flagged(self, ident: str, dlc: str, data: bytes, flags: int, switches: int) -> AnyFrame:
+        """Return the frame that its flags say: classic frames stand in such lines, too."""
+        can_id, extended = self._can_id(ident.rstrip("xX"), ident[-1:] in ("x", "X"))
+        if flags & FDF or len(data) > MAX_DATA_BYTES:
+            return FdFrame(can_id, data, extended, switches).checked()
+        if flags & RTR:
+            return CanFrame(can_id, b"", True, extended, self._length(dlc)).checked()
+        return CanFrame(can_id, data, False, extended).checked()
+
+
+def _note_errors(event: str, tally: Tally) -> None:
+    """Note what an event says of errors: no frame shows them."""
+    if state := _STATE.match(event):
+        tally.errors_told[_STATES[state[1].lower()]] += 1
+    elif _STATISTIC.match(event):
+        tally.errors_told[ERRORS_COUNTED] += 1
+
+
+def date_us(text: str) -> int | None:
+    """Read a date of a header, which is local time; None if it is none.
+
+    >>> date_us("Sam Sep 30 15:06:13.191 2017") == date_us("Sat Sep 30 03:06:13.191 pm 2017")
+    True
+    >>> date_us("yesterday") is None
+    True
+    """
+    match = _DATE.fullmatch(text.strip())
+    if match is None:
+        return None
+    month = _MONTHS.get(match["month"].lower()[:3].replace("\ufffd", "ä"))
+    hour = int(match["hour"])
+    if match["half"]:
+        hour = hour % 12 + 12 * (match["half"].lower() == "pm")
+    zone = UTC if (match["zone"] or "").upper() in ("UTC", "GMT") else None
+    year, day, minute, second = (int(match[name]) for name in ("year", "day", "minute", "second"))
+    try:
+        moment = datetime(year, month or 0, day, hour, minute, second, tzinfo=zone)
+        seconds = int(moment.timestamp())
+    except (ValueError, OverflowError, OSError):
+        return None
+    at_us = seconds * 1_000_000 + int(f"{match['part'] or '':0<6.6}")
+    return at_us if at_us >= 0 else None
+
+
+class AscLogReader(LineLogReader):
+    """A reader of an ASC log."""
+
+    comments = ("//",)
+    make_lines = AscLines

@@ -1,0 +1,411 @@
+r"""Log files, and logs that come in pieces, as the frames that are in them.
+
+>>> lines = WholeLines()
+>>> lines.push(b"one\ntw"), lines.push(b"o"), lines.push(b"\n"), lines.finish()
+(b'one\n', b'', b'two\n', b'')
+
+>>> tally = Tally()
+>>> record = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
+>>> record.at_us, record.channel, str(record.frame), record.sent
+(10000, 'vcan0', '705#7F', True)
+>>> parse_log_line("(0000000000.020000) vcan0 00040#81:00:12345678#AABB", 2, tally)
+>>> tally.passed_over
+Counter({'CAN XL frames': 1})
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Final, Protocol, cast
+
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_file import (
+    LogError,
+    LogFormat,
+    log_format,
+    open_log,
+    read_blocks,
+)
+from tickrig.host.canmon.model.logs.mark import DROP_COUNT, Mark, lost_frames, read_mark
+from tickrig.host.canmon.model.logs.notation import (
+    LONGEST_NAME,
+    parse_csv_line,
+    parse_frame,
+    parse_json_line,
+    parse_json_mark,
+)
+from tickrig.host.canmon.model.logs.screen_line import ScreenClock, parse_screen_line
+from tickrig.host.canmon.model.logs.tally import CAN_XL, Tally
+from tickrig.wire.can import CanFrame
+from tickrig.wire.errors import WireError
+
+Item = Record | Mark
+"""What a log holds, in its order."""
+
+LONGEST: Final = 1 << 20
+"""Bytes; of a longer line the beginning is kept, and no line of a log is so long."""
+
+
+class WholeLines:
+    """Holds back a line that has begun, in time and memory that do not grow with its pieces."""
+
+    def __init__(self) -> None:
+        self._pieces: list[bytes] = []
+        self._held = 0
+
+    def push(self, data: bytes, /) -> bytes:
+        """Return the lines that end in these bytes, each with its LF."""
+        lines, end, rest = data.rpartition(b"\n")
+        if not end:
+            self._hold(rest)
+            return b""
+        whole = b"".join((*self._pieces, lines, end))
+        self._pieces, self._held = [], 0
+        self._hold(rest)
+        return whole
+
+    def finish(self) -> bytes:
+        """Return a last line without LF."""
+        rest = b"".join(self._pieces)
+        self._pieces, self._held = [], 0
+        return rest
+
+    def _hold(self, rest: bytes) -> None:
+        if self._held < LONGEST:
+            self._pieces.append(rest)
+            self._held += len(rest)
+
+
+COMMENTS: Final = ("#", ";", "//")
+
+_LINE: Final = re.compile(
+    r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
+)
+_XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
+
+
+def parse_log_line(
+    line: str, number: int, tally: Tally, clock: ScreenClock | None = None
+) -> Record | None:
+    """Read a line; None if it holds no frame, and then the tally says why.
+
+    Beyond what `candump -L` writes at present it reads what others write in its name: stamps in
+    nanoseconds or with fewer digits, a direction behind the frame, the raw length code behind
+    eight bytes, error frames with less than eight bytes.
+
+    Empty lines and comments (`#`, `;`, `//`) hold none, and are no fault; what a comment of ours
+    says was lost is counted.
+
+    Args:
+        line: without its LF.
+        number: of the line, from 1.
+        tally: takes what was no frame.
+        clock: of the lines of a screen.
+    """
+    text = line.strip()
+    if not text or text.startswith(COMMENTS):
+        tally.lost += lost_frames(text)
+        return None
+    record = _parsed(line, text, tally, clock or ScreenClock())
+    if record is None:
+        tally.bad_lines.add(number, line.rstrip("\r"))
+    return record if isinstance(record, Record) else None
+
+
+def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
+    """Return a frame, what was counted instead, or None for a bad line."""
+    if text.startswith("{"):
+        return parse_json_line(text, tally)
+    if match := _LINE.fullmatch(text):
+        return _logged(match, tally)
+    return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally, clock)
+
+
+def _logged(match: re.Match[str], tally: Tally) -> Record | str | None:
+    """Return what a line of `candump -L` says."""
+    seconds, fraction, channel, notation, direction = match.groups()
+    if _XL.fullmatch(notation):
+        tally.passed_over[CAN_XL] += 1
+        return CAN_XL
+    at_us = int(seconds) * 1_000_000 + int(f"{fraction:0<6.6}")
+    try:
+        return Record(at_us, channel, parse_frame(notation), direction == "T")
+    except WireError:
+        return None
+
+
+_USUAL: Final = re.compile(
+    r"^\(([0-9]{1,12})\.([0-9]{6})\) ([!-~]{1,32}) ([0-7][0-9A-Fa-f]{2}|[01][0-9A-Fa-f]{7})"
+    r"#((?:[0-9A-Fa-f]{2}){0,8})(?: ([RT]))?\r?$",
+    re.ASCII | re.MULTILINE,
+)
+"""A line with a data frame, as candump writes it: nearly all are so."""
+
+
+class LogLines:
+    """A decoder of a log in text: `push` what has come in, `finish` at its end.
+
+    Bytes that are no ASCII make a line bad; they never raise.
+
+    Attributes:
+        tally: what was no frame.
+        marks: marks among the frames that were returned last, with how many of these are in
+            front of each.
+    """
+
+    def __init__(self) -> None:
+        self.tally, self.marks = Tally(), list[tuple[int, Mark]]()
+        self._whole, self._number, self._latest_us = WholeLines(), 0, 0
+        self._clock: ScreenClock | None = None
+
+    @property
+    def deltas(self) -> bool:
+        """Whether stamps count from frame to frame: only all of the log tells the time."""
+        return self._clock is not None and self._clock.deltas
+
+    def push(self, data: bytes, /) -> list[Record]:
+        """Return the frames of the lines that end in these bytes."""
+        lines, self.marks = self._whole.push(data), []
+        return self._frames(lines[:-1].decode("latin-1")) if lines else []
+
+    def finish(self) -> list[Record]:
+        """Return the frame of a last line without LF."""
+        rest, self.marks = self._whole.finish(), []
+        return self._frames(rest.decode("latin-1")) if rest else []
+
+    def _frames(self, text: str) -> list[Record]:
+        count, begin = text.count("\n") + 1, self._number
+        self._number += count
+        usual = _USUAL.findall(text)
+        records = _usual_frames(usual) if len(usual) == count else self._any_frames(text, begin)
+        self._latest_us = records[-1].at_us if records else self._latest_us
+        return records
+
+    def _any_frames(self, text: str, begin: int) -> list[Record]:
+        clock = self._clock = self._clock or ScreenClock.of(text)
+        records: list[Record] = []
+        for number, line in enumerate(text.split("\n"), begin + 1):
+            if record := parse_log_line(line, number, self.tally, clock):
+                records.append(record)
+            elif mark := _mark(line.strip()):
+                self.marks.append((len(records), mark))
+        self.marks = [(at, self._timed(mark, at, records)) for at, mark in self.marks]
+        return records
+
+    def _timed(self, mark: Mark, at: int, records: list[Record]) -> Mark:
+        """Give a mark that has no time that of the frame before it; the first, of that behind."""
+        if mark.at_us:
+            return mark
+        first_us = records[0].at_us if records else 0
+        return mark._replace(at_us=records[at - 1].at_us if at else self._latest_us or first_us)
+
+
+def _mark(text: str) -> Mark | None:
+    """Return the mark that a comment or an event is, without a time where it has none."""
+    if text.startswith(("#", DROP_COUNT)):
+        return read_mark(0, text.removeprefix("#"))
+    return parse_json_mark(text) if text.startswith("{") else None
+
+
+def among(records: Sequence[Record], marks: Sequence[tuple[int, Mark]]) -> Sequence[Item]:
+    """Return frames with marks among them, each behind so many frames."""
+    if not marks:
+        return records
+    items, begin = list[Item](), 0
+    for end, mark in marks:
+        items += [*records[begin:end], mark]
+        begin = end
+    return [*items, *records[begin:]]
+
+
+def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Record]:
+    """Return the frames of what `_USUAL` found; made without the constructors, for speed."""
+    records: list[Record] = []
+    add, new, unhex = records.append, tuple.__new__, bytes.fromhex
+    second, second_us, idents = "", 0, dict[str, tuple[int, bool]]()
+    for seconds, micros, channel, ident, data, direction in lines:
+        if seconds != second:
+            second, second_us = seconds, int(seconds) * 1_000_000
+        if ident not in idents:
+            idents[ident] = int(ident, 16), len(ident) == 8
+        can_id, extended = idents[ident]
+        frame = new(CanFrame, (can_id, unhex(data), False, extended, 0))
+        add(new(Record, (second_us + int(micros), channel, frame, direction == "T")))
+    return records
+
+
+BLOCK_BYTES: Final = 1 << 13
+"""So few frames at once that the garbage collector seldom meets them."""
+
+CAN_LOG: Final = "tickrig.host.canmon.model.logs.can_log"
+"""python-can is slow to import: this module is when a log needs it."""
+
+CAPTURE: Final = "tickrig.host.canmon.model.logs.pcap.pcap_reader"
+
+READERS: Final = {
+    LogFormat.CANDUMP: (__name__, "TextLogReader"),
+    LogFormat.JSONL: (__name__, "TextLogReader"),
+    LogFormat.CSV: (__name__, "TextLogReader"),
+    LogFormat.GVRET: (__name__, "TextLogReader"),
+    LogFormat.ASC: ("tickrig.host.canmon.model.logs.asc_log", "AscLogReader"),
+    LogFormat.BLF: (CAN_LOG, "CanLogReader"),
+    LogFormat.TRC: ("tickrig.host.canmon.model.logs.trc_log", "TrcLogReader"),
+    LogFormat.MF4: (CAN_LOG, "CanLogReader"),
+    LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogReader"),
+    LogFormat.PCAPNG: (CAPTURE, "PcapReader"),
+    LogFormat.PCAP: (CAPTURE, "PcapReader"),
+}
+"""Module and class of the reader of each format."""
+
+
+class LogReader(Protocol):
+    """An iterable of frames; it reads while it is iterated, from the beginning each time.
+
+    Attributes:
+        tally: what was no frame, so far.
+
+    Raises:
+        OSError: the file cannot be read, while it is iterated.
+        LogError: it is not what its name says, likewise.
+    """
+
+    tally: Tally
+
+    def __iter__(self) -> Iterator[Record]: ...
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames."""
+        ...
+
+
+def read_log(path: Path) -> LogReader:
+    """Return a reader of a log file; nothing is opened yet.
+
+    Raises:
+        LogFormatError: the file's name tells no format.
+    """
+    kind = log_format(path)
+    module, name = READERS[kind]
+    return cast("LogReader", getattr(import_module(module), name)(path, kind))
+
+
+class TextLogReader:
+    """A reader of a log in text."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._path, self.tally = path, Tally()
+
+    def __iter__(self) -> Iterator[Record]:
+        """Read the file."""
+        for records, _ in self._pieces():
+            yield from records
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames."""
+        for records, lines in self._pieces():
+            yield from among(records, lines.marks)
+
+    def _pieces(self) -> Iterator[tuple[list[Record], LogLines]]:
+        lines = LogLines()
+        self.tally = lines.tally
+        with open_log(self._path) as file:
+            for data in read_blocks(file, self._path, BLOCK_BYTES):
+                yield lines.push(data), lines
+        yield lines.finish(), lines
+
+
+MOST_MARKS: Final = 1_000
+"""Between two frames: more are a damaged log."""
+
+
+class Lines(Protocol):
+    """Reads the lines of one log, in their order."""
+
+    def read(self, line: str, tally: Tally, /) -> Record | str | None:
+        """Return a frame, what the line is instead, or None for a bad line.
+
+        Raises:
+            ValueError: this is no such log.
+        """
+        ...
+
+
+class LineLogReader:
+    """A reader of a log whose head tells how its lines are read.
+
+    Attributes:
+        comments: what lines begin with that may be marks.
+        make_lines: makes what reads the lines.
+    """
+
+    comments: tuple[str, ...] = ()
+    make_lines: Callable[[], Lines]
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._path, self._kind, self.tally = path, kind, Tally()
+
+    def __iter__(self) -> Iterator[Record]:
+        """Read the file."""
+        return (item for item in self.items() if isinstance(item, Record))
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames: they have the time of the next one."""
+        tally = self.tally = Tally()
+        lines, marks, at_us = type(self).make_lines(), deque[Mark](maxlen=MOST_MARKS), 0
+        for number, line in enumerate(self._lines(), 1):
+            try:
+                found = lines.read(line, tally)
+            except ValueError as error:
+                raise LogError(f"{self._path} is no {self._kind} log: {error}") from error
+            if isinstance(found, Record):
+                at_us = found.at_us
+                if marks:
+                    yield from (mark._replace(at_us=at_us) for mark in marks)
+                    marks.clear()
+                yield found
+            elif found is None:
+                tally.bad_lines.add(number, line.rstrip("\r"))
+            elif found.startswith(self.comments) and (mark := read_mark(0, found.lstrip("/;"))):
+                tally.lost += mark.frames
+                marks.append(mark)
+        yield from (mark._replace(at_us=at_us) for mark in marks)
+
+    def _lines(self) -> Iterator[str]:
+        """Give the lines: in UTF-8, or else in Latin-1."""
+        whole = WholeLines()
+        with open_log(self._path) as file:
+            first = True
+            for data in read_blocks(file, self._path, BLOCK_BYTES):
+                if lines := whole.push(data):
+                    text = _text(lines[:-1])
+                    yield from (text.removeprefix(BOM) if first else text).split("\n")
+                    first = False
+        if rest := whole.finish():
+            yield _text(rest)
+
+
+NUMBERLESS: Final = "canX"
+
+
+def bus_name(number: str) -> str:
+    """Return the name of a bus of a log that numbers them from 1; ValueError if it is no number.
+
+    >>> bus_name("1"), bus_name("0")
+    ('can0', 'canX')
+    """
+    count = int(number[:LONGEST_NAME])
+    return f"can{count - 1}"[:LONGEST_NAME] if count > 0 else NUMBERLESS
+
+
+BOM: Final = "\ufeff"
+
+
+def _text(data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")

@@ -1,0 +1,241 @@
+"""Frames into a log file."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from importlib import import_module
+from pathlib import Path
+from typing import Final, Protocol, cast
+
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
+from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.logs.notation import (
+    GVRET_HEADER,
+    LOG_HEADER,
+    csv_row,
+    gvret_row,
+    json_line,
+)
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+BLOCK_LINES: Final = 256
+
+
+CAN_LOG_WRITER: Final = "tickrig.host.canmon.model.logs.can_log_writer"
+"""python-can is slow to import: this module is when a log needs it."""
+
+MARKS: Final = "marks of gaps and triggers left out"
+
+CAPTURE_WRITER: Final = "tickrig.host.canmon.model.logs.pcap.pcapng_writer"
+
+WRITERS: Final = {
+    LogFormat.CANDUMP: (__name__, "TextLogWriter"),
+    LogFormat.JSONL: (__name__, "TextLogWriter"),
+    LogFormat.CSV: (__name__, "CsvLogWriter"),
+    LogFormat.GVRET: (__name__, "GvretLogWriter"),
+    LogFormat.ASC: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.BLF: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.TRC: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.MF4: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogWriter"),
+    LogFormat.PCAPNG: (CAPTURE_WRITER, "PcapngWriter"),
+    LogFormat.PCAP: (CAPTURE_WRITER, "PcapngWriter"),
+}
+"""Module and class of the writer of each format."""
+
+
+class LogWriter(Protocol):
+    """A log file that is written."""
+
+    def write(self, record: Record, /) -> None:
+        """Add a frame."""
+        ...
+
+    def mark(self, mark: Mark, /) -> None:
+        """Add what is no frame, where the format can hold it."""
+        ...
+
+    def flush(self) -> None:
+        """Give all that was added to the operating system: it is readable if nothing follows.
+
+        Where `in_blocks` says so that makes the file larger: do it seldom.
+        """
+        ...
+
+    def close(self) -> None:
+        """End the log; closing twice is no error."""
+        ...
+
+    def messages(self) -> list[str]:
+        """Say what the format could not hold, one line each."""
+        ...
+
+
+def in_blocks(path: Path) -> bool:
+    """Say whether a log is compressed, block by block."""
+    return path.suffix.lower() == COMPRESSED or log_format(path) is LogFormat.BLF
+
+
+def write_log(path: Path) -> LogWriter:
+    """Begin a log; a file that exists is replaced.
+
+    Raises:
+        LogFormatError: the file's name tells no format.
+        OSError: it cannot be written.
+        LogError: its format needs a library that is not there.
+    """
+    kind = log_format(path)
+    module, name = WRITERS[kind]
+    return cast("LogWriter", getattr(import_module(module), name)(path, kind))
+
+
+def log_line(record: Record) -> str:
+    """Write a frame as `candump -L` does; what we sent ends in T, as `candump -L -x` has it."""
+    at_us, channel, frame, sent = record
+    end = " T" if sent else ""
+    return f"({at_us // 1_000_000:010d}.{at_us % 1_000_000:06d}) {channel} {frame}{end}"
+
+
+_LINES: Final = {
+    LogFormat.CANDUMP: log_line,
+    LogFormat.JSONL: json_line,
+    LogFormat.CSV: csv_row,
+}
+
+
+def comment(mark: Mark) -> str:
+    """Write a mark as programs pass it over that read candump's logs."""
+    return f"# {mark.text}"
+
+
+_MARKS: Final = {LogFormat.CANDUMP: comment, LogFormat.JSONL: Mark.json}
+
+
+class TextLogWriter:
+    """A log in lines: candump's, JSON or CSV."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._file, self._lines = open_log(path, "wb"), list[str]()
+        self._kind = kind
+
+    def write(self, record: Record, /) -> None:
+        """Add a line."""
+        self._lines.append(self._row(record))
+        if len(self._lines) >= BLOCK_LINES:
+            self._give()
+
+    def mark(self, mark: Mark, /) -> None:
+        """Add a comment, or an event."""
+        self._lines.append(_MARKS[self._kind](mark))
+
+    def flush(self) -> None:
+        """Give what was added to the operating system."""
+        self._give()
+        self._file.flush()
+
+    def close(self) -> None:
+        """End the log."""
+        if not self._file.closed:
+            try:
+                self._give()
+            finally:
+                self._file.close()
+
+    def messages(self) -> list[str]:
+        """Nothing: these formats hold all there is."""
+        return []
+
+    def _row(self, record: Record) -> str:
+        return _LINES[self._kind](record)
+
+    def _give(self) -> None:
+        self._file.write("".join(f"{line}\n" for line in self._lines).encode())
+        self._lines.clear()
+
+
+class CsvLogWriter(TextLogWriter):
+    """Rows below a header; they do not name their bus."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        super().__init__(path, kind)
+        self._name, self._channels, self._marks = path.name, dict[str, None](), 0
+        self._lines.append(LOG_HEADER)
+
+    def write(self, record: Record, /) -> None:
+        """Add a row."""
+        self._channels[record.channel] = None
+        super().write(record)
+
+    def mark(self, mark: Mark, /) -> None:
+        """Count it: readers of python-can take each row for a frame."""
+        self._marks += 1
+
+    def messages(self) -> list[str]:
+        """Say which buses became one, and what was left out."""
+        said = [f"{self._name}: {self._marks} {MARKS}"] if self._marks else []
+        if len(self._channels) > 1:
+            buses = ", ".join(self._channels)
+            said.append(f"{self._name}: csv does not tell buses apart: {buses}")
+        return said
+
+
+_NUMBERED: Final = re.compile(r"can([0-9]{1,3})")
+
+
+class BusNumbers:
+    """Numbers of buses in a log without names: `can3` is number 3, others take free numbers."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[str, int] = {}
+
+    def number(self, channel: str) -> int:
+        """Return the number of a bus."""
+        if channel not in self._numbers:
+            match = _NUMBERED.fullmatch(channel)
+            number = int(match[1]) if match else 0
+            while number in self._numbers.values():
+                number += 1
+            self._numbers[channel] = number
+        return self._numbers[channel]
+
+    def messages(self, name: str) -> list[str]:
+        """Say which bus became which number, where its name does not."""
+        return [
+            f"{name}: {channel} became can{number}"
+            for channel, number in self._numbers.items()
+            if channel != f"can{number}"
+        ]
+
+
+class GvretLogWriter(TextLogWriter):
+    """Rows as SavvyCAN reads them: data frames of at most 8 bytes, with numbers of buses."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        super().__init__(path, kind)
+        self._name, self._numbers, self._left_out = path.name, BusNumbers(), Counter[str]()
+        self._lines.append(GVRET_HEADER)
+
+    def write(self, record: Record, /) -> None:
+        """Add a row, or count what such a log does not hold."""
+        frame = record.frame
+        if isinstance(frame, CanFrame) and not frame.remote:
+            super().write(record)
+        else:
+            is_error = isinstance(frame, ErrorFrame)
+            kind = "remote" if isinstance(frame, CanFrame) else "error" if is_error else "CAN FD"
+            self._left_out[f"{kind} frames left out"] += 1
+
+    def mark(self, mark: Mark, /) -> None:
+        """Count it."""
+        self._left_out[MARKS] += 1
+
+    def messages(self) -> list[str]:
+        """Say what was left out, and which bus has which number."""
+        said = [f"{self._name}: {count} {what}" for what, count in self._left_out.items()]
+        return said + self._numbers.messages(self._name)
+
+    def _row(self, record: Record) -> str:
+        return gvret_row(record, self._numbers.number(record.channel))

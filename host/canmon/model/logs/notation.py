@@ -1,0 +1,300 @@
+r"""Frames as lines of JSON and CSV, and in candump's compact notation.
+
+>>> csv_row(Record(1_500_000, "can0", CanFrame(0x705, b"\x7f"), sent=True))
+'1.500000,0x705,0,0,0,1,fw==>'
+
+>>> str(parse_frame("123#0011223344556677_C")), str(parse_frame("20000080#01"))
+('123#0011223344556677', '20000080#0100000000000000')
+"""
+
+from __future__ import annotations
+
+import re
+from binascii import a2b_base64, b2a_base64
+from typing import Any, Final, Protocol
+
+from tickrig.host.canmon.model.frames.record import AnyFrame, LineRecord, Record
+from tickrig.host.canmon.model.logs.log_file import to_us
+from tickrig.host.canmon.model.logs.mark import DROP, Mark, dropped, read_mark
+from tickrig.host.canmon.model.logs.tally import SERIAL_LINES, Tally
+from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame
+from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
+from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame, parse_sent
+from tickrig.wire.errors import WireError
+
+_CODED: Final = re.compile(r"(.+#(?:[0-9A-Fa-f]{16}|R8))_[9A-Fa-f]")
+_ERROR: Final = re.compile(r"([23][0-9A-Fa-f]{7})#((?:[0-9A-Fa-f]{2}){0,8})")
+
+
+def parse_frame(notation: str) -> AnyFrame:
+    """Read a frame; WireError if that is none.
+
+    The raw length code behind eight bytes is passed over; an error frame may have less
+    than eight bytes.
+    """
+    if error := _ERROR.fullmatch(notation):
+        data = bytes.fromhex(error[2]).ljust(8, b"\0")
+        return ErrorFrame(int(error[1], 16) & ERROR_CLASS_MASK, data)
+    coded = _CODED.fullmatch(notation)
+    return parse_sent(coded[1] if coded else notation)
+
+
+LONGEST_NAME: Final = 32
+"""Characters of the name of a bus, as in the lines of a candump log."""
+_NAME: Final = re.compile(rf"\S{{1,{LONGEST_NAME}}}", re.ASCII)
+
+VERSION: Final = 1
+LINE_EVENT: Final = "line"
+"""A line of a serial port, which no log of CAN holds."""
+
+
+def json_line(record: Record, more: str = "") -> str:
+    """Write a frame; `more` are further members, each with its comma in front.
+
+    A frame is an object with `v`, `t` (seconds), `ch`, `id`, `x` (1: extended), `dir` and `data`
+    (hex); a remote frame has `rtr`, its length, and an error frame has `err`: 1 and its class as
+    `id`; one of CAN FD has `fd`: 1, with `brs`: 1 and `esi`: 1 where it has these.
+    `{"v":1,"ev":"drop","n":12}` says what was lost; a line of a serial port is an event, too.
+
+    >>> json_line(Record(1_500_000, "can0", CanFrame(0x185, b"7")))
+    '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
+    """
+    at_us, channel, frame, sent = record
+    if isinstance(frame, ErrorFrame):
+        what = f'"id":{frame.error_class},"x":0,"err":1'
+    elif isinstance(frame, FdFrame):
+        flags = ',"brs":1' * frame.brs + ',"esi":1' * frame.esi
+        what = f'"id":{frame.can_id},"x":{frame.extended:d},"fd":1{flags}'
+    else:
+        remote = f',"rtr":{frame.dlc}' if frame.remote else ""
+        what = f'"id":{frame.can_id},"x":{frame.extended:d}{remote}'
+    return (
+        f'{{"v":{VERSION},"t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},"ch":{_quoted(channel)},'
+        f'{what},"dir":"{"tx" if sent else "rx"}","data":"{frame.data.hex().upper()}"{more}}}'
+    )
+
+
+def line_json(line: LineRecord, more: str = "") -> str:
+    """Write an event in JSON; `more` are further members, each with its comma in front.
+
+    >>> from tickrig.host.canmon.model.decode.decoded import Decoded
+    >>> line_json(LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc")))
+    '{"v":1,"ev":"line","t":1.500000,"ch":"ttyS0","dir":"rx","data":"45563A506F7765724F6E"}'
+    """
+    at_us = line.at_us
+    return (
+        f'{{"v":{VERSION},"ev":"{LINE_EVENT}","t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},'
+        f'"ch":{_quoted(line.channel)},"dir":"{"tx" if line.sent else "rx"}",'
+        f'"data":"{line.data.hex().upper()}"{more}}}'
+    )
+
+
+def drop_line(lost: int) -> str:
+    """Write that frames were lost.
+
+    >>> drop_line(12)
+    '{"v":1,"ev":"drop","n":12}'
+    """
+    return f'{{"v":{VERSION},"ev":"drop","n":{lost}}}'
+
+
+def parse_json_line(text: str, tally: Tally) -> Record | str | None:
+    """Return a frame, the name of an event, or None for anything else."""
+    import json  # noqa: PLC0415 - candump's lines are the usual ones
+
+    try:
+        said = json.loads(text)
+        if "ev" in said:
+            return _event(said, tally)
+        return Record(to_us(said["t"]), _name(said["ch"]), _frame(said), said.get("dir") == "tx")
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError, WireError):
+        return None
+
+
+def parse_json_mark(text: str) -> Mark | None:
+    """Return the mark that an event is; its time is 0 where it has none; None for others."""
+    import json  # noqa: PLC0415 - candump's lines are the usual ones
+
+    try:
+        said = json.loads(text)
+        at_us = to_us(said.get("t", 0))
+        if said["ev"] == DROP:
+            return dropped(at_us, int(said["n"])) if int(said["n"]) > 0 else None
+        mark = read_mark(at_us, str(said["text"]))
+        return mark if mark and mark.event == said["ev"] else None
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
+        return None
+
+
+def _event(said: dict[str, Any], tally: Tally) -> str:
+    """Take an event; one that is not known says nothing to us."""
+    if said["ev"] == DROP:
+        tally.lost += max(0, int(said["n"]))
+    elif said["ev"] == LINE_EVENT:
+        tally.passed_over[SERIAL_LINES] += 1
+    return str(said["ev"])
+
+
+def _name(channel: object) -> str:
+    name = str(channel)
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"channel {name!r} is not a name of 1 to 32 characters without blanks")
+    return name
+
+
+def _frame(said: dict[str, Any]) -> AnyFrame:
+    data = bytes.fromhex(said["data"])
+    if said.get("err"):
+        return ErrorFrame(int(said["id"]) & 0x1FFF_FFFF, data[:8].ljust(8, b"\0"))
+    if said.get("fd"):
+        flags = BRS * bool(said.get("brs")) | ESI * bool(said.get("esi"))
+        return FdFrame(int(said["id"]), data, bool(said["x"]), flags).checked()
+    remote = said.get("rtr")
+    frame = CanFrame(int(said["id"]), data, remote is not None, bool(said["x"]), int(remote or 0))
+    return frame.checked()
+
+
+def _quoted(text: str) -> str:
+    """Quote a name; nearly all need no care."""
+    if text.isascii() and text.isprintable() and '"' not in text and "\\" not in text:
+        return f'"{text}"'
+    import json  # noqa: PLC0415 - slow
+
+    return json.dumps(text)
+
+
+LOG_HEADER: Final = "timestamp,arbitration_id,extended,remote,error,dlc,data"
+DUMP_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
+UNNAMED: Final = "can0"
+"""What a bus without a name or number is called."""
+
+SENT: Final = ">"
+FD, FD_BRS, FD_ESI = "#", "!", "*"
+"""Behind the data of a row: base64 does not have them."""
+
+
+class Counting(Protocol):
+    """Tells the time of a counter of microseconds.
+
+    Attributes:
+        shift_us: what it adds to the counter.
+    """
+
+    shift_us: int
+
+    def counted_us(self, count: int) -> int:
+        """Return microseconds, not below 0."""
+        ...
+
+
+_DUMPED: Final = re.compile(
+    r"([0-9]{1,12}\.[0-9]{6}),([^,\"\s]{1,32}),([0-9A-Fa-f]*),([rt]x),[0-9]+,"
+    r"(R[0-8]?|#?[0-9A-Fa-f]*),.*"
+)
+
+
+def csv_row(record: Record) -> str:
+    """Write a frame below `LOG_HEADER`.
+
+    python-can does not tell who sent a frame. Here a `>` behind its data, which base64 does not
+    have and python-can passes over, says that this program did. Nor does it tell CAN FD: here a
+    `#` there says so, `!` that it has BRS, `*` that it has ESI.
+    """
+    at_us, _, frame, sent = record
+    marks = SENT * sent
+    if isinstance(frame, ErrorFrame):
+        what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"
+    elif isinstance(frame, FdFrame):
+        what = f"{frame.can_id:#x},{frame.extended:d},0,0,{len(frame.data)}"
+        marks = FD + FD_BRS * frame.brs + FD_ESI * frame.esi + marks
+    else:
+        what = f"{frame.can_id:#x},{frame.extended:d},{frame.remote:d},0,{frame.dlc}"
+    data = b2a_base64(frame.data, newline=False).decode("ascii")
+    return f"{at_us // 1_000_000}.{at_us % 1_000_000:06d},{what},{data}{marks}"
+
+
+GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"
+"""Of SavvyCAN's own logs; older ones have no `Dir`."""
+GVRET_BYTES: Final = 8
+"""So many columns of data there are, whatever the length."""
+WITHOUT_ERRORS: Final = "a GVRET log holds no error frames"
+
+_GVRET_HEAD: Final = re.compile(r"time stamp,\s*id,\s*extended,.*", re.IGNORECASE)
+_GVRET: Final = re.compile(
+    r"(-?[0-9]{1,18}),\s*([0-9A-F]{1,8}),\s*(true|false),(?:\s*(Rx|Tx),)?\s*([0-9]{1,3}),"
+    r"\s*([0-9]{1,2})((?:,\s*[0-9A-F]{1,2})*)(?:,\s*)*",
+    re.ASCII | re.IGNORECASE,
+)
+
+
+def gvret_row(record: Record, bus: int) -> str:
+    """Write a data frame of at most 8 bytes below `GVRET_HEADER`.
+
+    >>> gvret_row(Record(1_500_000, "can0", CanFrame(0x705, b"7"), sent=True), 0)
+    '1500000,00000705,false,Tx,0,1,37,00,00,00,00,00,00,00,'
+    """
+    frame = record.frame
+    assert isinstance(frame, CanFrame), "the log holds no others"
+    direction = "Tx" if record.sent else "Rx"
+    cells = frame.data.ljust(GVRET_BYTES, b"\0").hex(",").upper()
+    extended = "true" if frame.extended else "false"
+    head = f"{record.at_us},{frame.can_id:08X},{extended},{direction},{bus}"
+    return f"{head},{len(frame.data)},{cells},"
+
+
+def parse_csv_line(text: str, tally: Tally, clock: Counting) -> Record | str | None:
+    """Return a frame, the name of a header or of what was counted instead, or None.
+
+    What a row is, itself tells: one of python-can, of `canmon dump --csv`, or of SavvyCAN.
+    """
+    if text.startswith((LOG_HEADER, DUMP_HEADER)) or _GVRET_HEAD.fullmatch(text):
+        return text
+    try:
+        if match := _DUMPED.fullmatch(text):
+            return _dumped(match, tally)
+        if match := _GVRET.fullmatch(text):
+            return _of_savvycan(match, tally, clock)
+        return _logged(text.split(","))
+    except (ValueError, WireError):
+        return None
+
+
+def _of_savvycan(match: re.Match[str], tally: Tally, clock: Counting) -> Record:
+    """Return the frame of a row; some programs do not say of a CAN-ID that it has 29 bits."""
+    stamp, ident, extended, direction, bus, length, cells = match.groups()
+    can_id, size = int(ident, 16), int(length)
+    data = bytes(int(cell, 16) for cell in cells.split(",")[1 : size + 1])
+    if len(data) != size:
+        raise ValueError(f"{len(data)} bytes, {size} were announced")
+    long = extended.lower() == "true" or can_id > STANDARD_MAX
+    fd = size > MAX_DATA_BYTES
+    frame = FdFrame(can_id, data, long) if fd else CanFrame(can_id, data, False, long)
+    checked = frame.checked()
+    tally.without_errors = WITHOUT_ERRORS
+    at_us = clock.counted_us(int(stamp))
+    tally.shifted_us = clock.shift_us
+    return Record(at_us, f"can{int(bus)}", checked, (direction or "").lower() == "tx")
+
+
+def _dumped(match: re.Match[str], tally: Tally) -> Record | str:
+    stamp, channel, ident, direction, data = match.groups()
+    if not ident:
+        tally.passed_over[SERIAL_LINES] += 1
+        return SERIAL_LINES
+    return Record(to_us(float(stamp)), channel, parse_frame(f"{ident}#{data}"), direction == "tx")
+
+
+def _logged(cells: list[str]) -> Record:
+    stamp, ident, extended, remote, error, dlc, text = cells
+    data, can_id, length = a2b_base64(text), int(ident, 16), int(dlc)
+    frame: AnyFrame
+    if error == "1":
+        frame = ErrorFrame(can_id & ERROR_CLASS_MASK, data[:8].ljust(8, b"\0"))
+    elif remote == "1":
+        frame = CanFrame(can_id, b"", True, extended == "1", length).checked()
+    elif FD in text or (len(data) > MAX_DATA_BYTES and len(data) in FD_LENGTHS):
+        flags = BRS * (FD_BRS in text) | ESI * (FD_ESI in text)
+        frame = FdFrame(can_id, data, extended == "1", flags).checked()
+    else:
+        frame = CanFrame(can_id, data, False, extended == "1").checked()
+    return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(SENT))

@@ -1,0 +1,170 @@
+"""Frames in traces of benches and of ports (docs/reference/bench/trace.md)."""
+
+from __future__ import annotations
+
+import re
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_file import LogError, LogFormat, open_log
+from tickrig.host.canmon.model.logs.mark import Mark as LogMark
+from tickrig.host.canmon.model.logs.tally import SERIAL_LINES, Tally
+from tickrig.host.text.bench_header import (
+    BenchHeader,
+    DeviceEntry,
+    Place,
+    WireEntry,
+    WireType,
+    parse_bench_header,
+)
+from tickrig.host.text.bench_record import BenchParser, BenchRecord
+from tickrig.host.text.trace import Mark, TraceError
+from tickrig.wire.can import CanFrame
+from tickrig.wire.can_error import ErrorFrame
+
+OTHER_BUSES = "frames of other buses"
+ERROR_FRAMES = "error frames"
+LOG_MARKS = "marks of gaps and triggers"
+FD_FRAMES = "CAN FD frames"
+
+WITHOUT_ERRORS = "a trace holds no error frames"
+
+MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
+
+
+class TraceLogWriter:
+    """A trace of one bus, as a host sees it: that of the first frame; its times begin with it."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._file, self._name = open_log(path, "wb"), path.name
+        self._channel, self._began_us, self._latest_us = "", 0, 0
+        self._left_out: Counter[str] = Counter()
+
+    def write(self, record: Record, /) -> None:
+        """Add a frame; one that comes late is not before its last."""
+        if not self._channel:
+            self._begin(record)
+        if record.channel != self._channel or not isinstance(record.frame, CanFrame):
+            kind = ERROR_FRAMES if isinstance(record.frame, ErrorFrame) else FD_FRAMES
+            self._left_out[OTHER_BUSES if record.channel != self._channel else kind] += 1
+            return
+        self._latest_us = max(self._latest_us, record.at_us - self._began_us)
+        mark = MARKS[record.sent]
+        self._put(BenchRecord(self._latest_us, _name(self._channel), mark, record.frame).encode())
+
+    def mark(self, mark: LogMark, /) -> None:
+        """Count it: a trace has frames alone."""
+        self._left_out[LOG_MARKS] += 1
+
+    def flush(self) -> None:
+        """Give what was added to the operating system."""
+        self._file.flush()
+
+    def close(self) -> None:
+        """End the trace."""
+        if not self._file.closed:
+            try:
+                if self._channel:
+                    self._put(BenchRecord(self._latest_us, "", Mark.END).encode())
+            finally:
+                self._file.close()
+
+    def messages(self) -> list[str]:
+        """Say what was left out."""
+        return [
+            f"{self._name}: a trace holds one bus, without errors; left out: {count} {what}"
+            for what, count in self._left_out.items()
+        ]
+
+    def _begin(self, record: Record) -> None:
+        self._channel, self._began_us = record.channel, record.at_us
+        name = _name(record.channel)
+        wires = {"bus": WireEntry(WireType.CAN)}
+        self._put(BenchHeader({name: DeviceEntry("bus")}, wires, place=Place.PORT).encode())
+
+    def _put(self, line: str) -> None:
+        self._file.write(f"{line}\n".encode("ascii"))
+
+
+def _name(channel: str) -> str:
+    """Return a bus by a name that can stand in a trace."""
+    return re.sub(r"[^\w./:-]|^\W", "_", channel, flags=re.ASCII)
+
+
+class TraceLogReader:
+    """A reader of the frames in a trace.
+
+    Of a trace that was recorded at the devices it gives the frames in the order in which they
+    were sent, or first received: what several nodes received of the host is one frame.
+    """
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._path, self.tally = path, Tally()
+
+    def __iter__(self) -> Iterator[Record]:
+        """Read the file."""
+        self.tally = Tally(without_errors=WITHOUT_ERRORS)
+        try:
+            with open_log(self._path) as file:
+                header = parse_bench_header(file.readline().decode("ascii").rstrip("\n"))
+                passed = _Passed(header)
+                for record in BenchParser(header).parse(_whole_lines(file)):
+                    if isinstance(record.traffic, CanFrame):
+                        yield from passed.take(record, record.traffic)
+                    elif record.traffic:
+                        self.tally.passed_over[SERIAL_LINES] += 1
+        except (EOFError, zlib.error, TraceError) as error:
+            raise LogError(f"{self._path}: {error}") from error
+        except UnicodeDecodeError:
+            raise LogError(f"{self._path}: it is not ASCII") from None
+
+    def items(self) -> Iterator[Record]:
+        """Read the file; it holds no marks."""
+        return iter(self)
+
+
+def _whole_lines(file: BinaryIO) -> Iterator[str]:
+    """Give the lines; a last one without LF is of a writer that was killed."""
+    for line in file:
+        if line.endswith(b"\n"):
+            yield line[:-1].decode("ascii")
+
+
+class _Passed:
+    """Tells what was on a bus by what its nodes sent and received."""
+
+    def __init__(self, header: BenchHeader) -> None:
+        self._header = header
+        self._at_us, self._of_host = 0, Counter[tuple[str, CanFrame]]()
+        self._received: defaultdict[str, Counter[CanFrame]] = defaultdict(Counter)
+        self._awaited: defaultdict[str, Counter[CanFrame]] = defaultdict(Counter)
+
+    def take(self, record: BenchRecord, frame: CanFrame) -> Iterator[Record]:
+        """Give a frame, unless it was given before."""
+        header, name = self._header, record.name
+        wire = header.devices[name].wire
+        if header.place is Place.PORT:
+            yield Record(record.at_us, name, frame, record.mark is Mark.TO_DEVICE)
+        elif record.mark is Mark.FROM_DEVICE:
+            for other, entry in header.devices.items():
+                if other != name and entry.wire == wire:
+                    self._awaited[other][frame] += 1
+            yield Record(record.at_us, wire, frame)
+        elif self._awaited[name][frame]:
+            self._awaited[name][frame] -= 1
+        else:
+            yield from self._from_host(record, wire, frame)
+
+    def _from_host(self, record: BenchRecord, wire: str, frame: CanFrame) -> Iterator[Record]:
+        if record.at_us != self._at_us:
+            self._at_us = record.at_us
+            self._of_host.clear()
+            self._received.clear()
+        self._received[record.name][frame] += 1
+        if self._received[record.name][frame] > self._of_host[wire, frame]:
+            self._of_host[wire, frame] += 1
+            yield Record(record.at_us, wire, frame, sent=True)

@@ -1,0 +1,270 @@
+"""PEAK's traces (TRC), of versions 1.0 to 3.0, with their error frames.
+
+>>> lines, tally = TrcLines(), Tally()
+>>> lines.read(";$FILEVERSION=1.1", tally)
+';$FILEVERSION=1.1'
+>>> record = lines.read("     6)      1349.2  Error      0008  4  00 19 08 08", tally)
+>>> record.at_us, record.channel, str(record.frame)
+(1349200, 'can0', '200002A8#0000801900000808')
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.logs.log_file import END_S
+from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
+from tickrig.host.canmon.model.logs.tally import (
+    BAD_FRAMES,
+    CAN_XL,
+    COUNTERS_TOLD,
+    NO_TIME,
+    OTHER_LINES,
+    Tally,
+)
+from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
+from tickrig.wire.can_error import (
+    PROTOCOL_BYTE,
+    REC_BYTE,
+    TEC_BYTE,
+    ErrorClass,
+    ErrorFrame,
+    ProtocolFlag,
+)
+from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame
+from tickrig.wire.errors import WireError
+
+VERSIONS: Final = {
+    "1.0": ("N", "O", "I", "L", "D"),
+    "1.1": ("N", "O", "T", "I", "L", "D"),
+    "1.2": ("N", "O", "B", "T", "I", "L", "D"),
+    "1.3": ("N", "O", "B", "T", "I", "R", "L", "D"),
+}
+"""Columns by version: number, offset in ms, bus, type, CAN-ID, reserved, length, data, direction.
+From 2.0 on the file names them: `l` is a count of bytes, `L` a length code."""
+
+FD_FLAGS: Final = {"FD": 0, "FB": BRS, "BI": ESI, "FE": BRS | ESI}
+"""Types of CAN FD frames."""
+
+ERROR: Final = "ERROR"
+"""In version 1.0 it stands before the data of an error frame."""
+ERRORS: Final = ("Error", "ER")
+STATES: Final = ("Warng", "ST")
+COUNTERS: Final = "EC"
+EVENT: Final = "EV"
+
+_DAYS_TO_1970: Final = 25_569
+_DAY_US: Final = 86_400_000_000
+_LATEST_DAYS: Final = 2_958_465
+"""The end of 9999."""
+
+_HEAD: Final = re.compile(r";\$(FILEVERSION|STARTTIME|COLUMNS)=\s*(\S+)", re.IGNORECASE)
+_OFFSET: Final = re.compile(r"(-?)([0-9]{1,16})(?:\.([0-9]{1,9}))?", re.ASCII)
+_NUMBER: Final = re.compile(r"[0-9]+\)?", re.ASCII)
+_CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{1,8}")
+_BYTE: Final = re.compile(r"[0-9A-Fa-f]{2}")
+_LENGTH: Final = re.compile(r"[0-9]{1,2}", re.ASCII)
+
+STANDARD_DIGITS: Final = 4
+"""A CAN-ID of more digits has 29 bits."""
+
+STATUS: Final = {
+    0x10: "that a controller is bus-off",
+    0x4_0000: "that a controller is error passive",
+    0x08: "that a controller has reached its warning limit (BUSHEAVY)",
+    0x04: "that a controller has reached its warning limit (BUSLIGHT)",
+}
+"""Bits of a status (PCAN-Basic, PCAN_ERROR_...), the worst first."""
+
+KINDS: Final = {1: ProtocolFlag.BIT, 2: ProtocolFlag.FORM, 4: ProtocolFlag.STUFFING}
+ACK_SLOT: Final = 0x19
+SEGMENT: Final = 0x1F
+"""Place of an error in the frame, as the SJA1000 tells it, and Linux in byte 3."""
+
+
+class _Row(NamedTuple):
+    """The columns of a line, by their letters."""
+
+    cells: dict[str, str]
+    data: list[str]
+
+    def hex_bytes(self) -> bytes:
+        """Return the data up to the first word that is no byte, as `--` and `BUSHEAVY`."""
+        count = next((n for n, word in enumerate(self.data) if not _BYTE.fullmatch(word)), None)
+        return bytes.fromhex("".join(self.data[:count]))
+
+
+class TrcLines:
+    """Reads the lines of a trace, in their order."""
+
+    def __init__(self) -> None:
+        self._version, self._start_us = "1.0", 0
+        self._columns: Sequence[str] = VERSIONS["1.0"]
+
+    def read(self, line: str, tally: Tally) -> Record | str | None:
+        """Return a frame, what the line is instead, or None for a bad line.
+
+        Raises:
+            ValueError: the columns are not known.
+        """
+        text = line.strip()
+        if not text or text.startswith(";"):
+            if head := _HEAD.match(text):
+                self._head(head[1].upper(), head[2].rstrip(";"), tally)
+            return text
+        if not self._columns:
+            raise ValueError("File has no column information: ;$COLUMNS= is missing")
+        number, *words = text.split()
+        if not _NUMBER.fullmatch(number) or not words:
+            return None
+        try:
+            return self._row(number, words, tally)
+        except WireError:
+            tally.passed_over[BAD_FRAMES] += 1
+            return BAD_FRAMES
+        except (ValueError, LookupError):
+            return None
+
+    def _head(self, word: str, value: str, tally: Tally) -> None:
+        """Take what the file says of itself."""
+        match word:
+            case "FILEVERSION":
+                self._version, self._columns = value, VERSIONS.get(value, ())
+            case "COLUMNS" if self._version not in VERSIONS:
+                self._columns = value.split(",")
+            case "STARTTIME":
+                start_us = _start_us(value)
+                tally.undated += start_us is None
+                self._start_us = start_us or 0
+
+    def _row(self, number: str, words: list[str], tally: Tally) -> Record | str | None:
+        at_us, row = self._at_us(words[0]), self._cells([number, *words])
+        kind = row.cells.get("T", "Rx")
+        what = NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
+        if what:
+            tally.passed_over[what] += 1
+            return what
+        is_error = kind in ERRORS or row.data[:1] == [ERROR]
+        frame = _error(row) if is_error else _frame(row, kind)
+        sent = "Tx" in (kind, row.cells.get("d"))
+        return Record(at_us, bus_name(row.cells.get("B", "1")), frame, sent)
+
+    def _at_us(self, offset: str) -> int:
+        match = _OFFSET.fullmatch(offset)
+        if match is None:
+            raise ValueError(f"{offset!r} is no offset")
+        sign, whole, part = match.groups()
+        nanos = int(whole) * 1_000_000 + int(f"{part or '':0<6.6}")
+        return self._start_us + int(f"{sign}1") * ((nanos + 500) // 1_000)
+
+    def _cells(self, words: list[str]) -> _Row:
+        """Tell the columns apart: lines without a CAN-ID leave some out, those of 2.0 its own."""
+        names = list(self._columns)
+        place = names.index("T") if "T" in names else len(words)
+        kind = words[place] if place < len(words) else ""
+        if kind not in ("ER", "EC", "ST", EVENT):
+            count = names.index("D")
+            return _Row(dict(zip(names, words[:count], strict=False)), words[count:])
+        cells = dict(zip(names[: place + 1], words, strict=False))
+        behind = words[place + 1 :]
+        if "B" in names and names.index("B") > place and behind:
+            cells["B"] = behind.pop(0)
+        at = next((n for n, word in enumerate(behind) if word in ("Rx", "Tx")), None)
+        if at is None:
+            return _Row(cells, behind)
+        cells["d"], data = behind[at], behind[at + 1 :]
+        while data and not _BYTE.fullmatch(data[0]):  # what is reserved, and the length
+            del data[0]
+        return _Row(cells, data)
+
+
+def _aside(row: _Row, kind: str, tally: Tally) -> str:
+    """Say what a line is that is no frame of CAN or CAN FD, and note what it says of errors."""
+    if kind == "XL":
+        return CAN_XL
+    if kind in STATES or row.cells.get("I") == "FFFFFFFF":
+        _note_status(row.hex_bytes(), tally)
+    elif kind == COUNTERS:
+        if any(row.hex_bytes()):
+            tally.errors_told[COUNTERS_TOLD] += 1
+    elif kind != EVENT:
+        return ""
+    return OTHER_LINES
+
+
+def _start_us(days: str) -> int | None:
+    """Return the start of a trace; None for what is no date since 1970."""
+    try:
+        value = float(days)
+    except ValueError:
+        return None
+    if not _DAYS_TO_1970 <= value <= _LATEST_DAYS:
+        return None
+    return round((value - _DAYS_TO_1970) * _DAY_US)
+
+
+def _frame(row: _Row, kind: str) -> AnyFrame:
+    """Return a data or remote frame."""
+    if kind not in ("Rx", "Tx", "DT", "RR", *FD_FLAGS):
+        raise ValueError(f"{kind!r} is no type of a frame")
+    ident = row.cells["I"]
+    if not _CAN_ID.fullmatch(ident):
+        raise ValueError(f"{ident!r} is no CAN-ID")
+    can_id, extended = int(ident, 16), len(ident) > STANDARD_DIGITS
+    length = _length(row.cells, fd=kind in FD_FLAGS)
+    if kind == "RR" or row.data[:1] in (["RTR"], ["R"]):
+        return CanFrame(can_id, b"", True, extended, min(MAX_DATA_BYTES, length)).checked()
+    data = row.hex_bytes()
+    if len(data) != length:
+        raise ValueError(f"{len(data)} bytes, {length} were announced")
+    if kind in FD_FLAGS:
+        return FdFrame(can_id, data, extended, FD_FLAGS[kind]).checked()
+    return CanFrame(can_id, data, False, extended).checked()
+
+
+def _length(cells: dict[str, str], *, fd: bool) -> int:
+    """Return how many bytes a frame has; of a classic length code above 8 it has 8."""
+    text = cells["l"] if "l" in cells else cells["L"]
+    if not _LENGTH.fullmatch(text):
+        raise ValueError(f"{text!r} is no length")
+    if "l" in cells:
+        return int(text)
+    return FD_LENGTHS[int(text)] if fd else min(MAX_DATA_BYTES, int(text))
+
+
+def _error(row: _Row) -> ErrorFrame:
+    """Return an error frame as Linux tells it.
+
+    Up to version 1.3 the CAN-ID is its type, and the data are direction, place and both counters;
+    from 2.0 on the data begin with the type.
+    """
+    data = [*_Row({}, [word for word in row.data if word != ERROR]).hex_bytes()]
+    if "I" in row.cells:
+        data.insert(0, int(row.cells["I"], 16))
+    kind, direction, place, received, sent = (data + [0] * 5)[:5]
+    transmitting = ProtocolFlag.TRANSMITTING * (len(data) > 1 and not direction)
+    said = bytearray(8)
+    said[PROTOCOL_BYTE] = KINDS.get(kind, 0) | transmitting
+    said[3], said[TEC_BYTE], said[REC_BYTE] = place & SEGMENT, sent, received
+    error_class = ErrorClass.PROTOCOL | ErrorClass.BUS_ERROR
+    error_class |= ErrorClass.NO_ACK * (place & SEGMENT == ACK_SLOT)
+    error_class |= ErrorClass.COUNTERS * bool(received or sent)
+    return ErrorFrame(int(error_class), bytes(said))
+
+
+def _note_status(status: bytes, tally: Tally) -> None:
+    """Note what a status says of errors; 0 says that all is well."""
+    bits = int.from_bytes(status, "big")
+    text = next((text for bit, text in STATUS.items() if bits & bit), None)
+    if text is not None:
+        tally.errors_told[text] += 1
+
+
+class TrcLogReader(LineLogReader):
+    """A reader of a trace."""
+
+    comments = (";",)
+    make_lines = TrcLines

@@ -1,0 +1,277 @@
+"""A recorder: takes frames as they come, and keeps all of them, or those around triggers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from itertools import groupby
+from typing import TYPE_CHECKING, Final, cast
+
+from tickrig.host.canmon.model.frames.dump_line import decoded_text
+from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.mark import Mark, dropped, triggered
+from tickrig.host.canmon.model.recorder.files import Files
+from tickrig.host.canmon.model.recorder.plan import DEFAULT_SPAN, Plan, Span
+from tickrig.host.canmon.model.recorder.ring import Entry, PreTrigger
+from tickrig.host.text.values import counted
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
+
+LATE_US: Final = 1_000_000
+"""A frame is taken to have come by then, when time alone says that a recording is over."""
+
+MOST_CHARACTERS: Final = 200
+"""Of what is said of a frame that was a trigger."""
+
+LOOK_US: Final = 100_000
+"""How often rules are asked what is missing."""
+
+
+class State(StrEnum):
+    """How a recorder stands."""
+
+    WAITING = "waiting"
+    RECORDING = "recording"
+    ENDED = "ended"
+    FAILED = "failed"
+
+
+class _Window:
+    """What is recorded behind a trigger; another trigger makes it longer."""
+
+    def __init__(self, span: Span, at_us: int) -> None:
+        self._span = span
+        self.names: set[str] = set()
+        self.extend(at_us)
+
+    def extend(self, at_us: int) -> None:
+        self._left = self._span.frames
+        self._until_us = at_us + (self._span.us or 0)
+
+    def takes(self, record: Record) -> bool:
+        if self._left is None:
+            return record.at_us <= self._until_us
+        self._left -= 1
+        return self._left >= 0
+
+    def over(self, now_us: int) -> bool:
+        return self._left == 0 if self._left is not None else now_us > self._until_us + LATE_US
+
+
+class Recorder:
+    """Records what it is given.
+
+    Times are those of the source: frames have them, and `now_us` goes on from the latest frame.
+    Where a file cannot be written the recording ends; what comes then is counted as missing.
+
+    Args:
+        plan: what the recording shall be.
+        now_us: the time.
+        triggers: what it waits for, where the plan has it wait.
+        wanted: which frames are recorded; None for all. Triggers see all of them.
+        lost: how many frames the source lost before.
+
+    Attributes:
+        plan: what the recording is.
+        failed: why it ended before its time; empty if it did not.
+        triggers: how often it was triggered.
+
+    Raises:
+        OSError: nothing can be written there.
+        LogFormatError: the name of the file tells no format.
+        LogError: its format cannot be written here.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        now_us: int = 0,
+        triggers: Sequence[Trigger] = (),
+        wanted: FilterTrigger | None = None,
+        lost: int = 0,
+    ) -> None:
+        self.plan, self._triggers, self._wanted = plan, triggers, wanted
+        self._files = Files(plan, now_us)
+        before, self._behind = plan.around or (None, DEFAULT_SPAN)
+        self._before = None if before is None else PreTrigger(before)
+        self._window: _Window | None = None
+        self._lost, self._missing, self._look_us = lost, 0, 0
+        self.failed, self.triggers, self._closed = "", 0, False
+
+    @property
+    def state(self) -> State:
+        """How it stands."""
+        if self.failed:
+            return State.FAILED
+        if self._files.ended or self._closed:
+            return State.ENDED
+        waits = self._before is not None and self._window is None
+        return State.WAITING if waits else State.RECORDING
+
+    @property
+    def ended(self) -> str:
+        """Why it records no more; empty while it does."""
+        return self.failed or self._files.ended
+
+    @property
+    def frames(self) -> int:
+        """How many frames are in files, those that were removed among them."""
+        return self._files.safe_frames
+
+    @property
+    def missing(self) -> int:
+        """How many frames should be in files, and are not."""
+        return self._files.frames - self._files.safe_frames + self._missing if self.failed else 0
+
+    def take(
+        self,
+        decoded_frames: Sequence[tuple[AnyRecord, Decoded | None]],
+        lost: int,
+        now_us: int,
+        marks: Sequence[Mark] = (),
+    ) -> None:
+        """Take what came.
+
+        Args:
+            decoded_frames: frames alone, and what they mean where a filter asks.
+            lost: how many frames were lost until now.
+            now_us: the time.
+            marks: what happened behind these frames.
+        """
+        if self.state in (State.FAILED, State.ENDED):
+            self._missing += len(decoded_frames)
+            return
+        try:
+            if self._before is None and self._wanted is None:
+                self._files.store([cast("Record", record) for record, _ in decoded_frames])
+            else:
+                self._watch(decoded_frames)
+            self._take_marks(lost, marks, now_us)
+            self._pass_time(now_us, lost)
+            self._files.flush(now_us)
+        except (OSError, LogError) as error:
+            self._fail(error)
+
+    def trigger(self, why: str, now_us: int) -> None:
+        """Record what is kept, and what comes: somebody has pressed a key."""
+        if self._before is not None and self.state in (State.WAITING, State.RECORDING):
+            try:
+                self._fire(why, why, now_us)
+                self._files.flush(now_us)
+            except (OSError, LogError) as error:
+                self._fail(error)
+
+    def close(self, why: str = "closed") -> None:
+        """End the recording."""
+        if self._closed:
+            return
+        self._closed = True
+        try:
+            if not self.failed:
+                self._files.close(self._files.ended or why)
+        except (OSError, LogError) as error:
+            self._fail(error)
+
+    def messages(self) -> list[str]:
+        """Say how it went, one line each."""
+        said = self._files.messages()
+        if self._before is not None and self._before.short:
+            said = [*said, "too many frames came before a trigger: the oldest of them had to go"]
+        said = [*said, *(text for one in self._triggers for text in one.messages())]
+        said += self._wanted.messages() if self._wanted else []
+        if self.plan.numbered or self.failed:
+            said.append(self._summary())
+        return said
+
+    def _summary(self) -> str:
+        files = self._files
+        said = f"{counted(self.frames, 'frame')} in {counted(files.parts, 'file')}"
+        said += f", {counted(self.triggers, 'trigger')}" if self._before is not None else ""
+        said += f", {counted(files.removed, 'old file')} removed" if files.removed else ""
+        said += f"; {files.ended}" if files.ended else ""
+        missing = f"{self.missing} that came are" if self.missing else "none that came is"
+        said += f"; {missing} missing" if self.failed else ""
+        return f"{said}; {self.plan.index}" if self.plan.numbered else said
+
+    def _watch(self, decoded_frames: Sequence[tuple[AnyRecord, Decoded | None]]) -> None:
+        """Look at each frame; keep or record it."""
+        pending: list[Record] = []
+        for one, decoded in decoded_frames:
+            record = cast("Record", one)
+            if self._wanted is None or self._wanted.why(record, decoded):
+                if self._window is not None and not self._window.takes(record):
+                    self._files.store(pending)
+                    pending = []
+                    self._end_window()
+                if self._before is None or self._window is not None:
+                    pending.append(record)
+                else:
+                    self._before.add(record)
+            for trigger in self._triggers:
+                if why := trigger.why(record, decoded):
+                    self._files.store(pending)
+                    pending = []
+                    self._fire(trigger.name, why, record.at_us, (record, decoded))
+        self._files.store(pending)
+
+    def _fire(
+        self, name: str, why: str, at_us: int, seen: tuple[Record, Decoded | None] | None = None
+    ) -> None:
+        self.triggers += 1
+        if self._window is None:
+            self._window = _Window(self._behind, at_us)
+            self._store([] if self._before is None else self._before.drain())
+        else:
+            self._window.extend(at_us)
+        if name not in self._window.names:  # a filter that passes each frame is told once
+            self._window.names.add(name)
+            # a rule says what is wrong; a filter is its own name
+            what = f": {_what(*seen)}" if seen is not None and why == name else ""
+            self._files.mark(triggered(at_us, f"{why}{what}"))
+
+    def _store(self, entries: Sequence[Entry]) -> None:
+        """Add frames with the marks among them; these are in the index already."""
+        for is_mark, group in groupby(entries, lambda entry: isinstance(entry, Mark)):
+            if is_mark:
+                for mark in group:
+                    self._files.mark_again(cast("Mark", mark))
+            else:
+                self._files.store([cast("Record", record) for record in group])
+
+    def _take_marks(self, lost: int, marks: Sequence[Mark], now_us: int) -> None:
+        if lost != self._lost:
+            marks = [dropped(now_us, lost - self._lost), *marks]
+            self._lost = lost
+        for mark in marks:
+            self._files.mark(mark)
+            if self._before is not None and self._window is None:
+                self._before.mark(mark)
+
+    def _pass_time(self, now_us: int, lost: int) -> None:
+        if self._window is not None and self._window.over(now_us):
+            self._end_window()
+        if self._triggers and not 0 <= now_us - self._look_us < LOOK_US:
+            self._look_us = now_us
+            for trigger in self._triggers:
+                if why := trigger.missing(now_us, lost):
+                    self._fire(trigger.name, why, now_us)
+
+    def _end_window(self) -> None:
+        self._window = None
+        self._files.end_part()
+
+    def _fail(self, error: Exception) -> None:
+        self.failed = str(error)
+        if isinstance(error, OSError):
+            self.failed = f"{error.filename or self._files.path}: {error.strerror}"
+        self._files.rescue(self.failed)
+
+
+def _what(record: Record, decoded: Decoded | None) -> str:
+    """Say which frame it was, and what it means."""
+    text = decoded_text(decoded)
+    return f"{record.channel} {record.frame}{f', {text}' if text else ''}"[:MOST_CHARACTERS]

@@ -1,0 +1,121 @@
+"""All files that are written of a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+from tickrig.host.rtc.canopen.builder.c_header import write_header
+from tickrig.host.rtc.canopen.builder.names import check_identifiers, snake_name
+from tickrig.host.rtc.canopen.builder.profile_file import Project
+from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
+from tickrig.host.rtc.canopen.definition.definition import (
+    NodeEntry,
+    SdoPortEntry,
+    SystemDefinition,
+)
+from tickrig.host.rtc.canopen.definition.definition_writer import write_definition
+from tickrig.wire.canopen.eds.eds_value import format_value
+from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.rtc_canopen.objects import device_info, object_table
+from tickrig.wire.rtc_canopen.port_types import INTEGER, CanopenPortType
+from tickrig.wire.rtc_canopen.profile import (
+    FIRST_PORT,
+    PlacedPort,
+    PortDirection,
+    PortTransport,
+    RtcProfile,
+)
+
+
+def build(project: Project) -> dict[str, str]:
+    """Return the text of each file by its name.
+
+    Raises:
+        ValueError: names that Python or C cannot have.
+    """
+    profile = project.profile
+    check_identifiers(profile.type_name, (port.name for port in profile.ports))
+    stem = snake_name(profile.type_name)
+    return {
+        f"{stem}.eds": write_eds(object_table(profile), device_info(profile)),
+        f"{stem}_od.h": write_header(profile),
+        f"{stem}.yaml": write_fragment(project),
+        f"{stem}{SKELETON_SUFFIX}": write_skeleton(project),
+    }
+
+
+def write_fragment(project: Project) -> str:
+    """Return a System Definition that has this node alone; its ports keep their names."""
+    profile = project.profile
+    node = NodeEntry(
+        project.node_id,
+        f"{profile.type_name}0",
+        f"{snake_name(profile.type_name)}.eds",
+        ports={pdo_name(port): port.profile.name for port in profile.placed() if port.number},
+        sdo_ports={
+            port.profile.name: SdoPortEntry(
+                port.index, port.profile.direction, _sdo_type(port.profile.port_type)
+            )
+            for port in profile.placed()
+            if not port.number
+        },
+    )
+    return write_definition(SystemDefinition((node,)))
+
+
+def _sdo_type(kind: CanopenPortType[Any]) -> str | None:
+    """Return what a System Definition calls a type; the data type in the EDS says which Integer."""
+    return None if kind.name == INTEGER else kind.name
+
+
+def pdo_name(port: PlacedPort) -> str:
+    """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`; else `sdo`."""
+    if not port.number:
+        return PortTransport.SDO.value
+    kind = "rpdo" if port.profile.direction is PortDirection.IN else "tpdo"
+    return f"{kind}{port.number}"
+
+
+OBJECT: Final = "{:<9} {:<36} {:<14} {:<6} {}"
+LETTERS: Final = {
+    Access.READ: "r",
+    Access.WRITE: "w",
+    Access.CONST: "c",
+    Access.TPDO: "T",
+    Access.RPDO: "R",
+}
+PDO: Final = "{:<9} {:<9} {:<5} {}"
+
+
+def summary(profile: RtcProfile, *, every: bool = False) -> Iterator[str]:
+    """Give the lines: objects of the ports, or `every` object, then the PDOs."""
+    rows = [row for row in object_table(profile) if every or row.index >= FIRST_PORT]
+    yield from _objects(rows)
+    yield ""
+    yield PDO.format("PDO", "COB-ID", "bits", "carries")
+    for port in profile.placed():
+        yield _pdo(port)
+
+
+def _objects(rows: Iterable[EntryDescription]) -> Iterator[str]:
+    yield OBJECT.format("object", "name", "type", "access", "default")
+    for row in rows:
+        access = "".join(letter for flag, letter in LETTERS.items() if flag in row.access)
+        default = format_value(row.data_type, row.default, relative=row.relative)
+        place = f"{row.index:04X}h:{row.sub:02X}"
+        shown = default if default.isprintable() else row.default.hex()
+        yield OBJECT.format(place, row.name, row.data_type.name, access, shown).rstrip()
+
+
+def _pdo(port: PlacedPort) -> str:
+    kind = port.profile.port_type
+    what = f"{kind.length} x {kind.name}" if kind.length > 1 else kind.name
+    if not port.number:
+        cob_id = "-"
+    elif port.cob_id is None:
+        cob_id = "off"
+    else:
+        cob_id = f"{port.cob_id:03X}h{'+id' * port.relative}"
+    return PDO.format(pdo_name(port), cob_id, kind.bits or "-", f"{port.profile.name}: {what}")

@@ -1,0 +1,107 @@
+"""The skeleton of a DeviceRTC in Python: ports are there, callbacks wait for their bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+from tickrig.host.rtc.canopen.builder.names import python_name, snake_name
+from tickrig.host.rtc.canopen.builder.profile_file import Project
+from tickrig.wire.rtc_canopen.port_types import INTEGER, CanopenPortType
+from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
+
+SKELETON_SUFFIX: Final = ".py"
+
+CALLBACKS: Final = (
+    ("on_initialize", "Result", "Begin; after an error the node stays silent."),
+    ("on_activated", "Result", "Become Active; an error leads to Error."),
+    ("on_execute", "Result", "Work, once a period while Active; an error leads to Error."),
+    ("on_deactivated", "Result", "Leave Active; an error leads to Error."),
+    ("error_check", "Result", "Look after the device, once a period while Inactive."),
+    ("on_aborting", "None", "Come from Active to Error."),
+    ("on_error", "None", "Work, once a period while in Error."),
+    ("on_reset", "Result", "Leave Error; after an error it stays there."),
+    ("on_finalize", "Result", "End, before Reset Node or when the device is shut down."),
+)
+
+
+def write_skeleton(project: Project) -> str:
+    """Return the text of a Python file with the component."""
+    return "\n".join([*_head(project), *_attributes(project), *_callbacks(), ""])
+
+
+def _head(project: Project) -> Iterator[str]:
+    profile = project.profile
+    file = f"{snake_name(profile.type_name)}.py"
+    yield f'"""{profile.type_name}, a DeviceRTC.'
+    yield ""
+    yield f"Run it: canopen-slave-emu --rtc {file}:{profile.type_name} --node-id {project.node_id}"
+    yield '"""'
+    yield ""
+    yield "from __future__ import annotations"
+    yield ""
+    yield "from tickrig.device.canopen.device_rtc.component import CanopenComponent"
+    yield from _imports(profile)
+    yield ""
+    yield ""
+    yield f"class {profile.type_name}(CanopenComponent):"
+    yield '    """Returns ERROR from what failed; all else went well."""'
+    yield ""
+
+
+def _imports(profile: RtcProfile) -> Iterator[str]:
+    ports = sorted({_port_class(port) for port in profile.ports})
+    told = any(port.transport for port in profile.ports)
+    types = sorted({_constant(port.port_type) for port in profile.ports})
+    if ports:
+        yield f"from tickrig.device.canopen.device_rtc.ports import {', '.join(ports)}"
+    yield "from tickrig.device.component import Result"
+    if ports:
+        yield f"from tickrig.wire.rtc_canopen.port_types import {', '.join(types)}"
+    if told:
+        yield "from tickrig.wire.rtc_canopen.profile import PortTransport"
+
+
+def _attributes(project: Project) -> Iterator[str]:
+    profile = project.profile
+    for name in ("type_name", "version", "vendor", "category"):
+        yield f"    {name} = {_quoted(getattr(profile, name))}"
+    yield f"    rate_hz = {profile.rate_hz}"
+    yield f"    product_code = 0x{profile.code:08X}"
+    if project.strict_cia301:
+        yield "    strict_cia301 = True"
+    for port in profile.ports:
+        words = [_quoted(port.name), _type(port.port_type)]
+        if port.cob_id is not None:
+            words.append(f"cob_id=0x{port.cob_id:03X}")
+        if port.transport is not None:
+            words.append(f"transport=PortTransport.{port.transport.name}")
+        made = f"{_port_class(port)}({', '.join(words)})"
+        yield f"    {python_name(port.name)} = {made}"
+
+
+def _callbacks() -> Iterator[str]:
+    for name, result, text in CALLBACKS:
+        yield ""
+        yield f"    def {name}(self) -> {result}:"
+        yield f'        """{text}"""'
+
+
+def _port_class(port: CanopenPortProfile) -> str:
+    return "CanopenInPort" if port.direction is PortDirection.IN else "CanopenOutPort"
+
+
+def _constant(kind: CanopenPortType[Any]) -> str:
+    return "integer" if kind.name == INTEGER else snake_name(kind.name).upper()
+
+
+def _type(kind: CanopenPortType[Any]) -> str:
+    element = _constant(kind)
+    if kind.name == INTEGER:
+        element = f"integer({kind.data_type.bits})"
+    return element if kind.length == 1 else f"{element}.sequence({kind.length})"
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,79 @@
+"""The command `rtc-canopen-editor`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.options import PATH, version_option
+from tickrig.host.cli.refused import BusFailed, Refused
+from tickrig.host.cli.start import loading
+from tickrig.host.links.errors import LinkClosed
+from tickrig.host.rtc.canopen.commands.opening import (
+    STANDARD_OUTPUT,
+    add_components,
+    bus_of,
+    component_option,
+    log_listener,
+    open_link,
+    read_server,
+)
+from tickrig.wire.can_error import ErrorState
+
+
+@click.command(cls=BusCommand)
+@click.argument("file", type=PATH)
+@bus_options
+@component_option
+@click.option("--log", type=PATH, help="File for the events, a line of JSON each.")
+@click.option("--start", is_flag=True, help="Activate all nodes in the start order.")
+@version_option()
+def main(
+    file: Path, log: Path | None, components: Sequence[str], *, start: bool, **options: Any
+) -> None:
+    """Serve a System Definition, and show and change it while it runs (extra tickrig[tui]).
+
+    The same server as rtc-canopen-server, on a terminal: nodes and proxies, their
+    objects with live read and write, connections through the PC and PDO links.
+    What is changed is saved on demand only. F1 shows the keys.
+
+    \b
+    rtc-canopen-editor robot.yaml
+    rtc-canopen-editor robot.yaml -i socketcan -c vcan0 --start --log events.jsonl
+    rtc-canopen-editor robot.yaml --component Logger0=parts.py:Logger
+    """  # noqa: D301 - click wants the backspace
+    try:
+        with loading():
+            from tickrig.host.rtc.canopen.editor.app import SystemEditor  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
+    from tickrig.host.rtc.canopen.editor.session import EditorSession  # noqa: PLC0415
+
+    if log == STANDARD_OUTPUT:
+        raise Refused("--log -: the screen is on standard output; name a file")
+    server = read_server(file, components)
+    if not sys.stdout.isatty():
+        raise Refused("the editor needs a terminal; rtc-canopen-server does without one")
+    with ExitStack() as stack:
+        listeners = tuple(log_listener(log, stack))
+        bus = bus_of(BusOptions(**options), server.definition.bus)
+
+        def bus_state(state: ErrorState) -> None:
+            session.bus_state(state)
+
+        link, name = open_link(bus, bus_state, stack)
+        session = EditorSession(
+            server, file, link, lambda other: add_components(other, components), listeners
+        )
+        if start:
+            server.start()
+        try:
+            SystemEditor(session, name).run_session()
+        except LinkClosed as error:
+            raise BusFailed(str(error)) from None

@@ -1,0 +1,257 @@
+"""The System Editor: the nodes of a running server, their objects, and what joins them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import ClassVar, Final
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container
+
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
+from tickrig.host.rtc.canopen.editor.session import EditorSession
+from tickrig.host.rtc.canopen.editor.status import event_lines, status_line
+from tickrig.host.rtc.canopen.editor.system_pane import Item, SystemPane, connect, link, remove
+from tickrig.host.rtc.canopen.editor.widgets import CursorView, QuestionScreen
+from tickrig.host.rtc.canopen.errors import ServerRefused
+from tickrig.host.rtc.canopen.view import ServerView
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.tui.framed_app import FramedApp
+from tickrig.host.tui.key_footer import KeyFooter
+from tickrig.host.tui.line_view import LineView
+
+PAINT_S: Final = 0.1
+SWITCH_S: Final = 0.000_5
+"""How long the screen may keep the server from running."""
+
+EVENTS_SHOWN: Final = 500
+
+Command = Callable[[ServerView], object]
+Join = Callable[[ServerView, Item, Item], None]
+
+JOIN: Final[dict[str, Join]] = {"connect": connect, "link": link}
+ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
+    "activate": ServerView.activate,
+    "deactivate": ServerView.deactivate,
+    "reset": ServerView.reset,
+}
+
+
+class SystemEditor(FramedApp):
+    """Shows a server and commands it by keys and mouse.
+
+    Args:
+        session: the server; it is started by whoever runs the app.
+        bus: how the bus is called.
+    """
+
+    TITLE = "RTC-CANopen System Editor"
+    CSS = """
+    SystemPane, ObjectsPane, #events { border: round $secondary; }
+    SystemPane:focus, ObjectsPane:focus, #events:focus { border: round $accent; }
+    #panes, SystemPane { height: 1fr; }
+    ObjectsPane { height: 1fr; }
+    .-wide #panes { layout: horizontal; }
+    .-wide SystemPane { width: 2fr; min-width: 56; }
+    .-wide ObjectsPane { width: 3fr; }
+    #events { height: 7; }
+    #status { height: 1; background: $boost; }
+    """
+    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [  # type: ignore[misc]
+        (0, "-narrow"),
+        (130, "-wide"),
+    ]
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("a", "request('activate')", "activate"),
+        Binding("d", "request('deactivate')", "deactivate"),
+        Binding("r", "request('reset')", "reset"),
+        Binding("b", "boot", "set up again", show=False),
+        Binding("S", "start", "activate all in the start order", show=False),
+        Binding("m", "mark", "mark"),
+        Binding("c", "join('connect')", "connect"),
+        Binding("k", "join('link')", "link"),
+        Binding("x", "remove", "remove"),
+        Binding("g", "read", "read the object again", show=False),
+        Binding("w", "write", "write"),
+        Binding("l", "live", "live"),
+        Binding("ctrl+s", "save", "save", key_display="^s"),
+        Binding("ctrl+o", "load", "load", key_display="^o"),
+    ]
+
+    def __init__(self, session: EditorSession, bus: str = "") -> None:
+        super().__init__()
+        self.session, self._bus = session, bus
+        self.system, self.objects = SystemPane(), ObjectsPane()
+        self.events, self.status = LineView("events"), LineView("status")
+
+    def compose(self) -> ComposeResult:
+        """Lay out the panes."""
+        with Container(id="panes"):
+            yield self.system
+            yield self.objects
+        yield self.events
+        yield self.status
+        yield KeyFooter()
+
+    def on_mount(self) -> None:
+        """Begin to paint."""
+        self.status.can_focus, self.events.border_title = False, "events"
+        self.system.focus()
+        self.set_interval(PAINT_S, self.look)
+
+    def run_session(self) -> None:
+        """Run the server in a thread, and show it until the editor is left.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
+        before_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
+        with self.ended_by_signals():
+            self.session.start()
+            try:
+                self.run()
+            finally:
+                sys.setswitchinterval(before_s)
+                self.session.close()
+
+    def look(self) -> None:
+        """Show how things are now; called ten times a second, and after each command."""
+        if self.session.ended:
+            self.exit()
+            return
+        with self.session.lock:
+            view = self.session.view
+            system, events = view.system, view.events[-EVENTS_SHOWN:]
+        self.system.look(system)
+        self.objects.turn_to(self.system.node_id, self.session.eds_paths)
+        with self.session.lock:
+            self.objects.look(view)
+        self.objects.paint_objects()
+        marked = self.system.marked.key if self.system.marked else ""
+        file = self.session.path.name
+        self.status.show([status_line(system.nodes, file, self._bus, marked)])
+        follows = self.events.at_end
+        width = max(1, self.events.scrollable_content_region.width)
+        self.events.show([line for event in events for line in event_lines(event, width)])
+        if follows:
+            self.events.show_end()
+
+    def on_cursor_view_moved(self) -> None:
+        """Show what belongs to the row under the cursor."""
+        self.look()
+
+    def on_cursor_view_entered(self, event: CursorView.Entered) -> None:
+        """Write the object that was chosen; show what was folded or opened."""
+        self.look()
+        if event.view is self.objects:
+            self.action_write()
+
+    def action_request(self, what: str) -> None:
+        """Ask the proxy or component under the cursor for a state."""
+        if (owner := self.system.owner) is not None:
+            self._command(lambda view: ASK[what](view, owner.name))
+
+    def action_boot(self) -> None:
+        """Set the node up again, also one that was refused."""
+        if node_id := self.system.node_id:
+            self._command(lambda view: view.boot(node_id))
+
+    def action_start(self) -> None:
+        """Activate all nodes in the start order."""
+        self._command(ServerView.start)
+
+    def action_mark(self) -> None:
+        """Mark a port or PDO, or let it go."""
+        if not self.system.mark():
+            self._refuse("ports and PDOs can be marked")
+        self.look()
+
+    def action_join(self, how: str) -> None:
+        """Join what is marked with what is under the cursor."""
+        marked, row = self.system.marked, self.system.row
+        if marked is None or row is None:
+            self._refuse("mark a port or PDO first (m)")
+        elif self._command(lambda view: JOIN[how](view, marked.item, row.item)):
+            self.system.marked = None
+            self.look()
+
+    def action_remove(self) -> None:
+        """End the link or connection under the cursor."""
+        if (row := self.system.row) is not None:
+            self._command(lambda view: remove(view, row.item))
+
+    def action_read(self) -> None:
+        """Read the object under the cursor again."""
+        objects, row = self.objects.objects, self.objects.row
+        if objects is not None and row is not None:
+            objects.read(row.item)
+            self.look()
+
+    def action_live(self) -> None:
+        """Read the objects in view again and again, or no more."""
+        if (objects := self.objects.objects) is not None:
+            objects.live = not objects.live
+            self.look()
+
+    def action_write(self) -> None:
+        """Ask for a value, and write it."""
+        objects, row = self.objects.objects, self.objects.row
+        if objects is None or row is None:
+            return
+        name = objects.text_of(row.item).name
+
+        def write(words: str | None) -> None:
+            if words is not None:
+                self._command(lambda view: objects.write(view, row.item, words))
+
+        question = QuestionScreen(f"{write_entry(row.item)} {name}", objects.value_of(row.item))
+        self.push_screen(question, write)
+
+    def action_save(self) -> None:
+        """Ask for a file, and save the definition with connections and links as they are."""
+        self._prompt_path("save the System Definition as", self.session.save)
+
+    def action_load(self) -> None:
+        """Ask for a file, and serve the definition in it."""
+        self._prompt_path("load the System Definition", self._load)
+
+    def _load(self, path: Path) -> None:
+        self.session.load(path)
+        self.system.forget()
+        self.objects.forget()
+
+    def _prompt_path(self, text: str, do: Callable[[Path], None]) -> None:
+        def answered(path: str | None) -> None:
+            if path and self._try(lambda: do(Path(path))):
+                self.notify(f"{text}: {path}", markup=False)
+
+        self.push_screen(QuestionScreen(text, str(self.session.path)), answered)
+
+    def _command(self, command: Command) -> bool:
+        """Give the server a command; if it is refused, say why."""
+
+        def give() -> None:
+            with self.session.lock:
+                command(self.session.view)
+
+        return self._try(give)
+
+    def _try(self, do: Callable[[], object]) -> bool:
+        """Do something; if it is refused, say why."""
+        try:
+            do()
+        except (RtcRefused, ServerRefused, ValueError) as error:
+            return self._refuse(str(error))
+        except OSError as error:
+            return self._refuse(f"{error.filename}: {error.strerror}")
+        self.look()
+        return True
+
+    def _refuse(self, why: str) -> bool:
+        self.notify(why, severity="error", markup=False)
+        return False

@@ -1,0 +1,258 @@
+"""The objects of the node that was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects, Entry, read_eds_objects
+from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
+from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_file import EdsError
+from tickrig.wire.canopen.eds.eds_value import parse_value
+from tickrig.wire.errors import FieldError
+
+AT_ONCE: Final = 8
+"""Transfers that are under way; a command to the node waits for as many."""
+
+FIRST_INDEX: Final = 0x1000
+"""Below are data types (CiA 301, object dictionary)."""
+
+NAME: Final = 30
+"""Columns of a name."""
+
+DIM: Final = "bright_black"
+ALARM: Final = "bold red"
+CHANGED: Final = "bold yellow"
+
+ObjectRow = CursorRow[Entry]
+
+
+class NodeObjects:
+    """Reads objects of a node by SDO while somebody looks, and writes them.
+
+    Each is read once when it comes into view; if it is live, again and again.
+    One that could not be read is not asked for again until somebody wants it.
+
+    Args:
+        node_id: the node.
+        eds: what its EDS says.
+
+    Attributes:
+        node_id: the node.
+        live: those in view are read again and again.
+    """
+
+    def __init__(self, node_id: int, eds: EdsObjects) -> None:
+        self.node_id, self._eds = node_id, eds
+        self.live = False
+        self._values: dict[Entry, bytes] = {}
+        self._changed: set[Entry] = set()
+        self._problems: dict[Entry, str] = {}
+        self._reads, self._ages = 0, dict[Entry, int]()
+        self._wanted: list[Entry] = []
+        self._rows: dict[Entry, tuple[object, ObjectRow]] = {}
+        self._reading: dict[Entry, PendingTransfer] = {}
+        self._writing: list[tuple[Entry, PendingTransfer]] = []
+
+    @property
+    def rows(self) -> list[ObjectRow]:
+        """Its objects, by index."""
+        texts = sorted(self._eds.texts.items())
+        return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= FIRST_INDEX]
+
+    def look(self, view: ServerView, seen: Collection[Entry], *, answers: bool) -> None:
+        """Take what has come, and ask for what is missing.
+
+        Args:
+            view: commands the server.
+            seen: the objects that somebody looks at.
+            answers: the node answers SDO requests.
+        """
+        self._take_written()
+        for entry, transfer in tuple(self._reading.items()):
+            if transfer.done:
+                del self._reading[entry]
+                self._take(entry, transfer)
+        if not answers:
+            self._wanted.clear()
+            return
+        for entry in (*self._wanted, *self._due(seen)):
+            if len(self._reading) < AT_ONCE and entry not in self._reading:
+                self._wanted = [one for one in self._wanted if one != entry]
+                self._reading[entry] = view.read(self.node_id, *entry)
+
+    def read(self, entry: Entry) -> None:
+        """Read an object in its turn."""
+        self._problems.pop(entry, None)
+        self._wanted.append(entry)
+
+    def write(self, view: ServerView, entry: Entry, words: str) -> None:
+        """Write an object, and read it afterwards.
+
+        Raises:
+            ValueError: no value of its type.
+        """
+        data = encode_words(self._eds.texts[entry], words)
+        self._writing.append((entry, view.write(self.node_id, *entry, data)))
+
+    def text_of(self, entry: Entry) -> ObjectText:
+        """Return what is known of an object."""
+        return self._eds.texts[entry]
+
+    def value_of(self, entry: Entry) -> str:
+        """Return the value as it can be written, empty if it is not known."""
+        data = self._values.get(entry)
+        return "" if data is None else words_of(self.text_of(entry), data)
+
+    def forget(self) -> None:
+        """Forget all values: the node has begun anew."""
+        self._values.clear()
+        self._problems.clear()
+        self._changed.clear()
+
+    def _due(self, seen: Collection[Entry]) -> list[Entry]:
+        """Return what is to be read of what somebody looks at, the oldest first."""
+        due = [
+            entry
+            for entry in seen
+            if entry not in self._problems and (self.live or entry not in self._values)
+        ]
+        return sorted(due, key=lambda entry: self._ages.get(entry, 0))
+
+    def _take(self, entry: Entry, transfer: PendingTransfer) -> None:
+        if transfer.problem:
+            self._problems[entry] = _reason(entry, transfer)
+            return
+        self._reads += 1
+        self._ages[entry] = self._reads
+        before = self._values.get(entry)
+        self._values[entry] = transfer.data
+        if before in (None, transfer.data):
+            self._changed.discard(entry)
+        else:
+            self._changed.add(entry)
+
+    def _take_written(self) -> None:
+        for entry, transfer in [one for one in self._writing if one[1].done]:
+            self._writing.remove((entry, transfer))
+            if transfer.problem:
+                self._problems[entry] = _reason(entry, transfer)
+            else:
+                self.read(entry)
+
+    def _kept_row(self, entry: Entry, text: ObjectText) -> ObjectRow:
+        """Return the row of an object, written anew if something changed."""
+        known = self._values.get(entry), self._problems.get(entry), entry in self._changed
+        kept = self._rows.get(entry)
+        if kept is None or kept[0] != known:
+            kept = self._rows[entry] = known, self._row(entry, text)
+        return kept[1]
+
+    def _row(self, entry: Entry, text: ObjectText) -> ObjectRow:
+        data, problem = self._values.get(entry), self._problems.get(entry)
+        kind = "" if text.kind is None else text.kind.name
+        value = "" if data is None else f"{text.read(data)[1]} {text.unit}"
+        head = (f"{write_entry(entry)} ", DIM), (f"{_tail(text.name):<{NAME}} ", "")
+        style = CHANGED if entry in self._changed else "bold"
+        rest = ((problem, ALARM),) if problem else ((f"{kind:<14} ", DIM), (value, style))
+        return CursorRow(write_entry(entry), (*head, *rest), entry)
+
+
+def _reason(entry: Entry, transfer: PendingTransfer) -> str:
+    """Return why a transfer failed, in the columns that a row of 80 leaves."""
+    return transfer.problem.removeprefix(f"{write_entry(entry)} ").removeprefix("aborted: ")
+
+
+def _tail(name: str) -> str:
+    """Return the end of a long name: members of a record begin alike."""
+    return name if len(name) <= NAME else f"…{name[1 - NAME :]}"
+
+
+def encode_words(text: ObjectText, words: str) -> bytes:
+    """Return the bytes of a value as an EDS writes it; ValueError if it is none of its type.
+
+    >>> encode_words(ObjectText("mode", DataType.INTEGER8), "-2").hex()
+    'fe'
+    """
+    kind = text.kind or DataType.DOMAIN
+    try:
+        return kind.encode(parse_value(kind, words.strip())[0])
+    except ValueError:
+        raise ValueError(f"{words!r} is no {kind.name}") from None
+
+
+def words_of(text: ObjectText, data: bytes) -> str:
+    r"""Return the words that `encode_words` makes these bytes of.
+
+    >>> words_of(ObjectText("mode", DataType.INTEGER8), b"\xfe")
+    '-2'
+    """
+    try:
+        value = data if text.kind is None else text.kind.decode(data)
+    except FieldError:
+        return ""
+    return value.hex(" ").upper() if isinstance(value, bytes) else str(value)
+
+
+class ObjectsPane(CursorView[Entry]):
+    """Shows the objects of one node at a time.
+
+    Attributes:
+        objects: those of the node, None without one.
+    """
+
+    HELP = """
+    # Objects
+
+    Those that the EDS of the node has, in whose rows the cursor of the system is. Each is read
+    by SDO when it comes into view; while they are live, again and again. A value that changed
+    is yellow, a refusal red.
+
+    Numbers are written as 12, -2 or 0x1F, bytes as 37 02. A double click writes.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("objects")
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew, with another system."""
+        self.objects: NodeObjects | None = None
+        self._of: dict[int, NodeObjects] = {}
+
+    def turn_to(self, node_id: int, eds: Mapping[int, Path]) -> None:
+        """Show the objects of a node from now on, 0 for none; reads its EDS the first time."""
+        if node_id and node_id not in self._of:
+            self._of[node_id] = _read(node_id, eds[node_id])
+        self.objects = self._of.get(node_id)
+
+    def look(self, view: ServerView) -> None:
+        """Read those in view; the server waits meanwhile."""
+        if (objects := self.objects) is None:
+            self.title = "objects"
+            return
+        node = view.node(objects.node_id)
+        if node.phase is not NodePhase.READY:
+            objects.forget()
+        answers = node.phase is NodePhase.READY and node.nmt_state != "STOPPED"
+        objects.look(view, [row.item for row in self.in_view], answers=answers)
+        live = ", live" if objects.live else ""
+        self.title = f"objects of {node.node_id} {node.name}{live}"
+
+    def paint_objects(self) -> None:
+        """Show what is known of them."""
+        self.offer([] if self.objects is None else self.objects.rows)
+
+
+def _read(node_id: int, path: Path) -> NodeObjects:
+    """Return the objects of an EDS; none if it is there no more."""
+    try:
+        return NodeObjects(node_id, read_eds_objects(path, node_id))
+    except (OSError, EdsError):
+        return NodeObjects(node_id, EdsObjects())

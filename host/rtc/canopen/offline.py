@@ -1,0 +1,167 @@
+"""What can be said of a System Definition without a bus: its EDS files answer for the nodes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+
+from tickrig.host.canopen.dialogue import SdoRequest, Step
+from tickrig.host.canopen.errors import SdoAborted
+from tickrig.host.rtc.canopen.connections import are_there, check_lengths, find_layout
+from tickrig.host.rtc.canopen.definition.definition import NodeEntry, PdoLink, PdoName, SdoEntry
+from tickrig.host.rtc.canopen.definition.device_file import DeviceFile
+from tickrig.host.rtc.canopen.errors import ServerRefused
+from tickrig.host.rtc.canopen.node.boot import boot
+from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout
+from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc.canopen.proxy.sdo_ports import lay_out_sdo_ports
+from tickrig.host.rtc.canopen.server import RtcCanopenServer
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.ports.data_port import InPort
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.dot import Box, Edge, write_dot
+from tickrig.wire.canopen.cob_id import CAN_ID_MASK
+from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo.sdo import (
+    Abort,
+    DownloadInitiateRequest,
+    DownloadInitiateResponse,
+    DownloadSegmentResponse,
+    Response,
+    Segment,
+    UploadInitiateRequest,
+    UploadInitiateResponse,
+    parse_request,
+)
+
+Layouts = tuple[PdoLayout, ...]
+
+
+def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> Layouts | None:
+    """Return the PDOs that will be on, None where the EDS does not give the values."""
+    values = dict(file.defaults)
+    script = boot(entry, file, writes)
+    try:
+        step = next(script)
+        while True:
+            step = script.send(_answer(step, values))
+    except StopIteration as end:
+        layouts: Layouts = end.value
+        return layouts
+    except SdoAborted:
+        return None
+
+
+def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None:
+    """Answer as a device that has these values, and takes any."""
+    match parse_request(step.request) if isinstance(step, SdoRequest) else None:
+        case UploadInitiateRequest(index=index, sub=sub):
+            if (data := values.get((index, sub))) is None:
+                return Abort(index, sub, AbortCode.NO_OBJECT)
+            return UploadInitiateResponse(index, sub, data, len(data))
+        case DownloadInitiateRequest(index=index, sub=sub, data=data):
+            values[index, sub] = data or b""
+            return DownloadInitiateResponse(index, sub)
+        case Segment(toggle=toggle):
+            return DownloadSegmentResponse(toggle)
+    return None
+
+
+def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
+    """Return what will be refused on the bus, where devices are as their EDS says.
+
+    It also names PDOs that several nodes send with one COB-ID; no node refuses them. A node whose
+    EDS leaves values out is not judged, nor is a component that is not there.
+
+    Args:
+        server: it gets proxies of devices that are none, and is of no other use any more.
+    """
+    layouts = dict[int, Layouts]()
+    for node_id, node in server.nodes.items():
+        if (on := boot_offline(node.entry, node.file, node.writes)) is not None:
+            layouts[node_id] = on
+    return (
+        *_proxies(server, layouts),
+        *_sent_twice(server, layouts),
+        *(text for link in server.definition.pdo_links for text in _link(link, layouts)),
+        *_connections(server),
+    )
+
+
+def _proxies(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
+    for node_id, on in layouts.items():
+        try:
+            node = server.nodes[node_id]
+            made, refused = lay_out_sdo_ports(node.entry, node.file.data_types)
+            yield from (f"nodes: {node.entry.name}.{text}" for text in refused)
+            server.manager.add(ProxyRtc(node.entry, on, made))
+        except RtcRefused as error:
+            yield f"nodes: {error}"
+
+
+def _sent_twice(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
+    senders = defaultdict[int, list[str]](list)
+    for node_id, on in layouts.items():
+        file = server.nodes[node_id].file
+        for pdo in on:
+            default = int.from_bytes(file.defaults.get((pdo.index, 1), b""), "little")
+            kept = (pdo.index, 1) in file.relative and pdo.cob_id == default & CAN_ID_MASK
+            if pdo.sends:
+                senders[pdo.cob_id + kept * node_id].append(f"{node_id}.{pdo.name}")
+    for cob_id, names in senders.items():
+        if len(names) > 1:
+            which = f"{' and '.join(names)} are {'both' if len(names) == 2 else 'all'}"
+            yield f"pdos: {which} sent as {cob_id:03X}h; give each a cob_id of its own"
+
+
+def _link(link: PdoLink, layouts: dict[int, Layouts]) -> Iterator[str]:
+    ends = [
+        (name, layouts[name.node]) for name in (link.source, link.target) if name.node in layouts
+    ]
+    try:
+        found = [find_layout(name, on) for name, on in ends]
+        if len(found) == 2:
+            check_lengths(link, *found)
+    except ServerRefused as error:
+        yield f"pdo_links: {error}"
+
+
+def _connections(server: RtcCanopenServer) -> Iterator[str]:
+    for entry in server.definition.rt_connections:
+        try:
+            if are_there(server.manager, entry):
+                server.manager.connect(entry.source, entry.target, entry.properties)
+        except RtcRefused as error:
+            yield f"rt_connections: {error}"
+
+
+def draw_graph(server: RtcCanopenServer) -> str:
+    """Return the graph: connections through the PC, and PDO links dashed.
+
+    Args:
+        server: it is of no other use any more, as after `check_offline`.
+    """
+    check_offline(server)
+    entries = {node.id: node for node in server.definition.nodes}
+
+    def port(name: PdoName) -> str:
+        entry = entries[name.node]
+        return f"{entry.name}.{entry.ports.get(name.pdo, name.pdo)}"
+
+    titles = {node.name: f"node {node.id}" for node in entries.values()}
+    return write_dot(
+        (_box(one, titles.get(one.instance_name, "")) for one in server.manager.components),
+        (
+            *(Edge(*connector.ports) for connector in server.manager.connectors),
+            *(
+                Edge(port(link.source), port(link.target), dashed=True)
+                for link in server.definition.pdo_links
+            ),
+        ),
+    )
+
+
+def _box(component: RtComponent, title: str) -> Box:
+    ins = tuple(name for name, port in component.ports.items() if isinstance(port, InPort))
+    outs = tuple(name for name in component.ports if name not in ins)
+    return Box(component.instance_name, title or component.spec.type_name, ins, outs)

@@ -1,0 +1,111 @@
+"""Run a server on a link: a rig in virtual time, or a real bus."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tickrig.host.links.link import StampedLink
+from tickrig.host.rtc.canopen.definition.definition import SystemDefinition
+from tickrig.host.rtc.canopen.definition.definition_reader import read_definition
+from tickrig.host.rtc.canopen.definition.device_file import DeviceFile, read_device_file
+from tickrig.host.rtc.canopen.errors import DefinitionError
+from tickrig.host.rtc.canopen.server import RtcCanopenServer
+from tickrig.host.rtc.system.real_time import LATE_US, PAUSE_US
+from tickrig.wire.instant import NEVER
+
+
+def serve(
+    server: RtcCanopenServer,
+    link: StampedLink,
+    until_us: int = NEVER,
+    done: Callable[[], bool] = lambda: False,
+) -> None:
+    """Let a server work until a time on the link's clock, or until `done()`.
+
+    Raises:
+        LinkClosed: the bus is gone.
+    """
+    while link.now_us < until_us and not done():
+        _step(server, link, until_us)
+
+
+class ServerRunner:
+    """Runs a server on a link until somebody stops it.
+
+    Args:
+        server: the server.
+        link: the bus.
+
+    Attributes:
+        running: False once `stop` was called.
+        late_ticks: how many ticks began more than 1 ms after they were due.
+        worst_late_us: by how much the worst of them was late, us.
+        after_tick: called with the time after each tick.
+        serve: called between the ticks with the time in us that it may take, every
+            `pause_us` at least; a control socket, say.
+        pause_us: 20 ms; as long waits who is served.
+    """
+
+    def __init__(self, server: RtcCanopenServer, link: StampedLink) -> None:
+        self._server, self._link = server, link
+        self.running, self.late_ticks, self.worst_late_us = True, 0, 0
+        self.after_tick: list[Callable[[int], None]] = []
+        self.serve: Callable[[int], None] | None = None
+        self.pause_us = PAUSE_US
+
+    def run(self, until_us: int = NEVER) -> None:
+        """Let the server work until a time on the link's clock, or until somebody calls `stop`.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
+        while self.running and self._link.now_us < until_us:
+            pause_us = until_us
+            if self.serve is not None:
+                self.serve(0)
+                pause_us = min(until_us, self._link.now_us + self.pause_us)
+            late_us = _step(self._server, self._link, pause_us)
+            self.worst_late_us = max(self.worst_late_us, late_us)
+            self.late_ticks += late_us > LATE_US
+            for listener in tuple(self.after_tick):
+                listener(self._server.now_us)
+
+    def stop(self) -> None:
+        """End `run` after the present tick."""
+        self.running = False
+
+
+def _step(server: RtcCanopenServer, link: StampedLink, until_us: int) -> int:
+    """Wait for what is heard or due, tick the server, send; return how late that was, us."""
+    due_us = min(server.due_us, until_us)
+    now_us, received = link.receive_stamped(max(0, due_us - link.now_us))
+    if sent := server.tick(now_us, received):
+        link.send(sent)
+    return max(0, now_us - due_us) if due_us else 0
+
+
+def open_server(path: Path) -> RtcCanopenServer:
+    """Make a server of a System Definition and the EDS files beside it.
+
+    Raises:
+        OSError: the definition cannot be read.
+        DefinitionError: it or an EDS cannot be used; the line says where and why.
+    """
+    definition = read_definition(path)
+    return RtcCanopenServer(definition, read_files(definition, path.parent))
+
+
+def read_files(definition: SystemDefinition, folder: Path) -> dict[str, DeviceFile]:
+    """Read the EDS files of a definition, each once.
+
+    Raises:
+        DefinitionError: one cannot be used, or has not a PDO that the definition names.
+    """
+    names = dict.fromkeys(node.eds for node in definition.nodes)
+    files = {name: read_device_file(folder / name) for name in names}
+    by_id = {node.id: files[node.eds] for node in definition.nodes}
+    for pdo in definition.named_pdos:
+        if pdo.index not in by_id[pdo.node].pdos:
+            raise DefinitionError(f"{pdo}: the EDS of node {pdo.node} has no {pdo.index:04X}h")
+    return files

@@ -1,0 +1,79 @@
+"""Join a system with the engines that a command line asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Final
+
+from tickrig.host.cli.engine_options import EngineOptions
+from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.ros2_options import Ros2Options
+from tickrig.host.cli.start import load
+from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.system.manager import Manager
+
+OPENRTM: Final = "tickrig.host.rtc.engines.openrtm.engine:openrtm_joined"
+NEEDS_OMNIORB: Final = "--openrtm needs omniORB: pip install 'tickrig[openrtm]'"
+ROS2: Final = "tickrig.host.rtc.engines.ros2.engine:ros2_joined"
+NEEDS_CYCLONE: Final = "--ros2 needs Cyclone DDS: pip install 'tickrig[ros2]'"
+
+
+@contextmanager
+def engines_joined(
+    options: EngineOptions,
+    manager: Manager,
+    attach: Callable[[CallQueue], object],
+    stop: Callable[[], object],
+    *,
+    fixed: bool = False,
+) -> Iterator[None]:
+    """Join a system with others until the end.
+
+    Args:
+        options: which engines, and how.
+        manager: of the system; it is not running yet.
+        attach: has the calls of other threads made in the one that runs the manager.
+        stop: ends the command, where a peer asks for that.
+        fixed: components come and go as the command decides: peers neither create nor end any.
+
+    Raises:
+        Refused: an engine lacks its extra, or cannot be as it is asked for.
+    """
+    with ExitStack() as stack:
+        calls = CallQueue()
+        stack.callback(calls.close)
+        attach(calls)
+        if options.openrtm is not None:
+            try:
+                openrtm_joined = load(OPENRTM)
+                stack.enter_context(
+                    openrtm_joined(options.openrtm, manager, calls, stop, fixed=fixed)
+                )
+            except ImportError as error:
+                if (error.name or "").partition(".")[0] not in ("omniORB", "CosNaming"):
+                    raise
+                raise Refused(NEEDS_OMNIORB) from None
+            except (ValueError, RuntimeError) as error:
+                raise Refused(f"--openrtm: {error}") from None
+        if options.ros2 is not None:
+            stack.enter_context(_ros2_joined(options.ros2, manager, calls))
+        yield
+
+
+@contextmanager
+def _ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(load(ROS2)(options, manager, calls))
+        except ImportError as error:
+            if (error.name or "").partition(".")[0] != "cyclonedds":
+                raise
+            raise Refused(NEEDS_CYCLONE) from None
+        except OSError as error:
+            refuse_path("ros2-table", error)
+        except UnicodeDecodeError as error:
+            raise Refused(f"ros2-table {options.table}: byte {error.start} is no UTF-8") from None
+        except ValueError as error:
+            raise Refused(f"--ros2: {error}") from None
+        yield

@@ -1,0 +1,152 @@
+"""The components of a manager as RTCs of OpenRTM, for as long as it runs."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from tickrig.host.cli.openrtm_options import OpenRtmOptions, format_name
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.engines.openrtm.names import NameServer
+from tickrig.host.rtc.engines.openrtm.orb import Orb
+from tickrig.host.rtc.engines.openrtm.peers import Peers, refuse_wrong_paths
+from tickrig.host.rtc.engines.openrtm.ports.component_ports import ComponentPorts, SystemPorts
+from tickrig.host.rtc.engines.openrtm.servants import configuration, context, manager, rt_object
+from tickrig.host.rtc.engines.openrtm.servants.attached_contexts import AttachedContexts
+from tickrig.host.rtc.engines.openrtm.servants.references import References
+from tickrig.host.rtc.engines.openrtm.stubs import stubs
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.system.manager import Manager
+
+
+@dataclass(slots=True)
+class _Served:
+    servant: rt_object.RtObjectServant
+    contexts: list[ExecutionContext]
+    path: str
+
+
+class OpenRtmEngine:
+    """Makes the components of a manager known to a name server, and answers for them.
+
+    To be made and closed in the manager's thread.
+
+    Args:
+        options: where, and under which names.
+        rtcs: the manager.
+        calls: of its thread.
+        stop: ends the process in its own way, where a peer asks for that.
+        fixed: peers neither create nor end components.
+
+    Raises:
+        OrbFailed: there can be no ORB at that address.
+        RtcRefused: the stubs cannot be made, or a remote component has a path that leads nowhere.
+    """
+
+    def __init__(
+        self,
+        options: OpenRtmOptions,
+        rtcs: Manager,
+        calls: CallQueue,
+        stop: Callable[[], object],
+        *,
+        fixed: bool = False,
+    ) -> None:
+        self._rtcs, self._calls, self._options = rtcs, calls, options
+        self._served: dict[RtComponent, _Served] = {}
+        refuse_wrong_paths(rtcs)  # before there is an ORB, which would have to be closed
+        idl = stubs()
+        self._orb = Orb(options.endpoint)
+        self._references = References(self._orb, idl, calls, fixed=fixed)
+        self._ports = SystemPorts(self._orb, calls, rtcs)
+        self._names = NameServer(self._orb, options.name_server)
+        servant = manager.ManagerServant(rtcs, self._references, stop)
+        reference = self._orb.serve_as(manager.NAME, idl.skeleton(manager.INTERFACE), servant)
+        context, _, _ = self._path(manager.NAME, manager.SPEC).rpartition("/")
+        self._names.bind(f"{context}/{manager.NAME}.mgr".lstrip("/"), reference)
+        for component in rtcs.components:
+            self._add(component)
+        rtcs.on_added.append(self._add)
+        rtcs.on_removed.append(self._remove)
+        self._peers = Peers(self._ports, rtcs)
+
+    def close(self) -> None:
+        """Take the names away, answer the calls that run, and refuse all others."""
+        self._rtcs.on_added.remove(self._add)
+        self._rtcs.on_removed.remove(self._remove)
+        self._peers.close()
+        self._ports.close()
+        self._calls.close()
+        self._names.close()
+        self._orb.close()
+
+    def _add(self, component: RtComponent) -> None:
+        references = self._references
+        servant = rt_object.RtObjectServant(component, self._rtcs, references)
+        contexts = AttachedContexts(component, self._rtcs, references)
+        answers = configuration.ConfigurationServant(
+            component.configuration, self._calls, references.stubs
+        )
+        servant.configuration = self._orb.serve(
+            references.stubs.skeleton(configuration.INTERFACE), answers
+        )
+        reference = references.enter(component, rt_object.INTERFACE, servant, contexts)
+        servant.ports = ComponentPorts(self._ports, component, reference)
+        for one in component.contexts:
+            self._add_context(one, component)
+        path = self._path(component.instance_name, component.spec)
+        self._served[component] = _Served(servant, list(component.own_contexts), path)
+        self._names.bind(path, reference)
+        self._rtcs.path_uris[component.instance_name] = f"{self._options.name_server}/{path}"
+
+    def _add_context(self, one: ExecutionContext, component: RtComponent) -> None:
+        if self._references.of(one) is None:
+            owner = component if one in component.own_contexts else None
+            servant = context.ExecutionContextServant(one, owner, self._references)
+            self._references.enter(one, context.INTERFACE, servant)
+
+    def _remove(self, component: RtComponent) -> None:
+        served = self._served.pop(component)
+        self._names.unbind(served.path)
+        del self._rtcs.path_uris[component.instance_name]
+        for one in served.contexts:
+            self._references.remove(one)
+        self._references.remove(component)
+        self._orb.withdraw(served.servant.configuration)
+        if served.servant.ports is not None:
+            served.servant.ports.close()
+
+    def _path(self, name: str, spec: ModuleSpec) -> str:
+        values = {
+            "n": name,
+            "t": spec.type_name,
+            "m": spec.type_name,
+            "v": spec.version,
+            "V": spec.vendor,
+            "c": spec.category,
+            "h": socket.gethostname(),
+            "M": manager.NAME,
+            "p": str(os.getpid()),
+        }
+        return format_name(self._options.names, values)
+
+
+@contextmanager
+def openrtm_joined(
+    options: OpenRtmOptions,
+    rtcs: Manager,
+    calls: CallQueue,
+    stop: Callable[[], object],
+    *,
+    fixed: bool,
+) -> Iterator[None]:
+    """Let the components of a manager take part in a system of OpenRTM; see `OpenRtmEngine`."""
+    engine = OpenRtmEngine(options, rtcs, calls, stop, fixed=fixed)
+    try:
+        yield
+    finally:
+        engine.close()

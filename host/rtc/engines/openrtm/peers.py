@@ -1,0 +1,195 @@
+"""Connectors with components that run elsewhere, as a system file names them: made and kept."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, Final
+
+import CosNaming
+from omniORB import CORBA
+
+from tickrig.host.cli.openrtm_options import Endpoint, parse_endpoint
+from tickrig.host.rtc.engines.openrtm.names import name_of
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
+from tickrig.host.rtc.engines.openrtm.ports.component_ports import SystemPorts
+from tickrig.host.rtc.engines.openrtm.ports.properties import (
+    CORBA_CDR,
+    DATA_TYPE,
+    INTERFACE,
+    nvlist,
+)
+from tickrig.host.rtc.engines.openrtm.stubs import stubs
+from tickrig.host.rtc.ports.data_port import DataPort
+from tickrig.host.rtc.ports.port import AnyPort
+from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.remotes import RemoteConnection
+from tickrig.host.text.log import log_of
+
+LOOK_US: Final = 1_000_000
+"""So often a connector is looked at."""
+
+_LOG: Final = log_of(__name__)
+
+_USUAL: Final = {
+    "dataport.dataflow_type": "push",
+    "dataport.subscription_type": "flush",
+    INTERFACE: CORBA_CDR,
+}
+
+
+class Peers:
+    """Keeps the connectors of a system with components that run elsewhere.
+
+    Each is looked at once a second, in a thread of its own. One that cannot be made is tried
+    again; one whose peer was started again is made again. One that somebody ended while the peer
+    lived is left so.
+
+    Args:
+        ports: of the system.
+        manager: of the system; its `remotes` say what is wanted.
+        look_us: how often each is looked at.
+
+    Raises:
+        RtcRefused: a path that leads nowhere.
+    """
+
+    def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = LOOK_US) -> None:
+        wanted = [_Kept(one, ports, manager) for one in manager.remotes.connections]
+        self._threads = [PeerThread(f"keeper of {one.name}", look_us) for one in wanted]
+        for one, thread in zip(wanted, self._threads, strict=True):
+            thread.submit(partial(one.look, thread.retry_s))
+
+    def close(self) -> None:
+        """Keep nothing any more; the connectors stay."""
+        for thread in self._threads:
+            thread.close()
+
+
+class _Kept:
+    """A connector that is kept.
+
+    Attributes:
+        name: of the connector.
+    """
+
+    def __init__(self, wanted: RemoteConnection, ports: SystemPorts, manager: Manager) -> None:
+        self._wanted, self._ports, self._manager = wanted, ports, manager
+        self._server, self._path = parse_path(wanted.remote.path)
+        self.name = f"{wanted.remote.name}.{wanted.remote_port}"
+        self._peer: Reference = None
+        self._made, self._reason = False, ""
+
+    def look(self, again_s: float) -> float | None:
+        """Make the connector if it is not there; None to look no more."""
+        try:
+            if self._made and self._peer is not None:
+                if not self._is_there():
+                    _LOG.info("%s: somebody has ended the connector; it is left so", self.name)
+                    return None
+            else:
+                self._make()
+        except CORBA.SystemException as error:
+            self._failed(explain(error))
+        except CORBA.UserException as error:
+            self._failed(f"no such name: {type(error).__name__}")
+        except (RtcRefused, TimeoutError) as error:
+            self._failed(str(error))
+        return again_s
+
+    def _is_there(self) -> bool:
+        """Return whether both sides have the connector; what it raises tells that one is gone."""
+        wanted = self._wanted.connector_id
+        theirs = self._peer.get_connector_profile(wanted).connector_id == wanted
+        return bool(theirs) and self._ports.calls.call(self._is_here)
+
+    def _is_here(self) -> bool:
+        port = self._manager.port(self._wanted.port)
+        return port.find_connector(self._wanted.connector_id) is not None
+
+    def _make(self) -> None:
+        """Find the peer's port, and connect it unless it is connected still."""
+        self._peer = peer = _port_of(self._find(), self._wanted.remote_port)
+        if not self._is_there() and not self._connected(peer):
+            self._peer, self._reason = None, self._reason or "refused"  # our port has logged why
+            return
+        if self._reason:
+            _LOG.warning("%s: connected", self.name)
+        self._made, self._reason = True, ""
+
+    def _connected(self, peer: Reference) -> bool:
+        """Connect the ports, and return whether that was so."""
+        ours, values = self._ports.calls.call(self._begin)
+        rtc, wanted = stubs().rtc, self._wanted
+        profile = rtc.ConnectorProfile(
+            wanted.name, wanted.connector_id, [ours, peer], nvlist(values)
+        )
+        code, _ = ours.connect(profile)
+        return bool(code == rtc.RTC_OK)
+
+    def _begin(self) -> tuple[Reference, dict[str, str]]:
+        """Return our port's service, and what is to hold; what is left of a connector ends."""
+        port: AnyPort = self._manager.port(self._wanted.port)
+        if (left := port.find_connector(self._wanted.connector_id)) is not None:
+            left.end()
+        if (ours := self._ports.references.get(port)) is None:
+            raise RtcRefused(f"{self._wanted.port} is not served")
+        usual = {}
+        if isinstance(port, DataPort):
+            usual = {**_USUAL, DATA_TYPE: port.data_type.idl_id()}
+        return ours, {**usual, **self._wanted.properties}
+
+    def _find(self) -> Reference:
+        """Return the component, as its name server has it."""
+        orb: Orb = self._ports.orb
+        where = orb.reference(f"corbaloc::{self._server}/NameService")
+        root = where._narrow(CosNaming.NamingContext)
+        if root is None:
+            raise RtcRefused(f"{self._server} is no name service")
+        found = root.resolve(name_of(self._path))
+        component = None if found is None else found._narrow(stubs().rtc.RTObject)
+        if component is None:
+            raise RtcRefused(f"{self._wanted.remote.path} is no component")
+        return component
+
+    def _failed(self, reason: str) -> None:
+        self._peer = None
+        if reason != self._reason and not (self._made and self._reason):  # one line for each loss
+            _LOG.warning("%s: %s; asked again every second", self.name, reason)
+        self._reason = reason
+
+
+def refuse_wrong_paths(manager: Manager) -> None:
+    """Raise RtcRefused if a remote component has a path that leads nowhere."""
+    for entry in manager.remotes.components:
+        parse_path(entry.path)
+
+
+def parse_path(path: str) -> tuple[Endpoint, str]:
+    """Read a path as rtshell writes it: a name server, then the name in it.
+
+    >>> parse_path("localhost:2809/robot.host_cxt/Joystick0.rtc")
+    (Endpoint(host='localhost', port=2809), 'robot.host_cxt/Joystick0.rtc')
+
+    Raises:
+        RtcRefused: it is not like that.
+    """
+    server, _, name = path.lstrip("/").partition("/")
+    if not name or not all(name.split("/")):
+        raise RtcRefused(f"path {path!r} is not like localhost:2809/robot.host_cxt/Joystick0.rtc")
+    try:
+        return parse_endpoint(server), name
+    except ValueError as error:
+        raise RtcRefused(f"path {path!r}: {error}") from error
+
+
+def _port_of(component: Reference, name: str) -> Reference:
+    """Return the port of a component, by its name without that of the component."""
+    known: list[str] = []
+    for port in filter(None, component.get_ports()):
+        profile: Any = port.get_port_profile()
+        known.append(str(profile.name).rpartition(".")[2])
+        if known[-1] == name:
+            return port
+    raise RtcRefused(f"it has no port {name!r}; known: {', '.join(known) or 'none'}")

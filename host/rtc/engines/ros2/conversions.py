@@ -1,0 +1,111 @@
+"""Which values of ports are which messages of ROS 2, and what makes one of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from tickrig.host.rtc.engines.ros2 import robot_messages as robot
+from tickrig.host.rtc.engines.ros2.message_types import message_type
+from tickrig.host.rtc.engines.ros2.stamps import Stamps
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
+from tickrig.wire.rtc_types import basic, extended_2d, iis
+from tickrig.wire.rtc_types.actuators import ActArrayState
+from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.sensors import RangeData
+
+Conversion = Callable[[Any], Any]
+Maker = Callable[[TopicEntry, Stamps], Conversion]
+"""Makes what converts the values, or the messages, of one port."""
+
+_STD: Final[Mapping[str, tuple[type[Struct], ...]]] = {
+    "Bool": (basic.TimedBoolean,),
+    "Float32": (basic.TimedFloat,),
+    "Float64": (basic.TimedDouble,),
+    "Int16": (basic.TimedShort, basic.TimedState),
+    "Int32": (basic.TimedLong,),
+    "String": (basic.TimedString,),
+    "UInt16": (basic.TimedUShort,),
+    "UInt32": (basic.TimedULong,),
+    "UInt8": (basic.TimedOctet,),
+    "Float32MultiArray": (basic.TimedFloatSeq,),
+    "Float64MultiArray": (basic.TimedDoubleSeq,),
+    "Int16MultiArray": (basic.TimedShortSeq,),
+    "Int32MultiArray": (basic.TimedLongSeq,),
+    "UInt16MultiArray": (basic.TimedUShortSeq,),
+    "UInt32MultiArray": (basic.TimedULongSeq,),
+    "UInt8MultiArray": (basic.TimedOctetSeq,),
+}
+_POSES: Final = (iis.TimedPose2D, extended_2d.TimedPose2D)
+_SPEEDS: Final = (iis.TimedVelocity2D, extended_2d.TimedVelocity2D)
+_ANGLES: Final = (basic.TimedDoubleSeq, basic.TimedFloatSeq, basic.TimedDouble, basic.TimedFloat)
+
+
+def _data_out(name: str) -> Maker:
+    """Return what makes a message of `data` alone."""
+
+    def maker(entry: TopicEntry, stamps: Stamps) -> Conversion:
+        kind = message_type(name)
+        return lambda value: kind(value.data)
+
+    return maker
+
+
+def _array_out(name: str) -> Maker:
+    """Return what makes a message with a layout, which stays empty."""
+
+    def maker(entry: TopicEntry, stamps: Stamps) -> Conversion:
+        kind, layout = message_type(name), message_type("std_msgs/msg/MultiArrayLayout")([], 0)
+        return lambda value: kind(layout, list(value.data))
+
+    return maker
+
+
+def _data_in(data_type: type[Struct]) -> Maker:
+    """Return what makes a value of the `data` of a message."""
+    make: Any = data_type
+    return lambda entry, stamps: lambda message: make(stamps.to_system(), message.data)
+
+
+def _array_in(data_type: type[Struct]) -> Maker:
+    make: Any = data_type
+    whole: Callable[[Any], Any] = bytes if data_type is basic.TimedOctetSeq else tuple
+    return lambda entry, stamps: lambda message: make(stamps.to_system(), whole(message.data))
+
+
+def _std() -> tuple[dict[tuple[str, type[Struct]], Maker], ...]:
+    out, into = dict[tuple[str, type[Struct]], Maker](), dict[tuple[str, type[Struct]], Maker]()
+    for short, kinds in _STD.items():
+        name, many = f"std_msgs/msg/{short}", short.endswith("MultiArray")
+        for kind in kinds:
+            out[name, kind] = _array_out(name) if many else _data_out(name)
+            into[name, kind] = _array_in(kind) if many else _data_in(kind)
+    return out, into
+
+
+_STD_OUT, _STD_IN = _std()
+
+OUT: Final[Mapping[tuple[str, type[Struct]], Maker]] = {
+    **{("nav_msgs/msg/Odometry", kind): robot.odometry_out for kind in _POSES},
+    ("nav_msgs/msg/Odometry", extended_2d.TimedPoseVel2D): robot.pose_vel_out,
+    **{("tf2_msgs/msg/TFMessage", kind): robot.transform_out for kind in _POSES},
+    **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_out for kind in _POSES},
+    **{("geometry_msgs/msg/Twist", kind): robot.twist_out for kind in _SPEEDS},
+    **{("geometry_msgs/msg/TwistStamped", kind): robot.twist_stamped_out for kind in _SPEEDS},
+    **{("sensor_msgs/msg/JointState", kind): robot.joints_out for kind in _ANGLES},
+    ("sensor_msgs/msg/JointState", ActArrayState): robot.actuators_out,
+    ("sensor_msgs/msg/LaserScan", RangeData): robot.scan_out,
+    **_STD_OUT,
+}
+"""Of an OutPort; the first message that fits a type is the usual one."""
+
+IN: Final[Mapping[tuple[str, type[Struct]], Maker]] = {
+    **{("geometry_msgs/msg/Twist", kind): robot.twist_in(kind) for kind in _SPEEDS},
+    **{("geometry_msgs/msg/TwistStamped", kind): robot.twist_in(kind) for kind in _SPEEDS},
+    **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_in(kind) for kind in _POSES},
+    **_STD_IN,
+}
+"""Of an InPort."""
+
+MESSAGES: Final = tuple(sorted({name for name, _ in (*OUT, *IN)}))
+"""Messages that a table can name."""

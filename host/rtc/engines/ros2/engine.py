@@ -1,0 +1,245 @@
+"""Joins the ports of a system with topics of ROS 2, as a table says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from typing import Any, Final
+
+from tickrig.host.cli.ros2_options import Ros2Options
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
+from tickrig.host.rtc.engines.ros2.diagnostics import TYPE, Diagnostics
+from tickrig.host.rtc.engines.ros2.foreign_endpoints import ForeignEndpoints, OwnEndpoint
+from tickrig.host.rtc.engines.ros2.participant import Participant, dds_topic
+from tickrig.host.rtc.engines.ros2.stamps import Stamps
+from tickrig.host.rtc.engines.ros2.table_reader import parse_table
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry, TopicTable
+from tickrig.host.rtc.engines.ros2.topic_reader import TopicReader
+from tickrig.host.rtc.engines.ros2.topic_writer import TopicWriter
+from tickrig.host.rtc.engines.ros2.usual_topics import usual_entries
+from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.remote.in_port import InPortPushConnector
+from tickrig.host.rtc.remote.out_port import OutPortPushConnector
+from tickrig.host.rtc.remote.peer_end import Codec, PeerEnd
+from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.text.log import log_of
+
+CLOSE_US: Final = 1_000_000
+
+_LOG: Final = log_of(__name__)
+
+
+@contextmanager
+def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
+    """Join the ports of a system with topics, those of components that come later, too.
+
+    Raises:
+        OSError: the table cannot be read.
+        ValueError: the table, the domain or the interface cannot be; what the table says of
+            components that are there.
+    """
+    table = read_table(options)
+    refuse_mistakes(table, manager)
+    engine = Ros2Engine(options, table, manager, calls)
+    manager.on_added.append(engine.join)
+    try:
+        yield
+    finally:
+        manager.on_added.remove(engine.join)
+        engine.close()
+
+
+def read_table(options: Ros2Options) -> TopicTable:
+    """Return the table that is given, else that of the command, else one of all ports.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is none, a line for each mistake.
+    """
+    if options.table is not None:
+        return parse_table(options.table.read_text("utf-8"), str(options.table))
+    return parse_table(options.topics, "topics") if options.topics else TopicTable()
+
+
+def refuse_mistakes(table: TopicTable, manager: Manager) -> None:
+    """Raise ValueError with all that does not fit the components that are there, a line each."""
+    components = {each.instance_name: each for each in manager.components}
+    mistakes = []
+    for entry in table.entries or ():
+        if component := components.get(entry.port.partition(".")[0]):
+            mistakes += mistakes_of(entry, component)
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    owners = {entry.port.partition(".")[0]: None for entry in table.entries or ()}
+    if absent := ", ".join(name for name in owners if name not in components):
+        _LOG.warning("ros2: no %s yet; topics come with the components", absent)
+
+
+def mistakes_of(entry: TopicEntry, component: RtComponent) -> list[str]:
+    """Return why the port of an entry cannot have its topic, if it cannot."""
+    name = entry.port.partition(".")[2]
+    if (port := component.ports.get(name)) is None:
+        known = ", ".join(component.ports) or "none"
+        return [f"{entry}: {component.instance_name} has no port {name!r}; known: {known}"]
+    if not isinstance(port, InPort | OutPort):
+        return [f"{entry} is a {port.port_type}; topics are for data ports"]
+    makers = OUT if isinstance(port, OutPort) else IN
+    if (entry.type, port.data_type) in makers:
+        return []
+    fitting = [name for name, kind in makers if kind is port.data_type] or ["no message"]
+    return [f"{entry} carries {port.data_type.idl_id()}: {', '.join(fitting)}, not {entry.type}"]
+
+
+class Ros2Engine:
+    """Reads and writes topics in threads of its own, and joins them with ports.
+
+    Args:
+        options: domain and interface.
+        table: which ports.
+        manager: of the system.
+        calls: those of the manager's thread.
+
+    Raises:
+        ValueError: the domain or the interface cannot be.
+    """
+
+    def __init__(
+        self, options: Ros2Options, table: TopicTable, manager: Manager, calls: CallQueue
+    ) -> None:
+        self._table, self._manager, self._calls = table, manager, calls
+        self._participant = Participant(options.domain, options.interface)
+        self._stamps = Stamps(lambda: manager.now_us)
+        self._writing: dict[str, OwnEndpoint] = {}
+        self._reading: dict[str, OwnEndpoint] = {}
+        self._out, self._in = PeerThread("ros2 out"), PeerThread("ros2 in")
+        self._endpoints: list[TopicReader | TopicWriter] = []
+        self._foreign = ForeignEndpoints(self._participant, self._writing, self._reading)
+        calls.post(self._stamps.start)  # again, when the clock has started
+        for component in manager.components:
+            self.join(component)
+        self._diagnostics = self._add_diagnostics()
+        self._in.submit(self._foreign.look)
+
+    def join(self, component: RtComponent) -> None:
+        """Join the ports of a component; what cannot be is logged in a line."""
+        name = component.instance_name
+        entries = self._table.entries
+        if entries is None:
+            entries = usual_entries(component)
+        for entry in entries:
+            if entry.port.partition(".")[0] != name:
+                continue
+            if mistakes := mistakes_of(entry, component):
+                _LOG.warning("%s", *mistakes)
+                continue
+            try:
+                self._join_port(component.ports[entry.port.partition(".")[2]], entry)
+            except RtcRefused as error:
+                _LOG.warning("%s: %s", entry, error)
+
+    def close(self) -> None:
+        """End all connectors, and leave the domain."""
+        self._manager.remove_item(self._diagnostics)
+        for component in self._manager.components:
+            for port in component.ports.values():
+                for connector in port.connectors:
+                    if connector.profile.connector_id.startswith(_ID):
+                        connector.end()
+        self._out.close(CLOSE_US)
+        self._in.close(CLOSE_US)
+        for endpoint in self._endpoints:
+            endpoint.close()
+        self._foreign.close()
+        self._participant.close()
+
+    def _join_port(self, port: Any, entry: TopicEntry) -> None:
+        connector: Any
+        endpoint: TopicReader | TopicWriter
+        if isinstance(port, OutPort):
+            connector, endpoint = self._push(port, entry)
+            thread, own = self._out, self._writing
+        else:
+            connector, endpoint = self._take(port, entry)
+            thread, own = self._in, self._reading
+        connector.begin()
+        own[dds_topic(entry.topic)] = endpoint
+        self._endpoints.append(endpoint)
+        thread.submit(endpoint.open)
+
+        def ended(profile: Any) -> None:
+            if profile is connector.profile:
+                self._endpoints.remove(endpoint)
+                thread.submit(endpoint.close)
+
+        port.on_disconnect.append(ended)
+
+    def _push(self, port: OutPort[Any], entry: TopicEntry) -> tuple[Any, TopicWriter]:
+        writer = TopicWriter(self._participant, entry)
+        encode = OUT[entry.type, port.data_type](entry, self._stamps)
+        codec = Codec(_logging(entry, encode), _no_value)
+        return OutPortPushConnector(port, _end(entry), codec, writer, self._out), writer
+
+    def _take(self, port: InPort[Any], entry: TopicEntry) -> tuple[Any, TopicReader]:
+        convert = IN[entry.type, port.data_type](entry, self._stamps)
+        zero = port.data_type()
+
+        def decode(message: Any) -> Any:
+            return zero if message is None else convert(message)
+
+        codec = Codec(_no_value, decode)
+        connector = InPortPushConnector(port, _end(entry), codec, self._calls)
+        return connector, TopicReader(self._participant, entry, self._in, connector.put)
+
+    def _add_diagnostics(self) -> Diagnostics:
+        topic, period_us = self._table.diagnostics, self._table.period_us
+        entry = TopicEntry("diagnostics", topic, TYPE)
+        writer = TopicWriter(self._participant, entry)
+
+        def send(message: Any) -> None:
+            self._out.submit(partial(_written, writer, message))
+
+        item = Diagnostics(self._manager, self._stamps, period_us, send)
+        if topic:
+            self._writing[dds_topic(topic)] = writer
+            self._endpoints.append(writer)
+            self._out.submit(writer.open)
+            self._manager.add_item(item)
+        return item
+
+
+_ID: Final = "ros2:/"
+
+
+def _end(entry: TopicEntry) -> PeerEnd:
+    properties = {"ros2.type": entry.type}
+    return PeerEnd(f"{_ID}{entry.topic}", f"{_ID}{entry.topic}", properties, f"/{entry.topic}")
+
+
+def _no_value(value: Any) -> Any:
+    raise ValueError("this connector goes the other way")
+
+
+def _written(writer: TopicWriter, message: Any) -> None:
+    writer.put(message)
+
+
+def _logging(entry: TopicEntry, encode: Any) -> Any:
+    """Return an encoder that says in a line which value cannot be a message, the first time."""
+    warned = False
+
+    def encoded(value: Any) -> Any:
+        nonlocal warned
+        try:
+            return encode(value)
+        except (ValueError, OverflowError) as error:
+            if not warned:
+                _LOG.warning("%s: no %s: %s", entry, entry.type, error)
+            warned = True
+            raise ValueError(str(error)) from error
+
+    return encoded

@@ -1,0 +1,180 @@
+"""A device's place in a system: its proxy while it is there, a search for it while it is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from tickrig.host.links.link import Link
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
+from tickrig.host.rtc.lite.proxy import RtcLiteProxy
+from tickrig.host.rtc.lite.request_channel import POLL_US, RequestChannel
+from tickrig.host.rtc.lite.settings import ProxySettings
+from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_lite.codes import LiteCommand
+
+
+class DeviceWatcher:
+    """Asks for the state of a device each 100 ticks from now on, and waits for nothing.
+
+    Args:
+        link: the line to the device.
+        settings: how often, and how long an answer may take.
+    """
+
+    def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
+        self._channel, self._settings = RequestChannel(link, settings), settings
+        self._next_us = link.now_us + settings.search_period_us
+        self._answer_us = link.now_us  # until then an answer may come
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do, on the clock of the link."""
+        now_us = self._channel.now_us
+        return min(self._next_us, now_us + POLL_US) if now_us < self._answer_us else self._next_us
+
+    def tick(self) -> bool:
+        """Ask, if it is time to; return whether the device has answered."""
+        self._channel.poll()
+        if self._channel.state is None and self._channel.now_us >= self._next_us:
+            self._channel.send(LiteCommand.STATE)
+            self._answer_us = self._next_us + self._settings.reply_us
+            self._next_us += self._settings.search_period_us
+        return self._channel.state is not None
+
+
+RATE_HZ: Final = 10.0
+"""A period that two round trips at 57600 bit/s do not fill."""
+
+_LOG: Final = log_of(__name__)
+
+
+@dataclass(slots=True)
+class Attachment:
+    """Sends the PINGs of a proxy, removes it when its device is lost, and looks for the device.
+
+    The manager ticks it. A proxy that somebody else deletes ends it.
+
+    Attributes:
+        manager: of the system.
+        link: the line to the device; it stays open.
+        base_name: of the proxy, without its number.
+        settings: waits, and whether the device is looked for.
+        listener: called with events.
+        context: execution context of the proxy; None for one of its own.
+        rate_hz: of its own one.
+        proxy: the latest one.
+
+    Raises:
+        RtcRefused: the device does not start up.
+        ValueError: a rate that no execution context can have.
+    """
+
+    manager: Manager
+    link: Link[bytes]
+    base_name: str
+    settings: ProxySettings
+    listener: ProxyListener | None = None
+    context: ExecutionContext | None = None
+    rate_hz: float = RATE_HZ
+    proxy: RtcLiteProxy = field(init=False)
+    _watcher: DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
+
+    def __post_init__(self) -> None:
+        """Make the first proxy, and have the manager tick this."""
+        self.proxy = self._add_proxy()
+        self.manager.add_item(self)
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do, as the manager counts time; its clock may be another."""
+        return self.manager.now_us + max(0, self._link_due_us - self.link.now_us)
+
+    def tick(self, now_us: int) -> None:
+        """Mind the proxy, or look for the device."""
+        if self._watcher is not None:
+            if self._watcher.tick():
+                self.manager.defer(self._return)
+        else:
+            self._attend(self.proxy)
+
+    @property
+    def _link_due_us(self) -> int:
+        if self._watcher is not None:
+            return self._watcher.due_us
+        fatal_us = self.proxy.fatal_us
+        return self.proxy.due_us if fatal_us is None else fatal_us + self.settings.linger_us
+
+    def _add_proxy(self) -> RtcLiteProxy:
+        name = self.manager.free_name(self.base_name)
+        proxy = RtcLiteProxy(name, self.link, self.settings, self.listener)
+        return self.manager.add(proxy, self.rate_hz, self.context)
+
+    def _attend(self, proxy: RtcLiteProxy) -> None:
+        if not proxy.alive:
+            self.manager.remove_item(self)
+            return
+        proxy.tick()
+        if proxy.fatal_us is not None and self.link.now_us >= self._link_due_us:
+            self.manager.defer(lambda: self._remove(proxy))
+
+    def _remove(self, proxy: RtcLiteProxy) -> None:
+        """Take a proxy out of the system (DECISION L15), unless somebody just did."""
+        if not proxy.alive:
+            return
+        self.manager.delete(proxy.instance_name)
+        self._notify(ProxyEventType.REMOVED, proxy)
+        if self.settings.rediscover:
+            self._watcher = DeviceWatcher(self.link, self.settings)
+        else:
+            self.manager.remove_item(self)
+
+    def _return(self) -> None:
+        """Make a new proxy for a device that has answered, and so need not be waited for."""
+        self.settings = replace(self.settings, boot_us=0)
+        try:
+            self.proxy, self._watcher = self._add_proxy(), None
+        except RtcRefused as error:
+            _LOG.info("%s answers, but: %s", self.base_name, error)
+            self._watcher = DeviceWatcher(self.link, self.settings)
+        else:
+            self._notify(ProxyEventType.REDISCOVERED, self.proxy)
+
+    def _notify(self, kind: ProxyEventType, proxy: RtcLiteProxy) -> None:
+        pings = proxy.pings if kind is ProxyEventType.REMOVED else None
+        event = ProxyEvent(self.link.now_us, kind, proxy.instance_name, pings=pings)
+        notify(self.listener, event)
+
+
+def attach(  # noqa: PLR0913 - options, by keyword
+    manager: Manager,
+    link: Link[bytes],
+    base_name: str,
+    settings: ProxySettings | None = None,
+    *,
+    listener: ProxyListener | None = None,
+    context: ExecutionContext | None = None,
+    rate_hz: float = RATE_HZ,
+) -> RtcLiteProxy:
+    """Add a proxy to a system, named with the lowest number that is free: `LiteA0`.
+
+    Args:
+        manager: of the system; it sends the PINGs, removes the proxy and finds the device again.
+        link: the line to the device.
+        base_name: of the proxy, without its number.
+        settings: waits, checksum, rediscovery.
+        listener: called with events.
+        context: an execution context to take part in, in place of an own one.
+        rate_hz: of its own one.
+
+    Raises:
+        RtcRefused: the device does not start up.
+        ValueError: a rate that no execution context can have.
+    """
+    attachment = Attachment(
+        manager, link, base_name, settings or ProxySettings(), listener, context, rate_hz
+    )
+    return attachment.proxy

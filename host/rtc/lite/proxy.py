@@ -1,0 +1,281 @@
+"""The proxy: an ordinary RT component to everybody else, whose work a small device does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Final
+
+from tickrig.host.links.errors import DeviceRefused, LinkError
+from tickrig.host.links.link import Link
+from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
+from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
+from tickrig.host.rtc.lite.ping_monitor import PingStatistics
+from tickrig.host.rtc.lite.port_bridges import PortBridges
+from tickrig.host.rtc.lite.request_channel import RETRIES, RequestChannel
+from tickrig.host.rtc.lite.settings import ProxySettings
+from tickrig.host.rtc.lite.start_up import DeviceProfile, start_up
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
+from tickrig.host.text.log import log_of
+from tickrig.wire.errors import WireError
+from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
+from tickrig.wire.rtc_lite.messages import LiteReply
+
+MIRROR_US: Final = 100_000
+"""How often the state of a device is asked that executes by its own timer: each 10th tick."""
+
+MAX_RATE_HZ: Final = 0xFFFF
+
+_OK: Final = ReturnCode.RTC_OK
+_CODES: Final[dict[int, ReturnCode]] = {
+    LiteStatus.OK: ReturnCode.RTC_OK,
+    LiteStatus.WRONG_STATE: ReturnCode.PRECONDITION_NOT_MET,
+    LiteStatus.NO_IN_PORT: ReturnCode.BAD_PARAMETER,
+    LiteStatus.NO_OUT_PORT: ReturnCode.BAD_PARAMETER,
+    LiteStatus.UNSUPPORTED: ReturnCode.UNSUPPORTED,
+}
+"""What a callback returns for a status; RTC_ERROR for any other, and without a reply."""
+
+_TO_INACTIVE: Final = {
+    LiteState.CREATED: LiteCommand.INITIALIZE,
+    LiteState.ACTIVE: LiteCommand.ABORT,
+    LiteState.ERROR: LiteCommand.RESET,
+}
+"""What brings a device one step nearer to Inactive, on_reset of the proxy."""
+
+_LOG: Final = log_of(__name__)
+
+
+class RtcLiteProxy(RtComponent):
+    """Stands for an RTC-Lite component (Suzuki et al., RSJ 2007).
+
+    Each callback asks the device for the same, and waits for the reply in the
+    period itself, 100 ms at most: data that go in come out in the same period.
+    Somebody calls `tick` when `due_us` has come, so that PINGs are sent;
+    `attach` sees to that.
+
+    Not emulated: service ports and configuration sets, which RTC-Lite has not.
+
+    Args:
+        instance_name: unique in a system.
+        link: the line to the device. The time on its clock is the proxy's.
+        settings: waits and checksum.
+        listener: called with events.
+
+    Attributes:
+        device: what the device says of itself; None before `on_initialize`.
+        relays: its ports; there are none before `on_initialize`.
+        fatal_us: when the device was found to be lost; None as long as it is there.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec(
+        "RtcLiteProxy", "Proxy of an RTC-Lite component", category="RTC-Lite"
+    )
+
+    def __init__(
+        self,
+        instance_name: str,
+        link: Link[bytes],
+        settings: ProxySettings | None = None,
+        listener: ProxyListener | None = None,
+    ) -> None:
+        super().__init__(instance_name)
+        self._settings, self._listener = settings or ProxySettings(), listener
+        self._link, self._channel = link, RequestChannel(link, self._settings)
+        self.device: DeviceProfile | None = None
+        self.relays = PortBridges()
+        self.fatal_us: int | None = None
+        self._failed = False  # a callback failed, so that Error comes next
+        self._unreported = False  # an error of which nobody knows whether it is a fatal one
+        self._mirrored = -1  # in which ten ticks its state was asked
+        self._unanswered = 0  # how often in vain
+        self._why: tuple[str, tuple[str, ...]] = "", ()  # it went to Error, and the last frames
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do, on the clock of the link."""
+        return self._channel.due_us
+
+    @property
+    def device_state(self) -> LiteState | None:
+        """State of the device as it said last; None if nobody knows."""
+        return self._channel.state
+
+    @property
+    def profile(self) -> ComponentProfile:
+        """The component as it is, with the type of the one on the device and its PINGs."""
+        pings = {"rtc_lite.pings": str(self.pings).removeprefix("PINGs: ")}
+        properties = {} if self.device is None else {**self.device.properties, **pings}
+        return replace(super().profile, properties=properties)
+
+    @property
+    def pings(self) -> PingStatistics:
+        """How the PINGs went since `on_initialize`."""
+        return self._channel.ping_monitor.statistics
+
+    def tick(self) -> None:
+        """Send PINGs and look for their answers; a device that is lost leads to Error."""
+        self._channel.tick()
+        if self._channel.ping_monitor.lost and self.fatal_us is None:
+            self.fatal_us, self._unreported = self._channel.now_us, False
+            before = f"{self._channel.trouble}, and " if self._channel.trouble else ""
+            pings = f"none of {self._settings.pings} PINGs was answered"
+            self._why = before + pings, self._channel.frames
+            self._notify(ProxyEventType.FATAL_ERROR)
+            for context in self.contexts:
+                context.abort_component(self)
+
+    def on_initialize(self) -> ReturnCode:
+        """Bring the device to Inactive, and make a port of each of its ports."""
+        for port in tuple(self.ports.values()):
+            self.remove_port(port)
+        self._channel = RequestChannel(self._link, self._settings)
+        try:
+            self.device = start_up(self._channel, self._settings.boot_us)
+            self.relays = PortBridges(self.device.in_ports, self.device.out_ports)
+            for port in self.relays.ports:
+                self.add_port(port)
+            self._channel.ping_monitor.start(self._channel.now_us)
+        except (LinkError, DeviceRefused, WireError, RtcRefused) as error:
+            _LOG.warning("%s: no start-up: %s", self.instance_name, error)
+            return ReturnCode.RTC_ERROR
+        return _OK
+
+    def on_finalize(self) -> ReturnCode:
+        """Finalize the device."""
+        return self._command(LiteCommand.FINALIZE)
+
+    def on_startup(self, ec: ExecutionContext) -> ReturnCode:
+        """Tell a device that wants to know."""
+        return self._optional(LiteCommand.STARTUP)
+
+    def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
+        """Tell a device that wants to know."""
+        return self._optional(LiteCommand.SHUTDOWN)
+
+    def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
+        """Give the nearest whole rate to a device that executes by its own timer."""
+        if not self._by_timer:
+            return _OK
+        rate_hz = min(max(1, round(ec.rate_hz)), MAX_RATE_HZ)
+        return self._command(LiteCommand.RATE, rate_hz.to_bytes(2, "little"))
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Activate the device."""
+        code, self._unanswered = self._command(LiteCommand.ACTIVATE), 0
+        self._failed = code is not _OK
+        return code
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Deactivate the device, unless Error comes next: it is aborted then."""
+        code = _OK if self._failed else self._command(LiteCommand.DEACTIVATE)
+        self._write_out_ports()
+        return code
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Hand data in, let the device execute, and hand data out."""
+        code = _OK if self._mute else self._write_in_ports()
+        if code is _OK:
+            code = self._mirror(ec.now_us) if self._by_timer else self._command(LiteCommand.EXECUTE)
+        self._write_out_ports()
+        self._failed = code is not _OK
+        return code
+
+    def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
+        """Let the device follow into Error, if it is not there."""
+        self._unreported = self.fatal_us is None
+        if self._unreported:
+            self._why = self._channel.trouble or "it was told to abort", self._channel.frames
+        self._notify_passive()
+        return self._follow()
+
+    def on_error(self, ec: ExecutionContext) -> ReturnCode:
+        """Let the device run on_error; one whose reply was lost is made to follow first."""
+        self._notify_passive()
+        code = self._follow()
+        if self._channel.state is LiteState.ERROR and not self._by_timer:
+            code = self._command(LiteCommand.ERROR)
+        self._write_out_ports()
+        return code
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Bring the device to Inactive, from whatever state it is in."""
+        for _ in _TO_INACTIVE:  # no state is passed twice
+            state = self._known_state()
+            step = None if state is None else _TO_INACTIVE.get(state)
+            if step is None or self._command(step) is ReturnCode.RTC_ERROR:
+                break
+        return _OK if self._channel.state is LiteState.INACTIVE else ReturnCode.RTC_ERROR
+
+    @property
+    def _by_timer(self) -> bool:
+        return self.device is not None and self.device.context is LiteContextType.TIMER
+
+    @property
+    def _mute(self) -> bool:
+        """Whether a device that executes by itself is left alone until it answers a PING."""
+        return self._by_timer and self._channel.ping_monitor.doubted
+
+    def _command(self, command: LiteCommand, data: bytes = b"") -> ReturnCode:
+        return _code_of(self._channel.request(command, data))
+
+    def _optional(self, command: LiteCommand) -> ReturnCode:
+        """Ask for a callback that a device may leave out."""
+        code = self._command(command)
+        return _OK if code is ReturnCode.UNSUPPORTED else code
+
+    def _known_state(self) -> LiteState | None:
+        """Return the state of the device; ask for it if nobody knows."""
+        if self._channel.state is None:
+            self._channel.request(LiteCommand.STATE)
+        return self._channel.state
+
+    def _follow(self) -> ReturnCode:
+        if self._known_state() is LiteState.ACTIVE:
+            return self._command(LiteCommand.ABORT)
+        return _OK
+
+    def _mirror(self, now_us: int) -> ReturnCode:
+        """Ask once in 10 ticks whether the device is still Active; up to 3 times in vain."""
+        if self._mute or now_us // MIRROR_US == self._mirrored:
+            self._channel.poll()
+            return _OK
+        self._mirrored = now_us // MIRROR_US
+        reply = self._channel.request(LiteCommand.STATE)
+        self._unanswered = 0 if reply else self._unanswered + 1
+        if reply is None and self._unanswered <= RETRIES:
+            return _OK
+        code = _code_of(reply)
+        if code is _OK and self._channel.state is not LiteState.ACTIVE:
+            self._channel.trouble = "the device is no longer Active"
+            return ReturnCode.RTC_ERROR
+        return code
+
+    def _write_in_ports(self) -> ReturnCode:
+        """Write one new value to each in-port of the device that has one."""
+        for data in self.relays.fresh():
+            if (code := self._command(LiteCommand.WRITE, data.encode())) is not _OK:
+                return code
+        return _OK
+
+    def _write_out_ports(self) -> None:
+        """Write to the OutPorts what has arrived."""
+        pushed, self._channel.pushed = self._channel.pushed, []
+        for at_us, data in pushed:
+            self.relays.give(at_us, data)
+
+    def _notify_passive(self) -> None:
+        """Tell of an error once it is known that the device is there."""
+        if self._unreported and not self._channel.ping_monitor.doubted:
+            self._unreported = False
+            self._notify(ProxyEventType.PASSIVE_ERROR)
+
+    def _notify(self, kind: ProxyEventType) -> None:
+        notify(
+            self._listener, ProxyEvent(self._channel.now_us, kind, self.instance_name, *self._why)
+        )
+
+
+def _code_of(reply: LiteReply | None) -> ReturnCode:
+    error = ReturnCode.RTC_ERROR
+    return error if reply is None else _CODES.get(reply.status, error)

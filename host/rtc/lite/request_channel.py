@@ -1,0 +1,254 @@
+"""Requests, replies and PINGs between a proxy and its device, one at a time (DECISION L8)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from tickrig.host.links.link import Link
+from tickrig.host.rtc.lite.frame_link import SILENCE_US, FrameLink, RtnoLink
+from tickrig.host.rtc.lite.ping_monitor import PingMonitor
+from tickrig.host.rtc.lite.settings import ProxySettings
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_lite.codes import (
+    FAULT_COMMANDS,
+    LiteCommand,
+    LiteLinkFault,
+    LiteState,
+    LiteStatus,
+)
+from tickrig.wire.rtc_lite.decoder import LiteDecoder
+from tickrig.wire.rtc_lite.frame import Framing, LiteFrame
+from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
+from tickrig.wire.rtc_lite.messages import (
+    LitePortData,
+    LitePortProfile,
+    LiteReply,
+    parse_port_data,
+    parse_port_profile,
+    parse_reply,
+)
+
+POLL_US: Final = 1_000
+"""How often the answer to a PING is looked for."""
+
+PROFILE_US: Final = 10_000_000
+"""How long all frames of a profile may take (RTnoProxy)."""
+
+FAULTS: Final = frozenset(FAULT_COMMANDS)
+"""What stands in the place of a status when a device could not read a request."""
+
+RETRIES: Final = 3
+"""For requests that may be repeated (DECISION L13)."""
+
+_MEANINGS: Final[Mapping[int, str]] = {
+    LiteStatus.ERROR: "x: a callback failed",
+    LiteStatus.WRONG_STATE: "H: wrong state",
+    LiteStatus.NO_IN_PORT: "F: no such in-port",
+    LiteStatus.NO_OUT_PORT: "D: no such out-port",
+    LiteStatus.EMPTY: "I: nothing new",
+    LiteStatus.UNSUPPORTED: "!: not supported",
+    LiteLinkFault.TIMEOUT: "FK: broken off",
+    LiteLinkFault.CHECKSUM: "FH: wrong checksum",
+    LiteLinkFault.UNKNOWN: "FU: unknown",
+}
+
+_LOG: Final = log_of(__name__)
+
+
+class RequestChannel:
+    """What a proxy says and hears.
+
+    `request` waits for a reply, for `reply_us` at most. A reply that does not come
+    begins a burst of PINGs, which nobody waits for: `tick` goes on with it.
+    While it lasts, and after a device was lost, nothing else is sent. As the
+    device answers in order, an answered PING also means that no late reply is
+    on its way.
+
+    Args:
+        link: the line to the device.
+        settings: how long to wait, how to sum up.
+
+    Attributes:
+        ping_monitor: counts the PINGs.
+        state: of the device, as far as its replies tell; None if nobody knows.
+        pushed: data of out-ports, not yet taken, with the time at which they arrived.
+        in_ports: in-ports that the device has described.
+        out_ports: out-ports that it has described.
+        trouble: why the last request was not done, empty if it was.
+    """
+
+    def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
+        self._line, self._settings = _frames_over(link, settings), settings
+        self.ping_monitor = PingMonitor(settings.ping_period_us, settings.reply_us, settings.pings)
+        self.state: LiteState | None = None
+        self.pushed: list[tuple[int, LitePortData]] = []
+        self.in_ports: list[LitePortProfile] = []
+        self.out_ports: list[LitePortProfile] = []
+        self.trouble = ""
+        self._reply: LiteReply | None = None
+        self._awaited: LiteCommand | None = None
+        self._polled_us = self._deadline_us = link.now_us
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        """The last frames with their times, as `1.234 > CX`, `1.238 < CX@I`."""
+        return tuple(self._line.latest)
+
+    @property
+    def now_us(self) -> int:
+        """Time on the clock of the link."""
+        return self._line.now_us
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do."""
+        due_us = self.ping_monitor.due_us
+        return min(due_us, self._polled_us + POLL_US) if self.ping_monitor.awaiting else due_us
+
+    def tick(self) -> None:
+        """Take what has arrived, and send a PING if one is due.
+
+        All that had arrived when a PING is overdue is read before that is judged: who looks
+        late takes no device for lost.
+        """
+        now_us = self.now_us
+        self.poll()
+        if (number := self.ping_monitor.tick(now_us)) is not None:
+            self._ping(number)
+
+    def request(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
+        """Send a request and wait for its reply; None without one, or if nothing may be sent.
+
+        A PING that has fallen due goes first.
+        """
+        if not self._free():
+            return None
+        reply = self._exchange(command, data)
+        self.trouble = self._trouble(command, reply)
+        if reply is None:
+            _LOG.info("%s", self.trouble)
+            self._ping(self.ping_monitor.doubt(self.now_us))
+        else:
+            self.ping_monitor.replied()
+        return reply
+
+    def request_again(self, command: LiteCommand) -> LiteReply | None:
+        """Send a request until it is answered, 4 times at most; a missing reply has no effect.
+
+        A fault is no answer: what was on the line before has spoilt the request.
+        """
+        reply = self._exchange(command)
+        for _ in range(RETRIES):
+            if reply is not None and reply.status not in FAULTS:
+                break
+            if reply is not None:
+                self.listen(SILENCE_US)
+            reply = self._exchange(command)
+        return reply
+
+    def send(self, command: LiteCommand, data: bytes = b"") -> None:
+        """Send a request and wait for nothing."""
+        self._line.send(LiteFrame(command, data))
+
+    def poll(self) -> None:
+        """Take what has arrived."""
+        self._polled_us = self.now_us
+        self._receive(0)
+
+    def listen(self, duration_us: int) -> None:
+        """Take what arrives meanwhile."""
+        until_us = self.now_us + duration_us
+        while self.now_us < until_us and self._receive(until_us - self.now_us):
+            continue
+
+    def _free(self) -> bool:
+        """Whether a request may be sent; waits for the answer to a PING that is under way."""
+        ping_monitor = self.ping_monitor
+        if not ping_monitor.awaiting and (number := ping_monitor.tick(self.now_us)) is not None:
+            self._ping(number)
+        while ping_monitor.pending and self.now_us < ping_monitor.due_us:
+            if not self._receive(ping_monitor.due_us - self.now_us):
+                return False
+        ping_monitor.let_go()
+        return not (ping_monitor.awaiting or ping_monitor.doubted or ping_monitor.lost)
+
+    def _exchange(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
+        """Send a request and wait for its reply."""
+        self.poll()  # what nobody waits for any more
+        self._awaited, self._reply = command, None
+        self.in_ports, self.out_ports = [], []
+        if command in WITH_STATE:
+            self.state = None
+        self.send(command, data)
+        reply = self._await_reply()
+        self._awaited = None
+        return reply
+
+    def _await_reply(self) -> LiteReply | None:
+        limit_us = self.now_us + PROFILE_US
+        self._deadline_us = self.now_us + self._settings.reply_us
+        while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
+            if not self._receive(self._deadline_us - self.now_us):
+                break
+        if self._reply is None:
+            self._receive(0)  # it may have come while this process was stopped
+        return self._reply
+
+    def _trouble(self, command: LiteCommand, reply: LiteReply | None) -> str:
+        name = command.value.decode()
+        if reply is None:
+            return f"no reply to {name} within {self._settings.reply_us // 1_000} ms"
+        return "" if reply.ok else f"{name} was answered {_MEANINGS.get(reply.status, reply)}"
+
+    def _ping(self, number: int) -> None:
+        self.send(LiteCommand.PING, bytes([number]))
+
+    def _receive(self, timeout_us: int) -> bool:
+        """Wait for bytes and take them; False if the line is gone."""
+        frames = self._line.receive(timeout_us)
+        for frame in frames or ():
+            self._take(frame)
+        return frames is not None
+
+    def _take(self, frame: LiteFrame) -> None:
+        """Note what a frame says."""
+        match frame.command:
+            case LiteCommand.DATA:
+                self.pushed.append((self.now_us, parse_port_data(frame.data)))
+            case LiteCommand.IN_PROFILE | LiteCommand.OUT_PROFILE:
+                self._take_profile(frame)
+            case command if command in FAULT_COMMANDS.values():
+                if self._awaited is not None:
+                    self._reply = LiteReply(frame.data[0])  # no status, so nothing that is OK
+            case command:
+                self._take_reply(command, parse_reply(frame))
+
+    def _take_profile(self, frame: LiteFrame) -> None:
+        if frame.data[0] and self._awaited is LiteCommand.PROFILE:
+            is_in = frame.command is LiteCommand.IN_PROFILE
+            ports = self.in_ports if is_in else self.out_ports
+            ports.append(parse_port_profile(frame.data))
+            self._deadline_us = self.now_us + self._settings.reply_us
+
+    def _take_reply(self, command: LiteCommand, reply: LiteReply) -> None:
+        if command is LiteCommand.PING and reply.ok:
+            self.ping_monitor.answered(reply.fields[0], self.now_us)
+        if command in WITH_STATE and reply.fields:
+            self.state = _state(reply.fields[0])
+        if command is self._awaited:
+            self._reply = reply
+
+
+def _frames_over(link: Link[bytes], settings: ProxySettings) -> FrameLink:
+    if settings.framing is Framing.RTNO:
+        return RtnoLink(link)
+    checksum = settings.checksum
+    return FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))
+
+
+def _state(code: int) -> LiteState | None:
+    try:
+        return LiteState(code)
+    except ValueError:
+        return None

@@ -1,0 +1,110 @@
+"""The motion chain: six components, joined as the functional specification joins them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc import ExecutionContext, LifeCycleState, Manager
+from tickrig.host.rtc.motion.components.navigation import Navigation
+from tickrig.host.rtc.motion.components.odometry import Odometry
+from tickrig.host.rtc.motion.components.omni_to_2wd import OmniTo2WD
+from tickrig.host.rtc.motion.components.path_follower import PathFollower
+from tickrig.host.rtc.motion.components.position_input import PositionInput
+from tickrig.host.rtc.motion.components.ref_hard import Opener, RefHardRh3
+
+RATE_HZ: Final = 50.0
+"""1 / control_cycle."""
+
+CONNECTIONS: Final = (
+    ("RefHardRh3.OutWheelAngle", "Odometry.CurrentWheelAngle"),
+    ("Odometry.OdometryPosition", "OmniTo2WD.current_position"),
+    ("Odometry.OdometryPosition", "Navigation.position"),
+    ("Odometry.OdometryPosition", "PathFollower.position"),
+    ("PositionInput.position", "OmniTo2WD.goal"),
+    ("OmniTo2WD.min_path", "Navigation.min_path"),
+    ("Navigation.path", "PathFollower.target_path"),
+    ("PathFollower.velocity", "RefHardRh3.InTargetVelocity"),
+    ("Navigation.status", "OmniTo2WD.status"),
+    ("OmniTo2WD.status_out", "PositionInput.status"),
+)
+"""RH3 functional specification, wiring."""
+
+_WIDE: Final = {"dataport.buffer.length": "64"}
+
+
+class MotionChain:
+    """The six components in one execution context, in the order in which data flow.
+
+    Any other order works and costs periods.
+
+    Args:
+        manager: who runs them.
+        open_link: opens the line to the base.
+        number: behind each instance name, as OpenRTM numbers them; each cart has its own.
+        rate_hz: of the execution context.
+
+    Attributes:
+        manager: as given.
+        position_input: where goals are entered.
+        odometry: what the pose is.
+        components: all six, in the order of execution.
+        context: their execution context.
+    """
+
+    def __init__(
+        self,
+        manager: Manager,
+        open_link: Opener = SerialLink,
+        number: int = 0,
+        rate_hz: float = RATE_HZ,
+    ) -> None:
+        self.manager, self._number = manager, number
+        self.ref_hard = RefHardRh3(f"RefHardRh3{number}", open_link)
+        self.odometry = Odometry(f"Odometry{number}")
+        self.position_input = PositionInput(f"PositionInput{number}")
+        self.omni_to_2wd = OmniTo2WD(f"OmniTo2WD{number}")
+        self.navigation = Navigation(f"Navigation{number}")
+        self.path_follower = PathFollower(f"PathFollower{number}")
+        self.components = (
+            self.ref_hard,
+            self.odometry,
+            self.position_input,
+            self.omni_to_2wd,
+            self.navigation,
+            self.path_follower,
+        )
+        self.context = ExecutionContext(rate_hz)
+        for component in self.components:
+            manager.add(component, context=self.context)
+        self.context.start()
+        for first, second in CONNECTIONS:
+            manager.connect(self._named(first), self._named(second), _WIDE)
+
+    @property
+    def in_error(self) -> tuple[str, ...]:
+        """Names of the components in Error."""
+        return self._in(LifeCycleState.ERROR)
+
+    def use(self, set_id: str) -> None:
+        """Let the configuration set of a name hold in all components that have it."""
+        for component in self.components:
+            if set_id in component.configuration.sets:
+                component.configuration.activate(set_id)
+
+    def activate(self) -> None:
+        """Ask all for Active."""
+        self.manager.activate(*(component.instance_name for component in self.components))
+
+    def deactivate(self) -> None:
+        """Ask those that are Active for Inactive; one that is on its way to Error refuses."""
+        for component in self.components:
+            self.context.deactivate_component(component)
+
+    def _in(self, state: LifeCycleState) -> tuple[str, ...]:
+        state_of = self.context.state_of
+        return tuple(c.instance_name for c in self.components if state_of(c) is state)
+
+    def _named(self, port: str) -> str:
+        component, _, name = port.partition(".")
+        return f"{component}{self._number}.{name}"

@@ -1,0 +1,168 @@
+"""Navigation: one relay point at a time, with the mode and speed to get there."""
+
+from __future__ import annotations
+
+from math import pi, sqrt
+from typing import ClassVar
+
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.geometry import Pose, wrap
+from tickrig.host.rtc.motion.ports import read_newest, read_newest_pose, to_pose
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time, TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState, Path, RunMode
+
+State = NavigationState
+
+TUNED = {
+    "align_angle": "0.01",
+    "turn_angle": "0.01",
+    "goal_angle": "0.003",
+    "goal_distance": "0.002",
+    "braking": "0.24",
+    "creep_vel": "0.01",
+    "latency": "0.08",
+}
+"""The set `tuned`: turn before driving, brake to the end of the line (rh3-control, J)."""
+
+
+class Navigation(RtComponent):
+    """The state machine of the reference hardware's navigation (rh3-control, state machine).
+
+    It is judged once for each new pose. The parameters behind `max_vel` are ours; their
+    defaults are what the reference hardware had as constants. With `braking` above 0 it
+    commands a speed for each pose, so that the cart can stop at the end of the line with
+    that deceleration; `latency` is the time from a pose to the effect of the command.
+
+    An empty list means stop and FINISH. A new list takes the place of the old one without
+    a stop. A list with a number that is none is passed over.
+
+    Attributes:
+        state: as it is written to the port each period.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("Navigation", "Relay points, one at a time")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.judge_radius = bind("judge_radius", 0.5, "x>=0", unit="m")
+        self.max_vel = bind("max_vel", 0.3, "x>0", unit="m/s")
+        self.align_angle = bind("align_angle", pi / 6, "x>0", unit="rad")
+        self.turn_angle = bind("turn_angle", pi / 20, "x>0", unit="rad")
+        self.goal_angle = bind("goal_angle", 0.02, "x>0", unit="rad")
+        self.goal_distance = bind("goal_distance", 0.05, "x>=0", unit="m")
+        self.creep_vel = bind("creep_vel", 0.1, "x>0", unit="m/s")
+        self.braking = bind("braking", 0.0, "x>=0", unit="m/s2")
+        self.latency = bind("latency", 0.0, "x>=0", unit="s")
+        self.configuration.add_set("tuned", TUNED)
+        self.position = self.add_port(InPort("position", iis.TimedPose2D))
+        self.min_path = self.add_port(InPort("min_path", iis.TimedPath2DSeq))
+        self.path = self.add_port(OutPort("path", Path))
+        self.status = self.add_port(OutPort("status", TimedState))
+        self._forget()
+
+    def _forget(self) -> None:
+        self.state = State.FINISH
+        self._relays: tuple[Pose, ...] = ()
+        self._at, self._fresh, self._v = 0, False, 0.0
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin with nowhere to go."""
+        self._forget()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take a new list, judge a new pose, write the state."""
+        now = Time.from_us(ec.now_us)
+        if (way := read_newest(self.min_path)) is not None:
+            self._start(now, way)
+        if (pose := read_newest_pose(self.position)) is not None and self._relays:
+            self._judge(now, pose)
+        self.status.write(TimedState(now, self.state))
+        return ReturnCode.RTC_OK
+
+    def _start(self, now: Time, way: iis.TimedPath2DSeq) -> None:
+        relays = [to_pose(data) for data in way.pose]
+        if None in relays:
+            return
+        self._relays = tuple(relay for relay in relays if relay is not None)
+        self._at, self._fresh = 0, True
+        self.state = State.ANGLE_CHECK
+        if not self._relays:
+            self._stop(now)
+            self.state = State.FINISH
+
+    def _judge(self, now: Time, pose: Pose) -> None:
+        if self._fresh:
+            self._relays, self._fresh = (pose, *self._relays[1:]), False
+        relay = self._relays[self._at]
+        match self.state:
+            case State.ANGLE_CHECK:
+                self._check_angle(now, relay, pose)
+            case State.TURNING:
+                if _off(relay, pose) < self.turn_angle.value:
+                    self.state = State.GOAL_CHECK
+            case State.TURNING2:
+                if _off(relay, pose) < self.goal_angle.value:
+                    self._stop(now)
+                    self.state, self._relays = State.FINISH, ()
+            case State.GOAL_CHECK:
+                self._check_goal(now, relay, pose)
+            case State.SPEED_DOWN | State.STOPPING:
+                self._approach(now, relay, pose)
+
+    def _check_angle(self, now: Time, relay: Pose, pose: Pose) -> None:
+        last = self._at == len(self._relays) - 1
+        if last or _off(relay, pose) > self.align_angle.value:
+            self._send(now, RunMode.SPIN, relay, w=1.0)
+            self.state = State.TURNING2 if last else State.TURNING
+        else:
+            self.state = State.GOAL_CHECK
+
+    def _check_goal(self, now: Time, relay: Pose, pose: Pose) -> None:
+        if pose.distance(relay) > self.goal_distance.value:
+            self._drive(now, relay, pose, self.max_vel.value)
+            self.state = State.SPEED_DOWN
+        else:
+            self._next(now)
+
+    def _approach(self, now: Time, relay: Pose, pose: Pose) -> None:
+        """Drive to the line across the relay point, slower near it."""
+        over, braking = relay.along(pose), self.braking.value > 0
+        if braking:
+            if over > -self.goal_distance.value:
+                self._next(now)
+            else:
+                self._drive(now, relay, pose, self.max_vel.value)
+        elif self.state is State.STOPPING:
+            if over > 0:
+                self._next(now)
+        elif over > -self.judge_radius.value:
+            self.state = State.STOPPING
+            self._drive(now, relay, pose, self.creep_vel.value)
+
+    def _drive(self, now: Time, relay: Pose, pose: Pose, v: float) -> None:
+        if self.braking.value:
+            left = -relay.along(pose) - self.goal_distance.value - self._v * self.latency.value
+            can = sqrt(2 * self.braking.value * max(0.0, left))
+            v = min(self.max_vel.value, max(can, self.creep_vel.value))
+        self._send(now, RunMode.LINEFOLLOW, relay, v=v)
+
+    def _next(self, now: Time) -> None:
+        self._stop(now)
+        self._at += 1
+        self.state = State.ANGLE_CHECK
+        if self._at == len(self._relays):
+            self.state, self._relays = State.FINISH, ()
+
+    def _stop(self, now: Time) -> None:
+        self._send(now, RunMode.STOP, Pose())
+
+    def _send(self, now: Time, mode: RunMode, relay: Pose, v: float = 0.0, w: float = 0.0) -> None:
+        self._v = v
+        self.path.write(Path(mode, 0, relay.x, relay.y, relay.heading, v, w, tm=now))
+
+
+def _off(relay: Pose, pose: Pose) -> float:
+    return abs(wrap(relay.heading - pose.heading))

@@ -1,0 +1,121 @@
+"""OmniTo2WD: a goal or a path becomes turns on the spot and straight lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, Final
+
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.components.position_input import (
+    END_POINT,
+    INTERMEDIATE_POINT,
+    START_POINT,
+)
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.ports import read_all, read_newest, to_pose, to_pose_2d
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time, TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState
+
+LEAST_WAY_M: Final = 1e-6
+"""Metres that are no way: the heading of such a step would mean nothing."""
+
+_LOG: Final = log_of(__name__)
+
+
+class OmniTo2WD(RtComponent):
+    """Plans for a cart that cannot go sideways; it never goes backward.
+
+    A step from one point to the next that is no way is left out. A goal or a path with a
+    number that is none is passed over with a line in the log. FINISH is written when it is
+    reached, not while it lasts: what an earlier command left behind answers no later one.
+
+    Attributes:
+        refused: how many goals and paths were passed over.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("OmniTo2WD", "Plans turns and lines to a goal")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.current_position = self.add_port(InPort("current_position", iis.TimedPose2D))
+        self.goal = self.add_port(InPort("goal", iis.TimedPose2D))
+        self.status_in = self.add_port(InPort("status", TimedState))
+        self.min_path = self.add_port(OutPort("min_path", iis.TimedPath2DSeq))
+        self.status_out = self.add_port(OutPort("status_out", TimedState))
+        self.refused = 0
+        self._forget()
+
+    def _forget(self) -> None:
+        self._pose: Pose | None = None
+        self._points: list[Pose | None] = []
+        self._waiting: list[Pose] = []
+        self._began = self._ran = False
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin without a goal."""
+        self._forget()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Plan what arrived, and write what has finished."""
+        if (latest := read_newest(self.current_position)) is not None:
+            self._pose = to_pose(latest.data) or self._pose
+        for message in read_all(self.goal):
+            self._take(message)
+        if self._waiting and self._pose is not None:
+            self._plan(ec, self._pose)
+        for status in read_all(self.status_in):
+            self._follow(ec, status)
+        return ReturnCode.RTC_OK
+
+    def _take(self, message: iis.TimedPose2D) -> None:
+        """Take a goal, or a point of a path; what came before gives way."""
+        kind = message.id[0] if message.id else None
+        if kind not in (INTERMEDIATE_POINT, END_POINT):
+            self._points = []
+        self._points.append(to_pose(message.data))
+        if kind in (START_POINT, INTERMEDIATE_POINT):
+            return
+        plausible = [point for point in self._points if point is not None]
+        if len(plausible) == len(self._points):
+            self._waiting = plausible
+        else:
+            self.refused += 1
+            _LOG.warning("%s: passed over what is no number: %s", self.instance_name, message)
+        self._points = []
+
+    def _plan(self, ec: ExecutionContext, pose: Pose) -> None:
+        way = plan(pose, self._waiting)
+        self._waiting = []
+        now = Time.from_us(ec.now_us)
+        self.min_path.write(iis.TimedPath2DSeq(now, pose=tuple(to_pose_2d(p) for p in way)))
+        for _ in read_all(self.status_in):  # of the command before
+            continue
+        self._began, self._ran = True, False
+
+    def _follow(self, ec: ExecutionContext, status: TimedState) -> None:
+        if status.data != NavigationState.FINISH:
+            self._ran = True
+        elif self._began and self._ran:
+            self._began = False
+            self.status_out.write(TimedState(Time.from_us(ec.now_us), NavigationState.FINISH))
+
+
+def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
+    """Return where to turn and where to go straight to (RH3 specification, path calculation).
+
+    The first is the start; then for each point the place before it, with the heading to
+    it, and the point with that heading; then the last point as it is to be reached.
+
+    >>> [tuple(round(n, 2) for n in p) for p in plan(Pose(), [Pose(0.0, 2.0, 0.0)])]
+    [(0.0, 0.0, 0.0), (0.0, 0.0, 1.57), (0.0, 2.0, 1.57), (0.0, 2.0, 0.0)]
+    """
+    way, here = [start], start
+    for point in points:
+        if here.distance(point) > LEAST_WAY_M:
+            heading = here.bearing(point)
+            way += [Pose(here.x, here.y, heading), Pose(point.x, point.y, heading)]
+            here = point
+    return [*way, points[-1]]

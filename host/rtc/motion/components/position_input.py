@@ -1,0 +1,186 @@
+"""PositionInput: goals and paths that a person enters."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import ClassVar, Final
+
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.path_file import describe_pose, parse_points, read_path
+from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose, to_pose_2d
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time, TimedState
+from tickrig.wire.rtc_types.rh2 import NavigationState
+
+START_POINT: Final = 100
+INTERMEDIATE_POINT: Final = 101
+END_POINT: Final = 102
+"""`id[0]` of the points of a path; a goal has none."""
+
+DEFINED_PATH: Final = (Pose(1.0), Pose(1.0, 1.0), Pose(0.0, 1.0), Pose())
+"""The default of `PositionInput.defined_path`: a square of 1 m, back to the origin."""
+
+USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
+"""What a person types: metres and degrees; a file has radians."""
+
+
+class PositionInput(RtComponent):
+    """Sends one command after the other; the next when the last one has finished.
+
+    The original waits at its console in on_execute; here nothing waits: whoever has the
+    console calls `typed` with each line, and a program calls `goal`, `path` and `end`. Its
+    configuration is declared and unused, as there.
+
+    Attributes:
+        finished: how many commands have finished.
+        defined_path: the path of the command `path` without a file or points.
+        prompt: called with what can be typed each time that it wants a command; the console
+            prints it.
+        report: called with each command that it sends, and with FINISH.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("PositionInput", "Goals and paths from the console")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        for name, default, unit in (
+            ("01_x", 3.4, "m"),
+            ("01_y", 7.7, "m"),
+            ("01_th", -1.57, "rad"),
+        ):
+            bind(name, default, unit=unit)
+        self.status = self.add_port(InPort("status", TimedState))
+        self.position = self.add_port(OutPort("position", iis.TimedPose2D))
+        self._commands: deque[tuple[iis.TimedPose2D, ...]] = deque()
+        self._running = self._ending = self._prompted = False
+        self.finished = 0
+        self.defined_path: Sequence[Pose] = DEFINED_PATH
+        self.prompt: Callable[[str], None] | None = None
+        self.report: Callable[[str], None] | None = None
+
+    @property
+    def idle(self) -> bool:
+        """Whether no command waits or runs."""
+        return not (self._commands or self._running)
+
+    def goal(self, pose: Pose) -> None:
+        """Enter a goal; it waits for those before it.
+
+        Raises:
+            ValueError: a number that is none.
+        """
+        self._commands.append((_point(pose),))
+
+    def path(self, poses: Sequence[Pose]) -> None:
+        """Enter a path of two points or more.
+
+        Raises:
+            ValueError: fewer points, or a number that is none.
+        """
+        self._commands.append(_points(poses))
+
+    def replace(self, *poses: Pose) -> None:
+        """Enter a goal, or a path of several points, in the place of what runs and waits.
+
+        Raises:
+            ValueError: no point, or a number that is none; what runs goes on.
+        """
+        command = (_point(*poses),) if len(poses) == 1 else _points(poses)
+        self._commands.clear()
+        self._running = False
+        self._commands.append(command)
+
+    def typed(self, line: str) -> None:
+        """Enter a command as a person types it, see `USAGE`; it waits for those before it.
+
+        Raises:
+            ValueError: no such command, a pose or path that cannot be, a file that cannot be
+                read, or `end` was typed before; nothing is changed.
+        """
+        self.require_open()
+        word, _, rest = line.strip().partition(" ")
+        match word, rest.strip():
+            case "goal", text if text:
+                (pose,) = _exactly(1, parse_points(text), line)
+                self.goal(pose)
+            case "path", "":
+                self.path(self.defined_path)
+            case "path", text:
+                self.path(parse_points(text) if "," in text else read_path(Path(text).expanduser()))
+            case "end", "":
+                self.end()
+            case _:
+                raise ValueError(f"{line!r} is not a command: {USAGE}")
+
+    def require_open(self) -> None:
+        """Raise ValueError if `end` was called and the component was not reset since."""
+        if self._ending:
+            raise ValueError(f"{self.instance_name} has ended; reset it, then activate it")
+
+    def end(self) -> None:
+        """Go into Error when all has finished, as the original does after its last command."""
+        self._ending = True
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Ask again."""
+        self._prompted = False
+        return ReturnCode.RTC_OK
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Take commands again after `end`."""
+        self._ending = False
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Send the next command, or look whether the last one has finished."""
+        status = read_newest(self.status)
+        if self._running and status is not None and status.data == NavigationState.FINISH:
+            self._running = self._prompted = False
+            self.finished += 1
+            self._say("FINISH")
+        if self._commands and not self._running:
+            self._running = True
+            self._send(self._commands.popleft(), ec)
+        if self.idle and self._ending:
+            self._say("the end")
+            return ReturnCode.RTC_ERROR
+        if self.idle and self.prompt is not None and not self._prompted:
+            self._prompted = True
+            self.prompt(USAGE)
+        return ReturnCode.RTC_OK
+
+    def _send(self, points: Sequence[iis.TimedPose2D], ec: ExecutionContext) -> None:
+        now = Time.from_us(ec.now_us)
+        for point in points:
+            self.position.write(iis.TimedPose2D(now, point.id, point.data))
+        last = to_pose(points[-1].data) or Pose()
+        what = "goal" if len(points) == 1 else f"path of {len(points)} points to"
+        self._say(f"{what} {describe_pose(last)}")
+
+    def _say(self, text: str) -> None:
+        if self.report is not None:
+            self.report(text)
+
+
+def _exactly(count: int, points: Sequence[Pose], line: str) -> Sequence[Pose]:
+    if len(points) != count:
+        raise ValueError(f"{line!r} is not a command: {USAGE}")
+    return points
+
+
+def _points(poses: Sequence[Pose]) -> tuple[iis.TimedPose2D, ...]:
+    if len(poses) < 2:
+        raise ValueError(f"a path has 2 points or more, got {len(poses)}")
+    inner = [INTERMEDIATE_POINT] * (len(poses) - 2)
+    ids = (START_POINT, *inner, END_POINT)
+    return tuple(_point(pose, ident) for ident, pose in zip(ids, poses, strict=True))
+
+
+def _point(pose: Pose, *ids: int) -> iis.TimedPose2D:
+    if not plausible(*pose):
+        raise ValueError(f"a pose has three numbers, got {tuple(pose)}")
+    return iis.TimedPose2D(id=ids, data=to_pose_2d(pose))

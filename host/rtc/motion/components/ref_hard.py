@@ -1,0 +1,317 @@
+"""RefHardRh3: the cart's velocity becomes wheel speeds on an RS485 line."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from math import tau
+from typing import ClassVar, Final, Protocol
+
+from tickrig.host.links.errors import LinkError
+from tickrig.host.links.link import Link
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc import (
+    ExecutionContext,
+    InPort,
+    ModuleSpec,
+    OutPort,
+    Provider,
+    ReturnCode,
+    RtComponent,
+    ServicePort,
+)
+from tickrig.host.rtc.motion.geometry import Twist, wheel_speeds
+from tickrig.host.rtc.motion.modbus_master import ModbusAnswer, ModbusMaster
+from tickrig.host.rtc.motion.ports import plausible, read_newest
+from tickrig.host.rtc.parameter import Parameter
+from tickrig.host.text.log import log_of
+from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, ExceptionCode, Request
+from tickrig.wire.modbus.rh3 import (
+    DEVICE_ID,
+    REPORT,
+    Address,
+    Command,
+    Fault,
+    Mode,
+    Report,
+    Status,
+    wide,
+)
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
+
+MAX_MISSES: Final = 5
+"""Requests in a row, unanswered or refused, that are an error.
+
+rh3-control proposes 3; with a fifth of all exchanges lost they come once in ten minutes.
+"""
+
+GAINS: Final[Mapping[str, int]] = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
+"""Of position and of velocity."""
+
+WATCHDOG_MS: Final = 500
+"""Silence after which the base stops by itself."""
+
+_TURN: Final = 2**32  # counts after which a counter begins again
+
+_IDENTITY: Final = Request(READ, (Address.DEVICE_ID, 1))
+
+_MODE: Final = Request(READ, (Address.MODE, 1))
+
+_LOG: Final = log_of(__name__)
+
+Opener = Callable[[str], Link[bytes]]
+"""Opens the line that DeviceFileName names."""
+
+
+class RefHard(Protocol):
+    """The service of RefHardRh3Pro.idl."""
+
+    def Stop(self) -> None:  # noqa: N802 - as in the IDL
+        """Stop a running cart."""
+
+    def Go(self) -> None:  # noqa: N802
+        """Make a stopped cart run."""
+
+
+class RefHardRh3(RtComponent):
+    """Talks with the base: wheel angles out, speeds in, one exchange each period.
+
+    In on_execute it takes the answer of the period before and gives the wheel angles; in
+    on_state_update, when all others have executed, it sends the speeds of this period. So
+    nothing waits, and a command is on the line in the period in which it was made.
+
+    It goes into Error when the base has a fault, refuses or leaves unanswered `MAX_MISSES`
+    requests in a row, or the line is gone; the base then stops by its own watchdog. While the
+    bumper is pressed or after `Stop` it commands standstill. Where a wheel would have to be
+    faster than Velocity_limit, both are slowed down alike.
+
+    First it asks the device who it is, and writes nothing before it has answered as a base
+    does; with `AnyDevice` set to 1 it does not ask.
+
+    Not there: the library libsvm and its protocol, whose texts are not public.
+
+    Args:
+        instance_name: of the component.
+        open_link: opens the line; by pyserial unless given.
+
+    Attributes:
+        report: what the base said last.
+        error_reason: why it went into Error last.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("RefHardRh3", "Base of Reference Hardware 3")
+
+    def __init__(self, instance_name: str, open_link: Opener = SerialLink) -> None:
+        super().__init__(instance_name)
+        self._open_link = open_link
+        self._master: ModbusMaster | None = None
+        self._bind()
+        self.velocity = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
+        self.angles = self.add_port(OutPort("OutWheelAngle", TimedDoubleSeq))
+        for port_name, service in (("InventGUIRefHard", "service"), ("BumpRefHard", "service")):
+            port = self.add_port(ServicePort(port_name))
+            port.provide(Provider[RefHard](service, "RefHard", self))
+        self._counts, self._angles = (0, 0), [0.0, 0.0]
+        self.error_reason = ""
+        self._forget()
+
+    def _bind(self) -> None:
+        bind = self.configuration.bind
+        self.device = bind("DeviceFileName", "/dev/ttyUSB0")
+        self.any_device = bind("AnyDevice", 0, "0<=x<=1")
+        self.gains = tuple(
+            bind(f"gain_{name}", default, "0<=x<=32767") for name, default in GAINS.items()
+        )
+        self.velocity_limit = bind("Velocity_limit", 10.0, "x>0", unit="rad/s")
+        self.acceleration_limit = bind("Acceleration_limit", 50.0, "x>0", unit="rad/s2")
+        self.tread = bind("WheelTread", 0.441, "x>0", unit="m")
+        self.radius_left = bind("WheelRadiusLeft", 0.1, "x>0", unit="m")
+        self.radius_right = bind("WheelRadiusRight", 0.1, "x>0", unit="m")
+        self.gear = bind("GearRatio", 74.91, "x>0")
+        self.encoder = bind("EncoderCount", 2_000, "x>0")
+        self.constants = (bind("EncoderConstant_L", 1.0), bind("EncoderConstant_R", 1.0))
+
+    def _forget(self) -> None:
+        self._orders: deque[Request] = deque()
+        self._twist, self._stopped, self._refused = Twist(), False, 0
+        self._identified = False
+        self.report: Report | None = None
+
+    @property
+    def lost(self) -> int:
+        """Requests that had no answer since the line was opened."""
+        return self._master.lost if self._master else 0
+
+    def Stop(self) -> None:  # noqa: N802 - as in the IDL
+        """Command standstill until `Go`."""
+        self._stopped = True
+
+    def Go(self) -> None:  # noqa: N802
+        """Let the velocity at the port hold again."""
+        self._stopped = False
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Open the line, and order settings and power; a fault of the base is cleared."""
+        self._forget()
+        self.velocity.clear()
+        if not all(constant.value for constant in self.constants):
+            return self._failed("an EncoderConstant is 0")
+        try:
+            self._master = ModbusMaster(self._open_link(self.device.value))
+        except LinkError as error:
+            return self._failed(str(error))
+        gains = (gain.value for gain in self.gains)
+        limits = (self._limit(self.velocity_limit), self._limit(self.acceleration_limit))
+        settings = (*gains, *(word for limit in limits for word in wide(limit)))
+        self._identified = bool(self.any_device.value)
+        if not self._identified:
+            self._orders.append(_IDENTITY)
+        self._orders.append(_MODE)
+        self._orders.append(_write(Address.GAIN_P, *settings))
+        self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, WATCHDOG_MS))
+        self._orders.append(_write(Address.COMMAND, Command.ENABLE))
+        return ReturnCode.RTC_OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Stop the base on its ramp, and give the line back."""
+        if self._master is not None:
+            try:
+                if self._identified:
+                    self._master.begin(_write(Address.COMMAND, Command.STOP))
+            except LinkError as error:
+                _LOG.warning("%s: %s", self.instance_name, error)
+            self._master.close()
+        self._master = None
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take the answer of the period before."""
+        if self._master is None:
+            return self._failed("no line")
+        try:
+            answer = self._master.poll()
+        except LinkError as error:
+            return self._failed(str(error))
+        if answer is not None:
+            return self._take(ec, answer)
+        if self._master.misses >= MAX_MISSES:
+            return self._failed(f"no answer to {MAX_MISSES} requests in a row")
+        return ReturnCode.RTC_OK
+
+    def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
+        """Send what is to be sent in this period."""
+        if (latest := read_newest(self.velocity)) is not None:
+            v, w = latest.data.vx, latest.data.va
+            self._twist = Twist(v, w) if plausible(v, w) else Twist()
+        if self._master is None or self._master.pending:
+            return ReturnCode.RTC_OK
+        try:
+            self._master.begin(self._orders[0] if self._orders else self._cycle())
+        except LinkError as error:
+            return self._failed(str(error))
+        return ReturnCode.RTC_OK
+
+    @property
+    def _counts_per_rad(self) -> float:
+        return self.gear.value * self.encoder.value / tau
+
+    def _limit(self, parameter: Parameter[float]) -> int:
+        return min(round(parameter.value * self._counts_per_rad), _TURN // 2 - 1)
+
+    def _cycle(self) -> Request:
+        """Return the exchange of a period: speeds there, report back."""
+        bumped = self.report is not None and bool(self.report.status & Status.BUMPER)
+        twist = Twist() if self._stopped or bumped else self._twist
+        speeds = wheel_speeds(
+            twist, self.tread.value, self.radius_left.value, self.radius_right.value
+        )
+        share = min(1.0, self.velocity_limit.value / max(1e-9, *map(abs, speeds)))
+        words: list[int] = []
+        for speed, constant in zip(speeds, self.constants, strict=True):
+            words += wide(round(speed * share * self._counts_per_rad * constant.value))
+        return Request(READ_WRITE, REPORT, (Address.TARGET_SPEED_LEFT, tuple(words)))
+
+    def _take(self, ec: ExecutionContext, answer: ModbusAnswer) -> ReturnCode:
+        if answer.refusal is not None:
+            self._refused += 1  # noise may have made another request of it
+            if self._refused >= MAX_MISSES:
+                refusal = refusal_text(answer.request, answer.refusal)
+                return self._failed(f"the base refuses {refusal}{self._stranger}")
+            return ReturnCode.RTC_OK
+        self._refused = 0
+        if self._orders:
+            if self._orders[0] == _IDENTITY:
+                if answer.values != (DEVICE_ID,):
+                    says = ", ".join(f"{value:04X}h" for value in answer.values)
+                    what = f"register 0000h is {says}, not {DEVICE_ID:04X}h"
+                    return self._failed(f"{self.device.value}: {what}{self._stranger}")
+                self._identified = True
+            if self._orders.popleft() == _MODE and answer.values == (Mode.FREE,):
+                self._counts = (0, 0)  # it was without power
+            return ReturnCode.RTC_OK
+        self.report = report = Report.parse(answer.values)
+        self._turn(report)
+        now = Time.from_us(ec.now_us)
+        self.angles.write(TimedDoubleSeq(now, tuple(self._angles)))
+        if report.status & Status.FAULT:
+            faults = fault_text(report.fault_left, report.fault_right)
+            return self._failed(f"fault of the base: {faults}")
+        return ReturnCode.RTC_OK
+
+    @property
+    def _stranger(self) -> str:
+        """What a failure adds as long as the device may be something else than a base."""
+        if self._identified:
+            return ""
+        return "; not an RH3 base, so nothing was written (rh3 --any-device goes on)"
+
+    def _turn(self, report: Report) -> None:
+        """Add what the counters counted; they begin again after 2**32."""
+        counts = (report.left, report.right)
+        for place, constant in enumerate(self.constants):
+            change = (counts[place] - self._counts[place] + _TURN // 2) % _TURN - _TURN // 2
+            self._angles[place] += change / (self._counts_per_rad * constant.value)
+        self._counts = counts
+
+    def _failed(self, why: str) -> ReturnCode:
+        self.error_reason = why
+        _LOG.error("%s: %s", self.instance_name, why)
+        return ReturnCode.RTC_ERROR
+
+
+def _write(address: Address, *values: int) -> Request:
+    return Request(WRITE, write=(address, tuple(int(value) for value in values)))
+
+
+def fault_text(left: Fault, right: Fault) -> str:
+    """Return the faults of both wheels, each with the wheels that have it.
+
+    >>> fault_text(Fault.EMERGENCY_STOP | Fault.STALL, Fault.EMERGENCY_STOP)
+    'stall (left), emergency stop (left, right)'
+    >>> fault_text(Fault(0x20), Fault(0))
+    'fault 20h (left)'
+    """
+    sides = {"left": left, "right": right}
+    bits = [1 << place for place in range((left | right).bit_length())]
+    named = {bit: ", ".join(side for side, fault in sides.items() if fault & bit) for bit in bits}
+    return ", ".join(f"{_name(bit)} ({who})" for bit, who in named.items() if who) or "unknown"
+
+
+def _name(bit: int) -> str:
+    return _words(Fault(bit).name or f"fault {bit:02X}h")
+
+
+def refusal_text(request: Request, code: ExceptionCode | int) -> str:
+    """Return which request was refused, and why.
+
+    >>> refusal_text(Request(3, (0x10, 1)), ExceptionCode.ILLEGAL_DATA_ADDRESS)
+    'function 03h at 0010h: illegal data address'
+    """
+    first, _ = request.write or request.read or (0, 0)
+    why = _words(code.name) if isinstance(code, ExceptionCode) else f"exception code {code:02X}h"
+    return f"function {request.function:02X}h at {first:04X}h: {why}"
+
+
+def _words(name: str) -> str:
+    return name.lower().replace("_", " ")

@@ -1,0 +1,147 @@
+"""How the follower steers and turns, and what speeds a base can follow (rh3-control).
+
+The regulator of the Spur family follows lines and circles; the limiter is robot_speed_smooth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from math import atan2, copysign, hypot, pi, sqrt
+from typing import Final
+
+from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, wrap
+
+MOST_ANGULAR_ACCELERATION: Final = 5.0
+"""rad/s2: cap of what max_acc_w and acc_cycle give (rh3-control, units)."""
+
+FLOOR: Final = pi / 90
+"""rad/s: the reference spin is never slower than 2 degrees a second."""
+
+ETA: Final = 0.1
+"""Share of the angular acceleration that the reference spin uses."""
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityLimits:
+    """What a command may be.
+
+    Attributes:
+        v: m/s.
+        w: rad/s.
+        dv: m/s from one command to the next.
+        dw: rad/s from one command to the next.
+    """
+
+    v: float
+    w: float
+    dv: float
+    dw: float
+
+    def smooth(self, wanted: Twist, before: Twist) -> Twist:
+        """Return the command nearest to what is wanted."""
+        v, w = clip(wanted.v, self.v), clip(wanted.w, self.w)
+        return Twist(before.v + clip(v - before.v, self.dv), before.w + clip(w - before.w, self.dw))
+
+
+def steps(
+    max_acc_v: float, max_acc_w: float, tick_s: float, acc_cycle_s: float
+) -> tuple[float, float]:
+    """Return the steps that `max_acc_*` allow in a tick; they are given for each `acc_cycle_s`."""
+    share = tick_s / acc_cycle_s
+    return max_acc_v * share, min(max_acc_w * share, MOST_ANGULAR_ACCELERATION * tick_s)
+
+
+class ControlLaw(StrEnum):
+    """How the angular velocity goes on from one command to the next."""
+
+    IMPLICIT = "implicit"  # stable for any step; the designed dynamics
+    EXPLICIT = "explicit"  # as it was: a limit cycle where step times K3 is above 2
+
+
+@dataclass(frozen=True, slots=True)
+class Regulator:
+    """Steers to a line: w' = -K3 (w - w_ff) - K2 q - K1 d.
+
+    Attributes:
+        k1: rad/s2 for a metre beside the line.
+        k2: rad/s2 for a radian off its heading.
+        k3: 1/s.
+        most_offset: metres that count at most.
+        c1: m/s taken off the speed for a rad/s; the explicit law has none.
+        step_s: time from one command to the next, as the law takes it.
+        law: implicit or explicit.
+    """
+
+    k1: float
+    k2: float
+    k3: float
+    most_offset: float
+    c1: float
+    step_s: float
+    law: ControlLaw = ControlLaw.IMPLICIT
+
+    def follow_line(self, line: Pose, pose: Pose, v: float, before: Twist) -> Twist:
+        """Return the command along a line at a speed, positive or negative."""
+        return self._steer(line.left(pose), wrap(pose.heading - line.heading), v, before)
+
+    def follow_circle(
+        self, centre: Pose, radius: float, pose: Pose, v: float, before: Twist
+    ) -> Twist:
+        """Return the command round a circle, to the left for a positive radius."""
+        rho = hypot(pose.x - centre.x, pose.y - centre.y)
+        phi = atan2(pose.y - centre.y, pose.x - centre.x)
+        turn = copysign(1.0, radius)
+        off = (abs(radius) - rho) * turn
+        q = wrap(pose.heading - phi - turn * pi / 2)
+        return self._steer(off, q, v, before, v / radius)
+
+    def _steer(self, d: float, q: float, v: float, before: Twist, w_ff: float = 0.0) -> Twist:
+        h, k3 = self.step_s, self.k3
+        way = copysign(1.0, v if self.law is ControlLaw.IMPLICIT else before.v)
+        pull = way * self.k1 * clip(d, self.most_offset) + self.k2 * q
+        if self.law is ControlLaw.EXPLICIT:
+            return Twist(v, before.w - h * (pull + k3 * (before.w - w_ff)))
+        w = (before.w + h * k3 * w_ff - h * pull) / (1 + h * k3)
+        slower = abs(v) - self.c1 * abs(w - w_ff)
+        return Twist(copysign(max(0.0, slower), v), w)
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceSpin:
+    """The spin of the reference hardware's follower.
+
+    Attributes:
+        alpha: angular acceleration, rad/s2.
+    """
+
+    alpha: float
+
+    def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
+        """Return the command towards a heading, at most so fast."""
+        q = wrap(heading - present)
+        wanted = max(sqrt(2 * ETA * self.alpha * abs(q)), FLOOR)
+        return Twist(0.0, copysign(min(most, wanted), q))
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOptimalSpin:
+    """A spin that brakes as late as it can, for the angle that it will have when it acts.
+
+    Attributes:
+        alpha: angular acceleration, rad/s2.
+        step_s: time from one command to the next.
+        latency_s: from a pose to the effect of the command made of it.
+    """
+
+    alpha: float
+    step_s: float
+    latency_s: float
+
+    def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
+        """Return the command towards a heading, at most so fast."""
+        e = wrap(present + before.w * self.latency_s - heading)
+        w = -copysign(min(most, sqrt(2 * self.alpha * abs(e))), e)
+        if (e + self.latency_s * w) * e < 0:
+            w = -e / (self.step_s + self.latency_s)
+        return Twist(0.0, w)

@@ -1,0 +1,117 @@
+"""Let a cart drive to goals, and note what it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
+
+from tickrig.host.rtc.motion.chain import MotionChain
+from tickrig.host.rtc.motion.components.omni_to_2wd import plan
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.motion_run import MotionRun, Sample, least_time_s
+from tickrig.wire.rtc_types.rh2 import RunMode
+
+PERIOD_US: Final = 20_000
+SETTLE_US: Final = 500_000
+"""Time for the components to come up, and for a cart to roll on after its goal is reached."""
+
+ERROR_CHECK_PERIODS: Final = 5
+"""Samples from one look for a component in Error to the next."""
+
+TIMEOUT_FACTOR: Final = 3
+"""Times the least time that a way may take, and half a minute."""
+TIMEOUT_EXTRA_S: Final = 30
+
+OnSample = Callable[[Sample], None]
+
+
+class BaseConnection(Protocol):
+    """A cart with its components, in virtual or real time."""
+
+    @property
+    def chain(self) -> MotionChain:
+        """Its components."""
+        ...
+
+    @property
+    def now_us(self) -> int:
+        """The present time."""
+        ...
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is, as well as can be known."""
+        ...
+
+    def run_to(self, t_us: int) -> None:
+        """Go on to a time."""
+
+
+def start(connection: BaseConnection, set_id: str = "default") -> None:
+    """Let a configuration set hold, and activate all components."""
+    connection.chain.use(set_id)
+    connection.chain.activate()
+    connection.run_to(connection.now_us + SETTLE_US)
+
+
+def stop(connection: BaseConnection) -> None:
+    """Deactivate all components; RefHardRh3 stops the base."""
+    connection.chain.deactivate()
+    connection.run_to(connection.now_us + 2 * PERIOD_US)
+
+
+def drive(
+    connection: BaseConnection,
+    points: Sequence[Pose],
+    watch: OnSample = lambda sample: None,
+    timeout_us: int | None = None,
+) -> MotionRun:
+    """Let a cart go to a goal, or along a path of several points.
+
+    It ends half a second after the goal is reached, when a component is in Error, or with
+    the time-out.
+
+    Args:
+        connection: its components are active.
+        points: one is a goal.
+        watch: called with each sample.
+        timeout_us: when to give up; three times the least time and half a minute if left out.
+
+    Raises:
+        ValueError: no point, or a number that is none.
+    """
+    entered, start_us = connection.chain.position_input, connection.now_us
+    finished = entered.finished
+    entered.replace(*points)
+    run = MotionRun(points[-1])
+    until_us = start_us + (timeout_us or _timeout_us(connection, points))
+    while connection.now_us < until_us:
+        connection.run_to(min(connection.now_us + PERIOD_US, until_us))
+        run.samples.append(sample(connection, (connection.now_us - start_us) / 1e6))
+        watch(run.samples[-1])
+        if len(run.samples) % ERROR_CHECK_PERIODS == 0 and connection.chain.in_error:
+            break
+        if entered.finished > finished and run.reached_s is None:
+            run.reached_s = run.duration_s
+            until_us = connection.now_us + SETTLE_US
+    return run
+
+
+def _timeout_us(connection: BaseConnection, points: Sequence[Pose]) -> int:
+    least_s = least_time_s(plan(connection.chain.odometry.pose, points))
+    return round((TIMEOUT_FACTOR * least_s + TIMEOUT_EXTRA_S) * 1e6)
+
+
+def sample(connection: BaseConnection, time_s: float) -> Sample:
+    """Return what a cart does now."""
+    follower = connection.chain.path_follower
+    path = follower.path
+    line = Pose(path.x, path.y, path.theta) if path.type == RunMode.LINEFOLLOW else None
+    return Sample(time_s, connection.pose, follower.twist, line)
+
+
+def set_latency(chain: MotionChain, response_s: float) -> None:
+    """Tune the set `tuned` to a base: its time constant in s, and one and a half periods."""
+    latency = f"{1.5 * PERIOD_US / 1e6 + response_s:g}"
+    for component in (chain.navigation, chain.path_follower):
+        component.configuration.set("latency", latency, "tuned")

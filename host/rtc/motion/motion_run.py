@@ -1,0 +1,145 @@
+"""What a cart did on its way, and how well (rh3-control, customary measures)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
+from math import fsum, sqrt
+from typing import Final, NamedTuple
+
+from tickrig.host.rtc.motion.control_laws import VelocityLimits
+from tickrig.host.rtc.motion.geometry import Pose, Twist, wrap
+
+LONG_M: Final = 1.0
+"""A leg from here on is judged by its cross-track error."""
+
+_ROUNDING: Final = 1e-9
+
+
+class Sample(NamedTuple):
+    """A cart in one period.
+
+    Attributes:
+        time_s: since the start of the run.
+        pose: where it is.
+        twist: the velocity that is commanded.
+        line: the line it follows towards this pose, None while it turns or stands.
+    """
+
+    time_s: float
+    pose: Pose
+    twist: Twist
+    line: Pose | None
+
+
+class CrossTrack(NamedTuple):
+    """Distance from the line: root of the mean square, and most, m."""
+
+    rms: float
+    most: float
+
+
+@dataclass(slots=True)
+class MotionRun:
+    """A way from a pose to a goal.
+
+    Attributes:
+        goal: where it was to end.
+        samples: one for each period.
+        reached_s: when the goal was reached, as the components say; None if it was not.
+    """
+
+    goal: Pose
+    samples: list[Sample] = field(default_factory=list)
+    reached_s: float | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """How long it was watched."""
+        return self.samples[-1].time_s
+
+    @property
+    def end(self) -> Pose:
+        """Where the cart stands."""
+        return self.samples[-1].pose
+
+    @property
+    def error_m(self) -> float:
+        """How far from the goal it stands."""
+        return self.end.distance(self.goal)
+
+    @property
+    def heading_error_rad(self) -> float:
+        """How far it is turned from the heading of the goal, without sign."""
+        return abs(wrap(self.end.heading - self.goal.heading))
+
+    @property
+    def turning_rad_s(self) -> float:
+        """The sum of all changes of the commanded angular velocity."""
+        return fsum(abs(b.twist.w - a.twist.w) for a, b in pairwise(self.samples))
+
+    @property
+    def cross_track(self) -> CrossTrack:
+        """How far it was beside its long legs."""
+        errors = [line.left(sample.pose) for line, leg in self._long_legs() for sample in leg] or [
+            0.0
+        ]
+        square = fsum(error * error for error in errors) / len(errors)
+        return CrossTrack(sqrt(square), max(map(abs, errors)))
+
+    def violations(self, limits: VelocityLimits) -> int:
+        """Return how many commands were beyond a limit."""
+        return sum(_violates(a.twist, b.twist, limits) for a, b in pairwise(self.samples))
+
+    def _long_legs(self) -> Sequence[tuple[Pose, list[Sample]]]:
+        legs = [(line, list(leg)) for line, leg in groupby(self.samples, lambda s: s.line)]
+        return [
+            (line, leg)
+            for line, leg in legs
+            if line is not None and leg[0].pose.distance(line) >= LONG_M
+        ]
+
+
+def _violates(before: Twist, now: Twist, limits: VelocityLimits) -> bool:
+    return (
+        abs(now.v) > limits.v + _ROUNDING
+        or abs(now.w) > limits.w + _ROUNDING
+        or abs(now.v - before.v) > limits.dv + _ROUNDING
+        or abs(now.w - before.w) > limits.dw + _ROUNDING
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """What a cart can do at most: m/s, rad/s, m/s2, rad/s2; as the default set has it."""
+
+    v: float = 0.3
+    w: float = 0.3
+    acceleration: float = 0.3
+    angular_acceleration: float = 5.0
+
+
+def way_time_s(way: float, speed: float, acceleration: float) -> float:
+    """Return how long a way takes from rest to rest.
+
+    >>> way_time_s(3.0, 0.3, 0.3), way_time_s(0.3, 1.0, 0.3)
+    (11.0, 2.0)
+    """
+    if way < speed * speed / acceleration:
+        return 2 * sqrt(way / acceleration)
+    return way / speed + speed / acceleration
+
+
+def least_time_s(relays: Sequence[Pose], limits: MotionLimits | None = None) -> float:
+    """Return the least time along a list of `omni_to_2wd.plan`.
+
+    >>> round(least_time_s([Pose(), Pose(), Pose(3.0), Pose(3.0, 0.0, 0.3)]), 2)
+    12.06
+    """
+    limits = limits or MotionLimits()
+    return fsum(
+        way_time_s(here.distance(there), limits.v, limits.acceleration)
+        + way_time_s(abs(wrap(there.heading - here.heading)), limits.w, limits.angular_acceleration)
+        for here, there in pairwise(relays)
+    )

@@ -1,0 +1,232 @@
+"""From range data to a base that stops: points, the nearest in the way, two that react."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from math import cos, sin
+from typing import ClassVar, Final
+
+from tickrig.host.rtc import (
+    Consumer,
+    ExecutionContext,
+    InPort,
+    ModuleSpec,
+    OutPort,
+    ReturnCode,
+    RtComponent,
+    ServicePort,
+)
+from tickrig.host.rtc.motion.components.ref_hard import RefHard
+from tickrig.host.rtc.motion.control_laws import VelocityLimits
+from tickrig.host.rtc.motion.geometry import Twist
+from tickrig.host.rtc.motion.ports import MOST, plausible, read_newest, write_velocity
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import TimedDouble
+from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
+from tickrig.wire.rtc_types.sensors import RangeData
+
+ANY: Final = 1e9
+"""A limit that limits nothing."""
+
+_LOG: Final = log_of(__name__)
+
+
+class UrgToObstacles(RtComponent):
+    """Writes where things are, in the frame of the robot: x ahead of the axle, y to the left.
+
+    The specification only names it (Urg_to_Obstacles); ports and parameters are ours.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("Urg_to_Obstacles", "Points out of range data")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.sensor_x = self.configuration.bind("sensor_x", 0.2, unit="m")
+        self.ranges = self.add_port(InPort("ranges", RangeData))
+        self.obstacles = self.add_port(OutPort("obstacles", iis.TimedPose2DSeq))
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Take the newest scan."""
+        if (scan := read_newest(self.ranges)) is not None:
+            points = tuple(self._points(scan))
+            self.obstacles.write(iis.TimedPose2DSeq(scan.tm, data=points))
+        return ReturnCode.RTC_OK
+
+    def _points(self, scan: RangeData) -> list[Pose2D]:
+        first, step, ahead = scan.config.minAngle, scan.config.angularRes, self.sensor_x.value
+        if not plausible(first, step):
+            return []
+        ways = zip(_directions(first, step, len(scan.ranges)), scan.ranges, strict=True)
+        return [Pose2D(Point2D(ahead + d * x, d * y)) for (x, y), d in ways if 0 < d <= MOST]
+
+
+@lru_cache(maxsize=8)  # each scan has the same: a third of the time of its points
+def _directions(first: float, step: float, count: int) -> Sequence[tuple[float, float]]:
+    """Return where the beams of a scan go, as vectors of length 1."""
+    angles = [first + n * step for n in range(count)]
+    return tuple((cos(angle), sin(angle)) for angle in angles)
+
+
+class ObstacleMonitor(RtComponent):
+    """Looks along the lane that the robot is about to drive through, straight ahead.
+
+    `distance` is counted from its front; `range` stands for nothing in the way. The
+    specification only names it; ports and parameters are ours.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("ObstacleMonitor", "Distance to what is in the way")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.front = bind("front", 0.25, "x>=0", unit="m")
+        self.half_width = bind("half_width", 0.35, "x>0", unit="m")
+        self.range = bind("range", 5.0, "x>0", unit="m")
+        self.obstacles = self.add_port(InPort("obstacles", iis.TimedPose2DSeq))
+        self.distance = self.add_port(OutPort("distance", TimedDouble))
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Measure the newest points."""
+        if (seen := read_newest(self.obstacles)) is not None:
+            self.distance.write(TimedDouble(seen.tm, self._nearest(seen)))
+        return ReturnCode.RTC_OK
+
+    def _nearest(self, seen: iis.TimedPose2DSeq) -> float:
+        half, front = self.half_width.value, self.front.value
+        places = [pose.position for pose in seen.data]
+        ways = [place.x - front for place in places if -half <= place.y <= half and place.x > 0]
+        return max(0.0, min([self.range.value, *ways]))
+
+
+class WatchedDistance:
+    """Blocked below one distance, free above another, and blocked when nothing is heard.
+
+    Args:
+        port: where distances arrive.
+
+    Attributes:
+        free: whether the way is free; not before the first distance.
+    """
+
+    def __init__(self, port: InPort[TimedDouble]) -> None:
+        self._port, self.free, self._received_us = port, False, 0
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._port.clear()
+        self.free, self._received_us = False, 0
+
+    def update(self, ec: ExecutionContext, stop_m: float, go_m: float, timeout_s: float) -> bool:
+        """Take the newest distance; return whether the way is free."""
+        latest = read_newest(self._port)
+        if latest is not None and plausible(latest.data):
+            self._received_us = ec.now_us
+            self.free = latest.data > (stop_m if self.free else go_m)
+        elif ec.now_us - self._received_us > timeout_s * 1e6:
+            self.free = False
+        return self.free
+
+
+class ObstaclesAvoidance(RtComponent):
+    """Stands between PathFollower and base: stop and go, no way around.
+
+    Forward motion ends while something is nearer than `stop_distance`, and goes on when it
+    is farther than `go_distance`; both with `max_acc_v`. Turning on the spot and going back
+    always pass, and without a velocity for `timeout` it says nothing, so that the base's own
+    watchdog acts. The specification only names it; ports and parameters are ours.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("ObstaclesAvoidance", "Stop and go")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.stop_distance = bind("stop_distance", 0.5, "x>=0", unit="m")
+        self.go_distance = bind("go_distance", 0.7, "x>=0", unit="m")
+        self.timeout = bind("timeout", 0.5, "x>0", unit="s")
+        self.max_acc_v = bind("max_acc_v", 0.3, "x>0", unit="m/s2")
+        self.arriving = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
+        self.distance = self.add_port(InPort("distance", TimedDouble))
+        self.leaving = self.add_port(OutPort("OutTargetVelocity", iis.TimedVelocity2D))
+        self._watched = WatchedDistance(self.distance)
+        self._before = Twist()
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at standstill, with the way blocked."""
+        self._watched.forget()
+        self._before = Twist()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Pass the velocity on, as far as the way is free."""
+        free = self._watched.update(
+            ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
+        )
+        if (latest := read_newest(self.arriving)) is not None:
+            data = latest.data
+            self._pass(
+                ec, Twist(data.vx, data.va) if plausible(data.vx, data.va) else Twist(), free
+            )
+        return ReturnCode.RTC_OK
+
+    def _pass(self, ec: ExecutionContext, wanted: Twist, free: bool) -> None:
+        if not free and wanted.v > 0:
+            wanted = Twist()
+        step = self.max_acc_v.value * ec.period_us / 1e6
+        self._before = VelocityLimits(ANY, ANY, step, ANY).smooth(wanted, self._before)
+        write_velocity(self.leaving, ec, self._before.v, 0.0, self._before.w)
+
+
+class CollisionDetection(RtComponent):
+    """Calls Stop when something is nearer than `stop_distance`, Go when the way is free again.
+
+    Without a distance for `timeout` it calls Stop: nobody looks. When it is deactivated it
+    calls Go, if it had called Stop. Join `BumpRefHard` with RefHardRh3.BumpRefHard. The
+    specification only names it; ports and parameters are ours.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("CollisionDetection", "Stops the base at once")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.stop_distance = bind("stop_distance", 0.15, "x>=0", unit="m")
+        self.go_distance = bind("go_distance", 0.25, "x>=0", unit="m")
+        self.timeout = bind("timeout", 0.5, "x>0", unit="s")
+        self.distance = self.add_port(InPort("distance", TimedDouble))
+        port = self.add_port(ServicePort("BumpRefHard"))
+        self.ref_hard = port.require(Consumer[RefHard]("service", "RefHard"))
+        self._watched = WatchedDistance(self.distance)
+        self._stopped = False
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin with the way blocked."""
+        self._watched.forget()
+        return ReturnCode.RTC_OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Let the base run."""
+        if self._stopped:
+            self._call(stop=False)
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Look, and call."""
+        free = self._watched.update(
+            ec, self.stop_distance.value, self.go_distance.value, self.timeout.value
+        )
+        if free == self._stopped:
+            self._call(stop=not free)
+        return ReturnCode.RTC_OK
+
+    def _call(self, *, stop: bool) -> None:
+        if not self.ref_hard.connected:
+            return
+        if stop:
+            self.ref_hard.service.Stop()
+        else:
+            self.ref_hard.service.Go()
+        self._stopped = stop
+        _LOG.info("%s: %s", self.instance_name, "Stop" if stop else "Go")

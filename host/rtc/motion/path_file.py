@@ -1,0 +1,92 @@
+"""Goals and paths as text: of a file in metres and radians, of a console in metres and degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees, radians
+from pathlib import Path
+from typing import Final
+
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.ports import plausible
+
+FARTHEST_M: Final = 1_000
+"""A goal farther than this from the start is a slip of the pen: it takes an hour."""
+
+
+def within_reach(goal: Pose) -> bool:
+    """Return whether a goal is so near that somebody may mean it."""
+    return goal.distance(Pose()) <= FARTHEST_M
+
+
+def read_path(path: Path) -> list[Pose]:
+    """Return the points; `#` begins a comment, commas count as spaces.
+
+    Raises:
+        ValueError: the file cannot be read, a line is no point, or there is none; it says which.
+    """
+    try:
+        text = path.read_text("utf-8", "replace")
+    except OSError as error:
+        raise ValueError(f"path {path}: {error.strerror or error}") from None
+    points = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if words := line.partition("#")[0].replace(",", " ").split():
+            points.append(_point(f"{path}:{number}", words))
+    if not points:
+        raise ValueError(f"{path} has no point; a line has x and y in metres")
+    return points
+
+
+def parse_points(text: str) -> list[Pose]:
+    """Return the points that a person typed, with commas between them.
+
+    >>> parse_points("2 0, 2 2 90")[0]
+    Pose(x=2.0, y=0.0, heading=0.0)
+
+    Raises:
+        ValueError: one is no point; the text says which.
+    """
+    points = [part.split() for part in text.split(",")]
+    return [in_degrees(_numbers(words), " ".join(words)) for words in points]
+
+
+def in_degrees(numbers: Sequence[float], text: str) -> Pose:
+    """Return the pose of two or three numbers: metres, metres, degrees.
+
+    Args:
+        numbers: as they came.
+        text: what a message calls them.
+
+    Raises:
+        ValueError: another count, no number of a cart, or a pose beyond `FARTHEST_M`.
+    """
+    if len(numbers) not in (2, 3) or not plausible(*numbers):
+        raise ValueError(f"{text!r} is not X Y in metres, and a heading in degrees")
+    x, y, heading = (*numbers, 0.0)[:3]
+    if not within_reach(pose := Pose(x, y, radians(heading))):
+        raise ValueError(f"{text!r} is beyond {FARTHEST_M} m")
+    return pose
+
+
+def describe_pose(pose: Pose) -> str:
+    """Return a pose for people, in metres and degrees."""
+    return f"{pose.x:.3f} {pose.y:.3f} m, {degrees(pose.heading):.1f} deg"
+
+
+def _point(place: str, words: list[str]) -> Pose:
+    numbers = _numbers(words)
+    if len(numbers) not in (2, 3) or not plausible(*numbers):
+        text = " ".join(words)
+        raise ValueError(f"{place}: {text!r} is not x y in metres, and a heading in radians")
+    if not within_reach(point := Pose(*numbers)):
+        raise ValueError(f"{place}: {' '.join(words)!r} is beyond {FARTHEST_M} m")
+    return point
+
+
+def _numbers(words: Sequence[str]) -> list[float]:
+    """Return words as numbers, none if one of them is not a number."""
+    try:
+        return [float(word) for word in words]
+    except ValueError:
+        return []

@@ -1,0 +1,64 @@
+"""What the motion components read and write at their ports."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final, TypeVar
+
+from tickrig.host.rtc import ExecutionContext, InPort, OutPort
+from tickrig.host.rtc.motion.geometry import Pose, wrap
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
+from tickrig.wire.rtc_types.idl import Struct
+
+T = TypeVar("T", bound=Struct)
+
+MOST: Final = 1e9
+"""Numbers beyond it are no metres, radians or speeds of a cart."""
+
+
+def read_all(port: InPort[T]) -> Iterator[T]:
+    """Yield what arrived since the last read, oldest first."""
+    while port.is_new and (value := port.read()) is not None:
+        yield value
+
+
+def read_newest(port: InPort[T]) -> T | None:
+    """Return what arrived last, None if nothing did; the rest is dropped."""
+    latest = None
+    while port.is_new:
+        latest = port.read()
+    return latest
+
+
+def plausible(*numbers: float) -> bool:
+    """Return whether these can be numbers of a cart: not NaN, infinite or beyond `MOST`."""
+    for number in numbers:  # noqa: SIM110 - all() takes twice as long
+        if not -MOST <= number <= MOST:
+            return False
+    return True
+
+
+def to_pose(data: Pose2D) -> Pose | None:
+    """Return a pose, its heading in -pi..pi; None if a number is not `plausible`."""
+    x, y, heading = data.position.x, data.position.y, data.heading
+    return Pose(x, y, wrap(heading)) if plausible(x, y, heading) else None
+
+
+def read_newest_pose(port: InPort[iis.TimedPose2D]) -> Pose | None:
+    """Return the pose that arrived last; None without one, or if a number is not `plausible`."""
+    latest = read_newest(port)
+    return None if latest is None else to_pose(latest.data)
+
+
+def write_velocity(
+    port: OutPort[iis.TimedVelocity2D], ec: ExecutionContext, vx: float, vy: float, va: float
+) -> None:
+    """Write a velocity of now: m/s ahead, m/s to the left, rad/s to the left."""
+    port.write(iis.TimedVelocity2D(Time.from_us(ec.now_us), data=Velocity2D(vx, vy, va)))
+
+
+def to_pose_2d(pose: Pose) -> Pose2D:
+    """Return a pose as ports carry it."""
+    return Pose2D(Point2D(pose.x, pose.y), pose.heading)
