@@ -6,23 +6,22 @@ Run it with `canopen-slave-emu --rtc examples/device_rtc_gripper.py:Gripper --no
 from __future__ import annotations
 
 from tickrig import InputSignal
-from tickrig.device.canopen.device_rtc.component import CanopenComponent  # internal
-from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort  # internal
+from tickrig.device.canopen import device_rtc  # internal
 from tickrig.device.component import ERROR, Result  # internal
-from tickrig.wire.rtc_canopen.port_types import BOOLEAN, SHORT  # internal
+from tickrig.wire.rtc_canopen import BOOLEAN, SHORT  # internal
 
 STEP_UM, HOT_DC = 500, 900
 
 
-class Gripper(CanopenComponent):
+class Gripper(device_rtc.CanopenComponent):
     """Opens to what the in-port says once NMT Start activated it; ends in Error while hot."""
 
     type_name = "Gripper"
     category = "actuator"
     physical = (InputSignal("motor_dc", "at the motor", low=-400, high=1_250, unit="0.1 degC"),)
-    target_um = CanopenInPort("target_um", SHORT)
-    width_um = CanopenOutPort("width_um", SHORT)
-    moving = CanopenOutPort("moving", BOOLEAN)
+    target_um = device_rtc.CanopenInPort("target_um", SHORT)
+    width_um = device_rtc.CanopenOutPort("width_um", SHORT)
+    moving = device_rtc.CanopenOutPort("moving", BOOLEAN)
 
     def on_execute(self) -> Result:
         """Move towards the target."""

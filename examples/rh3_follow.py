@@ -6,7 +6,7 @@ robot on omni wheels follows the first. Everything runs in virtual time.
 
 from __future__ import annotations
 
-from tickrig.emulators.rh3.cart.convoy import Convoy  # internal
+from tickrig.emulators.rh3.convoy import Convoy  # internal
 from tickrig.host.rtc.motion.geometry import Pose  # internal
 
 SECOND_US = 1_000_000

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.emulators.rh3.cart.convoy import Convoy  # internal
+from tickrig.emulators.rh3.convoy import Convoy  # internal
 from tickrig.host.rtc.motion.geometry import Pose  # internal
-from tickrig.host.rtc.motion.options.game_pad import GamePad  # internal
-from tickrig.host.rtc.motion.options.game_pad_devices import StickPosition  # internal
+from tickrig.host.rtc.motion.options.game_pad import GamePad, StickPosition  # internal
 
 SECOND_US = 1_000_000
 PUSHES = (StickPosition(forward=1.0), StickPosition(turn=1.0), StickPosition())

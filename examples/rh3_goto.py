@@ -9,7 +9,7 @@ Six components run in closed loop over an emulated base; `SerialBaseConnection` 
 from __future__ import annotations
 
 from tickrig.device.rh3.parameters import BaseParameters  # internal
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop  # internal
+from tickrig.emulators.rh3.closed_loop import ClosedLoop  # internal
 from tickrig.host.rtc.motion.drive import drive, start  # internal
 from tickrig.host.rtc.motion.geometry import Pose  # internal
 

@@ -11,7 +11,7 @@ from tickrig import RealClock
 from tickrig.host.rtc.motion.chain import MotionChain  # internal
 from tickrig.host.rtc.motion.options.game_pad import GamePad  # internal
 from tickrig.host.rtc.motion.options.switch_input import SwitchInput  # internal
-from tickrig.host.rtc.system.real_time import RealTime  # internal
+from tickrig.host.rtc.system.schedule import RealTime  # internal
 from tickrig.rtc import Manager
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tickrig import SimLink
 from tickrig.device.urg.world import Post, World  # internal
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop  # internal
+from tickrig.emulators.rh3.closed_loop import ClosedLoop  # internal
 from tickrig.host.rtc.motion.geometry import Pose  # internal
-from tickrig.host.rtc.motion.options.collision_guard import CollisionGuard  # internal
+from tickrig.host.rtc.motion.options.obstacles import CollisionGuard  # internal
 
 SECOND_US = 1_000_000
 

@@ -8,8 +8,7 @@ from tickrig import CanWire
 from tickrig.emulators.can.outside.host import CanHost  # internal
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
 from tickrig.emulators.canopen.rig_file import read_rig  # internal
-from tickrig.host.rtc.canopen.robots.beego import Beego  # internal
-from tickrig.host.rtc.canopen.robots.joystick import Joystick  # internal
+from tickrig.host.rtc.canopen.robots import Beego, Joystick  # internal
 from tickrig.host.rtc.canopen.serve import open_server, serve  # internal
 
 WAY = ((0, 0, 1), (60, 0, 3), (40, 50, 2), (0, -100, 1), (0, 0, 1))

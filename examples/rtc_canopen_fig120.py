@@ -9,8 +9,8 @@ from tickrig import CanWire
 from tickrig.emulators.can.outside.host import CanHost  # internal
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
 from tickrig.emulators.canopen.rig_file import read_rig  # internal
-from tickrig.host.rtc.canopen.definition.definition import RtConnection  # internal
-from tickrig.host.rtc.canopen.definition.definition_reader import read_definition  # internal
+from tickrig.host.rtc.canopen.definition import RtConnection  # internal
+from tickrig.host.rtc.canopen.definition_reader import read_definition  # internal
 from tickrig.host.rtc.canopen.serve import read_files, serve  # internal
 from tickrig.host.rtc.canopen.server import RtcCanopenServer  # internal
 

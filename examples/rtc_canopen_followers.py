@@ -8,7 +8,7 @@ from tickrig import CanWire
 from tickrig.emulators.can.outside.host import CanHost  # internal
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
 from tickrig.emulators.canopen.rig_file import read_rig  # internal
-from tickrig.host.rtc.canopen.definition.definition import PdoName  # internal
+from tickrig.host.rtc.canopen.definition import PdoName  # internal
 from tickrig.host.rtc.canopen.serve import open_server, serve  # internal
 from tickrig.host.rtc.canopen.view import ServerView  # internal
 from tickrig.rtc import Time, TimedShort

@@ -8,7 +8,7 @@ from tickrig.device.rtc_lite.component import LiteEcho  # internal
 from tickrig.emulators.rig.sim_link import RigClock  # internal
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut  # internal
 from tickrig.host.rtc.lite import attach  # internal
-from tickrig.host.rtc.system.real_time import RealTime  # internal
+from tickrig.host.rtc.system.schedule import RealTime  # internal
 from tickrig.rtc import Manager
 
 

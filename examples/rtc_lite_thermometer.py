@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from tickrig import InputSignal, SignalType
 from tickrig.device.component import ERROR, Result  # internal
-from tickrig.device.rtc_lite.component import LiteComponent  # internal
-from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort  # internal
+from tickrig.device.rtc_lite.component import LiteComponent, LiteInPort, LiteOutPort  # internal
 from tickrig.wire.rtc_lite.values import BOOLEAN, FLOAT  # internal
 
 

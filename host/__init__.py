@@ -5,23 +5,23 @@ from tickrig._lazy import lazy
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig.host.links.can_link import CanLink as CanLink
-    from tickrig.host.links.errors import DeviceRefused as DeviceRefused
-    from tickrig.host.links.errors import LinkClosed as LinkClosed
-    from tickrig.host.links.errors import LinkError as LinkError
-    from tickrig.host.links.errors import LinkTimeout as LinkTimeout
+    from tickrig.host.links.link import DeviceRefused as DeviceRefused
+    from tickrig.host.links.link import LinkClosed as LinkClosed
+    from tickrig.host.links.link import LinkError as LinkError
+    from tickrig.host.links.link import LinkTimeout as LinkTimeout
     from tickrig.host.links.recording_link import RecordingLink as RecordingLink
     from tickrig.host.links.serial_link import SerialLink as SerialLink
     from tickrig.host.rrc.client import RrcClient as RrcClient
     from tickrig.host.rtc.lite.proxy import RtcLiteProxy as RtcLiteProxy
     from tickrig.host.rtc.motion.modbus_master import ModbusMaster as ModbusMaster
-    from tickrig.host.urg.client import UrgClient as UrgClient
-    from tickrig.wire.rrc.replies import RrcEvent as RrcEvent
+    from tickrig.host.urg import UrgClient as UrgClient
+    from tickrig.wire.rrc import RrcEvent as RrcEvent
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
             "tickrig.host.links.can_link": ("CanLink",),
-            "tickrig.host.links.errors": (
+            "tickrig.host.links.link": (
                 "DeviceRefused",
                 "LinkClosed",
                 "LinkError",
@@ -32,7 +32,7 @@ else:
             "tickrig.host.rtc.motion.modbus_master": ("ModbusMaster",),
             "tickrig.host.rrc.client": ("RrcClient",),
             "tickrig.host.rtc.lite.proxy": ("RtcLiteProxy",),
-            "tickrig.host.urg.client": ("UrgClient",),
-            "tickrig.wire.rrc.replies": ("RrcEvent",),
+            "tickrig.host.urg": ("UrgClient",),
+            "tickrig.wire.rrc": ("RrcEvent",),
         },
     )

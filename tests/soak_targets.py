@@ -21,37 +21,35 @@ from tests.host.canopen.data_sheet import mutations as eds
 from tests.mutators import damaged, with_piece
 from tests.properties import test_devices as known
 from tickrig import Bench
-from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models.epos import make_epos
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rtc_lite.component import LiteEcho
-from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.device.urg.sensor import Urg
+from tickrig.device.urg.world import UrgParameters
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.serial.network.network_port import NetworkPort
-from tickrig.emulators.serial.network.serve_url import ServeUrl
+from tickrig.emulators.serial.network import NetworkPort, ServeUrl
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
-from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz
+from tickrig.emulators.testing.fuzz import DeviceFuzz
 from tickrig.host.canmon.conform.conform_source import ConformSource
-from tickrig.host.canmon.net.lss_work import LssSettings, LssWork
 from tickrig.host.canmon.net.session import NetSession, NodeFailed
+from tickrig.host.canmon.net.verbs.lss_verb import LssSettings, LssWork
 from tickrig.host.canopen.commissioning.lss_master import LssMaster
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.control.server import ControlServer
 from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
+from tickrig.wire import rrc as cmd
 from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID, LssAddress, LssCommand
 from tickrig.wire.instant import NEVER
-from tickrig.wire.modbus.requests import Request, encode_request
-from tickrig.wire.modbus.rtu import encode_frame
-from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.modbus import Request, encode_frame, encode_request
 
 Throw = Callable[[Random], str]
 """Makes an input with chance and throws it; says in a word what came of it."""

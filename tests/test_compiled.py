@@ -30,14 +30,14 @@ from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.horizon import Horizon
 from tickrig.device.physical import InputBank
-from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.urg.world import UrgParameters
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame
-from tickrig.wire.modbus.requests import Request
-from tickrig.wire.sensors.scip.command import Command
-from tickrig.wire.serial.uart import UartSetting
+from tickrig.wire.modbus import Request
+from tickrig.wire.scip import Command
+from tickrig.wire.uart import UartSetting
 
 ROOT: Final = Path(__file__).parents[1]
 TABLE: Final = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["tickrig"]

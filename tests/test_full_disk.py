@@ -21,19 +21,19 @@ from tests.emulators.testing.campaign.test_table import TABLE
 from tests.emulators.testing.report.test_report_json import REPORT
 from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR
 from tickrig.emulators.canopen.cli import main as canopen_slave_emu
-from tickrig.emulators.canopen.node.store_file import StoreFile
+from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.commands.cli import main as tickrig
-from tickrig.emulators.rh3.cart.motion_cli import main as rh3
+from tickrig.emulators.rh3.motion_cli import main as rh3
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.campaign.table import write_table
 from tickrig.emulators.testing.report.report_file import write_run
 from tickrig.host.canmon.cli import main as canmon
 from tickrig.host.canmon.workspace import Workspace, WorkspaceError
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.rtc.canopen.commands.builder import main as rtc_canopen_builder
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc.canopen.definition.definition_writer import save_definition
-from tickrig.host.rtc.commands.system_file import write_system
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_writer import save_definition
+from tickrig.host.rtc.system.system_file import write_system
 from tickrig.host.text.whole_file import replacing, write_whole
 
 ROOT = Path(__file__).parents[1]
@@ -245,15 +245,15 @@ def test_a_device_is_written_to() -> None:
 
 STREAMS = {
     "emulators/bench/child.py": "what a child process says, while it runs",
-    "emulators/record/candump_file.py": "a recording",
-    "emulators/serial/pty_link.py": "a lock",
+    "emulators/record/recorder.py": "a recording",
+    "emulators/serial/pty_port.py": "a lock",
     "emulators/testing/campaign/journal.py": "verdicts as they come, one line each",
     "emulators/testing/campaign/worker.py": "/dev/null",
     "host/cli/start.py": "standard streams that were closed",
     "host/canmon/model/logs/log_file.py": "a recording, or a new file of `whole_log`",
-    "host/canmon/model/recorder/index.py": "the index of a recording",
+    "host/canmon/model/recorder/files.py": "the index of a recording",
     "host/rtc/canopen/commands/opening.py": "events as they come",
-    "host/text/line_file.py": "a recording",
+    "host/text/whole_file.py": "a recording",
 }
 """Modules that open files for writing themselves, and why."""
 

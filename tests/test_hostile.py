@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.host.canmon.terminal import Terminal
-from tickrig.host.cli.lazy_group import LazyCommand
+from tickrig.host.cli.options import LazyCommand
 from tickrig.host.cli.start import load
 
 ROOT = Path(__file__).parents[1]

@@ -22,58 +22,56 @@ import pytest
 from tests.emulators.lamp import Lamp
 from tests.emulators.scenario.test_scenario import parse as parse_scenario
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError
+from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
 from tickrig.emulators.canopen.bus_file.urdf import parse_urdf
-from tickrig.emulators.canopen.node.store_file import StoreFile
 from tickrig.emulators.canopen.rig_file import read_rig
-from tickrig.emulators.record.bench_replay import read_bench_recording
-from tickrig.emulators.record.replay import read_recording
-from tickrig.emulators.record.tolerance import parse_number_rule
+from tickrig.emulators.canopen.store_file import StoreFile
+from tickrig.emulators.record.comparison import parse_number_rule
+from tickrig.emulators.record.replay import read_bench_recording, read_recording
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.testing.campaign.journal import _entries
-from tickrig.emulators.testing.campaign.order import Refusal
+from tickrig.emulators.testing.campaign.order import CampaignRefusal
 from tickrig.emulators.testing.campaign.table import read_table
-from tickrig.emulators.testing.machine.step import parse_steps
-from tickrig.emulators.testing.report.report_json import from_json
-from tickrig.emulators.testing.report.requirement_file import parse_requirements
+from tickrig.emulators.testing.machine.host_runs import parse_steps
+from tickrig.emulators.testing.report.overview import parse_requirements
+from tickrig.emulators.testing.report.report_file import from_json
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
-from tickrig.emulators.testing.signals.formula_parser import parse_formula
-from tickrig.emulators.testing.signals.table_file import read_points
+from tickrig.emulators.testing.signals.formula import parse_formula
+from tickrig.emulators.testing.signals.table import read_points
 from tickrig.emulators.tkernel.resolution.table import parse_table as parse_ucodes
 from tickrig.host.canmon.eds_document import read_document
-from tickrig.host.canmon.model.check.expression.parse_rule import parse_rule
-from tickrig.host.canmon.model.check.rule_file import parse_rule_file
+from tickrig.host.canmon.model.check.rule_parser import parse_rule
+from tickrig.host.canmon.model.check.rules import parse_rule_file
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
 from tickrig.host.canmon.model.decode.filter import parse_filter
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.recorder.index import _objects
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.canmon.model.sequence.variables import evaluate, fill_in
-from tickrig.host.canmon.model.transmit.transmit_list import parse_row_text
+from tickrig.host.canmon.model.recorder.files import _objects
+from tickrig.host.canmon.model.sequence import TomlSequence, parse_lines
+from tickrig.host.canmon.model.sequence_variables import evaluate, fill_in
+from tickrig.host.canmon.model.transmit import parse_row_text
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.canopen.bus_file.bus_file import decode_bus_file
 from tickrig.host.canopen.conform.report.baseline import Baseline
 from tickrig.host.canopen.data_sheet.check import check
 from tickrig.host.canopen.eds import read_sound
-from tickrig.host.canopen.gateway.gateway_error import GatewayError
-from tickrig.host.canopen.gateway.request import parse_request
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canopen.gateway import GatewayError, parse_request
+from tickrig.host.cli.messages import Refused
 from tickrig.host.control.requests import RequestDispatcher
 from tickrig.host.rtc.canopen.builder.profile_file import parse_project
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.configuration import Constraint
 from tickrig.host.rtc.engines.ros2.table_reader import parse_table as parse_topics
 from tickrig.host.rtc.motion.components.odometry import read_conf
 from tickrig.host.rtc.motion.path_file import read_path
-from tickrig.host.rtc.parameter import Constraint
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
-from tickrig.host.rtc.system.system_toml import parse_toml
+from tickrig.host.rtc.system.system_file import parse_toml
 from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
 from tickrig.host.text.byte_text import unescape
 from tickrig.host.text.names import near
 from tickrig.host.text.toml_reader import read_toml
-from tickrig.wire.candump import parse_log
+from tickrig.wire.can import parse_log
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -90,7 +88,7 @@ UNITS: Final = ("\n", " ", "a", "0", "[", "{", "(", "<a>", '"', ",", ";", "\\", 
 WHOLE: Final = ("\n", "a", "[")
 """Those that come by the megabyte."""
 
-TOLD: Final = (ValueError, GatewayError, Refused, Refusal, RtcRefused, BusMistakesError)
+TOLD: Final = (ValueError, GatewayError, Refused, CampaignRefusal, RtcRefused, BusMistakesError)
 """How a reader says that a text is none of its own: all of it in one line."""
 
 
@@ -143,10 +141,10 @@ READERS: Final = {
     "host.control.requests": Reader(
         lambda text: RequestDispatcher({}).answer_line(text.encode()), ('{"v": 1, "do": ',)
     ),
-    "host.canopen.gateway.request": Reader(
+    "host.canopen.gateway": Reader(
         parse_request, ("[1] ", '[1] 5 w 0x2000 0 vs "'), long=(("[1] ", "1 "), ("[1] r ", '"" '))
     ),
-    "wire.candump": Reader(parse_log, ("(1.000000) can0 123#",)),
+    "wire.can": Reader(parse_log, ("(1.000000) can0 123#",)),
     "wire.canopen.eds": Reader(
         of_file(read_sound, "a.eds"),
         ("[2000]\nDataType=7\nDefaultValue=", "[2000]\nObjectType="),
@@ -171,41 +169,41 @@ READERS: Final = {
     "host.canopen.bus_file.yaml_tree": Reader(
         lambda text: decode_bus_file(text.encode(), Path("bus.yml")), ("nodes: ",), SLOW
     ),
-    "host.rtc.canopen.definition.marked_yaml": Reader(parse_definition, ("nodes: ",), SLOW),
+    "host.rtc.canopen.definition_reader": Reader(parse_definition, ("nodes: ",), SLOW),
     "emulators.testing.rig_file": Reader(
         lambda text: parse_rig_file(text, Path("rig.toml")), ("[device.a]\ntype = ", "# ")
     ),
     "emulators.canopen.rig_file": Reader(of_file(read_rig, "rig.toml"), ("x = ", "a.")),
-    "emulators.canopen.node.store_file": Reader(of_file(StoreFile, "store.json"), ('{"a": ',)),
-    "emulators.scenario.scenario": Reader(
+    "emulators.canopen.store_file": Reader(of_file(StoreFile, "store.json"), ('{"a": ',)),
+    "emulators.scenario": Reader(
         lambda text: parse_scenario(text, Emulator("lamp", Lamp())),
         ("1ms send ", "1ms set ", "1ms expect ", "1ms fault ", "1ms press "),
     ),
     "emulators.bench.fault_spec": Reader(parse_fault_spec, ("cut=", "cut@")),
-    "emulators.record.tolerance": Reader(parse_number_rule, ("a=", "a[1:2]=")),
+    "emulators.record.comparison": Reader(parse_number_rule, ("a=", "a[1:2]=")),
     "emulators.testing.campaign.table": Reader(
         of_file(read_table, "t.csv"),
         ("test,seed,outcome,virtual_us,where,reason,replay\n", "test,seed,"),
     ),
     "emulators.testing.campaign.journal": Reader(lambda text: list(_entries(text.encode()))),
-    "emulators.testing.machine.step": Reader(
+    "emulators.testing.machine.host_runs": Reader(
         lambda text: parse_steps(text, "s.txt"), ("+1ms call ", "+1ms call a(b=", "+1ms seed ")
     ),
-    "emulators.testing.report.report_json": Reader(from_json, ('{"a": ',)),
-    "emulators.testing.report.requirement_file": Reader(
+    "emulators.testing.report.report_file": Reader(from_json, ('{"a": ',)),
+    "emulators.testing.report.overview": Reader(
         lambda text: parse_requirements(text, "r.txt"), ("A-1 ", '["a"]\ntitle="')
     ),
-    "emulators.testing.signals.table_file": Reader(
+    "emulators.testing.signals.table": Reader(
         of_file(lambda path: read_points(path, None), "p.csv"), ("t,a\n0,", 't,"')
     ),
-    "emulators.testing.signals.formula_parser": Reader(parse_formula, ("1 + ", "- ")),
+    "emulators.testing.signals.formula": Reader(parse_formula, ("1 + ", "- ")),
     "emulators.tkernel.resolution.table": Reader(parse_ucodes, ("x = ", "a.")),
     "host.canmon.workspace": Reader(Workspace, ("x = ",)),
     "host.canopen.conform.report.baseline": Reader(of_file(Baseline.read, "b.txt")),
     "host.rtc.engines.ros2.table_reader": Reader(
         lambda text: parse_topics(text, "t.toml"), ('[[topic]]\nname = "',)
     ),
-    "host.canmon.model.check.rule_file": Reader(
+    "host.canmon.model.check.rules": Reader(
         lambda text: parse_rule_file(text, no_rule), ('rules = ["', "x = ", "a.")
     ),
     "host.canmon.model.check.expression": Reader(parse_rule, ("never ", "node 1 of ", "not ")),
@@ -221,25 +219,23 @@ READERS: Final = {
     "host.canmon.model.logs.csv": log("csv", "0.000000,can0,123,rx,1,"),
     "host.canmon.model.logs.trace_log": log("trace", "# tickrig-trace v2 "),
     "host.text.bench_header": log("trace", "# tickrig-trace v2 {"),
-    "host.canmon.model.recorder.index": Reader(lambda text: list(_objects(text)), ('{"a": ',)),
-    "host.canmon.model.sequence.parse_sequence": Reader(
+    "host.canmon.model.recorder.files": Reader(lambda text: list(_objects(text)), ('{"a": ',)),
+    "host.canmon.model.sequence": Reader(
         lambda text: TomlSequence(text, "s.toml").parse(), ('[[step]]\nsend = "', "x = ", "a.")
     ),
     "host.canmon.model.sequence.lines": Reader(
         lambda text: parse_lines(text, "s.txt"), ("+1 123#",)
     ),
-    "host.canmon.model.sequence.variables": Reader(
+    "host.canmon.model.sequence_variables": Reader(
         lambda text: fill_in(f"{{{text}}}", {}), ("- ",)
     ),
     "host.canmon.model.sequence.evaluate": Reader(lambda text: evaluate(text, {}), ("1+", "-")),
-    "host.canmon.model.transmit.transmit_list": Reader(
-        parse_row_text, ("123#", "123#00 --every "), SLOW
-    ),
+    "host.canmon.model.transmit": Reader(parse_row_text, ("123#", "123#00 --every "), SLOW),
     "host.rtc.motion.components.odometry": Reader(of_file(read_conf, "a.conf"), ("conf.a.b: ",)),
     "host.rtc.motion.path_file": Reader(of_file(read_path, "p.txt"), ("1 2 ",)),
-    "host.rtc.parameter": Reader(Constraint, ("x<", "(")),
+    "host.rtc.configuration": Reader(Constraint, ("x<", "(")),
     "host.rtc.system.rts_profile": Reader(parse_rts_profile, ("<a>",)),
-    "host.rtc.system.system_toml": Reader(parse_toml, ('[[component]]\nname = "', "x = ", "a.")),
+    "host.rtc.system.system_file": Reader(parse_toml, ('[[component]]\nname = "', "x = ", "a.")),
     "host.rtc.ucode.contents_interpretation": Reader(parse_contents, ('{"a": ',)),
     "host.rtc.canopen.builder.profile_file": Reader(parse_project, ("x = ", "a.")),
 }
@@ -273,10 +269,10 @@ ELSEWHERE: Final = {
     "emulators.testing.plugin.settings": "lines of pytest.ini",
     "host.canmon.conform.stimulus": "of a program that the user names, its first line",
     "host.canmon.tui.panels.alarms_panel": "`parse_rules`, as of a file",
-    "host.canmon.tui.tasks.sequence_task": "`TomlSequence`",
+    "host.canmon.tui.sequence_task": "`TomlSequence`",
     "host.control.client": "of our own emulator",
     "host.links.serial_link": "of the kernel",
-    "host.canmon.model.check.sarif": "our own findings",
+    "host.canmon.model.check.report": "our own findings",
     "host.rtc.commands.verbs": "a word of the command line",
     "host.text.steps": "`parse_steps`, `parse_scenario`",
 }

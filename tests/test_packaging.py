@@ -34,7 +34,7 @@ QUICK = (
     "tests/device/canopen/nmt",
     "tests/host/rrc",
     "tests/emulators/record/test_trace.py",
-    "tests/test_rooms.py::test_a_room_is_small_and_says_what_lives_there",
+    "tests/test_rooms.py::test_a_room_has_a_size_and_says_what_lives_there",
     "tests/test_docs.py::test_every_link_and_named_test_is_there",
 )
 """Some of each floor, what reads golden files and pages, and what looks at the tree itself."""

@@ -25,8 +25,8 @@ RUNNING = re.compile(
 
 RUNS = {
     "emulators/bench/child.py": "our own emulators, for demos",
-    "emulators/testing/bench/modes/hardware/power_switch.py": "`power` of a rig file",
-    "emulators/testing/campaign/worker_process.py": "a worker of a campaign: pytest",
+    "emulators/testing/bench/modes/human_operator.py": "`power` of a rig file",
+    "emulators/testing/campaign/crew.py": "a worker of a campaign: pytest",
     "host/canmon/conform/stimulus.py": "`--stimulus CMD`",
     "host/rtc/engines/openrtm/stubs.py": "omniidl, and the stubs that it makes",
     "host/text/user_file.py": "`FILE.py:Class`",

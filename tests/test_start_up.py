@@ -12,11 +12,11 @@ import click
 import pytest
 
 from tickrig.emulators.canopen.choices import AUTO, MODELS, PROFILES
+from tickrig.emulators.canopen.eds import PROFILES as CANOPEN_PROFILES
 from tickrig.emulators.canopen.models import MODELS as CANOPEN_MODELS
-from tickrig.emulators.canopen.profiles import PROFILES as CANOPEN_PROFILES
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.host.canmon.cli import main as canmon
-from tickrig.host.cli.lazy_group import LazyCommand
+from tickrig.host.cli.options import LazyCommand
 from tickrig.host.cli.start import load
 
 ROOT = Path(__file__).parents[1]

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.panels.tabs import make_panels
-from tickrig.host.canmon.tui.tasks.session import Model, open_session
+from tickrig.host.canmon.tui.app import MonitorApp
+from tickrig.host.canmon.tui.panels.panel import make_panels
+from tickrig.host.canmon.tui.session import Model, open_session
 from tickrig.host.cli.can_options import BusOptions
 
 SIZE: Final = (110, 26)
@@ -31,7 +31,7 @@ async def _draw(log: str, keys: Sequence[str]) -> str:
     session = open_session([log], BusOptions(), Model())
     while not session.model.ended:
         session.step()
-    monitor = Monitor(session, make_panels(session, print))
+    monitor = MonitorApp(session, make_panels(session, print))
     async with monitor.run_test(size=SIZE) as pilot:
         await pilot.press(*keys)
         monitor.refresh_view()

@@ -21,12 +21,11 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import Described, describe_device, make_bench, make_nodes
 from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
-from tickrig.host.canmon.model.frames.record import AnyRecord, Record
+from tickrig.host.canmon.model.frames import AnyRecord, Record
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.panels.tabs import make_panels
-from tickrig.host.canmon.tui.tasks.session import Model, Session
+from tickrig.host.canmon.tui.app import MonitorApp
+from tickrig.host.canmon.tui.panels.panel import Panel, make_panels
+from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.wire.can import CanFrame
 
 SIZES: Final = ((80, 24), (120, 40), (200, 60))
@@ -94,7 +93,7 @@ class RunSource(AnySource[AnyRecord]):
         return [*sent, *(Record(self._host.now_us, BUS, frame) for frame in frames)]
 
 
-def run() -> Monitor:
+def run() -> MonitorApp:
     """Return the monitor when it has heard all of `RUN`."""
     wire = CanWire()
     nodes = [Described(str(node), node, describe_device(name)) for node, name in MODELS.items()]
@@ -114,7 +113,7 @@ def run() -> Monitor:
         for event in events:
             _happen(event, source, bench.operator)
     session.step(1_000)
-    return Monitor(session, panels)
+    return MonitorApp(session, panels)
 
 
 def _happen(event: str, source: RunSource, operator: Operator) -> None:
@@ -145,7 +144,7 @@ STILL: Final = 12
 """After so many pictures the frames of the run are past: the rate is 0."""
 
 
-async def _draw(monitor: Monitor, panel: Panel, pilot: object) -> str:
+async def _draw(monitor: MonitorApp, panel: Panel, pilot: object) -> str:
     for badge in monitor.query("AlarmsPanel"):
         badge.refresh_badge()
     for _ in range(3):  # a size that has come needs another picture

@@ -14,6 +14,7 @@ from shutil import which
 from tickrig import Bench
 from tickrig.device import Rrc, make_epos
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.plugin.bench_evidence import SignalSampler
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
     JournalLine,
@@ -24,7 +25,6 @@ from tickrig.emulators.testing.report.bench_report import (
     TestRecord,
 )
 from tickrig.emulators.testing.report.report_file import write_report
-from tickrig.emulators.testing.report.signal_sampler import SignalSampler
 from tickrig.host.text.byte_text import escape
 
 SIZE = "1000,1460"

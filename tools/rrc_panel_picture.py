@@ -14,10 +14,9 @@ from typing import Final
 
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.transcript import Transcript
+from tickrig.emulators.bench.running_emulator import Transcript
 from tickrig.emulators.rrc.panel import RrcPanel
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import ScenarioParser
+from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import Object
 
@@ -41,7 +40,7 @@ def picture() -> str:
     """Return the panel as SVG, at the end of `SCENARIO`."""
     emulator = Emulator("rrc", Rrc(), link="/tmp/rrc")
     scenario = ScenarioParser(emulator.device, emulator.operator).parse(SCENARIO, "")
-    Player(emulator, scenario, Transcript(emulator, lambda line: None))
+    ScenarioPlayer(emulator, scenario, Transcript(emulator, lambda line: None))
     while emulator.running:
         emulator.step()
     return asyncio.run(_draw(EmulatorControl(emulator)))

@@ -1,17 +1,62 @@
-"""Classic CAN frames and their candump notation.
+r"""Classic CAN frames and their candump notation.
 
 >>> str(CanFrame.parse("705#7F")), str(CanFrame.parse("705#R1"))
 ('705#7F', '705#R1')
 >>> CanFrame.parse("00000605#40").extended
+True
+
+The length of a classic CAN frame on the bus, to the bit.
+
+A node sends the bit stream from start of frame to the end of the CRC with bit
+stuffing: after five equal bits one of the other value is inserted, and it
+counts as the first of the next run (ISO 11898-1, bit stuffing). What follows
+has a fixed form: CRC delimiter, ACK slot, ACK delimiter, seven bits end of
+frame and three bits interframe space.
+
+>>> frame_bits(CanFrame.parse("705#7F")), frame_bits(CanFrame.parse("000#"))
+(58, 53)
+
+CAN FD frames, their candump notation, and how long they are on the bus.
+
+>>> frame = FdFrame.parse("123##1" + "AA" * 9)
+>>> frame.brs, len(frame.data), frame.dlc, str(frame)
+(True, 12, 9, '123##1AAAAAAAAAAAAAAAAAA000000')
+>>> fd_bits(FdFrame.parse("123##1AABB")), fd_bits(FdFrame.parse("123##0AABB"))
+(FdBits(nominal=30, fast=48), FdBits(nominal=79, fast=0))
+
+Error states of a CAN controller, and error frames in candump notation and in words.
+
+>>> str(NO_ACK)
+'20000020#0000000000000000'
+>>> ErrorFrame.parse("20000088#0000010000000000").error_class
+136
+>>> describe_error_frame(ErrorFrame.parse("20000004#0020000000006000"))
+'controller: transmitter passive'
+>>> describe_error_frame(ErrorFrame.parse("20000088#0000040000000000"))
+'protocol: bit stuffing, bus error'
+
+Text of a CAN log, as `candump -L` writes it and `canplayer` reads it.
+
+>>> line = LogLine(10_000, "vcan0", CanFrame.parse("705#7F"))
+>>> str(line)
+'(0000000000.010000) vcan0 705#7F'
+>>> parse_log(f"{line}\n") == (line,)
 True
 """
 
 from __future__ import annotations
 
 import re
-from typing import Final, NamedTuple
+from bisect import bisect_left
+from collections.abc import Mapping
+from enum import IntEnum, IntFlag
+from functools import lru_cache, reduce
+from operator import getitem
+from typing import Any, Final, NamedTuple
 
-from tickrig.wire.errors import FieldError, FramingError
+import crcmod
+
+from tickrig.wire.errors import FieldError, FramingError, WireError
 
 MAX_DATA_BYTES: Final = 8
 STANDARD_MAX: Final = 0x7FF
@@ -106,3 +151,497 @@ _new: Final = tuple.__new__
 
 Frames = tuple[CanFrame, ...]
 """The traffic of one tick on a CAN bus."""
+
+
+INTERFRAME_BITS: Final = 3
+"""Bits of the interframe space (intermission), included in `frame_bits`."""
+
+_CRC_POLYNOMIAL: Final = 0x4599
+"""x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 (ISO 11898-1)."""
+
+# The generator times x: the CRC of 15 bits stands in the upper bits of 16, and
+# bytes can be fed. Zeros in front of a stream change nothing: the seed is 0.
+_crc16 = crcmod.mkCrcFun(1 << 16 | _CRC_POLYNOMIAL << 1, initCrc=0, rev=False, xorOut=0)
+
+STANDARD_BITS: Final = 1 + 11 + 3 + 4 + 15 + 10 + INTERFRAME_BITS
+EXTENDED_BITS: Final = STANDARD_BITS + 20
+"""Bits of an empty frame without stuff bits."""
+EXTENDED_FLAGS: Final = 0b11  # SRR and IDE, both recessive
+
+# States of the stuffing automaton: value of the latest bit << 2 | length of its
+# run - 1; a run of five is broken at once. Two more states begin a frame: they
+# skip the zeros that fill its first byte up.
+START_STANDARD: Final = 8
+START_EXTENDED: Final = 9
+_FILL_BITS: Final = {START_STANDARD: 5, START_EXTENDED: 1}
+_STATES: Final = 10
+
+_MAX_STUFFED: Final = 29
+"""Of the 118 bits from start of frame to the end of the CRC: all but the first of each fifth."""
+
+_STUFFED_BITS: Final = 256
+"""Place in a row of the number of stuff bits so far; before it stand the rows that follow."""
+
+KEPT_HEADS: Final = 4_096
+
+_Row = list[Any]
+
+_heads: Final[dict[int, tuple[int, _Row, int]]] = {}
+"""What was begun before: a plain table, for `lru_cache` keeps an order of use that costs 1 %."""
+
+
+def frame_bits(frame: CanFrame) -> int:
+    """Return the bits of a frame with stuff bits and interframe space."""
+    data = frame[1]  # places, not names: all five at once would take longer than these
+    key = frame[0] << 6 | len(data)
+    if frame[2] or frame[3]:
+        key |= frame[3] << 5 | frame[2] << 4 | frame[4]
+    bits, row, crc = _heads.get(key) or _head(key)
+    crc = _crc16(data, crc)
+    row = reduce(getitem, data, row)
+    # Behind the CRC a bit unlike its last one: it fills the byte up, and is never stuffed.
+    end: int = row[crc >> 8][crc & 0xFE | ~crc >> 1 & 1][_STUFFED_BITS]
+    return bits + end
+
+
+def _head(key: int) -> tuple[int, _Row, int]:
+    """Begin a frame: its bits without stuff bits, and row and CRC behind the DLC."""
+    can_id, extended, remote, length = key >> 6, key >> 5 & 1, key >> 4 & 1, key & 0xF
+    control = remote << 6 | length
+    if extended:
+        arbitration = (can_id >> 18) << 20 | EXTENDED_FLAGS << 18 | can_id & 0x3_FFFF
+        stream, bits = (arbitration << 7 | control).to_bytes(5, "big"), EXTENDED_BITS
+    else:
+        stream, bits = (can_id << 7 | control).to_bytes(3, "big"), STANDARD_BITS
+    first = _rows()[START_EXTENDED if extended else START_STANDARD]
+    data_bits = 0 if remote else 8 * length
+    if len(_heads) >= KEPT_HEADS:
+        _heads.clear()
+    head = bits + data_bits, reduce(getitem, stream, first), _crc16(stream)
+    _heads[key] = head
+    return head
+
+
+@lru_cache(1)
+def _rows() -> list[_Row]:
+    """Lay the automaton out, so that bytes are followed without a step of Python for each.
+
+    Returns:
+        By the state in which a frame begins: by each byte what follows it, and so on; at
+        `_STUFFED_BITS` how many bits were stuffed on the way there.
+    """
+    steps = [stuffed * _STATES + (state >> 8) for stuffed, state in zip(STUFFED, NEXT, strict=True)]
+    rows: list[_Row] = [[] for _ in range(_STATES * (_MAX_STUFFED + 1) + max(steps))]
+    for stuffed in range(_MAX_STUFFED + 1):
+        first = stuffed * _STATES
+        for state in range(_STATES):
+            row = rows[first + state]
+            row += [rows[first + step] for step in steps[state << 8 : state + 1 << 8]]
+            row.append(stuffed)
+    return rows
+
+
+def crc16(stream: bytes) -> int:
+    """Return the CRC of a bit stream, times two.
+
+    >>> crc16(bytes([1])) == _CRC_POLYNOMIAL << 1
+    True
+    """
+    crc: int = _crc16(stream)
+    return crc
+
+
+def _feed(state: int, byte: int) -> tuple[int, int]:
+    """Return the state after eight more bits, and how many bits were stuffed."""
+    fill = _FILL_BITS.get(state, 0)
+    last, run = (None, 0) if fill else (state >> 2, (state & 3) + 1)
+    stuffed = 0
+    for place in reversed(range(8 - fill)):
+        bit = byte >> place & 1
+        run = run + 1 if bit == last else 1
+        last = bit
+        if run == 5:
+            last, run, stuffed = 1 - bit, 1, stuffed + 1
+    return (last or 0) << 2 | run - 1, stuffed
+
+
+_FED: Final = tuple(_feed(state, byte) for state in range(_STATES) for byte in range(256))
+NEXT: Final = tuple(state << 8 for state, _ in _FED)
+"""By state << 8 | byte: the state after it << 8."""
+STUFFED: Final = tuple(stuffed for _, stuffed in _FED)
+"""By state << 8 | byte: how many bits are stuffed."""
+
+
+MAX_FD_BYTES: Final = 64
+FD_LENGTHS: Final = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Bytes that a frame can have, by data length code (ISO 11898-1)."""
+
+BRS: Final = 0x1
+ESI: Final = 0x2
+"""Flags of a frame (linux/can.h, CANFD_BRS and CANFD_ESI)."""
+
+_FD_NOTATION: Final = re.compile(
+    r"([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})##([0-9A-Fa-f])((?:[0-9A-Fa-f]{2}\.?)*)"
+)
+
+
+class FdFrame(NamedTuple):
+    """A CAN FD frame; it is always a data frame. Not checked, see `checked`.
+
+    Attributes:
+        can_id: 0x000..0x7FF, extended 0x0000_0000..0x1FFF_FFFF.
+        data: payload, one of `FD_LENGTHS` bytes.
+        extended: a 29-bit identifier.
+        flags: `BRS` and `ESI`.
+    """
+
+    can_id: int
+    data: bytes = b""
+    extended: bool = False
+    flags: int = 0
+
+    @property
+    def brs(self) -> bool:
+        """Its data are sent at the data bit rate (bit rate switch)."""
+        return bool(self.flags & BRS)
+
+    @property
+    def esi(self) -> bool:
+        """Its sender was error passive (error state indicator)."""
+        return bool(self.flags & ESI)
+
+    @property
+    def remote(self) -> bool:
+        """No: CAN FD has no remote frames."""
+        return False
+
+    @property
+    def dlc(self) -> int:
+        """The data length code, 0 to 15."""
+        return bisect_left(FD_LENGTHS, len(self.data))
+
+    @classmethod
+    def parse(cls, text: str) -> FdFrame:
+        """Read candump's compact notation.
+
+        Args:
+            text: `ID##FDATA`: F is one hex digit, 1 BRS and 2 ESI; other flags are passed over.
+                An ID of 8 digits is a 29-bit one. Data are filled up as `checked` says.
+
+        Returns:
+            The frame.
+
+        Raises:
+            FramingError: not a frame in this notation.
+            FieldError: an identifier or length that CAN FD does not have.
+        """
+        match = _FD_NOTATION.fullmatch(text.strip())
+        if match is None:
+            raise FramingError(f"{text!r} is not a CAN FD frame like 123##1AABB")
+        can_id, flags, data = match.groups()
+        frame = cls(
+            int(can_id, 16),
+            bytes.fromhex(data.replace(".", "")),
+            len(can_id) == 8,
+            int(flags, 16) & (BRS | ESI),
+        )
+        return frame.checked()
+
+    def checked(self) -> FdFrame:
+        """Check the frame.
+
+        Returns:
+            The frame; data of a length that CAN FD does not have are filled up with zeros to the
+            next one, as a controller sends them.
+
+        Raises:
+            FieldError: it cannot be on a CAN FD bus.
+        """
+        most = EXTENDED_MAX if self.extended else STANDARD_MAX
+        if not 0 <= self.can_id <= most:
+            raise FieldError(f"CAN-ID 0x{self.can_id:X} is not {29 if self.extended else 11}-bit")
+        if len(self.data) > MAX_FD_BYTES:
+            raise FieldError(f"a CAN FD frame of {len(self.data)} bytes, at most 64 fit")
+        length = FD_LENGTHS[self.dlc]
+        if length == len(self.data):
+            return self
+        return self._replace(data=self.data.ljust(length, b"\0"))
+
+    def __str__(self) -> str:
+        """Write candump's compact notation."""
+        can_id = f"{self.can_id:08X}" if self.extended else f"{self.can_id:03X}"
+        return f"{can_id}##{self.flags:X}{self.data.hex().upper()}"
+
+
+class FdBits(NamedTuple):
+    """The length of a frame on the bus.
+
+    The rate is taken to switch behind the bit BRS and before the CRC delimiter; it does at the
+    sample points of these two, which differ from bus to bus.
+
+    Attributes:
+        nominal: bits at the nominal bit rate, with the interframe space.
+        fast: bits at the data bit rate; none in a frame without BRS.
+    """
+
+    nominal: int
+    fast: int
+
+
+_CRC_FIELD: Final = {False: 4 + 17 + 6, True: 4 + 21 + 7}
+"""Stuff count, CRC and fixed stuff bits: of no more than 16 bytes, and of more."""
+
+_TAIL: Final = 1 + 2 + 7 + INTERFRAME_BITS  # CRC delimiter, ACK, end of frame
+_KEPT: Final = 1_024
+
+
+def fd_bits(frame: FdFrame) -> FdBits:
+    """Return the bits of a frame with stuff bits and interframe space (ISO 11898-1).
+
+    From start of frame to the data bits are stuffed as in classic CAN. The CRC field has stuff
+    bits at fixed places; the first of them stands for one that the last data would want.
+    """
+    data, length = frame.data, frame.dlc
+    nominal, fast, state = _fd_head(frame.can_id, frame.extended, frame.flags, length)
+    for byte in data:
+        place = state << 8 | byte
+        fast += STUFFED[place]
+        state = NEXT[place] >> 8
+    fast -= state >> 2 != (data[-1] if data else length) & 1  # the last bit was a stuff bit
+    fast += 8 * len(data) + _CRC_FIELD[len(data) > 16]
+    return FdBits(nominal, fast) if frame.flags & BRS else FdBits(nominal + fast, 0)
+
+
+@lru_cache(_KEPT)
+def _fd_head(can_id: int, extended: bool, flags: int, dlc: int) -> tuple[int, int, int]:
+    """Return the bits at each rate but those of data and CRC, and the state before the data."""
+    brs, esi = flags & BRS, flags >> 1 & 1
+    if extended:
+        stream = f"0{can_id >> 18:011b}11{can_id & 0x3_FFFF:018b}010{brs}"
+    else:
+        stream = f"0{can_id:011b}0010{brs}"
+    last, run, slow = _stuff(1, 0, stream)
+    last, run, stuffed = _stuff(last, run, f"{esi}{dlc:04b}")
+    return len(stream) + slow + _TAIL, 5 + stuffed, last << 2 | run - 1
+
+
+def _stuff(last: int, run: int, stream: str) -> tuple[int, int, int]:
+    """Return value and run of the last bit, and how many bits were stuffed."""
+    stuffed = 0
+    for bit in map(int, stream):
+        run = run + 1 if bit == last else 1
+        last = bit
+        if run == 5:
+            last, run, stuffed = 1 - bit, 1, stuffed + 1
+    return last, run, stuffed
+
+
+def parse_sent(text: str) -> CanFrame | FdFrame:
+    """Read a frame in candump's compact notation, of CAN FD where it has `##`.
+
+    Raises:
+        FramingError: not a frame in this notation.
+        FieldError: an identifier or length that there is not.
+    """
+    return FdFrame.parse(text) if "##" in text else CanFrame.parse(text)
+
+
+ERROR_FLAG: Final = 0x2000_0000
+"""Marks an identifier as that of an error frame (linux/can.h, CAN_ERR_FLAG)."""
+
+ERROR_CLASS_MASK: Final = 0x1FFF_FFFF
+
+_ERROR_NOTATION: Final = re.compile(r"([23][0-9A-Fa-f]{7})#([0-9A-Fa-f]{16})")
+
+
+class ErrorState(IntEnum):
+    """State of fault confinement (ISO 11898-1)."""
+
+    ACTIVE = 0
+    PASSIVE = 1
+    BUS_OFF = 2
+
+
+class ErrorFrame(NamedTuple):
+    """An error frame of SocketCAN (linux/can/error.h).
+
+    Attributes:
+        error_class: what failed, a set of CAN_ERR_ bits.
+        data: eight bytes that say more.
+    """
+
+    error_class: int
+    data: bytes = bytes(8)
+
+    @classmethod
+    def parse(cls, text: str) -> ErrorFrame:
+        """Read candump's notation; FramingError if it is no error frame."""
+        match = _ERROR_NOTATION.fullmatch(text)
+        if match is None:
+            raise FramingError(f"{text!r} is not an error frame like {NO_ACK}")
+        return cls(int(match[1], 16) & ERROR_CLASS_MASK, bytes.fromhex(match[2]))
+
+    def __str__(self) -> str:
+        """Write candump's notation."""
+        return f"{ERROR_FLAG | self.error_class:08X}#{self.data.hex().upper()}"
+
+
+NO_ACK: Final = ErrorFrame(0x20)
+"""Nobody acknowledged a frame: CAN_ERR_ACK."""
+
+BIT_ERROR: Final = ErrorFrame(0x88, bytes((0, 0, 1, 0, 0, 0, 0, 0)))
+"""A bit on the bus was not the one that was sent: CAN_ERR_PROT and BUSERROR, PROT_BIT."""
+
+
+class ErrorClass(IntFlag):
+    """Bits of the identifier of an error frame (linux/can/error.h)."""
+
+    TRANSMIT_TIMEOUT = 0x001
+    LOST_ARBITRATION = 0x002
+    CONTROLLER = 0x004
+    PROTOCOL = 0x008
+    TRANSCEIVER = 0x010
+    NO_ACK = 0x020
+    BUS_OFF = 0x040
+    BUS_ERROR = 0x080
+    RESTARTED = 0x100
+    COUNTERS = 0x200
+    """Bytes 6 and 7 are TEC and REC."""
+
+
+class ControllerFlag(IntFlag):
+    """Bits of byte 1, with `ErrorClass.CONTROLLER`."""
+
+    RECEIVE_OVERFLOW = 0x01
+    TRANSMIT_OVERFLOW = 0x02
+    RECEIVE_WARNING = 0x04
+    TRANSMIT_WARNING = 0x08
+    RECEIVE_PASSIVE = 0x10
+    TRANSMIT_PASSIVE = 0x20
+    ACTIVE = 0x40
+
+
+class ProtocolFlag(IntFlag):
+    """Bits of byte 2, with `ErrorClass.PROTOCOL`."""
+
+    BIT = 0x01
+    FORM = 0x02
+    STUFFING = 0x04
+    DOMINANT = 0x08
+    RECESSIVE = 0x10
+    OVERLOAD = 0x20
+    ACTIVE = 0x40
+    TRANSMITTING = 0x80
+
+
+CONTROLLER_BYTE: Final = 1
+PROTOCOL_BYTE: Final = 2
+TEC_BYTE: Final = 6
+REC_BYTE: Final = 7
+
+_CLASSES: Final[Mapping[int, str]] = {
+    ErrorClass.TRANSMIT_TIMEOUT: "transmit time-out",
+    ErrorClass.LOST_ARBITRATION: "lost arbitration",
+    ErrorClass.CONTROLLER: "controller",
+    ErrorClass.PROTOCOL: "protocol",
+    ErrorClass.TRANSCEIVER: "transceiver",
+    ErrorClass.NO_ACK: "no acknowledge",
+    ErrorClass.BUS_OFF: "bus-off",
+    ErrorClass.BUS_ERROR: "bus error",
+    ErrorClass.RESTARTED: "restarted",
+}
+_CONTROLLER: Final[Mapping[int, str]] = {
+    ControllerFlag.RECEIVE_OVERFLOW: "receive buffer overflow",
+    ControllerFlag.TRANSMIT_OVERFLOW: "transmit buffer overflow",
+    ControllerFlag.RECEIVE_WARNING: "receiver warning",
+    ControllerFlag.TRANSMIT_WARNING: "transmitter warning",
+    ControllerFlag.RECEIVE_PASSIVE: "receiver passive",
+    ControllerFlag.TRANSMIT_PASSIVE: "transmitter passive",
+    ControllerFlag.ACTIVE: "active again",
+}
+_PROTOCOL: Final[Mapping[int, str]] = {
+    ProtocolFlag.BIT: "single bit",
+    ProtocolFlag.FORM: "frame format",
+    ProtocolFlag.STUFFING: "bit stuffing",
+    ProtocolFlag.DOMINANT: "no dominant bit",
+    ProtocolFlag.RECESSIVE: "no recessive bit",
+    ProtocolFlag.OVERLOAD: "overload",
+    ProtocolFlag.ACTIVE: "active error announced",
+    ProtocolFlag.TRANSMITTING: "while transmitting",
+}
+_DETAILS: Final = {
+    ErrorClass.CONTROLLER: (CONTROLLER_BYTE, _CONTROLLER),
+    ErrorClass.PROTOCOL: (PROTOCOL_BYTE, _PROTOCOL),
+}
+
+
+def describe_error_frame(frame: ErrorFrame) -> str:
+    """Return what an error frame says, in words.
+
+    >>> describe_error_frame(ErrorFrame(0x240)), describe_error_frame(ErrorFrame(0))
+    ('bus-off', 'unknown')
+    """
+    words = [_name(bit, text, frame.data) for bit, text in _CLASSES.items() if _has(frame, bit)]
+    return ", ".join(words) or "unknown"
+
+
+def _has(frame: ErrorFrame, bit: int) -> bool:
+    return bool(frame.error_class & bit)
+
+
+def _name(bit: int, text: str, data: bytes) -> str:
+    place, texts = _DETAILS.get(ErrorClass(bit), (0, {}))
+    details = [detail for flag, detail in texts.items() if data[place] & flag]
+    return f"{text}: {' and '.join(details)}" if details else text
+
+
+_LINE: Final = re.compile(r"\(([0-9]{1,12})\.([0-9]{6})\) (\S{1,32}) (\S+)(?: [RT])?", re.ASCII)
+_ERROR: Final = re.compile(r"[23][0-9A-Fa-f]{7}#.*")  # bit 29: no identifier has it
+
+
+class CandumpError(ValueError):
+    """A line that is none of a CAN log."""
+
+
+class LogLine(NamedTuple):
+    """One frame or error frame of a log.
+
+    Attributes:
+        at_us: when it had ended.
+        channel: name of the bus, without blanks.
+        received: what was on the bus.
+    """
+
+    at_us: int
+    channel: str
+    received: CanFrame | ErrorFrame | FdFrame
+
+    def __str__(self) -> str:
+        """Write the line, without LF."""
+        seconds, micros = divmod(self.at_us, 1_000_000)
+        return f"({seconds:010d}.{micros:06d}) {self.channel} {self.received}"
+
+
+def parse_line(line: str, number: int = 1) -> LogLine:
+    """Read one line; CandumpError if it is none."""
+    match = _LINE.fullmatch(line.rstrip())
+    if match is None:
+        raise CandumpError(
+            f"line {number} is not like '(0000000000.010000) vcan0 705#7F': {line!r:.60}"
+        )
+    seconds, micros, channel, text = match.groups()
+    kind: type[CanFrame | ErrorFrame] = ErrorFrame if _ERROR.fullmatch(text) else CanFrame
+    try:
+        return LogLine(int(seconds) * 1_000_000 + int(micros), channel, kind.parse(text))
+    except WireError as error:
+        raise CandumpError(f"line {number}: {error}") from error
+
+
+def parse_log(text: str) -> tuple[LogLine, ...]:
+    """Read a log; empty lines are skipped.
+
+    Raises:
+        CandumpError: a line that is none.
+    """
+    lines = enumerate(text.splitlines(), 1)
+    return tuple(parse_line(line, number) for number, line in lines if line.strip())

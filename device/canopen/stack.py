@@ -5,25 +5,16 @@ from __future__ import annotations
 from functools import partial
 from typing import Final
 
-from tickrig.device.canopen.bus.lss_slave import LssSlave
-from tickrig.device.canopen.bus.parameter_store import ParameterStore
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.bus.time_stamp import TimeStamp
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.errors.emcy_consumer import EmcyConsumer
-from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
-from tickrig.device.canopen.errors.error_behaviour import ErrorBehaviour
-from tickrig.device.canopen.errors.error_state_emcy import ErrorStateEmcy
-from tickrig.device.canopen.nmt.error_control import HeartbeatProducer, NodeGuarding
-from tickrig.device.canopen.nmt.heartbeat_consumer import HeartbeatConsumer
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.errors import EmcyConsumer, EmcyProducer, ErrorBehaviour, ErrorStateEmcy
+from tickrig.device.canopen.lss import LssSlave
+from tickrig.device.canopen.nmt import HeartbeatConsumer, HeartbeatProducer, NmtSlave, NodeGuarding
+from tickrig.device.canopen.parameter_store import ParameterStore
+from tickrig.device.canopen.pdo.rpdo import PdoConsumer
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.sdo import USUAL, SdoLimits, SdoServers
+from tickrig.device.canopen.slave import Application, CanopenSlave, Nonvolatile, ServiceMaker
+from tickrig.device.canopen.sync import Sync, TimeStamp
 
 SERVICES: Final[tuple[ServiceMaker, ...]] = (
     NmtSlave,

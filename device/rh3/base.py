@@ -2,19 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar, Final, NamedTuple
 
-from tickrig.device.body.pose import Pose
-from tickrig.device.modbus.slave import ModbusSlave
+from tickrig.device.body import Contact, Pose, arc
+from tickrig.device.chance import Chance
+from tickrig.device.modbus import ModbusSlave
 from tickrig.device.physical import OutputSignal, QuantityBank
-from tickrig.device.rh3.driver import Driver
-from tickrig.device.rh3.ground import Ground
+from tickrig.device.rh3.driver import INPUTS, OUTPUTS, Driver
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
-from tickrig.device.rh3.terminals import INPUTS, OUTPUTS
-from tickrig.device.twin import Copyable
+from tickrig.device.twin import Copyable, Part
 
-Pair = tuple[float, float]
+# The ground under a base: where its wheels have taken it.
+
+_STEP_S: Final = 1e-3
+_HALF: Final = 2.0**63
+
+
+class Ground(Part):
+    """Takes the turning of two wheels for a way over the ground, on exact arcs.
+
+    Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
+
+    Args:
+        parameters: of the base.
+
+    Attributes:
+        speed_m_s: forward, in the latest step.
+        turn_rad_s: to the left, in the latest step.
+        left: the left wheel's contact.
+        right: the right wheel's contact.
+    """
+
+    def __init__(self, parameters: BaseParameters) -> None:
+        share_kg, friction = parameters.mass_kg / 2, parameters.friction
+        self.left = Contact(parameters.radius_left_m, share_kg, friction)
+        self.right = Contact(parameters.radius_right_m, share_kg, friction)
+        self._tread_m, self._noise = parameters.tread_m, parameters.noise
+        self._grips = friction is None
+        self._chance = Chance(parameters.seed, "ground")
+        self.pose, self.speed_m_s, self.turn_rad_s = Pose(), 0.0, 0.0
+
+    @property
+    def pose(self) -> Pose:
+        """Where the middle of the axle is; it may be put elsewhere."""
+        return Pose(*self._place)
+
+    @pose.setter
+    def pose(self, pose: Pose) -> None:
+        self._place = (pose.x_m, pose.y_m, pose.heading_rad)
+
+    @property
+    def resting(self) -> bool:
+        """Whether a step without turning would change nothing."""
+        return not (self.speed_m_s or self.turn_rad_s or self.left.slip_m_s or self.right.slip_m_s)
+
+    def roll(self, lefts: Sequence[float], rights: Sequence[float]) -> None:
+        """Let milliseconds pass.
+
+        Args:
+            lefts: by how many counts the left wheel turned in each.
+            rights: the same of the right wheel.
+        """
+        left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
+        grips, noise, left_m, right_m = self._grips, self._noise, 0.0, 0.0
+        for each, other in zip(lefts, rights):  # noqa: B905 - strict takes as long as a step
+            left_rad, right_rad = each / COUNTS_PER_RAD, other / COUNTS_PER_RAD
+            if grips:
+                left_m, right_m = left_rad * left.radius_m, right_rad * right.radius_m
+            else:
+                left_m, right_m = left.roll(left_rad, _STEP_S), right.roll(right_rad, _STEP_S)
+            if noise:
+                left_m, right_m = self._roughened(left_m), self._roughened(right_m)
+            if left_m or right_m:
+                place = arc(place, left_m, right_m, tread_m)
+        self._place = place
+        self.speed_m_s = (left_m + right_m) / 2 / _STEP_S
+        self.turn_rad_s = (right_m - left_m) / tread_m / _STEP_S
+
+    def _roughened(self, way_m: float) -> float:
+        """Return a way with the noise of the ground: uniform, from one step to the next anew."""
+        if not way_m:
+            return 0.0
+        return way_m * (1 + self._noise * (self._chance.draw() / _HALF - 1))
+
+
+_Pair = tuple[float, float]
 
 
 class BaseState(NamedTuple):
@@ -31,15 +104,15 @@ class BaseState(NamedTuple):
     """
 
     pose: Pose
-    speed: Pair
-    travel: Pair
-    slip: Pair
-    torque: Pair
+    speed: _Pair
+    travel: _Pair
+    slip: _Pair
+    torque: _Pair
     status: int
     frames: tuple[int, int]
 
 
-READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
+_READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
     "x_m": lambda state: state.pose.x_m,
     "y_m": lambda state: state.pose.y_m,
     "heading_rad": lambda state: state.pose.heading_rad,
@@ -58,7 +131,7 @@ READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
 """By the names in `terminals.OUTPUTS`."""
 
 
-TICK_US: Final = 1_000
+_TICK_US: Final = 1_000
 
 LOOK_US: Final = 10_000
 """How often the world looks at it."""
@@ -102,7 +175,7 @@ class Rh3Base(Copyable):
     @property
     def tick_us(self) -> int:
         """The period of the servo."""
-        return TICK_US
+        return _TICK_US
 
     @property
     def due_us(self) -> int:
@@ -140,7 +213,7 @@ class Rh3Base(Copyable):
         Raises:
             KeyError: there is none of that name.
         """
-        return READ[name](self._seen)
+        return _READ[name](self._seen)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
         """Let time pass up to now.
@@ -152,7 +225,7 @@ class Rh3Base(Copyable):
         Returns:
             The bytes that it sends in this tick.
         """
-        heard, before_us = self.slave.due_us <= now_us, now_us - TICK_US
+        heard, before_us = self.slave.due_us <= now_us, now_us - _TICK_US
         happens = heard or self.inputs.changed or self._restarted
         made = self._catch_up(before_us if happens else now_us) and not happens
         if self._restarted:
@@ -190,7 +263,7 @@ class Rh3Base(Copyable):
         """Make the milliseconds up to a time, while it moves; return whether all are made."""
         driver = self._driver
         while self._moving and driver.now_us < until_us:
-            driver.now_us += TICK_US
+            driver.now_us += _TICK_US
             self._pass_to(until_us)
         return driver.now_us >= until_us
 

@@ -6,26 +6,145 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.device.modbus.registers import Registers
-from tickrig.device.physical import QuantityBank
-from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.device.rh3.register_map import TABLE
+from tickrig.device.modbus import Register, Registers
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.device.rh3.parameters import COUNTS_PER_RAD, ENCODER_COUNTS, BaseParameters
 from tickrig.device.rh3.side import STALL_MS, Side
-from tickrig.device.rh3.terminals import SIDES
 from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
-from tickrig.wire.modbus.rh3 import Command, Fault, Mode, Status
+from tickrig.wire.modbus import DEVICE_ID, VERSION, Address, Command, Fault, Mode, Status
 
-TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in SIDES)
+# The registers of the driver (rh3-control, drive protocol: register map A).
+
+_INT32: Final = range(-(2**31), 2**31)
+_SPEED_LIMIT: Final = round(10 * COUNTS_PER_RAD)
+"""Counts/s: Velocity_limit 10.0 of the specification, taken as rad/s of the wheel."""
+_ACCELERATION_LIMIT: Final = round(50 * COUNTS_PER_RAD)
+"""Counts/s2: Acceleration_limit 50.0, taken as rad/s2 of the wheel."""
+_MOST_GAIN: Final = 32_767
+
+
+def _fixed(address: Address, text: str, value: int) -> Register:
+    return Register(address, address.name.lower(), text, initial=value)
+
+
+def _setting(address: Address, text: str, high: int, initial: int) -> Register:
+    name = address.name.lower()
+    return Register(address, name, text, high=high, initial=initial, writable=True)
+
+
+def _wide(address: Address, text: str, initial: int = 0, *, target: bool = False) -> Register:
+    low, high = (_INT32[0], _INT32[-1]) if target else (0, _INT32[-1])
+    name = address.name.lower()
+    return Register(address, name, text, 2, target, low, high, initial, writable=True)
+
+
+def _measured(address: Address, text: str, words: int = 1) -> Register:
+    return Register(address, address.name.lower(), text, words, signed=words == 2)
+
+
+TABLE: Final = (
+    _fixed(Address.DEVICE_ID, "5248h", DEVICE_ID),
+    _fixed(Address.VERSION, "high byte major, low byte minor", VERSION),
+    _setting(Address.MODE, "0 free, 1 velocity, 2 position", 2, Mode.FREE),
+    _setting(Address.COMMAND, "1 enable .. 6 zero counters", 6, Command.NONE),
+    _setting(Address.WATCHDOG_MS, "silence that stops the base, 0 for never", 0xFFFF, 500),
+    _setting(Address.GAIN_P, "position, 1/s", _MOST_GAIN, 10),
+    _setting(Address.GAIN_I, "position, 1/s2", _MOST_GAIN, 0),
+    _setting(Address.GAIN_D, "position", _MOST_GAIN, 0),
+    _setting(Address.GAIN_VP, "velocity, per mille of torque for a count/ms", _MOST_GAIN, 10),
+    _setting(Address.GAIN_VI, "velocity, per mille for a count", _MOST_GAIN, 0),
+    _setting(Address.GAIN_VD, "velocity, per mille for a count/ms in a ms", _MOST_GAIN, 1),
+    _wide(Address.SPEED_LIMIT, "counts/s", _SPEED_LIMIT),
+    _wide(Address.ACCELERATION_LIMIT, "counts/s2", _ACCELERATION_LIMIT),
+    _fixed(
+        Address.ENCODER_COUNTS,
+        "counts in a turn of a motor",
+        ENCODER_COUNTS,
+    ),
+    _setting(Address.DIRECTION, "bit 0: left runs backward; bit 1: right", 3, 0),
+    _wide(Address.TARGET_SPEED_LEFT, "counts/s", target=True),
+    _wide(Address.TARGET_SPEED_RIGHT, "counts/s", target=True),
+    _wide(Address.TARGET_POSITION_LEFT, "counts", target=True),
+    _wide(Address.TARGET_POSITION_RIGHT, "counts", target=True),
+    _measured(Address.STATUS, "see Status"),
+    _measured(Address.FAULT_LEFT, "see Fault"),
+    _measured(Address.FAULT_RIGHT, "see Fault"),
+    _measured(Address.SAMPLE, "milliseconds since power-up, modulo 65536"),
+    _measured(Address.POSITION_LEFT, "counts", 2),
+    _measured(Address.POSITION_RIGHT, "counts", 2),
+    _measured(Address.SPEED_LEFT, "counts/s", 2),
+    _measured(Address.SPEED_RIGHT, "counts/s", 2),
+    _measured(Address.CURRENT_LEFT, "mA, two's complement"),
+    _measured(Address.CURRENT_RIGHT, "mA, two's complement"),
+)
+
+
+# The physical side of a base: what the world does to it, and what can be seen of it.
+
+_SIDES: Final = ("left", "right")
+
+INPUTS: Final = (
+    InputSignal("emergency_stop", "the red button is down", SignalType.FAULT),
+    InputSignal("bumper", "the bumper touches something", SignalType.BUTTON),
+    *(
+        InputSignal(
+            f"load_{side}_nm",
+            f"torque against the {side} wheel",
+            low=-100,
+            high=100,
+            unit="Nm",
+            real=True,
+        )
+        for side in _SIDES
+    ),
+    *(
+        InputSignal(f"jam_{side}", f"something holds the {side} wheel", SignalType.FAULT)
+        for side in _SIDES
+    ),
+    *(
+        InputSignal(
+            f"encoder_unplugged_{side}", f"no signal of the {side} encoder", SignalType.FAULT
+        )
+        for side in _SIDES
+    ),
+    *(
+        InputSignal(
+            f"short_circuit_{side}", f"windings of the {side} motor touch", SignalType.FAULT
+        )
+        for side in _SIDES
+    ),
+    InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+)
+
+OUTPUTS: Final = (
+    OutputSignal("x_m", "true place", "m"),
+    OutputSignal("y_m", "true place, to the left of x", "m"),
+    OutputSignal("heading_rad", "true heading, not wrapped", "rad"),
+    OutputSignal("speed_m_s", "true speed forward", "m/s"),
+    OutputSignal("turn_rad_s", "true turning to the left", "rad/s"),
+    OutputSignal("angle_left_rad", "true angle of the left wheel", "rad"),
+    OutputSignal("angle_right_rad", "true angle of the right wheel", "rad"),
+    OutputSignal("slip_left_m_s", "speed of the left rim over the ground", "m/s"),
+    OutputSignal("slip_right_m_s", "speed of the right rim over the ground", "m/s"),
+    OutputSignal("torque_left_pm", "torque of the left motor, of the rated one", "per mille"),
+    OutputSignal("torque_right_pm", "torque of the right motor, of the rated one", "per mille"),
+    OutputSignal("status", "status register 0200h"),
+    OutputSignal("served", "requests that were answered or obeyed"),
+    OutputSignal("garbled", "frames with a wrong length or CRC"),
+)
+
+
+_TARGETS: Final = frozenset(f"target_{what}_{s}" for what in ("speed", "position") for s in _SIDES)
 ENABLED, MOVING, FAULT, WATCHDOG, CLIPPED, EMERGENCY_STOP, BUMPER = (int(bit) for bit in Status)
 """Plain numbers: a flag takes ten times as long."""
 
-STEP_US: Final = 1_000
+_STEP_US: Final = 1_000
 
-Pair = tuple[list[float], list[float]]
+_Pair = tuple[list[float], list[float]]
 """Left and right, of each millisecond."""
 
-DELAYED: Final = TARGETS | {"mode", "command"}
+_DELAYED: Final = _TARGETS | {"mode", "command"}
 """What takes effect after the delay."""
 
 
@@ -53,7 +172,7 @@ class Driver(Part):
         measured = {"status": self._status, "sample": self._sample}
         self.registers = Registers(TABLE, measured)
         self.sides = tuple(
-            Side(name, bit, parameters, self.registers) for bit, name in enumerate(SIDES)
+            Side(name, bit, parameters, self.registers) for bit, name in enumerate(_SIDES)
         )
         for side in self.sides:
             measured.update(side.measured)
@@ -93,12 +212,12 @@ class Driver(Part):
 
     def written(self, values: Mapping[str, int]) -> None:
         """Take what a master wrote, at once or after the delay."""
-        if values.keys() - DELAYED:
+        if values.keys() - _DELAYED:
             self._configure()
-        if values.keys() & DELAYED:
+        if values.keys() & _DELAYED:
             self._waiting.append((self.now_us + self._delay_us, values))
 
-    def step(self, last_request_us: int, until_us: int) -> Pair:
+    def step(self, last_request_us: int, until_us: int) -> _Pair:
         """Let the millisecond of `now_us` pass, and those behind it in which nothing happens.
 
         Args:
@@ -124,13 +243,13 @@ class Driver(Part):
         steps = 1
         if until_us > self.now_us and not to_position:
             steps = self._alike(last_request_us, until_us)
-            self.now_us += (steps - 1) * STEP_US
+            self.now_us += (steps - 1) * _STEP_US
         return (
             left.drive(steps, stop=stop, to_position=to_position),
             right.drive(steps, stop=stop, to_position=to_position),
         )
 
-    def coast(self) -> Pair:
+    def coast(self) -> _Pair:
         """Let a millisecond pass without supply: a relay shorts the motors."""
         left, right = self.sides
         return left.coast(shorted=True), right.coast(shorted=True)
@@ -143,7 +262,7 @@ class Driver(Part):
         until_us = min(until_us, last_request_us + self._watch_us - 1)
         if self._waiting:
             until_us = min(until_us, self._waiting[0][0] - 1)
-        return max(1, min((until_us - self.now_us) // STEP_US + 1, STALL_MS))
+        return max(1, min((until_us - self.now_us) // _STEP_US + 1, STALL_MS))
 
     def _status(self) -> int:
         return self.status
@@ -164,7 +283,7 @@ class Driver(Part):
             self._obey(self._waiting.popleft()[1])
 
     def _obey(self, values: Mapping[str, int]) -> None:
-        if values.keys() & TARGETS:
+        if values.keys() & _TARGETS:
             self._tripped = self._stopped = False
         for side in self.sides:
             side.obey(values)

@@ -7,16 +7,16 @@ from math import tau
 from typing import Final
 
 from tickrig.device.twin import Immutable
-from tickrig.wire.modbus.rtu import ADDRESSES
+from tickrig.wire.modbus import ADDRESSES
 
-GEAR_RATIO: Final = 74.91
+_GEAR_RATIO: Final = 74.91
 """Turns of the motor for one of the wheel (RH3 functional specification, RefHardRh3)."""
 ENCODER_COUNTS: Final = 2_000
 """Counts in a turn of the motor (the same)."""
-COUNTS_PER_RAD: Final = GEAR_RATIO * ENCODER_COUNTS / tau
+COUNTS_PER_RAD: Final = _GEAR_RATIO * ENCODER_COUNTS / tau
 """Counts in a radian of the wheel: 23 844.6."""
 
-DEFAULT_GAIN: Final = 10
+_DEFAULT_GAIN: Final = 10
 """gain_VP, at which the speed loop has its time constant."""
 PER_MILLE: Final = 1_000.0
 
@@ -74,7 +74,7 @@ class BaseParameters(Immutable):
     @property
     def agility(self) -> float:
         """Counts/ms gained in a millisecond by a per mille of torque."""
-        return 1 / (DEFAULT_GAIN * max(1.0, self.response_s * 1_000))
+        return 1 / (_DEFAULT_GAIN * max(1.0, self.response_s * 1_000))
 
     def per_mille(self, torque_nm: float) -> float:
         """Return a torque at a wheel in per mille of the rated one."""

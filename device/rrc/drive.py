@@ -3,14 +3,150 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import lru_cache
-from math import isqrt
+from math import atan2, degrees, isqrt
+from typing import Final
 
 from tickrig.device.physical import InputBank
-from tickrig.device.rrc.gearbox import Gear, Gearbox
-from tickrig.device.rrc.settings import Settings
-from tickrig.device.rrc.states import RrcState
-from tickrig.wire.rrc.commands import Limit
+from tickrig.device.rrc.settings import RrcState, Settings
+from tickrig.wire.rrc import Joystick, Limit
+
+# The buttons of the VR2 controller as the RRC sees them while VR2 runs.
+
+_SPEED_MODES: Final = range(1, 6)
+
+_BUTTON_MODES: Final = {(0, 0): 0, (1, 0): 1, (0, 1): 2, (1, 1): 3}
+"""Reverse mode by held buttons, (down, up), when alarm is pressed (RRC manual, last page)."""
+
+
+def count_button_edges(inputs: InputBank, settings: Settings) -> bool:
+    """Count button edges and do what speed buttons do.
+
+    A counter is odd while its button is pressed (RRC manual, SA #7 to #9); so a
+    counter whose parity differs from the button is the edge itself. Edges count
+    whether or not the lock is on (DECISION R23).
+
+    Returns:
+        Whether the alarm button has just been pressed.
+    """
+    up, down = inputs["speed_up_button"], inputs["speed_down_button"]
+    if settings.speed_up_count & 1 != up:
+        settings.speed_up_count = (settings.speed_up_count + 1) & 0xF
+        _shift_speed(settings, up)
+    if settings.speed_down_count & 1 != down:
+        settings.speed_down_count = (settings.speed_down_count + 1) & 0xF
+        _shift_speed(settings, -down)
+    if settings.alarm_count & 1 != inputs["alarm_button"]:
+        settings.alarm_count = (settings.alarm_count + 1) & 0xF
+        return bool(inputs["alarm_button"])
+    return False
+
+
+def chosen_mode(inputs: InputBank) -> int:
+    """Return the reverse mode that the held speed buttons choose (DECISION R8)."""
+    return _BUTTON_MODES[inputs["speed_down_button"], inputs["speed_up_button"]]
+
+
+def _shift_speed(settings: Settings, step: int) -> None:
+    mode = settings.speed_mode + step
+    if not settings.speed_locked and mode in _SPEED_MODES:
+        settings.speed_mode = mode
+
+
+# The reverse modes and the imitated gear change (RRC manual, `joystick` #7 to #10).
+
+_RESET_TICKS: Final = 20
+"""A stick that rests 0.2 s in neutral takes the gear out."""
+
+
+class Gear(Enum):
+    """The imitated gear."""
+
+    NEUTRAL = "N"
+    FORWARD = "F"
+    REVERSE = "R"
+
+
+@dataclass(slots=True)
+class Gearbox:
+    """Gear of modes 2 and 3, chosen by where the stick leaves neutral.
+
+    Attributes:
+        gear: the gear after the latest tick.
+        reversed_at: tick at which gear R was chosen; the automatic alarm counts from it.
+        resets_at: tick at which a stick that stays in neutral takes the gear out.
+    """
+
+    gear: Gear = Gear.NEUTRAL
+    reversed_at: int = 0
+    resets_at: int | None = None
+
+    def reset(self) -> None:
+        """Take the gear out: limit mode is entered, or the reverse mode changes."""
+        self.gear, self.resets_at = Gear.NEUTRAL, None
+
+    def drive(
+        self, tick: int, mode: int, stick: tuple[int, int], shaped: tuple[int, int], knobs: Joystick
+    ) -> tuple[int, int]:
+        """Return translation and rotation of one tick in reverse mode 0 to 3.
+
+        Args:
+            tick: number of the tick.
+            mode: reverse mode, #7 or what the buttons chose.
+            stick: translation and rotation as received; they choose the gear.
+            shaped: the same after shaping; they are what is driven (DECISION R18).
+            knobs: #8 to #10.
+        """
+        v_pct, w_pct = shaped
+        if mode == 0:
+            return v_pct, w_pct
+        if mode == 1:
+            return max(v_pct, 0), w_pct
+        if self._rests(tick, stick, knobs.neutral_pct):
+            return 0, 0
+        angle = _angle_deg(stick)
+        if self.gear is Gear.NEUTRAL:
+            self._engage(tick, Gear.REVERSE if angle <= knobs.switch_deg else Gear.FORWARD)
+        if self.gear is Gear.FORWARD:
+            return max(v_pct, 0), w_pct
+        if stick[0] > 0:
+            return 0, 0
+        turn = -1 if mode == 3 else 1
+        return _fade(v_pct, angle, knobs.fade_deg), turn * _fade(w_pct, angle, knobs.fade_deg)
+
+    def _rests(self, tick: int, stick: tuple[int, int], neutral_pct: int) -> bool:
+        """Whether the stick is in neutral; it takes the gear out when it stays there."""
+        if stick[0] ** 2 + stick[1] ** 2 > neutral_pct**2:
+            self.resets_at = None
+            return False
+        if self.resets_at is None:
+            self.resets_at = tick + _RESET_TICKS
+        if tick >= self.resets_at:
+            self.gear = Gear.NEUTRAL
+        return True
+
+    def _engage(self, tick: int, gear: Gear) -> None:
+        self.gear = gear
+        if gear is Gear.REVERSE:
+            self.reversed_at = tick
+
+
+def _angle_deg(stick: tuple[int, int]) -> float:
+    """Return the stick's angle: 0 straight back, 90 sideways, 180 forward (DECISION R17)."""
+    v_pct, w_pct = stick
+    return degrees(atan2(abs(w_pct), -v_pct))
+
+
+def _fade(value_pct: int, angle: float, start_deg: int) -> int:
+    """Scale a value from full at `start_deg` to nothing at 90 degrees, toward zero.
+
+    >>> _fade(-40, 56.31, 45), _fade(60, 90.0, 45), _fade(60, 90.0, 90)
+    (-29, 0, 60)
+    """
+    if angle <= start_deg:
+        return value_pct
+    return int(value_pct * (90 - angle) / (90 - start_deg))
 
 
 @lru_cache(maxsize=256)
@@ -90,7 +226,7 @@ class Drive:
 
     def step(self, tick: int, state: RrcState, settings: Settings, inputs: InputBank) -> None:
         """Decide what the motors get in this tick."""
-        mode = driving_mode(state, settings)
+        mode = _driving_mode(state, settings)
         self.by_stick = mode is not None
         if mode is not None:
             steered = self._steer(tick, mode, settings, inputs)
@@ -114,7 +250,7 @@ class Drive:
         return self.gearbox.drive(tick, mode, stick, shaped, knobs)
 
 
-def driving_mode(state: RrcState, settings: Settings) -> int | None:
+def _driving_mode(state: RrcState, settings: Settings) -> int | None:
     """Return the reverse mode in which the stick drives, None if it does not."""
     if state is RrcState.LIMIT:
         return settings.joystick.reverse_mode

@@ -2,32 +2,121 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar, Final
 
 from tickrig.device.physical import InputBank, OutputSignal
-from tickrig.device.rrc.buzzer import Buzzer
-from tickrig.device.rrc.config import RrcConfig
-from tickrig.device.rrc.controller import chosen_mode, count_button_edges
-from tickrig.device.rrc.drive import Drive
-from tickrig.device.rrc.load import LoadAccount
-from tickrig.device.rrc.power import PowerSequence
-from tickrig.device.rrc.receive_buffer import ReceiveBuffer, read_line
-from tickrig.device.rrc.settings import Settings
-from tickrig.device.rrc.states import NEXT_STATE, POWERED_ON, Move, RrcState
-from tickrig.device.rrc.terminals import OUTPUTS, new_inputs
+from tickrig.device.rrc.board import OUTPUTS, Buzzer, LoadAccount, PowerSequence, new_inputs
+from tickrig.device.rrc.drive import Drive, chosen_mode, count_button_edges
+from tickrig.device.rrc.settings import NEXT_STATE, POWERED_ON, Move, RrcConfig, RrcState, Settings
 from tickrig.device.twin import Copyable
+from tickrig.wire import rrc as cmd
+from tickrig.wire.errors import ChecksumError
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import commands as cmd
-from tickrig.wire.rrc.load import LINES_A_PERIOD, PACE_WITHOUT_VR2, PERIOD_PCT, pace_lines_s
-from tickrig.wire.rrc.replies import RECEIVE_BUFFER_OVERFLOW, Event, Ok, Refusal, RrcEvent, Text
-from tickrig.wire.rrc.replies import StatusA as Status
+from tickrig.wire.rrc import (
+    COMMAND_CHECKSUM,
+    COMMAND_UNKNOWN,
+    LINES_A_PERIOD,
+    PACE_WITHOUT_VR2,
+    PERIOD_PCT,
+    RECEIVE_BUFFER_OVERFLOW,
+    BadParameters,
+    Command,
+    Event,
+    Ok,
+    Refusal,
+    RrcEvent,
+    Text,
+    UnknownCommand,
+    pace_lines_s,
+    parse_command,
+    strip_check,
+)
+from tickrig.wire.rrc import StatusA as Status
+
+# What comes over the line: bytes that wait, lines, commands and refusals.
+
+
+@dataclass(slots=True)
+class ReceiveBuffer:
+    """Bytes that wait to be worked on, cut into lines (DECISION R27).
+
+    The byte that does not fit drops all that waits; it and what follows are
+    thrown away up to the next LF.
+
+    Attributes:
+        size: bytes it holds, line ends included.
+        overflows: how often it has overflowed.
+        thrown_blocks: how often `size` bytes more of such a line were thrown away.
+    """
+
+    size: int
+    _lines: deque[bytes] = field(default_factory=deque, init=False)
+    _used: int = field(default=0, init=False)
+    _begun: bytes = field(default=b"", init=False)
+    _thrown: int | None = field(default=None, init=False)  # bytes of the line behind an overflow
+    overflows: int = field(default=0, init=False)
+    thrown_blocks: int = field(default=0, init=False)
+
+    def __bool__(self) -> bool:
+        """Whether a whole line waits."""
+        return bool(self._lines)
+
+    def push(self, data: bytes) -> None:
+        """Take bytes from the line."""
+        *lines, tail = data.split(b"\n")
+        for line in lines:
+            self._push(line, 1)
+            if self._thrown is None:
+                self._lines.append(self._begun)
+            self._begun, self._thrown = b"", None
+        self._push(tail, 0)
+
+    def pop(self) -> bytes:
+        """Take the oldest whole line, without its LF."""
+        line = self._lines.popleft()
+        self._used -= len(line) + 1
+        return line
+
+    def _push(self, piece: bytes, end: int) -> None:
+        """Append a piece of one line, and its LF if `end` is 1."""
+        if self._thrown is None:
+            beyond = self._used + len(piece) + end - self.size
+            if beyond <= 0:
+                self._used += len(piece) + end
+                self._begun += piece
+                return
+            self._lines.clear()
+            self._used, self._begun = 0, b""
+            self.overflows += 1
+            before, piece = 0, piece[len(piece) + end - beyond + 1 :]  # behind the byte too many
+        else:
+            before = self._thrown
+        self._thrown = before + len(piece)
+        self.thrown_blocks += self._thrown // self.size - before // self.size
+
+
+def _read_line(line: bytes, *, check_wanted: bool) -> Command | Refusal | None:
+    """Return what a line without LF asks for, its refusal (DECISION R11), or None if empty."""
+    message = line.removesuffix(b"\r")
+    if not message:
+        return None
+    try:
+        return parse_command(strip_check(message) if check_wanted else message)
+    except ChecksumError:
+        return Refusal(COMMAND_CHECKSUM)
+    except UnknownCommand:
+        return Refusal(COMMAND_UNKNOWN)
+    except BadParameters as error:
+        return Refusal(error.name.decode())
+
 
 TICK_US: Final = 10_000
 """The RRC's internal command period (RRC manual, notes)."""
 
-MOVES: Final[dict[type[cmd.Command], Move]] = {
+_MOVES: Final[dict[type[cmd.Command], Move]] = {
     cmd.Limit: Move.LIMIT,
     cmd.Output: Move.OUTPUT,
     cmd.PowerOff: Move.FORCED,
@@ -185,7 +274,7 @@ class Rrc(Copyable):
     def _answer(self, line: bytes, tick: int) -> None:
         """Do what a line asks for; the reply keeps to the mode it came in (DECISION R21)."""
         stable = self._settings.stable
-        request = read_line(line, check_wanted=stable)
+        request = _read_line(line, check_wanted=stable)
         if request is None:
             return
         if isinstance(request, Refusal):
@@ -202,7 +291,7 @@ class Rrc(Copyable):
 
     def _obey(self, command: cmd.Command, tick: int) -> bool:
         """Carry out a command; False if it is not allowed in this state (DECISION R10)."""
-        move = MOVES.get(type(command))
+        move = _MOVES.get(type(command))
         if move is not None and not self._move(move, tick):
             return False
         if isinstance(command, cmd.Beep):

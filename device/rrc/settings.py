@@ -1,24 +1,140 @@
-"""What Initialize wipes: all that commands and buttons have set."""
+"""What an RRC is configured with and told, and the states that it has."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum, auto
 from typing import Final
 
-from tickrig.wire.rrc.commands import (
+from tickrig.device.twin import Immutable
+from tickrig.wire.rrc import (
+    POWER_ON_TRIGGER,
     Command,
     Joystick,
     Limit,
     Output,
+    RrcEvent,
     SpeedMode,
     StableMode,
     Status,
     Watchdog,
 )
 
-NO_LIMIT_YET: Final = Limit(0, 0, 0, 0, 0)
-NO_OUTPUT_YET: Final = Output(0, 0)
-PLAIN_STICK: Final = Joystick()
+# States and transitions of the RRC (RRC manual, state diagram and its conditions 1 to 9).
+
+
+class RrcState(Enum):
+    """The states of the diagram, S0 to S8."""
+
+    OFF = "Off"
+    INITIALIZE = "Initialize"
+    WAIT_POWER_ON = "WaitPowerOn"
+    STANDBY = "Standby"
+    LIMIT = "Limit"
+    OUTPUT = "Output"
+    POWER_OFF_BY_BUTTON = "PowerOffByButton"
+    POWER_OFF_BY_OTHERS = "PowerOffByOthers"
+    POWER_OFF_FINISHED = "PowerOffFinished"
+
+
+class Move(Enum):
+    """What makes the RRC change its state."""
+
+    INITIALIZED = auto()
+    POWER_ON_FAILED = auto()
+    POWER_ON_SUCCEEDED = auto()
+    LIMIT = auto()
+    OUTPUT = auto()
+    POWER_BUTTON = auto()
+    FORCED = auto()
+    TRAFFIC_ENDED = auto()
+    RESTART = auto()
+
+
+POWERED_ON: Final = (RrcState.STANDBY, RrcState.LIMIT, RrcState.OUTPUT)
+"""The "PowerOnSuccess period" of the manual: VR2 runs."""
+
+NEXT_STATE: Final[dict[tuple[RrcState, Move], RrcState]] = {
+    (RrcState.INITIALIZE, Move.INITIALIZED): RrcState.WAIT_POWER_ON,  # 2
+    # 3 stays in WAIT_POWER_ON, or starts again (DECISION R3)
+    (RrcState.WAIT_POWER_ON, Move.POWER_ON_FAILED): RrcState.INITIALIZE,
+    (RrcState.WAIT_POWER_ON, Move.POWER_ON_SUCCEEDED): RrcState.STANDBY,  # 4
+    **{(state, Move.LIMIT): RrcState.LIMIT for state in POWERED_ON},  # 5 (DECISION R4)
+    **{(state, Move.OUTPUT): RrcState.OUTPUT for state in POWERED_ON},  # 6 (DECISION R4)
+    **{(state, Move.POWER_BUTTON): RrcState.POWER_OFF_BY_BUTTON for state in POWERED_ON},  # 7
+    **{(state, Move.FORCED): RrcState.POWER_OFF_BY_OTHERS for state in POWERED_ON},  # 8
+    (RrcState.POWER_OFF_BY_BUTTON, Move.TRAFFIC_ENDED): RrcState.POWER_OFF_FINISHED,  # 9
+    (RrcState.POWER_OFF_BY_OTHERS, Move.TRAFFIC_ENDED): RrcState.POWER_OFF_FINISHED,  # 9
+    (RrcState.POWER_OFF_FINISHED, Move.RESTART): RrcState.INITIALIZE,  # "at once"
+}
+
+
+# What differs from one RRC to another, and what the manual leaves open.
+
+
+class FailTarget(Enum):
+    """Where a failed power-on leads (DECISION R3)."""
+
+    WAIT = "wait"  # wait for the button again, settings kept
+    INITIALIZE = "initialize"  # through Initialize, settings wiped
+
+
+@dataclass(frozen=True, slots=True)
+class RrcConfig(Immutable):
+    """Configuration of an emulated RRC. Times are in ticks of 10 ms.
+
+    Attributes:
+        device_name: answer of `device`.
+        version: answer of `version`.
+        date: answer of `date`.
+        power_on_event: `PowerOnTrigger` as in the field, or `PowerOn` as in the
+            manual's event table (DECISION R7).
+        power_on_fail_target: where transition 3 leads (DECISION R3).
+        initialize_ticks: length of Initialize (DECISION R6).
+        power_on_ticks: from the power button to the result (DECISION R6).
+        power_on_timeout_ticks: from the power button to `PowerOnTimeout` (DECISION R6).
+        button_off_ticks: from the power button to `PowerOffFinished` (DECISION R6).
+        forced_off_ticks: the same after a forced stop (DECISION R6).
+        fault_hold_ticks: how long a fault must last to be detected (DECISION R25).
+        buffer_bytes: size of the receive buffer (DECISION R27).
+        overtime: whether too much work stops VR2 (DECISION R27).
+
+    Raises:
+        ValueError: a time or size below 1, or an event name the manual does not know.
+    """
+
+    device_name: str = "RRC"
+    version: str = "Version 1.0"
+    date: str = "Apr 30 2015 00:00:00"
+    power_on_event: str = POWER_ON_TRIGGER
+    power_on_fail_target: FailTarget = FailTarget.WAIT
+    initialize_ticks: int = 1
+    power_on_ticks: int = 30
+    power_on_timeout_ticks: int = 300
+    button_off_ticks: int = 50
+    forced_off_ticks: int = 10
+    fault_hold_ticks: int = 10
+    buffer_bytes: int = 256
+    overtime: bool = True
+
+    def __post_init__(self) -> None:
+        """Refuse what no RRC could be."""
+        names = (POWER_ON_TRIGGER, RrcEvent.POWER_ON.value)
+        if self.power_on_event not in names:
+            raise ValueError(f"power-on event {self.power_on_event!r} is none of {names}")
+        for name in (
+            *("initialize_ticks", "power_on_ticks", "power_on_timeout_ticks"),
+            *("button_off_ticks", "forced_off_ticks", "fault_hold_ticks", "buffer_bytes"),
+        ):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}, at least 1 is needed")
+
+
+# What Initialize wipes: all that commands and buttons have set.
+
+_NO_LIMIT_YET: Final = Limit(0, 0, 0, 0, 0)
+_NO_OUTPUT_YET: Final = Output(0, 0)
+_PLAIN_STICK: Final = Joystick()
 
 
 @dataclass(slots=True)
@@ -46,9 +162,9 @@ class Settings:
     watchdog_ticks: int = 0
     speed_mode: int = 1
     speed_locked: bool = False
-    limit: Limit = NO_LIMIT_YET
-    output: Output = NO_OUTPUT_YET
-    joystick: Joystick = PLAIN_STICK
+    limit: Limit = _NO_LIMIT_YET
+    output: Output = _NO_OUTPUT_YET
+    joystick: Joystick = _PLAIN_STICK
     button_mode: int | None = None
     speed_up_count: int = 0
     speed_down_count: int = 0

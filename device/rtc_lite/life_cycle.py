@@ -20,7 +20,7 @@ class LiteTransition(NamedTuple):
     bad: LiteState
 
 
-TRANSITIONS: Final[Mapping[LiteCommand, LiteTransition]] = MappingProxyType(
+_TRANSITIONS: Final[Mapping[LiteCommand, LiteTransition]] = MappingProxyType(
     {
         LiteCommand.INITIALIZE: LiteTransition(
             LiteState.CREATED, "on_initialize", LiteState.INACTIVE, LiteState.CREATED
@@ -46,13 +46,13 @@ TRANSITIONS: Final[Mapping[LiteCommand, LiteTransition]] = MappingProxyType(
     }
 )
 
-CONTEXT_CALLBACKS: Final = {
+_CONTEXT_CALLBACKS: Final = {
     LiteCommand.STARTUP: "on_startup",
     LiteCommand.SHUTDOWN: "on_shutdown",
 }
 """They change no state, and are optional: `!` from a component that does not define them."""
 
-NOT_ALIVE: Final = (LiteState.CREATED, LiteState.NONE)
+_NOT_ALIVE: Final = (LiteState.CREATED, LiteState.NONE)
 
 
 class LiteLifeCycle(CallbackRunner[LiteComponent]):
@@ -70,9 +70,9 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
         """Do what a command of the life cycle asks for."""
         if command is LiteCommand.ABORT:
             return self._abort_at_once()
-        if command in CONTEXT_CALLBACKS:
-            return self._notify(CONTEXT_CALLBACKS[command])
-        move = TRANSITIONS[command]
+        if command in _CONTEXT_CALLBACKS:
+            return self._notify(_CONTEXT_CALLBACKS[command])
+        move = _TRANSITIONS[command]
         if self.state is not move.begin:
             return LiteStatus.WRONG_STATE
         if self.call(move.callback):
@@ -99,6 +99,6 @@ class LiteLifeCycle(CallbackRunner[LiteComponent]):
     def _notify(self, callback: str) -> LiteStatus:
         if getattr(type(self.component), callback) is getattr(LiteComponent, callback):
             return LiteStatus.UNSUPPORTED
-        if self.state in NOT_ALIVE:
+        if self.state in _NOT_ALIVE:
             return LiteStatus.WRONG_STATE
         return LiteStatus.OK if self.call(callback) else LiteStatus.ERROR

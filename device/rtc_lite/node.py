@@ -2,29 +2,160 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final, Protocol
 
-from tickrig.device.component import Timer
-from tickrig.device.physical import InputBank, OutputSignal
-from tickrig.device.rtc_lite.component import LiteComponent
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.component import Timer, shown
+from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
+from tickrig.device.rtc_lite.component import LiteComponent, LitePort
 from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
-from tickrig.device.rtc_lite.receiver import BUFFER_BYTES, LiteReceiver
-from tickrig.device.rtc_lite.server import LiteServer
-from tickrig.device.rtc_lite.terminals import new_inputs, output_table, port_text
+from tickrig.device.rtc_lite.server import LiteConfig, LiteServer
 from tickrig.device.twin import Copyable
+from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteLinkFault, LiteState
-from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import Framing, LiteFrame, fault_frame
-from tickrig.wire.rtc_lite.layout import REQUESTS
+from tickrig.wire.rtc_lite.frame import REQUESTS, Framing, LiteDecoder, LiteFrame, fault_frame
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
+
+# Bytes from the line: a buffer of 64, frames out of it, and time-outs (DECISION L7).
+
+BUFFER_BYTES: Final = 64
+GAP_US: Final = 100_000
+"""Silence inside a frame that drops it."""
+SILENCE_US: Final = 20_000
+"""Silence that a receiver needs after a frame whose length it does not know."""
+
+
+class RequestDecoder(Protocol):
+    """`Decoder` or `RtnoDecoder`."""
+
+    lost: bool
+
+    @property
+    def begun(self) -> bool:
+        """Whether a frame has begun that is not whole."""
+        ...
+
+    def clear(self) -> None:
+        """Look for a header again."""
+
+    def push(self, data: bytes, /) -> list[LiteFrame | LiteLinkFault]:
+        """Take bytes in; give frames and faults out."""
+        ...
+
+
+@dataclass(slots=True)
+class LiteReceiver:
+    """What the line brought.
+
+    Attributes:
+        decoder: reads the frames.
+        dropped: bytes that found the buffer full.
+    """
+
+    decoder: RequestDecoder
+    dropped: int = field(default=0, init=False)
+    _waiting: bytes = field(default=b"", init=False)
+    _received_us: int = field(default=0, init=False)  # when the latest byte came
+
+    @property
+    def due_us(self) -> int:
+        """When a frame that has begun is dropped."""
+        return self._received_us + GAP_US if self.decoder.begun else NEVER
+
+    def push(self, now_us: int, data: bytes) -> None:
+        """Take bytes from the line, as many as there is room for."""
+        if not data:
+            return
+        if self.decoder.lost and now_us - self._received_us >= SILENCE_US:
+            self.decoder.clear()
+        self._received_us = now_us
+        if not self.decoder.lost:
+            room = BUFFER_BYTES - len(self._waiting)
+            self._waiting += data[:room]
+            self.dropped += max(0, len(data) - room)
+
+    def drop_broken_off(self, now_us: int) -> bool:
+        """Drop a frame that was broken off; True if there was one."""
+        if self._waiting or now_us < self.due_us:
+            return False
+        self.decoder.clear()
+        return True
+
+    def pull(self) -> LiteFrame | LiteLinkFault | None:
+        """Return the next frame or fault, and leave what follows it in the buffer."""
+        for at in range(len(self._waiting)):
+            for found in self.decoder.push(self._waiting[at : at + 1]):
+                self._waiting = b"" if self.decoder.lost else self._waiting[at + 1 :]
+                return found
+        self._waiting = b""
+        return None
+
+
+# The physical side of a node: its supply, its processor, and what can be seen of it.
+
+INPUTS: Final = (
+    InputSignal("callback_ms", "how long each callback takes", high=10_000, unit="ms"),
+    InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+    InputSignal(
+        "slow_answer", "the processor is busy elsewhere: each answer is late", SignalType.FAULT
+    ),
+)
+"""Every node has these; a component may add its own."""
+
+_OUTPUTS: Final = (
+    OutputSignal("state", "state of the component: Off, Created, Inactive, Active, Error, None"),
+    OutputSignal("callback", "the callback that ran last"),
+    OutputSignal("executed", "how often on_execute ran"),
+    OutputSignal("dropped_bytes", "bytes that found the receive buffer full"),
+)
+"""Every node has these; each port adds its value."""
+
+
+def _new_inputs(component: LiteComponent) -> InputBank:
+    """Return the inputs of a node at rest.
+
+    Raises:
+        ValueError: two inputs have the same name.
+    """
+    names = {item.name for item in INPUTS}
+    kind = type(component).__name__
+    for item in component.physical:
+        if item.name in names:
+            raise ValueError(f"{kind}: two inputs are called {item.name!r}")
+        names.add(item.name)
+    return InputBank((*INPUTS, *component.physical))
+
+
+def _output_table(component: LiteComponent) -> dict[str, OutputSignal]:
+    """Return the outputs of a node: its own, and the ports as `in.NAME` and `out.NAME`."""
+    ports = [
+        *(
+            OutputSignal(f"in.{name.decode()}", "value of this in-port")
+            for name in component.in_ports
+        ),
+        *(
+            OutputSignal(f"out.{name.decode()}", "value of this out-port")
+            for name in component.out_ports
+        ),
+    ]
+    return {output.name: output for output in (*_OUTPUTS, *ports)}
+
+
+def _port_text(component: LiteComponent, name: str) -> float | str:
+    """Return the value of the port `in.NAME` or `out.NAME`; KeyError if there is none."""
+    side, _, port = name.partition(".")
+    ports: dict[str, Mapping[bytes, LitePort[Any]]] = {
+        "in": component.in_ports,
+        "out": component.out_ports,
+    }
+    return shown(ports[side][port.encode()].value)
+
 
 TICK_US: Final = 1_000
 """How often the main loop of the device looks at the line; a choice, the paper names none."""
 
-TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
+_TIMED: Final = (LiteState.ACTIVE, LiteState.ERROR)
 """States in which the timer of the device runs."""
 
 
@@ -65,7 +196,7 @@ class RtcLiteNode(Copyable):
 
     def __post_init__(self) -> None:
         """Begin without power."""
-        self.inputs = new_inputs(self.make())
+        self.inputs = _new_inputs(self.make())
         self.reset()
 
     @property
@@ -90,7 +221,7 @@ class RtcLiteNode(Copyable):
     @property
     def outputs(self) -> dict[str, OutputSignal]:
         """What `read` knows."""
-        return output_table(self.component)
+        return _output_table(self.component)
 
     def reset(self) -> None:
         """Forget everything but configuration and physical inputs, as a power cut does."""
@@ -124,7 +255,7 @@ class RtcLiteNode(Copyable):
             "executed": life.executed,
             "dropped_bytes": self._receiver.dropped,
         }
-        return own[name] if name in own else port_text(life.component, name)
+        return own[name] if name in own else _port_text(life.component, name)
 
     def tick(self, now_us: int, rx: bytes, /) -> bytes:
         """Run one pass of the main loop.
@@ -188,7 +319,7 @@ class RtcLiteNode(Copyable):
 
     def _update_timer(self, now_us: int) -> None:
         """Let the timer run in the states in which it has something to do."""
-        if self.config.context is LiteContextType.TIMER and self._life.state in TIMED:
+        if self.config.context is LiteContextType.TIMER and self._life.state in _TIMED:
             self._timer.run(now_us)
         else:
             self._timer.stop()

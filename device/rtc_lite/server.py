@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from tickrig.device.component import Timer
-from tickrig.device.rtc_lite.config import RATE_HZ
+from tickrig.device.rtc_lite.component import LitePort
 from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
-from tickrig.device.rtc_lite.ports import LitePort
+from tickrig.device.twin import Immutable
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
-from tickrig.wire.rtc_lite.frame import LiteFrame
-from tickrig.wire.rtc_lite.layout import WITH_FIELDS
+from tickrig.wire.rtc_lite.frame import WITH_FIELDS, Checksum, Framing, LiteFrame
 from tickrig.wire.rtc_lite.messages import (
     LiteComponentProfile,
     LitePortData,
@@ -20,7 +19,45 @@ from tickrig.wire.rtc_lite.messages import (
     parse_port_data,
 )
 
-BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
+# What differs from one node to another, and what the paper leaves open.
+
+_RATE_HZ: Final = range(1, 1_001)
+"""Rates that a tick of 1 ms can hold."""
+DEFAULT_RATE_HZ: Final = 10
+
+
+@dataclass(frozen=True, slots=True)
+class LiteConfig(Immutable):
+    """Configuration of an emulated node.
+
+    Attributes:
+        framing: frames of RTC-Lite, or packets of RTno (bridge mode).
+        checksum: how frames are summed up (DECISION L5); packets of RTno always by `sum8`.
+        context: who makes the component execute.
+        rate_hz: rate of the timer, 1..1000 Hz, until the proxy sets another.
+        slow_answer_us: by how much the fault `slow_answer` delays each answer.
+
+    Raises:
+        ValueError: a rate or a delay that a node cannot have.
+    """
+
+    framing: Framing = Framing.LITE
+    checksum: Checksum = Checksum.SUM8
+    context: LiteContextType = LiteContextType.PROXY
+    rate_hz: int = DEFAULT_RATE_HZ
+    slow_answer_us: int = 200_000
+
+    def __post_init__(self) -> None:
+        """Refuse what no node could be."""
+        if self.rate_hz not in _RATE_HZ:
+            raise ValueError(f"rate_hz is {self.rate_hz}, 1..{_RATE_HZ[-1]} is possible")
+        if self.slow_answer_us < 1:
+            raise ValueError(f"slow_answer_us is {self.slow_answer_us}, at least 1 is needed")
+        if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
+            raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
+
+
+_BY_CONTEXT: Final = (LiteCommand.EXECUTE, LiteCommand.ERROR)
 """What the device's own timer does, so that the proxy may not (type 22h)."""
 
 
@@ -67,7 +104,7 @@ class LiteServer:
 
     def _live(self, command: LiteCommand) -> list[LiteFrame]:
         """Let the life cycle go on; data go before the reply (DECISION L12)."""
-        if self.context is LiteContextType.TIMER and command in BY_CONTEXT:
+        if self.context is LiteContextType.TIMER and command in _BY_CONTEXT:
             status = LiteStatus.UNSUPPORTED
         else:
             status = self.life.obey(command)
@@ -97,7 +134,7 @@ class LiteServer:
 
     def _set_rate(self, rate_hz: int) -> LiteStatus:
         """Set the rate of the timer; it starts again with it."""
-        if self.context is not LiteContextType.TIMER or rate_hz not in RATE_HZ:
+        if self.context is not LiteContextType.TIMER or rate_hz not in _RATE_HZ:
             return LiteStatus.UNSUPPORTED
         self.timer.rate_hz = rate_hz
         self.timer.stop()

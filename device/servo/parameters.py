@@ -1,12 +1,14 @@
 """What a motor, its power stage, its gear, its encoders and its loops are made of.
 
-Units are in the names; the presets are in `tickrig.device.servo.presets`.
+Units are in the names; the presets are in `tickrig.device.servo.parameters`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Immutable
 
@@ -45,7 +47,7 @@ class MotorParameters(Immutable):
     winding_max_c: float
 
     def __post_init__(self) -> None:
-        require_positive(self, zero=("viscous_nm_s",))
+        _require_positive(self, zero=("viscous_nm_s",))
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,7 @@ class PowerStage(Immutable):
     supply_min_v: float
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        _require_positive(self)
         if self.peak_a < self.continuous_a:
             raise ValueError(f"peak_a {self.peak_a} is below continuous_a {self.continuous_a}")
         if self.duty_max > 1:
@@ -93,7 +95,7 @@ class GearParameters(Immutable):
     coulomb_nm: float = 0.0
 
     def __post_init__(self) -> None:
-        require_positive(self, zero=("inertia_kg_m2", "coulomb_nm"))
+        _require_positive(self, zero=("inertia_kg_m2", "coulomb_nm"))
         if self.efficiency > 1:
             raise ValueError(f"efficiency {self.efficiency} is not in 0..1")
 
@@ -111,7 +113,7 @@ class Encoders(Immutable):
     gear_counts_per_turn: int = 0
 
     def __post_init__(self) -> None:
-        require_positive(self, zero=("gear_counts_per_turn",))
+        _require_positive(self, zero=("gear_counts_per_turn",))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,7 @@ class LoopGains(Immutable):
     position_rad_s: float = 40.0
 
     def __post_init__(self) -> None:
-        require_positive(self)
+        _require_positive(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +155,7 @@ class ServoParameters(Immutable):
         return self.motor.coulomb_nm + self.gear.coulomb_nm / self.gear.ratio
 
 
-def require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> None:
+def _require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> None:
     """Refuse a table with a number that is not above 0; those named in `zero` may be 0.
 
     Raises:
@@ -164,3 +166,139 @@ def require_positive(table: DataclassInstance, zero: tuple[str, ...] = ()) -> No
         if not (value > 0 or (name in zero and value == 0)):
             allowed = "0 or more" if name in zero else "more than 0"
             raise ValueError(f"{name} {value} is not {allowed}")
+
+
+# Servos that are shipped, with where their numbers are from (docs/reference/devices/servo.md).
+
+RE_30: Final = MotorParameters(  # maxon catalogue, RE 30, 60 W, 24 V, order number 310007
+    resistance_ohm=0.611,
+    inductance_h=0.119e-3,
+    torque_constant_nm_a=25.9e-3,
+    inertia_kg_m2=33.5e-7,
+    coulomb_nm=3.4e-3,  # with the next: no-load current 164 mA at 8810 rpm; split ours
+    viscous_nm_s=0.92e-6,
+    winding_housing_k_w=1.7,
+    housing_ambient_k_w=6.0,
+    winding_s=16.2,
+    housing_s=593.0,
+    winding_max_c=125.0,
+)
+
+EPOS_24_5: Final = PowerStage(  # EPOS 24/5: 11..24 V, 5 A, 10 A for 1 s, 0.9 of the supply
+    continuous_a=5.0,
+    peak_a=10.0,
+    peak_s=1.0,
+    duty_max=0.9,
+    supply_v=24.0,
+    supply_min_v=9.0,  # chosen, below the 11 V of its manual
+)
+
+EPOS_WHEEL: Final = ServoParameters(
+    motor=RE_30,
+    stage=EPOS_24_5,
+    encoders=Encoders(counts_per_turn=2_000),  # 500 pulses
+    gear=GearParameters(  # chosen, typical of a planetary gear of 32 mm with three stages
+        ratio=51.0,
+        efficiency=0.70,
+        inertia_kg_m2=2.0e-3,
+        coulomb_nm=0.05,
+    ),
+)
+
+_CORE_RATIO: Final = 100.0  # strain wave gear, chosen
+
+CORE_MOTOR: Final = MotorParameters(  # chosen, typical of a brushless motor of 100 W, but:
+    resistance_ohm=0.5,
+    inductance_h=0.5e-3,
+    torque_constant_nm_a=9.0 / _CORE_RATIO,  # table 5: 60 rpm at 60 V, of which 0.95 arrive
+    inertia_kg_m2=4.0e-6,
+    coulomb_nm=2.0e-3,  # with the gear's: 0.5 Nm at the output
+    viscous_nm_s=1.0e-6,
+    winding_housing_k_w=8.0,  # so that a winding can be too hot before its housing is
+    housing_ambient_k_w=2.5,
+    winding_s=20.0,
+    housing_s=900.0,
+    winding_max_c=125.0,
+)
+
+FTMD: Final = PowerStage(  # NEDO report, FTMD 1 axis: 7 A continuous, 10 A peak, 10..60 V
+    continuous_a=7.0,
+    peak_a=10.0,
+    peak_s=2.0,  # chosen
+    duty_max=0.95,  # chosen
+    supply_v=60.0,
+    supply_min_v=10.0,
+)
+
+MOTOR_CORE_UNIT: Final = ServoParameters(
+    motor=CORE_MOTOR,
+    stage=replace(  # the driver, set to what the gear bears (table 5): 15 Nm, 30 Nm at the peak
+        FTMD, continuous_a=15.0 / 9.0, peak_a=30.0 / 9.0
+    ),
+    encoders=Encoders(counts_per_turn=4_096, gear_counts_per_turn=65_536),  # chosen
+    gear=GearParameters(  # with the rotor: 0.05 kg m2 at the output
+        ratio=_CORE_RATIO,
+        efficiency=1.0,  # its loss is in the torque constant and in the friction
+        inertia_kg_m2=0.01,
+        coulomb_nm=0.3,
+    ),
+    gains=LoopGains(),
+)
+
+PRESETS: Final[Mapping[str, ServoParameters]] = MappingProxyType(
+    {"epos-wheel": EPOS_WHEEL, "motor-core-unit": MOTOR_CORE_UNIT}
+)
+
+
+# Servos of another size than the shipped ones: as large as a joint needs them.
+
+
+def peak_torque_nm(servo: ServoParameters) -> float:
+    """Return the torque of the peak current at the output shaft, friction not taken off.
+
+    >>> from tickrig.device.servo.parameters import EPOS_WHEEL
+    >>> round(peak_torque_nm(EPOS_WHEEL), 2)
+    13.21
+    """
+    return servo.stage.peak_a * servo.motor.torque_constant_nm_a * servo.gear.ratio
+
+
+def free_speed_rad_s(servo: ServoParameters) -> float:
+    """Return the speed of the output shaft at which the back-EMF takes the whole voltage.
+
+    >>> from tickrig.device.servo.parameters import EPOS_WHEEL
+    >>> round(free_speed_rad_s(EPOS_WHEEL), 1)
+    16.4
+    """
+    volts = servo.stage.duty_max * servo.stage.supply_v
+    return volts / servo.motor.torque_constant_nm_a / servo.gear.ratio
+
+
+def of_size(servo: ServoParameters, size: float) -> ServoParameters:
+    """Return what so many of a servo are, side by side on one shaft.
+
+    Currents, torques, inertias and friction grow with the size, resistances to current and heat
+    fall with it; speeds, voltages, temperatures and all time constants stay.
+
+    Args:
+        servo: one of them.
+        size: above 0; a fraction is a smaller one.
+    """
+    motor, stage, gear = servo.motor, servo.stage, servo.gear
+    return replace(
+        servo,
+        motor=replace(
+            motor,
+            resistance_ohm=motor.resistance_ohm / size,
+            inductance_h=motor.inductance_h / size,
+            inertia_kg_m2=motor.inertia_kg_m2 * size,
+            coulomb_nm=motor.coulomb_nm * size,
+            viscous_nm_s=motor.viscous_nm_s * size,
+            winding_housing_k_w=motor.winding_housing_k_w / size,
+            housing_ambient_k_w=motor.housing_ambient_k_w / size,
+        ),
+        stage=replace(stage, continuous_a=stage.continuous_a * size, peak_a=stage.peak_a * size),
+        gear=replace(
+            gear, inertia_kg_m2=gear.inertia_kg_m2 * size, coulomb_nm=gear.coulomb_nm * size
+        ),
+    )

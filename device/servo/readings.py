@@ -1,14 +1,312 @@
-"""What a servo shows: to its drive through sensors, and to whoever looks at it."""
+"""What can be read of a servo, its temperatures and settings too."""
 
 from __future__ import annotations
 
-from math import floor
+from math import expm1, floor, inf, sqrt
+from typing import Final
 
-from tickrig.device.servo.heat import Heat
-from tickrig.device.servo.parameters import ServoParameters
+from tickrig._compiled import mypyc_attr
+from tickrig.device.servo.parameters import MotorParameters, PowerStage, ServoParameters
 from tickrig.device.servo.plant import Plant
-from tickrig.device.servo.settings import ServoSettings
-from tickrig.device.servo.thermal import Temperatures
+from tickrig.device.twin import Copyable, Part
+
+# The heat of a motor: winding and housing as two thermal nodes.
+
+COPPER_PER_K: Final = 0.0039  # growth of the resistance of copper, of its value at 25 degC
+HOTTEST_C: Final = 1_000.0  # no motor is left beyond this, and no model
+
+
+_Temperatures = tuple[float, float]
+"""Of the winding and the housing of a motor, degC."""
+
+
+class ThermalModel(Part):
+    """Winding and housing, heated by the current in the winding.
+
+    The heat is R I^2, and R grows with the temperature, which keeps the
+    system linear: its state at any later time is a closed form. Not modelled:
+    heat of friction and iron, the gear, the power stage, air that moves.
+    """
+
+    __slots__ = ("_capacities", "_motor")
+
+    def __init__(self, motor: MotorParameters) -> None:
+        self._motor = motor
+        self._capacities = (
+            motor.winding_s / motor.winding_housing_k_w,
+            motor.housing_s / motor.housing_ambient_k_w,
+        )
+
+    def resistance_ohm(self, winding_c: float) -> float:
+        """Return the resistance of the winding at a temperature."""
+        return self._motor.resistance_ohm * (1 + COPPER_PER_K * (winding_c - 25.0))
+
+    def after(
+        self, start: _Temperatures, seconds: float, square_a2: float, ambient_c: float
+    ) -> _Temperatures:
+        """Return the temperatures some time later.
+
+        Args:
+            start: temperatures now.
+            seconds: how much later, 0 or more.
+            square_a2: mean square of the current meanwhile, A^2.
+            ambient_c: temperature of the air.
+        """
+        motor, (winding, housing), (winding_c, housing_c) = self._motor, self._capacities, start
+        slope = motor.resistance_ohm * COPPER_PER_K * square_a2
+        across, out = 1 / motor.winding_housing_k_w, 1 / motor.housing_ambient_k_w
+        a, b = (slope - across) / winding, across / winding
+        c, d = across / housing, -(across + out) / housing
+        # rates of change now, then each mode of the system grows or fades by itself
+        flow = across * (winding_c - housing_c)
+        heat = square_a2 * self.resistance_ohm(winding_c)
+        dw = (heat - flow) / winding
+        dh = (flow - out * (housing_c - ambient_c)) / housing
+        middle, spread = (a + d) / 2, sqrt(((a - d) / 2) ** 2 + b * c)
+        slow, fast = _span(middle + spread, seconds), _span(middle - spread, seconds)
+        mean, half = (slow + fast) / 2, (slow - fast) / (2 * spread)
+        tilt = (a - d) / 2
+        return (
+            min(winding_c + mean * dw + half * (tilt * dw + b * dh), HOTTEST_C),
+            min(housing_c + mean * dh + half * (c * dw - tilt * dh), HOTTEST_C),
+        )
+
+
+def _span(rate: float, seconds: float) -> float:
+    """Return the integral of e^(rate t) over a time."""
+    return expm1(min(rate * seconds, 50.0)) / rate if rate else seconds
+
+
+# How warm and how overloaded a servo is, and what current that leaves.
+
+
+class I2t(Part):
+    """The I2t protection of a power stage.
+
+    A budget of (peak^2 - continuous^2) * time fills by the square of the
+    current above the continuous one and drains by it below. Once full, only
+    the continuous current is allowed, until the budget is empty again.
+
+    Attributes:
+        filled_a2s: how much of the budget is used.
+        reduced: only the continuous current is allowed.
+    """
+
+    __slots__ = ("_budget_a2s", "_continuous_a2", "_stage", "filled_a2s", "reduced")
+
+    def __init__(self, stage: PowerStage) -> None:
+        self._stage = stage
+        self._continuous_a2 = stage.continuous_a**2
+        self._budget_a2s = (stage.peak_a**2 - self._continuous_a2) * stage.peak_s
+        self.filled_a2s, self.reduced = 0.0, False
+
+    @property
+    def limit_a(self) -> float:
+        """Current that is allowed now."""
+        return self._stage.continuous_a if self.reduced else self._stage.peak_a
+
+    def pass_time(self, seconds: float, square_a2s: float) -> None:
+        """Let time pass with an integral of the squared current."""
+        filled = self.filled_a2s + square_a2s - self._continuous_a2 * seconds
+        self.filled_a2s = min(max(filled, 0.0), self._budget_a2s)
+        if self.filled_a2s == 0.0:
+            self.reduced = False
+        elif self.filled_a2s == self._budget_a2s:
+            self.reduced = True
+
+    def settled(self, current_a: float) -> bool:
+        """Return whether a constant current changes nothing any more."""
+        rate = current_a**2 - self._continuous_a2
+        if rate < 0.0:
+            return self.filled_a2s == 0.0 and not self.reduced
+        return rate == 0.0 or self.reduced
+
+
+_DERATING_K: Final = 15.0  # the limit falls to 0 over these last kelvins below the hottest
+
+
+def _derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
+    """Return what is left of a current limit at a temperature of the winding.
+
+    >>> [_derated_a(10.0, winding_c, 125.0) for winding_c in (110.0, 119.0, 125.0)]
+    [10.0, 4.0, 0.0]
+    """
+    left = (winding_max_c - winding_c) / _DERATING_K
+    return limit_a * min(max(left, 0.0), 1.0)
+
+
+_AGES_S: Final = 1e9  # after this all temperatures stand still
+
+
+class Heat(Part):
+    """Temperatures and I2t budget of a servo, from the squared current.
+
+    Attributes:
+        since_us: the instant at which they were worked out.
+        temperatures: temperatures at that instant.
+        ambient_c: temperature of the air since then.
+        i2t: the overload of the power stage.
+    """
+
+    __slots__ = ("_thermal", "_winding_max_c", "ambient_c", "i2t", "since_us", "temperatures")
+
+    def __init__(self, parameters: ServoParameters, ambient_c: float) -> None:
+        self._thermal, self.i2t = ThermalModel(parameters.motor), I2t(parameters.stage)
+        self._winding_max_c = parameters.motor.winding_max_c
+        self.since_us, self.ambient_c = 0, ambient_c
+        self.temperatures: _Temperatures = (ambient_c, ambient_c)
+
+    @property
+    def limit_a(self) -> float:
+        """Current that may flow now."""
+        return self._limit_at(self.temperatures[0])
+
+    @property
+    def resistance_ohm(self) -> float:
+        """Resistance of the winding."""
+        return self._thermal.resistance_ohm(self.temperatures[0])
+
+    def pass_time(self, now_us: int, square_a2s: float) -> None:
+        """Let time pass with an integral of the squared current, A^2 s."""
+        seconds = (now_us - self.since_us) / 1_000_000
+        if seconds:
+            self.i2t.pass_time(seconds, square_a2s)
+            self.temperatures = self._after(seconds, square_a2s / seconds)
+            self.since_us = now_us
+
+    def rest(self, now_us: int, current_a: float) -> None:
+        """Let time pass with a constant current; the temperatures are those of `at`, to the bit."""
+        seconds = (now_us - self.since_us) / 1_000_000
+        self.i2t.pass_time(seconds, current_a**2 * seconds)
+        self.temperatures, self.since_us = self.at(now_us, current_a), now_us
+
+    def at(self, now_us: int, current_a: float) -> _Temperatures:
+        """Return the temperatures at an instant, the current constant until then."""
+        return self._after((now_us - self.since_us) / 1_000_000, current_a**2)
+
+    def bears(self, current_a: float) -> bool:
+        """Return whether a current may flow for ever and changes no limit."""
+        last, _ = self._after(_AGES_S, current_a**2)
+        hottest = max(last, self.temperatures[0])
+        return self.i2t.settled(current_a) and abs(current_a) <= self._limit_at(hottest)
+
+    def _after(self, seconds: float, square_a2: float) -> _Temperatures:
+        return self._thermal.after(self.temperatures, seconds, square_a2, self.ambient_c)
+
+    def _limit_at(self, winding_c: float) -> float:
+        return _derated_a(self.i2t.limit_a, winding_c, self._winding_max_c)
+
+
+# What the world does to a servo, and what its drive allows.
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class ServoSettings(Copyable):
+    """Attributes whose change has consequences: setting another value calls `changed`."""
+
+    __slots__ = (
+        *("_ambient_c", "_blocked", "_current_limit_a", "_encoder_unplugged", "_load_kg_m2"),
+        *("_load_nm", "_phase_open", "_supply_v"),
+    )
+
+    def __init__(self, supply_v: float) -> None:
+        self._supply_v, self._ambient_c, self._encoder_unplugged = supply_v, 25.0, False
+        self._load_nm, self._load_kg_m2 = 0.0, 0.0
+        self._blocked, self._phase_open, self._current_limit_a = False, False, inf
+
+    def changed(self) -> None:
+        """Take the settings into account: one of them is new."""
+
+    @property
+    def supply_v(self) -> float:
+        """Supply of the power stage."""
+        return self._supply_v
+
+    @supply_v.setter
+    def supply_v(self, value: float) -> None:
+        if value != self._supply_v:
+            self._supply_v = value
+            self.changed()
+
+    @property
+    def ambient_c(self) -> float:
+        """Temperature of the air."""
+        return self._ambient_c
+
+    @ambient_c.setter
+    def ambient_c(self, value: float) -> None:
+        if value != self._ambient_c:
+            self._ambient_c = value
+            self.changed()
+
+    @property
+    def encoder_unplugged(self) -> bool:
+        """The counts stand still, and are lost."""
+        return self._encoder_unplugged
+
+    @encoder_unplugged.setter
+    def encoder_unplugged(self, value: bool) -> None:
+        if value != self._encoder_unplugged:
+            self._encoder_unplugged = value
+            self.changed()
+
+    @property
+    def load_nm(self) -> float:
+        """External torque at the output shaft; positive drives it forward."""
+        return self._load_nm
+
+    @load_nm.setter
+    def load_nm(self, value: float) -> None:
+        if value != self._load_nm:
+            self._load_nm = value
+            self.changed()
+
+    @property
+    def load_kg_m2(self) -> float:
+        """Inertia at the output shaft beside what is always there."""
+        return self._load_kg_m2
+
+    @load_kg_m2.setter
+    def load_kg_m2(self, value: float) -> None:
+        if value != self._load_kg_m2:
+            self._load_kg_m2 = value
+            self.changed()
+
+    @property
+    def blocked(self) -> bool:
+        """The shaft is held."""
+        return self._blocked
+
+    @blocked.setter
+    def blocked(self, value: bool) -> None:
+        if value != self._blocked:
+            self._blocked = value
+            self.changed()
+
+    @property
+    def phase_open(self) -> bool:
+        """No current can flow."""
+        return self._phase_open
+
+    @phase_open.setter
+    def phase_open(self, value: bool) -> None:
+        if value != self._phase_open:
+            self._phase_open = value
+            self.changed()
+
+    @property
+    def current_limit_a(self) -> float:
+        """What the drive allows; the stage may allow less."""
+        return self._current_limit_a
+
+    @current_limit_a.setter
+    def current_limit_a(self, value: float) -> None:
+        if value != self._current_limit_a:
+            self._current_limit_a = value
+            self.changed()
+
+
+# What a servo shows: to its drive through sensors, and to whoever looks at it.
 
 
 class Readings(ServoSettings):
@@ -108,7 +406,7 @@ class Readings(ServoSettings):
         """Temperature of the housing."""
         return self._temperatures()[1]
 
-    def _temperatures(self) -> Temperatures:
+    def _temperatures(self) -> _Temperatures:
         if self.resting:
             return self._heat.at(self.now_us, self._plant.current_a)
         return self._heat.temperatures

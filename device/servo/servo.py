@@ -3,18 +3,197 @@
 from __future__ import annotations
 
 from enum import Enum
-from math import floor
+from math import copysign, floor, pi
 from typing import Final
 
-from tickrig.device.servo.loops import Loops
 from tickrig.device.servo.parameters import ServoParameters
-from tickrig.device.servo.plant import Plant
+from tickrig.device.servo.plant import BREAKAWAY, STEP_S, Plant
 from tickrig.device.servo.readings import Readings
-from tickrig.device.servo.run_ahead import Demands, RunAhead, work_out
+from tickrig.device.twin import Part
+
+# The velocity and position loops of a drive.
+
+
+class Loops(Part):
+    """A position loop around a velocity loop, in control steps of 1 ms.
+
+    Position: proportional, in whole counts; an error below one count counts as
+    none while the demand stands still. Velocity: proportional and integral.
+    Acceleration, viscous and dry friction are fed forward. While the demand
+    of current is cut, the integral does not grow further that way.
+
+    Attributes:
+        integral_a: what the integral adds to the current.
+        cut: direction in which the latest demand was cut: -1, 0, 1.
+    """
+
+    __slots__ = (
+        "_accelerate",
+        "_dry",
+        "_integral",
+        "_position",
+        "_proportional",
+        "_rad",
+        "_viscous",
+        "cut",
+        "integral_a",
+    )
+
+    def __init__(self, parameters: ServoParameters) -> None:
+        gains, motor = parameters.gains, parameters.motor
+        k, natural = motor.torque_constant_nm_a, gains.velocity_rad_s
+        self._rad = 2 * pi / parameters.encoders.counts_per_turn
+        self._accelerate = parameters.inertia_kg_m2 / k
+        self._dry, self._viscous = parameters.coulomb_nm / k, motor.viscous_nm_s / k
+        self._proportional = 2 * gains.damping * natural * self._accelerate
+        self._integral = natural**2 * self._accelerate * STEP_S
+        self._position = gains.position_rad_s
+        self.integral_a, self.cut = 0.0, 0
+
+    @property
+    def gains(self) -> tuple[float, float, float, float, float, float]:
+        """For `RunAhead`: rad a count; gains of position, integral, error, speed, friction."""
+        proportional, viscous, dry = self._proportional, self._viscous, self._dry
+        return self._rad, self._position, self._integral, proportional, viscous, dry
+
+    def follow(
+        self, position: float, counts: int, velocity: float, acceleration: float, speed: float
+    ) -> float:
+        """Return the current that a demanded position asks for, A."""
+        error = position - counts
+        if velocity == 0.0 and -1.0 < error < 1.0:
+            error = 0.0
+        return self.turn(velocity + self._position * error, acceleration, speed)
+
+    def turn(self, velocity: float, acceleration: float, speed: float) -> float:
+        """Return the current that a demanded velocity asks for, A.
+
+        Args:
+            velocity: demand, counts/s.
+            acceleration: demand, counts/s^2.
+            speed: measured speed of the motor, rad/s.
+        """
+        wanted = velocity * self._rad
+        error = wanted - speed
+        if error * self.cut <= 0.0:
+            self.integral_a += self._integral * error
+        current = self.integral_a + self._proportional * error + self._viscous * wanted
+        if wanted != 0.0:
+            current += copysign(self._dry, wanted)
+        return current + self._accelerate * self._rad * acceleration
+
+
+# Several control steps of a servo in one go: the plain ones, in which nothing happens.
+
+_Demands = list[tuple[float, float]]
+"""Position in counts and velocity in counts/s, for each step."""
+
+_Bounds = tuple[float, float, float, float, float, float]
+"""Where a run ends: before a step that would lead out of these bounds.
+
+Largest current that is demanded, A; largest voltage at the winding, V; lowest and highest
+position, counts; largest distance from the demanded position, counts; velocity, counts/s, up to
+which the motor stands: it may not stand while it is demanded to turn faster.
+"""
+
+Four = tuple[float, float, float, float]
+
+
+class RunAhead(Part):
+    """Where a servo is after some steps.
+
+    Attributes:
+        steps: how many there are.
+        counts: what the encoder says.
+        motion: position of the motor, counts; its speed, rad/s; current in the winding, A;
+            integral of the velocity loop, A.
+        losses: what came out of the power stage, since the start, J; heat of the winding, J;
+            heat of friction, J; integral of the squared current, A^2 s.
+    """
+
+    __slots__ = ("counts", "losses", "motion", "steps")
+
+    def __init__(self, steps: int, counts: int, motion: Four, losses: Four) -> None:
+        self.steps, self.counts, self.motion, self.losses = steps, counts, motion, losses
+
+
+def _work_out(  # noqa: PLR0915 - one loop over locals
+    plant: Plant, loops: Loops, encoder: tuple[int, float], demands: _Demands, bounds: _Bounds
+) -> RunAhead:
+    """Work out what the loops and the plant do in steps with a position demand, to the bit.
+
+    Nothing is changed. The run ends before the first step in which friction stops the shaft
+    or holds it, the demand is cut, or the bounds are left: then `Servo` goes on by single steps.
+
+    Args:
+        plant: as it is now.
+        loops: as they are now; no demand is cut.
+        encoder: the counts that it says now, and by how many it is off.
+        demands: for each step, without acceleration.
+        bounds: where the run ends.
+    """
+    # one loop over locals takes half the time of calls
+    (s0, s1, s2, s3), (a0, a1, a2, a3) = plant.rows
+    k, el, b, per_rad = plant.constants
+    rad, stiffness, integral_gain, proportional, viscous, dry = loops.gains
+    r, load, blocked = plant.resistance_ohm, plant.load_nm, plant.blocked
+    low, high = plant.friction_nm
+    low_breakaway, high_breakaway = low * BREAKAWAY, high * BREAKAWAY
+    (counts, lost_counts), (most_a, most_v, first, last, window, slow) = encoder, bounds
+    losses = plant.losses
+    electrical, copper = losses.electrical_j, losses.copper_j
+    rubbed, squares = losses.friction_j, losses.square_a2s
+    angle, w, i, integral = plant.position, plant.speed_rad_s, plant.current_a, loops.integral_a
+    fast, steps = slow + 1.0, 0
+    for position, velocity in demands:
+        error = position - counts
+        if velocity == 0.0 and -1.0 < error < 1.0:
+            error = 0.0
+        wanted = (velocity + stiffness * error) * rad
+        error = wanted - w
+        led = integral + integral_gain * error
+        current = led + proportional * error + viscous * wanted
+        if wanted != 0.0:
+            current += dry if wanted > 0.0 else -dry  # `copysign` is a call of Python
+        current += 0.0  # no acceleration is fed forward
+        if w == 0.0 or blocked or not -most_a <= current <= most_a:
+            break
+        free = s0 * i + s1 * w + s2 * current + s3 * load
+        friction = -free / s3
+        if low_breakaway <= friction <= high_breakaway:
+            break
+        friction = low if friction < low else high
+        speed = free + s3 * friction
+        slope_v = el * (current - i) / STEP_S
+        if (
+            not -most_v <= r * i + k * w + slope_v <= most_v
+            or not -most_v <= r * current + k * speed + slope_v <= most_v
+        ):
+            break
+        way = a0 * i + a1 * w + a2 * current + a3 * (load + friction)
+        ahead = angle + way * per_rad
+        seen = floor(ahead - lost_counts + 0.5)
+        rate = speed * per_rad
+        rolls = not -fast <= rate <= fast or abs(round(rate)) > slow  # `round` is one, too
+        turns = rolls or -slow <= velocity <= slow
+        follows = turns and -window <= position - seen <= window
+        if not (follows and first <= seen <= last and speed):
+            break
+        square = (i * i + i * current + current * current) / 3 * STEP_S
+        middle = (6 * way / STEP_S - w - speed) / 4
+        mean = (i * w + 2 * (i + current) * middle + current * speed) * STEP_S / 6
+        electrical += r * square + el * (current * current - i * i) / 2 + k * mean
+        squares += square
+        copper += r * square
+        rubbed += b * (w * w + w * speed + speed * speed) / 3 * STEP_S - friction * way
+        angle, w, i, integral, counts = ahead, speed, current, led, seen
+        steps += 1
+    return RunAhead(steps, counts, (angle, w, i, integral), (electrical, copper, rubbed, squares))
+
 
 STEP_US: Final = 1_000
-SLOW_US: Final = 20_000  # between two looks at heat and overload
-RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it is followed
+_SLOW_US: Final = 20_000  # between two looks at heat and overload
+_RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it is followed
 
 
 class Demand(Enum):
@@ -111,23 +290,23 @@ class Servo(Readings):
         special = self.resting or self._off or self.encoder_unplugged or self._loops.cut
         if special or feed != 0.0 or self._demand is not Demand.POSITION:
             return 0
-        return (SLOW_US - STEP_US - self.now_us + self._heat.since_us) // STEP_US
+        return (_SLOW_US - STEP_US - self.now_us + self._heat.since_us) // STEP_US
 
     def run_ahead(
-        self, demands: Demands, counts: tuple[float, float], error: float, standstill: float
+        self, demands: _Demands, counts: tuple[float, float], error: float, standstill: float
     ) -> RunAhead:
         """Work out up to `plain_steps` control steps; they are not made.
 
         Args:
             demands: position and velocity for each of them, the first as it is demanded now.
-            counts: as in `Bounds`, where the run ends.
+            counts: as in `_Bounds`, where the run ends.
             error: the same.
             standstill: the same.
         """
         first, last = counts
         bounds = (self._limit_a, self._limit_v, first, last, error, standstill)
         encoder = self.counts, self._lost_counts
-        return work_out(self._plant, self._loops, encoder, demands, bounds)
+        return _work_out(self._plant, self._loops, encoder, demands, bounds)
 
     def follow(self, run: RunAhead, position: float, velocity: float) -> None:
         """Make the steps of a run, then have a position as `drive_position` does."""
@@ -175,7 +354,7 @@ class Servo(Readings):
         else:
             self.counts = floor(plant.position - self._lost_counts + 0.5)
         self.now_us += STEP_US
-        if self.now_us - self._heat.since_us >= SLOW_US:
+        if self.now_us - self._heat.since_us >= _SLOW_US:
             self._update_limit()
         if (
             plant.speed_rad_s == 0.0
@@ -213,7 +392,7 @@ class Servo(Readings):
         heat.pass_time(self.now_us, plant.losses.square_a2s)
         plant.losses.square_a2s = 0.0
         resistance = heat.resistance_ohm
-        if abs(resistance - plant.resistance_ohm) > RESISTANCE_STEP * resistance:
+        if abs(resistance - plant.resistance_ohm) > _RESISTANCE_STEP * resistance:
             plant.shape(plant.inertia_kg_m2, resistance)
         self._limit_a = max(min(self.current_limit_a, heat.limit_a), 0.0)
 

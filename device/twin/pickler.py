@@ -11,10 +11,10 @@ from typing import Any, Final, NoReturn, TypeVar
 
 T = TypeVar("T")
 
-NOTHING: Final[Mapping[str, object]] = {}
+_NOTHING: Final[Mapping[str, object]] = {}
 
 
-def state_of(machine: object, begun: Mapping[str, object] = NOTHING) -> Any:
+def state_of(machine: object, begun: Mapping[str, object] = _NOTHING) -> Any:
     """Return the state that a twin begins with; for `__getstate__`, of compiled classes too.
 
     Args:

@@ -33,10 +33,10 @@ from typing import Any, Final
 
 from tickrig.device.twin.copyable import NonCopyable
 
-PutBack = Callable[[], object]
+_PutBack = Callable[[], object]
 """Makes one object what it was."""
 
-LEFT: Final = (
+_LEFT: Final = (
     *(int, str, bytes, float, complex, type(None), range, slice, type(...)),
     *(Decimal, type, ModuleType, CodeType, GenericAlias, re.Pattern, enum.Enum, struct.Struct),
     *(operator.attrgetter, operator.itemgetter, operator.methodcaller, property),
@@ -44,16 +44,16 @@ LEFT: Final = (
 )
 """What never changes, or is of the process: it is left as it is."""
 
-NEVER_CHANGES: Final[tuple[type, ...]] = (
+_NEVER_CHANGES: Final[tuple[type, ...]] = (
     *(tuple, frozenset, MethodType, BuiltinFunctionType, MethodWrapperType, partial),
     *(MappingProxyType, type({}.keys()), type({}.values()), type({}.items())),
 )
 """What never changes itself, but refers to what does."""
 
-LEFT_MODULES: Final = {"_thread", "datetime", "logging"}
+_LEFT_MODULES: Final = {"_thread", "datetime", "logging"}
 """Modules whose objects are left as they are: locks, times, loggers."""
 
-HEAP_TYPE: Final = 1 << 9
+_HEAP_TYPE: Final = 1 << 9
 """Flag of a class that is written in Python."""
 
 
@@ -82,7 +82,7 @@ class MachineSnapshot:
     """
 
     def __init__(self, *machines: object) -> None:
-        self._put_back: tuple[PutBack, ...] = tuple(_Walk().through(machines))
+        self._put_back: tuple[_PutBack, ...] = tuple(_Walk().through(machines))
 
     def restore(self) -> None:
         """Make all of it what it was; as often as wanted.
@@ -101,7 +101,7 @@ class _Walk:
         self._seen: dict[int, object] = {}
         self._found: list[tuple[object, str]] = []
 
-    def through(self, machines: tuple[object, ...]) -> Iterator[PutBack]:
+    def through(self, machines: tuple[object, ...]) -> Iterator[_PutBack]:
         """Give what puts each of it back."""
         self._found = [(machine, "a snapshot") for machine in machines]
         while self._found:
@@ -112,7 +112,7 @@ class _Walk:
             way_back = getattr(type(item), "way_back", None)
             if way_back is not None:
                 yield way_back(item)
-            elif isinstance(item, NEVER_CHANGES):
+            elif isinstance(item, _NEVER_CHANGES):
                 self._find(item, gc.get_referents(item))
             elif not _is_left(item):
                 yield from self._changing(item, owner)
@@ -121,7 +121,7 @@ class _Walk:
         name = type(owner).__name__
         self._found.extend((item, name) for item in items)
 
-    def _changing(self, item: Any, owner: str) -> Iterator[PutBack]:
+    def _changing(self, item: Any, owner: str) -> Iterator[_PutBack]:
         if isinstance(item, FunctionType):
             self._find(item, item.__closure__ or ())
         elif isinstance(item, CellType):
@@ -135,7 +135,7 @@ class _Walk:
             yield from self._contents(item, owner)
             yield from self._attributes(item)
 
-    def _contents(self, item: Any, owner: str) -> Iterator[PutBack]:
+    def _contents(self, item: Any, owner: str) -> Iterator[_PutBack]:
         """Give what puts back what a container holds; TypeError for what nobody can put back."""
         if isinstance(item, dict):
             kept = dict(item)
@@ -158,7 +158,7 @@ class _Walk:
             name = type(item).__name__
             raise TypeError(f"{name} cannot be put back, and {owner} has one")
 
-    def _attributes(self, item: Any) -> Iterator[PutBack]:
+    def _attributes(self, item: Any) -> Iterator[_PutBack]:
         """Give what puts attributes back; a frozen dataclass has none to be put back."""
         kind, own = type(item), getattr(item, "__dict__", {})
         kept = dict(own)
@@ -178,7 +178,7 @@ class _Walk:
 def _is_left(item: object) -> bool:
     kind = type(item)
     shared = getattr(kind, "shared_by_twins", False)
-    return shared or isinstance(item, LEFT) or kind.__module__ in LEFT_MODULES
+    return shared or isinstance(item, _LEFT) or kind.__module__ in _LEFT_MODULES
 
 
 def _slots_of(kind: type) -> list[str]:
@@ -192,7 +192,7 @@ def _is_plain(kind: type) -> bool:
     solid = next(
         base
         for base, new in made
-        if not base.__flags__ & HEAP_TYPE
+        if not base.__flags__ & _HEAP_TYPE
         or (isinstance(new, BuiltinFunctionType) and new.__self__ is base)
     )
     return solid is object or hasattr(kind, "__mypyc_attrs__")

@@ -1,4 +1,4 @@
-"""The sensor's side of SCIP 1.1: what a URG-04LX understands until it is switched."""
+"""SCIP 1.1, with the texts and settings that both protocols share."""
 
 from __future__ import annotations
 
@@ -8,19 +8,90 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from tickrig.device.twin import Immutable
-from tickrig.device.urg.parameters import LAST_STEP
-from tickrig.device.urg.settings import Settings
-from tickrig.device.urg.texts import first_version
-from tickrig.device.urg.view import View
-from tickrig.wire.sensors.scip import status
-from tickrig.wire.sensors.scip.scip1 import (
-    ERROR,
-    FARTHEST_MM,
-    OK,
-    SWITCH,
-    encode_distances,
-    encode_reply,
-)
+from tickrig.device.urg.world import BIT_RATE, LAST_STEP, View
+from tickrig.wire import scip as status
+from tickrig.wire.scip import ERROR, FARTHEST_MM, SCIP1_OK, SWITCH, encode_distances, encode_reply
+
+# What a URG-04LX tells of itself (URG network, status information).
+
+BY_DEFAULT: Final = "<-Default setting by user"
+
+CONDITION: Final[Mapping[str, str]] = {
+    "": "Sensor works well.",
+    status.LASER_TROUBLE: "Laser trouble.",
+    status.MOTOR_TROUBLE: "Motor trouble.",
+}
+"""By the status of what is broken; the texts of the troubles are ours."""
+
+
+def _first_version(serial: str) -> Mapping[str, str]:
+    """Return what V tells in SCIP 1.1 (HokuyoAIST; a recording in regilo)."""
+    return {
+        "VEND": "Hokuyo Automatic Co.,Ltd.",
+        "PROD": "SOKUIKI Sensor URG-04LX",
+        "FIRM": "3.1.00,07/01/18(20-4095[mm],240[deg],44-725[step],600[rpm])",
+        "PROT": "00003,(SCIP 1.0)",
+        "SERI": serial,
+    }
+
+
+def version(serial: str) -> Mapping[str, str]:
+    """Return what VV tells."""
+    return {
+        "VEND": "Hokuyo Automatic Co.,Ltd.",
+        "PROD": "SOKUIKI Sensor URG-04LX",
+        "FIRM": "3.1.00(18/Jan./2007)",
+        "PROT": "SCIP 2.0",
+        "SERI": serial,
+    }
+
+
+# What SS and HS set (SCIP 2.0, sensor commands).
+
+_BIT_RATES: Final = (19_200, 38_400, 57_600, 115_200, 250_000, 500_000, 750_000)
+
+
+@dataclass(slots=True)
+class Settings:
+    """Bit rate and sensitivity; both are told, and change nothing that is emulated."""
+
+    rate: int = BIT_RATE
+    sensitive: bool = False
+
+    @property
+    def mode(self) -> str:
+        """How it measures, as II tells it."""
+        return f"Measuring by {'Sensitive' if self.sensitive else 'Normal'} Mode"
+
+    @property
+    def rate_text(self) -> str:
+        """The bit rate, as II tells it."""
+        return f"{self.rate}[bps]{BY_DEFAULT if self.rate == BIT_RATE else ''}"
+
+    def set_rate(self, text: str) -> str:
+        """Set the bit rate; return the status."""
+        if not text.isdecimal():
+            return "01"
+        rate = int(text)
+        if rate not in _BIT_RATES:
+            return "02"
+        if rate == self.rate:
+            return "03"
+        self.rate = rate
+        return status.OK
+
+    def set_sensitivity(self, text: str) -> str:
+        """Set the sensitivity; return the status."""
+        if text not in ("0", "1"):
+            return "01"
+        sensitive = text == "1"
+        if sensitive == self.sensitive:
+            return "02"
+        self.sensitive = sensitive
+        return status.OK
+
+
+# The sensor's side of SCIP 1.1: what a URG-04LX understands until it is switched.
 
 _RATE_KEPT: Final = "03"
 
@@ -73,7 +144,7 @@ class Capture(Immutable):
         """Return a scan as it was asked for."""
         numbers = view.distances(self.first, self.last, self.cluster)
         lines = encode_distances([min(number, FARTHEST_MM) for number in numbers])
-        return encode_reply(self.line, OK, lines)
+        return encode_reply(self.line, SCIP1_OK, lines)
 
     def refuse(self, code: str) -> bytes:
         """Return that there will be no scan."""
@@ -89,20 +160,20 @@ def obey(sensor: Sensor, now_us: int, line: bytes) -> bytes:
 
 
 def _version(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
-    lines = (f"{key}:{text}".encode() for key, text in first_version(sensor.serial).items())
-    return encode_reply(match[0], OK, lines)
+    lines = (f"{key}:{text}".encode() for key, text in _first_version(sensor.serial).items())
+    return encode_reply(match[0], SCIP1_OK, lines)
 
 
 def _laser(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
     if match[1] == b"0":
         sensor.stop()
-        return encode_reply(match[0], OK)
-    return encode_reply(match[0], OK if sensor.light(now_us) else ERROR)
+        return encode_reply(match[0], SCIP1_OK)
+    return encode_reply(match[0], SCIP1_OK if sensor.light(now_us) else ERROR)
 
 
 def _rate(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
     code = sensor.settings.set_rate(match[1].decode())
-    return encode_reply(match[0], OK if code in (status.OK, _RATE_KEPT) else ERROR)
+    return encode_reply(match[0], SCIP1_OK if code in (status.OK, _RATE_KEPT) else ERROR)
 
 
 def _get(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
@@ -115,7 +186,7 @@ def _get(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
 
 def _switch(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
     sensor.switch()
-    return encode_reply(match[0], OK)
+    return encode_reply(match[0], SCIP1_OK)
 
 
 _COMMANDS: Final[Mapping[re.Pattern[bytes], Callable[[Sensor, int, re.Match[bytes]], bytes]]] = {

@@ -3,34 +3,176 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
-from tickrig.device.body.pose import Pose
+from tickrig.device.body import Pose
 from tickrig.device.twin import Part
 from tickrig.device.urg import first_protocol
-from tickrig.device.urg.first_protocol import Capture
-from tickrig.device.urg.parameters import URG_04LX, UrgParameters
-from tickrig.device.urg.refusal import flaw, refusal
-from tickrig.device.urg.rotation import Rotation
-from tickrig.device.urg.settings import Settings
-from tickrig.device.urg.stream import Stream
-from tickrig.device.urg.texts import CONDITION, version
-from tickrig.device.urg.view import View
-from tickrig.device.urg.world import World
+from tickrig.device.urg.first_protocol import BY_DEFAULT, CONDITION, Capture, Settings, version
+from tickrig.device.urg.world import LAST_STEP, URG_04LX, UrgParameters, View, World
+from tickrig.wire import scip as status
 from tickrig.wire.instant import NEVER
-from tickrig.wire.sensors.scip import status
-from tickrig.wire.sensors.scip.command import Command
-from tickrig.wire.sensors.scip.description import encode_lines
-from tickrig.wire.sensors.scip.encoding import encode_number, with_sum
-from tickrig.wire.sensors.scip.reply import Reply
+from tickrig.wire.scip import (
+    LETTERS,
+    MOST_STRING,
+    SIZES,
+    WIDTHS,
+    Command,
+    Reply,
+    encode_lines,
+    encode_number,
+    encode_scan,
+    with_sum,
+)
 
-TIMER: Final = 2**24
+# Why a command is refused (SCIP 2.0, sensor commands and response to invalid commands).
+
+_NOT_A_NUMBER = ("01", "02", "03", "06", "07")
+"""Starting step, end step, cluster count, scan interval, number of scans."""
+
+
+def _refusal(command: Command, *, adjusting: bool) -> str:
+    """Return the status for what is no command, or not now; empty if nothing is wrong."""
+    if command.symbol not in SIZES:
+        return status.UNKNOWN
+    if len(command.string) > MOST_STRING + 1:
+        return status.STRING_TOO_LONG
+    if not LETTERS.issuperset(command.string[1:]):
+        return status.STRING_LETTERS
+    wanted: int = sum(SIZES[command.symbol])
+    if len(command.parameters) != wanted:
+        return status.TOO_SHORT if len(command.parameters) < wanted else status.TOO_LONG
+    if adjusting and command.symbol not in ("TM", "RS"):
+        return status.UNKNOWN  # by which the vendor's urg_library knows the mode
+    return ""
+
+
+def _flaw(command: Command) -> str:
+    """Return the status that refuses MD, MS, GD or GS for its parameters, empty if none does."""
+    for text, code in zip(command.fields, _NOT_A_NUMBER, strict=False):
+        if not text.isdecimal():
+            return code
+    first, last = (int(text) for text in command.fields[:2])
+    if max(first, last) > LAST_STEP:
+        return "04"
+    return "05" if last < first else ""
+
+
+# The mirror that turns: when scans begin and end.
+
+_TURN_US_RPM = 60_000_000
+
+
+@dataclass(slots=True)
+class Rotation:
+    """One scan a turn, without drift.
+
+    Attributes:
+        speed_rpm: turns a minute.
+        level: of CR, 0..10; each takes 1 % off the speed.
+        began_us: when the first scan at this speed began.
+    """
+
+    speed_rpm: int
+    level: int = 0
+    began_us: int = field(default=0, init=False)
+
+    @property
+    def present_rpm(self) -> int:
+        """Turns a minute at the level."""
+        return self.speed_rpm * (100 - self.level) // 100
+
+    @property
+    def period_us(self) -> int:
+        """How long a turn takes."""
+        return _TURN_US_RPM // self.present_rpm
+
+    @property
+    def text(self) -> str:
+        """The speed, as II tells it."""
+        speed = f"{self.present_rpm}[rpm]"
+        return speed if self.level else f"Initial({speed}){BY_DEFAULT}"
+
+    def whole_end_us(self, now_us: int) -> int:
+        """Return when the first scan ends that begins now or later."""
+        period_us = self.period_us
+        return self.began_us + (-(-(now_us - self.began_us) // period_us) + 1) * period_us
+
+    def change(self, now_us: int, level: int) -> None:
+        """Turn at another level from now on."""
+        self.level, self.began_us = level, now_us
+
+
+# What a sensor was asked to measure: one scan, or one after the other.
+
+_WIDEST = {2: 0xFFF, 3: 0x3_FFFF}
+"""The most that so many characters carry; what is farther reads so."""
+
+
+@dataclass(slots=True)
+class Stream:
+    """A command that measures.
+
+    Attributes:
+        command: as it came, without flaw.
+        begins_us: ends of scans before that are not for it.
+        left: scans that remain, 0 if they have no end.
+        skipped: scans that are still left out.
+    """
+
+    command: Command
+    begins_us: int
+    left: int = 0
+    skipped: int = 0
+
+    @property
+    def endless(self) -> bool:
+        """Whether it goes on until it is told to stop."""
+        return self.command.fields[-1] == "00"
+
+    def reply(self, view: View, code: str, echo: bytes) -> bytes:
+        """Return a scan as it was asked for."""
+        first, last, cluster = (int(text) for text in self.command.fields[:3])
+        width = WIDTHS[self.command.symbol[1]]
+        numbers, widest = view.distances(first, last, cluster), _WIDEST[width]
+        if max(numbers, default=0) > widest:
+            numbers = tuple(min(number, widest) for number in numbers)
+        return Reply(echo, code, encode_scan(view.time_ms, numbers, width)).encode()
+
+    def answer(self, view: View) -> bytes:
+        """Return the scan of GD or GS."""
+        return self.reply(view, status.OK, self.command.echo)
+
+    def refuse(self, code: str) -> bytes:
+        """Return why there will be no scan."""
+        return Reply(self.command.echo, code).encode()
+
+    def take(self, ended_us: int, view: View) -> bytes:
+        """Return what is sent of a scan of MD or MS."""
+        if ended_us < self.begins_us:
+            return b""
+        if self.skipped:
+            self.skipped -= 1
+            return b""
+        self.skipped = int(self.command.fields[3])
+        self.left -= not self.endless
+        return self.reply(view, status.DATA, self.echo)
+
+    @property
+    def echo(self) -> bytes:
+        """The command with the scans that remain."""
+        head, command = self.command.parameters[:-2], self.command
+        return Command(command.symbol, f"{head}{self.left:02}", command.string).echo
+
+
+_TIMER: Final = 2**24
 """Milliseconds after which the timer begins again."""
 
-LEVELS: Final = range(11)
-DEFAULT_LEVEL: Final = 99
+_LEVELS: Final = range(11)
+_DEFAULT_LEVEL: Final = 99
 
-Answer = tuple[str, tuple[bytes, ...]]
+_Answer = tuple[str, tuple[bytes, ...]]
 """Status and lines."""
 
 
@@ -57,7 +199,7 @@ class ScipServer(Part):
 
     def __init__(self, parameters: UrgParameters) -> None:
         self.parameters, self.trouble = parameters, ""
-        self._commands: Mapping[str, Callable[[int, Command], Answer]] = {
+        self._commands: Mapping[str, Callable[[int, Command], _Answer]] = {
             **dict.fromkeys(("MD", "MS"), self._stream),
             "BM": self._laser_on,
             "QT": self._quit,
@@ -100,7 +242,7 @@ class ScipServer(Part):
         if not self._switched:
             return first_protocol.obey(self, now_us, line)
         command = Command.parse(line)
-        code = refusal(command, adjusting=self._adjusting)
+        code = _refusal(command, adjusting=self._adjusting)
         if code:
             return Reply(command.echo, code).encode()
         if command.symbol in ("GD", "GS"):
@@ -156,7 +298,7 @@ class ScipServer(Part):
         return b""
 
     def _single(self, now_us: int, command: Command) -> bytes:
-        code = flaw(command) or self.trouble
+        code = _flaw(command) or self.trouble
         if not (code or self.laser):
             code = status.LASER_OFF
         if not code and self._waiting is not None:
@@ -165,8 +307,8 @@ class ScipServer(Part):
             return Reply(command.echo, code).encode()
         return self.measure(Stream(command, now_us)) or b""
 
-    def _stream(self, now_us: int, command: Command) -> Answer:
-        code = flaw(command) or self.trouble
+    def _stream(self, now_us: int, command: Command) -> _Answer:
+        code = _flaw(command) or self.trouble
         if not code and self._running is not None:
             code = status.REPEATED
         if code:
@@ -177,7 +319,7 @@ class ScipServer(Part):
         self._running = Stream(command, begins_us, int(command.fields[-1]))
         return status.OK, ()
 
-    def _laser_on(self, now_us: int, command: Command) -> Answer:
+    def _laser_on(self, now_us: int, command: Command) -> _Answer:
         if self.trouble:
             return "01", ()
         if self.laser:
@@ -185,15 +327,15 @@ class ScipServer(Part):
         self.light(now_us)
         return status.OK, ()
 
-    def _quit(self, now_us: int, command: Command) -> Answer:
+    def _quit(self, now_us: int, command: Command) -> _Answer:
         self.stop()
         return status.OK, ()
 
-    def _reset(self, now_us: int, command: Command) -> Answer:
+    def _reset(self, now_us: int, command: Command) -> _Answer:
         self._begin(now_us)
         return status.OK, ()
 
-    def _time(self, now_us: int, command: Command) -> Answer:
+    def _time(self, now_us: int, command: Command) -> _Answer:
         match command.parameters:
             case "0" | "2" as code:
                 on = code == "0"
@@ -209,12 +351,12 @@ class ScipServer(Part):
             case _:
                 return "01", ()
 
-    def _speed(self, now_us: int, command: Command) -> Answer:
+    def _speed(self, now_us: int, command: Command) -> _Answer:
         if not command.parameters.isdecimal():
             return "01", ()
         level = int(command.parameters)
-        level = 0 if level == DEFAULT_LEVEL else level
-        if level not in LEVELS:
+        level = 0 if level == _DEFAULT_LEVEL else level
+        if level not in _LEVELS:
             return "02", ()
         if level == self.rotation.level:
             return "03", ()
@@ -223,22 +365,22 @@ class ScipServer(Part):
             self.due_us = self.rotation.whole_end_us(now_us)
         return status.OK, ()
 
-    def _rate(self, now_us: int, command: Command) -> Answer:
+    def _rate(self, now_us: int, command: Command) -> _Answer:
         return self.settings.set_rate(command.parameters), ()
 
-    def _sensitivity(self, now_us: int, command: Command) -> Answer:
+    def _sensitivity(self, now_us: int, command: Command) -> _Answer:
         return self.settings.set_sensitivity(command.parameters), ()
 
-    def _version(self, now_us: int, command: Command) -> Answer:
+    def _version(self, now_us: int, command: Command) -> _Answer:
         return status.OK, encode_lines(version(self.serial))
 
-    def _specification(self, now_us: int, command: Command) -> Answer:
+    def _specification(self, now_us: int, command: Command) -> _Answer:
         return status.OK, URG_04LX.lines
 
     def _timer(self, at_us: int) -> int:
-        return (at_us - self._zero_us) // 1_000 % TIMER
+        return (at_us - self._zero_us) // 1_000 % _TIMER
 
-    def _state(self, now_us: int, command: Command) -> Answer:
+    def _state(self, now_us: int, command: Command) -> _Answer:
         texts = {
             "MODL": URG_04LX.model,
             "LASR": "ON" if self.laser else "OFF",

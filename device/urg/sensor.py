@@ -6,17 +6,52 @@ from collections.abc import Callable, Mapping
 from math import inf
 from typing import ClassVar, Final
 
-from tickrig.device.body.pose import Pose
-from tickrig.device.physical import OutputSignal, QuantityBank
+from tickrig.device.body import Pose
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.device.twin import Copyable
-from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.scip_server import ScipServer
-from tickrig.device.urg.terminals import GROUPS, INPUTS, OUTPUTS
-from tickrig.device.urg.world import Post, World
-from tickrig.wire.sensors.scip import status
-from tickrig.wire.serial.lines import LineSplitter
+from tickrig.device.urg.world import Post, UrgParameters, World
+from tickrig.wire import scip as status
+from tickrig.wire.lines import LineSplitter
 
-TICK_US: Final = 1_000
+# The physical side of a sensor: where it is, who steps in its way, and what breaks.
+
+_FAR_M: Final = 10_000
+
+
+def _place(name: str, text: str) -> InputSignal:
+    return InputSignal(name, text, low=-_FAR_M, high=_FAR_M, unit="m", real=True)
+
+
+INPUTS: Final = (
+    _place("x_m", "place of the sensor"),
+    _place("y_m", "place of the sensor, to the left of x"),
+    InputSignal("heading_rad", "where it looks", low=-1e6, high=1e6, unit="rad", real=True),
+    _place("post_x_m", "place of somebody who stands there"),
+    _place("post_y_m", "place of somebody, to the left of x"),
+    InputSignal(
+        "post_radius_m", "how wide; 0 if nobody is there", high=_FAR_M, unit="m", real=True
+    ),
+    InputSignal("laser_broken", "the laser gives no light", SignalType.FAULT),
+    InputSignal("motor_jammed", "something holds the mirror", SignalType.FAULT),
+    InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+)
+
+_GROUPS: Final = {
+    "pose": ("x_m", "y_m", "heading_rad"),
+    "post": ("post_x_m", "post_y_m", "post_radius_m"),
+}
+
+OUTPUTS: Final = (
+    OutputSignal("laser", "1 while the laser is on"),
+    OutputSignal("speed_rpm", "turns of the mirror, 0 while it stands", "1/min"),
+    OutputSignal("ahead_m", "true distance straight ahead, -1 if nothing is there", "m"),
+    OutputSignal("scans", "scans that were measured since power-up"),
+    OutputSignal("served", "commands that were answered since power-up"),
+)
+
+
+_TICK_US: Final = 1_000
 
 
 class Urg(Copyable):
@@ -42,7 +77,7 @@ class Urg(Copyable):
 
     def __init__(self, parameters: UrgParameters | None = None, world: World | None = None) -> None:
         self.parameters, self.world = parameters or UrgParameters(), world or World()
-        self.inputs = QuantityBank(INPUTS, GROUPS, self._input_set)
+        self.inputs = QuantityBank(INPUTS, _GROUPS, self._input_set)
         self._server, self._lines = ScipServer(self.parameters), LineSplitter()
         self._on, self._restarted, self._switched = True, False, True
         self._obeyed: tuple[float, ...] = ()
@@ -50,7 +85,7 @@ class Urg(Copyable):
     @property
     def tick_us(self) -> int:
         """How finely it keeps time."""
-        return TICK_US
+        return _TICK_US
 
     @property
     def due_us(self) -> int:
@@ -67,12 +102,12 @@ class Urg(Copyable):
     @property
     def pose(self) -> Pose:
         """Where it is."""
-        return Pose(*(self.inputs[name] for name in GROUPS["pose"]))
+        return Pose(*(self.inputs[name] for name in _GROUPS["pose"]))
 
     @property
     def surroundings(self) -> World:
         """The world, with whoever stands there."""
-        x_m, y_m, radius_m = (self.inputs[name] for name in GROUPS["post"])
+        x_m, y_m, radius_m = (self.inputs[name] for name in _GROUPS["post"])
         return self.world.with_posts(Post(x_m, y_m, radius_m)) if radius_m else self.world
 
     @property

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-START_S: Final = 60.0
+_START_S: Final = 60.0
 """How long an emulator may take to come up on a busy machine; one that ends is seen at once."""
 
 
@@ -62,7 +62,7 @@ def running(module: str, *options: str, linked: bool = True) -> Iterator[Child]:
 
 
 def _wait_until_up(child: Child, paths: list[Path]) -> None:
-    deadline = time.monotonic() + START_S
+    deadline = time.monotonic() + _START_S
     while not all(path.exists() for path in paths):
         if child.process.poll() is not None or time.monotonic() > deadline:
             said = child.log.read_text("utf-8", "replace").split("\n")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from concurrent.futures import Future
+from queue import Empty, SimpleQueue
 from typing import Final
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
@@ -13,9 +16,9 @@ from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 
-MAX_LINES: Final = 100
-MAX_PRESS_US: Final = 10**15
-MAX_SINCE: Final = 2**63 - 1
+_MAX_LINES: Final = 100
+_MAX_PRESS_US: Final = 10**15
+_MAX_SINCE: Final = 2**63 - 1
 """As long as a command line can say."""
 
 
@@ -91,7 +94,7 @@ class EmulatorControl(RequestDispatcher):
         return {}
 
     def _press(self, request: Object) -> Object:
-        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, MAX_PRESS_US)
+        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, _MAX_PRESS_US)
         emulator = self._emulator
         emulator.operator.press(emulator.effective_us, text_of(request, "name"), duration_us)
         return {}
@@ -107,18 +110,18 @@ class EmulatorControl(RequestDispatcher):
         return {}
 
     def _lines(self, request: Object) -> Object:
-        since = whole(request.get("since", 0), "since", 0, MAX_SINCE)
+        since = whole(request.get("since", 0), "since", 0, _MAX_SINCE)
         return {
             "lines": [
                 {"number": x.number, "at_us": x.at_us, "mark": x.mark, "text": escape(x.data)}
-                for x in self._emulator.log.since(since)[-MAX_LINES:]
+                for x in self._emulator.log.since(since)[-_MAX_LINES:]
             ]
         }
 
     def _status(self, request: Object) -> Object:
         status: Object = dict(self._emulator.status())
         if "since" in request:
-            since_us = whole(request["since"], "since", 0, MAX_SINCE)
+            since_us = whole(request["since"], "since", 0, _MAX_SINCE)
             status["late_us"] = self._emulator.rig.late_since(since_us)
         return status
 
@@ -131,3 +134,56 @@ def _setting(value: object) -> Setting:
     if not isinstance(value, int | float | str) or isinstance(value, bool):
         raise ValueError(f"value is a number or a string, not {short(value)}")
     return value
+
+
+# Requests to an emulator from another thread, served between its steps.
+
+_Answers = Future[list[Object]]
+
+
+class EmulatorEnded(Exception):  # noqa: N818 - no error
+    """Nobody is there to answer any more."""
+
+
+class RequestInbox:
+    """Takes requests from any thread; the emulator's own thread answers them.
+
+    Args:
+        control: answers the requests, as those of the control socket.
+    """
+
+    def __init__(self, control: EmulatorControl) -> None:
+        self._control = control
+        self._posted: SimpleQueue[tuple[Sequence[Object], _Answers]] = SimpleQueue()
+        self._closed = False
+
+    def post(self, requests: Sequence[Object]) -> _Answers:
+        """Hand in requests; they are answered together, between two steps.
+
+        The future raises EmulatorEnded if the emulator ends first. It is not cancelled: an event
+        loop would take that for the end of the task that waits.
+        """
+        answers: _Answers = Future()
+        self._posted.put((requests, answers))
+        if self._closed:
+            self.serve()
+        return answers
+
+    def serve(self) -> None:
+        """Answer what was handed in, or refuse it after the end."""
+        while True:
+            try:
+                requests, answers = self._posted.get_nowait()
+            except Empty:
+                return
+            if not answers.set_running_or_notify_cancel():
+                continue
+            if self._closed:
+                answers.set_exception(EmulatorEnded())
+            else:
+                answers.set_result([self._control.answer(request) for request in requests])
+
+    def close(self) -> None:
+        """Answer nothing any more."""
+        self._closed = True
+        self.serve()

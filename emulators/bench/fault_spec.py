@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from tickrig.host.text.values import parse_time_us
@@ -85,3 +85,33 @@ def _parse_rate(text: str) -> float:
         return float(text)
     except ValueError:
         raise ValueError(f"{text!r} is not a rate: write a number up to 1, as 0.001") from None
+
+
+# A fault that a test ordered, and when it is to come.
+
+
+@dataclass(slots=True)
+class FaultOrder:
+    """A fault, ordered for a time or for what it waits for.
+
+    Attributes:
+        spec: the fault, by its full name.
+        ordered_us: when it was ordered.
+        for_us: how long it stays; as `spec` says if None.
+        when: what it waits for, for people; empty if it waits for a time.
+        due_us: when it begins; None as long as it waits.
+        to_us: when it ends; `NEVER` if it stays.
+    """
+
+    spec: FaultSpec
+    ordered_us: int
+    for_us: int | None = None
+    when: str = ""
+    due_us: int | None = None
+    to_us: int = NEVER
+
+    def begin(self, now_us: int) -> FaultSpec:
+        """Note that it has waited long enough; return the fault with its end."""
+        self.due_us = max(now_us, self.spec.from_us)
+        self.to_us = self.spec.to_us if self.for_us is None else self.due_us + self.for_us
+        return replace(self.spec, to_us=self.to_us)

@@ -12,9 +12,9 @@ from tickrig.wire.can import CanFrame
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
-NUMBER_BITS: Final = 24
-NUMBER_MASK: Final = (1 << NUMBER_BITS) - 1
-FIRST_NUMBER: Final = -1
+_NUMBER_BITS: Final = 24
+_NUMBER_MASK: Final = (1 << _NUMBER_BITS) - 1
+_FIRST_NUMBER: Final = -1
 """Of the node that the fault `babble` adds; the others are counted from 0."""
 
 
@@ -69,12 +69,12 @@ class CanArbiter(Part):
 
     def join(self, end: CanEnd) -> None:
         """Know a node, which may then take part."""
-        self._ends[end.number - FIRST_NUMBER] = end
+        self._ends[end.number - _FIRST_NUMBER] = end
 
     def leave(self, end: CanEnd) -> None:
         """Know a node no longer."""
         self._remove(end)
-        del self._ends[end.number - FIRST_NUMBER]
+        del self._ends[end.number - _FIRST_NUMBER]
 
     def enter(self, end: CanEnd, now: int) -> None:
         """Let a node whose queue was empty take part from now on."""
@@ -89,25 +89,25 @@ class CanArbiter(Part):
 
     def push(self, end: CanEnd) -> None:
         """Let a node take part again, which has a frame to send."""
-        head = priority(end.next) << NUMBER_BITS | end.number - FIRST_NUMBER
+        head = priority(end.next) << _NUMBER_BITS | end.number - _FIRST_NUMBER
         heappush(self.heads, head)
 
     def take(self) -> list[CanEnd]:
         """Take the winner out; several nodes with the same identifier all win."""
         heads = self.heads
         head = heappop(heads)
-        winners = [self._ends[head & NUMBER_MASK]]
-        while heads and heads[0] >> NUMBER_BITS == head >> NUMBER_BITS:
-            winners.append(self._ends[heappop(heads) & NUMBER_MASK])
+        winners = [self._ends[head & _NUMBER_MASK]]
+        while heads and heads[0] >> _NUMBER_BITS == head >> _NUMBER_BITS:
+            winners.append(self._ends[heappop(heads) & _NUMBER_MASK])
         return winners
 
     def take_waiting(self, *, everybody: bool = False) -> tuple[int, list[CanEnd]]:
         """Take the winner of those that wait least, or all of them; the start comes first."""
-        waiting = {head: self._ends[head & NUMBER_MASK] for head in sorted(self.heads)}
+        waiting = {head: self._ends[head & _NUMBER_MASK] for head in sorted(self.heads)}
         start = max(self.free, min(end.held for end in waiting.values()))
         able = [head for head, end in waiting.items() if end.held <= start]
-        rank = able[0] >> NUMBER_BITS
-        winners = [waiting[head] for head in able if everybody or head >> NUMBER_BITS == rank]
+        rank = able[0] >> _NUMBER_BITS
+        winners = [waiting[head] for head in able if everybody or head >> _NUMBER_BITS == rank]
         self.slow = any(end.held > self.free for end in waiting.values())
         for end in winners:
             self._remove(end)
@@ -115,6 +115,6 @@ class CanArbiter(Part):
 
     def _remove(self, end: CanEnd) -> None:
         """Let a node take part no longer."""
-        number = end.number - FIRST_NUMBER
-        self.heads = [head for head in self.heads if head & NUMBER_MASK != number]
+        number = end.number - _FIRST_NUMBER
+        self.heads = [head for head in self.heads if head & _NUMBER_MASK != number]
         heapify(self.heads)

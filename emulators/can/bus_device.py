@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol, TypeGuard
 
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState
 
 Accepted = frozenset[int] | None
 """CAN-IDs that an end listens to, 29-bit ones with bit 29 set; None for all."""

@@ -9,11 +9,10 @@ from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.bridge import CanBridge, CountingPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.clock import Clock
-from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.rig import Coupling, Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import CanFrame, Frames

@@ -16,14 +16,13 @@ from tickrig.emulators.can.bus_device import (
     is_filtering,
 )
 from tickrig.emulators.can.fault_confinement import ErrorCounters
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import CanFrame, ErrorState, Frames
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.wire import CanWire
 
-QUEUE_FRAMES: Final = 4_096
+_QUEUE_FRAMES: Final = 4_096
 """Frames that an end keeps, going out and as many coming in; more are lost and counted."""
 
 
@@ -77,7 +76,7 @@ class CanEnd(Copyable):
         self._first: Frames = ()  # the frame that waits longest, as all its receivers have it
         self._more: list[tuple[int, CanFrame]] | None = None  # those behind it, with their times
         self.arrived_us = NEVER
-        self.waiting, self.room, self.held, self.lost = 0, QUEUE_FRAMES, 0, 0
+        self.waiting, self.room, self.held, self.lost = 0, _QUEUE_FRAMES, 0, 0
         self.unfiltered = False
         self._reconfigured_by: frozenset[int] = frozenset()
         self.wake: Callable[[int], None] = _ignore
@@ -184,7 +183,7 @@ class CanEnd(Copyable):
         """Take a frame behind others that wait, if it fits."""
         if self._more is None:
             self._more = []
-        elif len(self._more) >= QUEUE_FRAMES - 1:
+        elif len(self._more) >= _QUEUE_FRAMES - 1:
             self.lost += 1
             return False
         self._more.append((at_us, frame))
@@ -212,7 +211,7 @@ class CanEnd(Copyable):
 
     def open(self, *, on_bus: bool) -> None:
         """Let it send, or not; then what waits is lost."""
-        self.room = QUEUE_FRAMES if on_bus else 0
+        self.room = _QUEUE_FRAMES if on_bus else 0
         if not on_bus:
             self.lost += self.waiting
             self.drop()

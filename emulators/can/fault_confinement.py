@@ -6,16 +6,16 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Part
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
-PASSIVE_LIMIT: Final = 128
-BUS_OFF_LIMIT: Final = 256
-TRANSMIT_ERROR: Final = 8
-BACK_FROM_PASSIVE: Final = 119
+_PASSIVE_LIMIT: Final = 128
+_BUS_OFF_LIMIT: Final = 256
+_TRANSMIT_ERROR: Final = 8
+_BACK_FROM_PASSIVE: Final = 119
 """REC after a good frame in a passive receiver; 119 to 127 is allowed."""
 
 
@@ -56,13 +56,13 @@ class ErrorCounters(Part):
         """Count a frame that came well."""
         if self.rec:
             self.rec = (
-                min(self.rec - 1, BACK_FROM_PASSIVE) if self._receiver_passive else self.rec - 1
+                min(self.rec - 1, _BACK_FROM_PASSIVE) if self._receiver_passive else self.rec - 1
             )
             self._note()
 
     def transmit_failed(self) -> None:
         """Count an error while transmitting."""
-        self.tec += TRANSMIT_ERROR
+        self.tec += _TRANSMIT_ERROR
         self._note()
 
     def receive_failed(self) -> None:
@@ -78,12 +78,12 @@ class ErrorCounters(Part):
 
     @property
     def _receiver_passive(self) -> bool:
-        return self.rec >= PASSIVE_LIMIT
+        return self.rec >= _PASSIVE_LIMIT
 
     def _note(self) -> None:
-        if self.tec >= BUS_OFF_LIMIT:
+        if self.tec >= _BUS_OFF_LIMIT:
             self.state = ErrorState.BUS_OFF
-        elif self.tec >= PASSIVE_LIMIT or self._receiver_passive:
+        elif self.tec >= _PASSIVE_LIMIT or self._receiver_passive:
             self.state = ErrorState.PASSIVE
         else:
             self.state = ErrorState.ACTIVE
@@ -151,8 +151,8 @@ class FaultConfinement(Part):
             self.marked.remove(end)
 
 
-SEQUENCES: Final = 128
-SEQUENCE_BITS: Final = 11
+_SEQUENCES: Final = 128
+_SEQUENCE_BITS: Final = 11
 """A node returns after 128 times 11 recessive bits in a row (ISO 11898-1, bus-off recovery)."""
 
 
@@ -167,13 +167,13 @@ class Recovery(Part):
     """
 
     def __init__(self, bit: int) -> None:
-        self._sequence = SEQUENCE_BITS * bit
+        self._sequence = _SEQUENCE_BITS * bit
         self._waiting: dict[int, tuple[CanEnd, int, int]] = {}  # end, sequences left, since
         self.active = False
 
     def begin(self, end: CanEnd, now: int) -> None:
         """Let a node wait; asking twice changes nothing."""
-        self._waiting.setdefault(end.number, (end, SEQUENCES, now))
+        self._waiting.setdefault(end.number, (end, _SEQUENCES, now))
         self.active = True
 
     def leave(self, end: CanEnd) -> None:

@@ -10,11 +10,11 @@ from typing import Final
 from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.twin import Immutable, Part
 
-DELAY_US: Final = 10_000
+_DELAY_US: Final = 10_000
 """How long a delayed node sends nothing."""
 
 
-class Verdict(Enum):
+class FaultVerdict(Enum):
     """What becomes of a frame on the bus."""
 
     SENT = auto()
@@ -35,20 +35,20 @@ class CanFaultType(Immutable):
 
     text: str
     rated: bool = True
-    verdict: Verdict | None = None
+    verdict: FaultVerdict | None = None
 
 
 CAN_FAULTS: Final[Mapping[str, CanFaultType]] = {
     "drop": CanFaultType(
         "each frame is acknowledged and then taken by nobody, at this rate",
-        verdict=Verdict.DROPPED,
+        verdict=FaultVerdict.DROPPED,
     ),
     "corrupt": CanFaultType(
-        "a bit of each frame is turned over, at this rate", verdict=Verdict.CORRUPTED
+        "a bit of each frame is turned over, at this rate", verdict=FaultVerdict.CORRUPTED
     ),
     "duplicate": CanFaultType(
         "each frame is sent again, its sender saw the last bit wrong, at this rate",
-        verdict=Verdict.DUPLICATED,
+        verdict=FaultVerdict.DUPLICATED,
     ),
     "delay": CanFaultType("each time a node sends, it is held for 10 ms, at this rate"),
     "babble": CanFaultType("a broken node sends 000# without a pause", rated=False),
@@ -79,7 +79,7 @@ class CanFaults(Part):
         self.seed, self._changed = seed, changed
         self._armed: dict[str, int] = {}
         self._chances: dict[str, Chance] = {}
-        self._verdict: Verdict | None = None
+        self._verdict: FaultVerdict | None = None
         self.active, self.place = False, 0
 
     @property
@@ -110,13 +110,13 @@ class CanFaults(Part):
             self._verdict, self.active = None, bool(self._armed)
             self._changed(name, False)
 
-    def judge(self) -> Verdict:
+    def judge(self) -> FaultVerdict:
         """Say what becomes of the next frame on the bus; the same until `spend`."""
         if self._verdict is None:
-            self._verdict = Verdict.SENT
+            self._verdict = FaultVerdict.SENT
             for name in self._armed:
                 verdict = self.fault_types[name].verdict
-                if verdict and self._hits(name, name) and self._verdict is Verdict.SENT:
+                if verdict and self._hits(name, name) and self._verdict is FaultVerdict.SENT:
                     self._verdict = verdict
             self.place = self._chance("place").draw()
         return self._verdict
@@ -127,7 +127,7 @@ class CanFaults(Part):
 
     def delay_us(self, number: int) -> int:
         """Draw how long a node that sends is held."""
-        return DELAY_US if "delay" in self._armed and self._hits("delay", f"delay {number}") else 0
+        return _DELAY_US if "delay" in self._armed and self._hits("delay", f"delay {number}") else 0
 
     def _hits(self, name: str, stream: str) -> bool:
         return self._chance(stream).hit(self._armed[name])

@@ -7,23 +7,21 @@ from typing import TYPE_CHECKING, Final
 
 from tickrig.device.twin import Cache, Listeners
 from tickrig.emulators.can.arbitration import dominant, first_difference
-from tickrig.emulators.can.faults import CanFaults, Verdict
+from tickrig.emulators.can.faults import CanFaults, FaultVerdict
 from tickrig.emulators.can.transmission_outcomes import (
     RECESSIVE_BITS,
     Observer,
     TransmissionOutcomes,
 )
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_bits import INTERFRAME_BITS, frame_bits
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import INTERFRAME_BITS, CanFrame, ErrorState, Frames, frame_bits
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
 
-ERROR_BITS: Final = 6 + RECESSIVE_BITS  # an error flag, and what follows it
-ECHO_BITS: Final = 6  # the error flags of the others, which begin when the first one ends
-HEADER_BITS: Final = 19  # from start of frame to DLC
+_ERROR_BITS: Final = 6 + RECESSIVE_BITS  # an error flag, and what follows it
+_ECHO_BITS: Final = 6  # the error flags of the others, which begin when the first one ends
+_HEADER_BITS: Final = 19  # from start of frame to DLC
 KEPT_LENGTHS: Final = 8_192
 
 
@@ -130,7 +128,7 @@ class CanSegment(TransmissionOutcomes):
         self.disturb(now_us)
         if end in self._winners:
             self._withdraw()
-            self._arbiter.free = now_us * self.unit + (ECHO_BITS + ERROR_BITS) * self.bit
+            self._arbiter.free = now_us * self.unit + (_ECHO_BITS + _ERROR_BITS) * self.bit
         self._arbiter.leave(end)
         self.routes.ends.remove(end)
         if end.unfiltered:
@@ -208,26 +206,26 @@ class CanSegment(TransmissionOutcomes):
     def _judge(self, frame: CanFrame, bits: int) -> None:
         """Plan a transmission that may fail."""
         if self.shorted:  # recessive for good: each start of frame is a bit error
-            self._settle(self._fail_alone, 1 + ERROR_BITS)
+            self._settle(self._fail_alone, 1 + _ERROR_BITS)
         elif any(end.next != frame for end in self._winners):
             self._collide()
         elif self._on_bus <= len(self._winners):
-            self._settle(self._go_unheard, bits - RECESSIVE_BITS + ERROR_BITS)
+            self._settle(self._go_unheard, bits - RECESSIVE_BITS + _ERROR_BITS)
         else:
             self._suffer(bits)
 
     def _suffer(self, bits: int) -> None:
         """Plan a transmission on a bus with faults."""
         match self._faults.judge():
-            case Verdict.SENT:
+            case FaultVerdict.SENT:
                 self._settle(self._deliver, bits)
-            case Verdict.DROPPED:
+            case FaultVerdict.DROPPED:
                 self._settle(self._drop, bits)
-            case Verdict.DUPLICATED:
-                self._settle(self._duplicate, bits - INTERFRAME_BITS + ECHO_BITS + ERROR_BITS)
-            case Verdict.CORRUPTED:
-                turned = HEADER_BITS + self._faults.place % (bits - HEADER_BITS - RECESSIVE_BITS)
-                self._settle(self._fail, turned + ECHO_BITS + ERROR_BITS)
+            case FaultVerdict.DUPLICATED:
+                self._settle(self._duplicate, bits - INTERFRAME_BITS + _ECHO_BITS + _ERROR_BITS)
+            case FaultVerdict.CORRUPTED:
+                turned = _HEADER_BITS + self._faults.place % (bits - _HEADER_BITS - RECESSIVE_BITS)
+                self._settle(self._fail, turned + _ECHO_BITS + _ERROR_BITS)
 
     def _collide(self) -> None:
         """Plan what happens when several send one identifier with different contents."""
@@ -237,7 +235,7 @@ class CanSegment(TransmissionOutcomes):
         if all(end.controller.state is ErrorState.PASSIVE for end in losers):
             self._settle(self._override, self._length(received))
         else:
-            self._settle(self._fail, first_difference(frames) + ECHO_BITS + ERROR_BITS)
+            self._settle(self._fail, first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
 
     def _settle(self, finish: Callable[[], None], bits: int) -> None:
         """Enter what the plan ends in, and how long it keeps the bus busy."""

@@ -2,28 +2,108 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from math import gcd
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.twin import Listeners, Part
+from tickrig.device.twin import Cache, Listeners, Part
 from tickrig.emulators.can.arbitration import CanArbiter, dominant
-from tickrig.emulators.can.busy_time import BusyTime
 from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
 from tickrig.emulators.can.faults import CanFaults
-from tickrig.emulators.can.routes import CanRoutes
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import INTERFRAME_BITS
-from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame, ErrorState
+from tickrig.wire.can import BIT_ERROR, INTERFRAME_BITS, NO_ACK, CanFrame, ErrorFrame, ErrorState
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
+
+
+# When a bus was busy, and how much of its time.
+
+KEPT_SPANS: Final = 32_768
+
+
+class BusyTime(Part):
+    """The latest spans of time in which a bus was busy; frames behind each other are one span.
+
+    Times are whole numbers of any unit.
+    """
+
+    __slots__ = ("_since", "_spans", "_until")
+
+    def __init__(self) -> None:
+        self._since = self._until = 0
+        self._spans: deque[tuple[int, int]] = deque(maxlen=KEPT_SPANS)
+
+    def note(self, since: int, until: int) -> None:
+        """Add a span that begins at the end of the latest one, or later."""
+        if since != self._until:
+            self._spans.append((self._since, self._until))
+            self._since = since
+        self._until = until
+
+    def permille(self, first: int, now: int, present: tuple[int, int]) -> int:
+        """Return the share of the time from `first` to `now`, in 0.1 %.
+
+        Args:
+            first: when it begins.
+            now: when it ends.
+            present: the span of the frame that is on the bus.
+        """
+        spans = (*self._spans, (self._since, self._until), present)
+        busy = sum(max(0, min(until, now) - max(since, first)) for since, until in spans)
+        return 1_000 * busy // (now - first) if now > first else 0
+
+
+# Delivery by table: which ends of a bus receive which CAN-ID.
+
+_EXTENDED: Final = 1 << 29
+"""Marks a 29-bit CAN-ID in a filter, as it does in a COB-ID (CiA 301)."""
+
+_CACHED_ROUTES: Final = 4_096
+
+
+class CanRoutes(Part):
+    """The ends of a bus and their filters, looked up once for each CAN-ID.
+
+    Attributes:
+        ends: all ends, in the order in which they joined.
+        unfiltered: those of them whose filter is out of use until they are polled.
+    """
+
+    def __init__(self) -> None:
+        self.ends: list[CanEnd] = []
+        self.unfiltered: list[CanEnd] = []
+        self._table: Cache[int, tuple[CanEnd, ...]] = Cache()
+
+    def forget(self) -> None:
+        """Begin anew: an end joined, left or has another filter."""
+        self._table.clear()
+
+    def receivers(self, frame: CanFrame) -> tuple[CanEnd, ...]:
+        """Return the ends that receive a frame; its sender may be among them."""
+        key = frame[0] | _EXTENDED if frame[3] else frame[0]
+        found = self._table.get(key)
+        if found is None:
+            found = self._table[key] = self._look_up(key)
+        return (*found, *self._passing(key)) if self.unfiltered else found
+
+    def _passing(self, key: int) -> Iterator[CanEnd]:
+        """Give the unfiltered ends that a CAN-ID would not reach by the filters."""
+        for end in self.unfiltered:
+            if end.accepts is not None and key not in end.accepts:
+                yield end
+
+    def _look_up(self, key: int) -> tuple[CanEnd, ...]:
+        if len(self._table) >= _CACHED_ROUTES:
+            self._table.clear()
+        return tuple(end for end in self.ends if end.accepts is None or key in end.accepts)
+
 
 Observer = Callable[[int, CanFrame | ErrorFrame], None]
 """Called with each frame and each error frame with the time at which it had ended."""
 
 RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter to the next frame
-SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
+_SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 
 
 class TransmissionOutcomes(Part):
@@ -170,7 +250,7 @@ class TransmissionOutcomes(Part):
         """Let passive nodes that have sent wait for the others."""
         for end in senders:
             if end.controller.state is ErrorState.PASSIVE:
-                end.held = max(end.held, self._free + SUSPEND_BITS * self.bit)
+                end.held = max(end.held, self._free + _SUSPEND_BITS * self.bit)
                 self._arbiter.slow = True
 
     def _notify(self, received: CanFrame | ErrorFrame) -> None:

@@ -14,9 +14,9 @@ from tickrig.emulators.can.segment import CanSegment
 from tickrig.emulators.can.transmission_outcomes import Observer
 from tickrig.wire.can import CanFrame
 
-BIT_RATES: Final = range(10_000, 1_000_001)
+_BIT_RATES: Final = range(10_000, 1_000_001)
 WINDOW_US: Final = 1_000_000
-BABBLER: Final = -1  # number of the node that the fault `babble` adds
+_BABBLER: Final = -1  # number of the node that the fault `babble` adds
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -55,8 +55,10 @@ class CanWire(Copyable):
     """
 
     def __init__(self, bit_rate: int = 1_000_000, seed: int = 0) -> None:
-        if bit_rate not in BIT_RATES:
-            raise ValueError(f"bit rate {bit_rate} is not in {BIT_RATES[0]}..{BIT_RATES[-1]} bit/s")
+        if bit_rate not in _BIT_RATES:
+            raise ValueError(
+                f"bit rate {bit_rate} is not in {_BIT_RATES[0]}..{_BIT_RATES[-1]} bit/s"
+            )
         self.bit_rate = bit_rate
         self.faults = CanFaults(seed, self._fault_changed)
         self.observers: Listeners[Observer] = Listeners()
@@ -176,7 +178,7 @@ class CanWire(Copyable):
 
     def _babble(self, now_us: int, *, armed: bool) -> None:
         if armed:
-            self._babbler = _Babbler(self, BABBLER, frozenset())
+            self._babbler = _Babbler(self, _BABBLER, frozenset())
             self._babbler.enqueue((CanFrame(0),))
             self.bus.join(self._babbler, now_us)
         elif self._babbler is not None:

@@ -7,34 +7,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.core.slave import UNCONFIGURED
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.device import application_of as application_of_component
-from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
-from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
+from tickrig.device.canopen.device_rtc import CanopenComponent, make_device_rtc, make_dictionary
+from tickrig.device.canopen.device_rtc import application_of as application_of_component
+from tickrig.device.canopen.sdo import USUAL, SdoLimits
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body.body_spec import BodySpec
-from tickrig.emulators.canopen.choices import AUTO, is_bus_node
+from tickrig.emulators.canopen.body import BodySpec
+from tickrig.emulators.canopen.choices import AUTO, LSS, NodeSpec, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node.node import NODE_INPUTS, Node
-from tickrig.emulators.canopen.node.node_spec import LSS, NodeSpec
-from tickrig.emulators.canopen.node.nodes import Nodes
-from tickrig.emulators.canopen.node.store_file import StoreFile
-from tickrig.emulators.canopen.second_node import SecondNodeAlarm
-from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm
+from tickrig.emulators.canopen.store_file import StoreFile
+from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.station import Station
-from tickrig.host.cli.messages import say, show_findings
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path, say, show_findings
 from tickrig.host.text.log import log_of
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error, find_class
 from tickrig.wire.canopen.eds.eds_file import EdsError
-from tickrig.wire.rtc_canopen.objects import device_info
+from tickrig.wire.rtc_canopen import device_info
 
 if TYPE_CHECKING:
     from tickrig.emulators.canopen.bus_file.bus_nodes import BusNodes

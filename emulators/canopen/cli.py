@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 
-def complete_node(
+def _complete_node(
     context: click.Context, option: click.Parameter, word: str
 ) -> list[CompletionItem]:
     """Complete `5=ep` to `5=epos`, and let the shell add its files."""
@@ -28,7 +28,7 @@ def complete_node(
     return [*map(CompletionItem, models), CompletionItem(word, type="file")]
 
 
-def device_faults(context: click.Context) -> tuple[str, ...]:
+def _device_faults(context: click.Context) -> tuple[str, ...]:
     """Give the faults of the node, those of its model too where --model is given."""
     return (*NODE_FAULTS, *MODEL_FAULTS.get(context.params.get("model") or "", ()))
 
@@ -49,7 +49,7 @@ def device_faults(context: click.Context) -> tuple[str, ...]:
     "nodes",
     multiple=True,
     metavar="N=FILE|MODEL",
-    shell_complete=complete_node,
+    shell_complete=_complete_node,
     help="One more node, as 5=a.eds or 5=epos; 1-20=a.eds makes twenty; may be repeated.",
 )
 @click.option("--rig", type=PATH, help="TOML file with tables [[node]], and [body] if it has one.")
@@ -86,7 +86,7 @@ def device_faults(context: click.Context) -> tuple[str, ...]:
     help="What the strings and domains of a node hold together, as 4096, 64k, 16M.  [64M]",
 )
 @click.option("--trace", type=PATH, help="File to record the bus in, as a candump log.")
-@run_options("drop, corrupt, duplicate, delay, babble, short", device_faults)
+@run_options("drop, corrupt, duplicate, delay, babble, short", _device_faults)
 @click.pass_context
 def main(  # noqa: PLR0913 - options
     context: click.Context,

@@ -8,20 +8,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import ServiceMaker
-from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds401 import Ds401, families
+from tickrig.device.canopen.ds402 import Ds402, indices
 from tickrig.device.canopen.ds402.modes.modes import MODES, supported
-from tickrig.device.canopen.ds402.objects import indices
+from tickrig.device.canopen.slave import Application, ServiceMaker
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.profiles import (
-    DEVICE_TYPE,
-    application_of,
-    default_of,
-    looks_like,
-    profile_name,
-)
 from tickrig.host.canopen.eds import open_eds
 from tickrig.host.text.values import Setting, counted
 from tickrig.wire.canopen.datatypes import Value
@@ -30,6 +22,82 @@ from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription
+
+# What a node does with its objects: the device profiles that are here, and which one it has.
+
+_DEVICE_TYPE: Final = 0x1000
+
+PROFILES: Final[dict[str, ServiceMaker]] = {"none": Application, "401": Ds401, "402": Ds402}
+"""Device profiles by the number that the low word of 1000h holds."""
+
+PROFILE_AREA: Final = range(0x6000, 0xA000)
+_AXIS: Final = 0x800
+"""How far the objects of two axes, or logical devices, are apart (CiA 301)."""
+_PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+_TRANSMISSION_TYPE: Final = 2
+_EVENT_DRIVEN: Final = 255
+"""The transmission type that CiA 401 and CiA 402 give their PDOs."""
+
+_DRIVE_DEFAULTS: Final = {**indices.DEFAULTS, (indices.SUPPORTED_MODES, 0): supported(MODES)}
+_DRIVE_OBJECTS: Final = (*(indices.CONTROLWORD, indices.STATUSWORD, indices.MODES_OF_OPERATION),)
+_MODULE_OBJECTS: Final = (
+    *(families.READ_INPUT.by_8, families.WRITE_OUTPUT.by_8),
+    *(families.ANALOGUE_INPUT.integers[1], families.ANALOGUE_OUTPUT.integers[1]),
+)
+"""Arrays of the usual inputs and outputs."""
+
+
+def application_of(dictionary: Dictionary, profile: str = AUTO) -> ServiceMaker:
+    """Return a profile of `choices.PROFILES`; `auto` takes that of the device type, if it is there.
+
+    >>> application_of(Dictionary([])).__name__
+    'Application'
+    """
+    if profile == AUTO:
+        entry = dictionary.find(_DEVICE_TYPE)
+        number = entry.number & 0xFFFF if entry else 0
+        return PROFILES.get(str(number), Application)
+    return PROFILES[profile]
+
+
+def profile_name(application: ServiceMaker) -> str:
+    """Return the name of a profile, `none` for what is none of `PROFILES`.
+
+    >>> profile_name(Ds401)
+    '401'
+    """
+    return next((name for name, make in PROFILES.items() if make is application), "none")
+
+
+def _looks_like(dictionary: Dictionary) -> str:
+    """Return the name of the profile that the objects of a dictionary are of, empty if none is.
+
+    >>> _looks_like(Dictionary([]))
+    ''
+    """
+    if all(index in dictionary.objects for index in _DRIVE_OBJECTS):
+        return "402"
+    return "401" if any((index, 1) in dictionary for index in _MODULE_OBJECTS) else ""
+
+
+def _default_of(application: ServiceMaker, index: int, sub: int) -> int | None:
+    """Return the default that a profile gives an entry, -1 for all bits; None if it gives none.
+
+    >>> _default_of(Ds402, 0x6081, 0), _default_of(Ds401, 0x6206, 1), _default_of(Ds402, 0x2000, 0)
+    (10000, -1, None)
+    """
+    name = profile_name(application)
+    if name == "none":
+        return None
+    if index not in PROFILE_AREA:
+        is_transmission = index in _PDO_PARAMETERS and sub == _TRANSMISSION_TYPE
+        of_communication = _EVENT_DRIVEN if is_transmission else None
+        return int(name) if (index, sub) == (_DEVICE_TYPE, 0) else of_communication
+    first = PROFILE_AREA.start + (index - PROFILE_AREA.start) % _AXIS
+    if application is Ds401:
+        of_all = first == families.DIGITAL_INTERRUPT_ENABLE
+        return families.DEFAULTS.get(first) if sub or of_all else None
+    return _DRIVE_DEFAULTS.get((first, sub))
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,18 +131,18 @@ class DeviceDescription:
         return self.template.copy()
 
 
-OPEN: Final[Mapping[tuple[int, int], int]] = {}
-INVALID: Final = 1 << 31
+_OPEN: Final[Mapping[tuple[int, int], int]] = {}
+_INVALID: Final = 1 << 31
 
-FIXED: Final = {(0x1005, 0): 0x80, (0x1012, 0): 0x100}
-RELATIVE: Final = {
+_FIXED: Final = {(0x1005, 0): 0x80, (0x1012, 0): 0x100}
+_RELATIVE: Final = {
     (0x1014, 0): 0x80,
     (0x1200, 1): 0x600,
     (0x1200, 2): 0x580,
     **{(0x1400 + number, 1): 0x200 + 0x100 * number for number in range(4)},
     **{(0x1800 + number, 1): 0x180 + 0x100 * number for number in range(4)},
 }
-COB_IDS: Final = (
+_COB_IDS: Final = (
     (range(0x1201, 0x1300), (1, 2)),
     (range(0x1404, 0x1600), (1,)),
     (range(0x1804, 0x1A00), (1,)),
@@ -82,19 +150,19 @@ COB_IDS: Final = (
 """Objects that are not valid until somebody gives them a COB-ID, and its sub-indices."""
 
 
-def predefined(index: int, sub: int) -> tuple[int, bool] | None:
+def _predefined(index: int, sub: int) -> tuple[int, bool] | None:
     """Return a default, and whether the node-ID is added to it; None if there is none.
 
-    >>> predefined(0x1800, 1), predefined(0x1809, 1), predefined(0x2000, 0)
+    >>> _predefined(0x1800, 1), _predefined(0x1809, 1), _predefined(0x2000, 0)
     ((384, True), (2147483648, False), None)
     """
     at = (index, sub)
-    if at in FIXED:
-        return FIXED[at], False
-    if at in RELATIVE:
-        return RELATIVE[at], True
-    invalid = any(index in objects and sub in subs for objects, subs in COB_IDS)
-    return (INVALID, False) if invalid else None
+    if at in _FIXED:
+        return _FIXED[at], False
+    if at in _RELATIVE:
+        return _RELATIVE[at], True
+    invalid = any(index in objects and sub in subs for objects, subs in _COB_IDS)
+    return (_INVALID, False) if invalid else None
 
 
 def read_eds(path: Path, profile: str = AUTO) -> DeviceDescription:
@@ -150,7 +218,7 @@ def _describe(file: EdsFile) -> DeviceDescription:
 
 
 def in_profile(
-    description: DeviceDescription, profile: str, defaults: Mapping[tuple[int, int], int] = OPEN
+    description: DeviceDescription, profile: str, defaults: Mapping[tuple[int, int], int] = _OPEN
 ) -> DeviceDescription:
     """Return a device with its profile, whose defaults count where its file gives none.
 
@@ -190,7 +258,7 @@ def _in_profile(
         return row
     value = defaults.get((row.index, row.sub))
     if value is None:
-        value = default_of(application, row.index, row.sub)
+        value = _default_of(application, row.index, row.sub)
     return row if value is None else row.with_default(fitting(row, value))
 
 
@@ -208,7 +276,7 @@ def fitting(row: EntryDescription, value: int) -> Value:
     return round(nearest) if row.data_type.is_integer else nearest
 
 
-SHOWN: Final = 3
+_SHOWN: Final = 3
 """Entries that a warning names."""
 
 
@@ -216,9 +284,9 @@ def _told_of_values(rows: Sequence[EntryDescription], what: str) -> Iterator[str
     """Say once which values were chosen."""
     if rows:
         named = (
-            f"{_place(row)}={format_value(row.data_type, row.default)}" for row in rows[:SHOWN]
+            f"{_place(row)}={format_value(row.data_type, row.default)}" for row in rows[:_SHOWN]
         )
-        more = ", ..." if rows[SHOWN:] else ""
+        more = ", ..." if rows[_SHOWN:] else ""
         values = counted(len(rows), "value")
         yield f"no DefaultValue for {values} {what}, as {', '.join(named)}{more}"
 
@@ -229,7 +297,7 @@ def _place(row: EntryDescription) -> str:
 
 def _told_of_type(dictionary: Dictionary, application: ServiceMaker, profile: str) -> Iterator[str]:
     """Say that a device has no profile and looks like one, or serves other modes than it says."""
-    row, likely = dictionary.find(DEVICE_TYPE), looks_like(dictionary)
+    row, likely = dictionary.find(_DEVICE_TYPE), _looks_like(dictionary)
     if profile == AUTO and likely and (row is None or not row.number & 0xFFFF):
         said = "has no value" if row and not row.description.has_default else "names none"
         what = f"1000h {said}" if row else "there is no 1000h"
@@ -252,7 +320,7 @@ def _completed(row: EntryDescription, highest: int) -> EntryDescription:
         return row
     if row.sub == 0 and highest and row.index not in COUNTS:
         number, relative = highest, False
-    elif known := predefined(row.index, row.sub):
+    elif known := _predefined(row.index, row.sub):
         number, relative = known
     else:
         return row

@@ -7,20 +7,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import ServiceMaker
-from tickrig.device.canopen.device_rtc.component import CanopenEcho
-from tickrig.device.canopen.device_rtc.device import application_of, make_dictionary
+from tickrig.device.canopen.device_rtc import CanopenEcho, application_of, make_dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import epos, f_palette, f_palette_boot, motor_core_unit
+from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.emulators.canopen.eds import DeviceDescription
 from tickrig.wire.canopen.eds.object_table import BIT_RATES, DeviceInfo
 
-VENDOR: Final = "tickrig"
-PRODUCT: Final = 0x1008
+_VENDOR: Final = "tickrig"
+_PRODUCT: Final = 0x1008
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class EmulatedModel:
     """A device that needs no file.
 
     Attributes:
@@ -42,7 +41,7 @@ class Model:
         template = self.dictionary()
         return DeviceDescription(
             self.name,
-            DeviceInfo(VENDOR, template[PRODUCT, 0].data.decode("ascii"), bit_rates=BIT_RATES),
+            DeviceInfo(_VENDOR, template[_PRODUCT, 0].data.decode("ascii"), bit_rates=BIT_RATES),
             template,
             self.node_id,
             application=self.application,
@@ -50,35 +49,35 @@ class Model:
 
 
 _MODELS: Final = (
-    Model(
+    EmulatedModel(
         "f-palette",
         "I/O module: 8 digital inputs, 8 digital outputs, 8 analogue inputs",
         f_palette.NODE_ID,
         f_palette.dictionary,
         f_palette.make_application,
     ),
-    Model(
+    EmulatedModel(
         "f-palette-boot",
         "f-palette with a boot loader that takes its program (1F50h)",
         f_palette_boot.NODE_ID,
         f_palette_boot.dictionary,
         f_palette_boot.make_application,
     ),
-    Model(
+    EmulatedModel(
         "motor-core-unit",
         "motor core unit with FTMD driver: current, velocity and angle mode",
         motor_core_unit.NODE_ID,
         motor_core_unit.dictionary,
         motor_core_unit.make_application,
     ),
-    Model(
+    EmulatedModel(
         "epos",
         "CiA 402 drive as Maxon's EPOS 24/5, at a wheel of the robot beego",
         epos.NODE_ID,
         epos.dictionary,
         epos.make_application,
     ),
-    Model(
+    EmulatedModel(
         "rtc-echo",
         "DeviceRTC whose out-port says what its in-port heard, both Long",
         48,

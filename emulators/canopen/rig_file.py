@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.emulators.canopen.body.body_spec import BodySpec, read_body
-from tickrig.emulators.canopen.choices import MODELS, PROFILES
-from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids
+from tickrig.emulators.canopen.body import BodySpec, read_body
+from tickrig.emulators.canopen.choices import MODELS, PROFILES, NodeSpec, parse_ids
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.text.user_file import SUFFIX
 
 NODE_KEYS: Final = ("id", "eds", "model", "rtc", "profile")
 DEVICE_KEYS: Final = ("eds", "model", "rtc")
-TABLES: Final = "it consists of tables [[node]] and perhaps one table [body]"
+_TABLES: Final = "it consists of tables [[node]] and perhaps one table [body]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,7 @@ def read_rig(path: Path) -> RigFile:
         raise Refused(f"rig {path}: it describes a bench: tickrig run {path}")
     if content or not isinstance(tables, list):
         extra = f", not [{next(iter(content))}]" if content else ""
-        raise Refused(f"rig {path}: {TABLES}{extra}")
+        raise Refused(f"rig {path}: {_TABLES}{extra}")
     nodes = [
         spec
         for number, table in enumerate(tables, 1)

@@ -10,13 +10,12 @@ from typing import Any, Final, NamedTuple
 
 import click
 
-from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
-from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.transcript import FrameTranscript
+from tickrig.device.canopen.sdo import USUAL, SdoLimits
+from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bus_port import open_bus
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body.body_spec import BodySpec
+from tickrig.emulators.canopen.body import BodySpec
 from tickrig.emulators.canopen.build import (
     Described,
     describe_bus,
@@ -26,28 +25,24 @@ from tickrig.emulators.canopen.build import (
     make_nodes,
     store_keeper,
 )
-from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.node.node_spec import NodeSpec, parse_ids, parse_node
-from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
-from tickrig.emulators.canopen.profiles import profile_name
+from tickrig.emulators.canopen.choices import AUTO, NodeSpec, parse_ids, parse_node
+from tickrig.emulators.canopen.eds import profile_name
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
+from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
-from tickrig.emulators.record.candump_file import CandumpFile
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep, Send
+from tickrig.emulators.record.recorder import CandumpFile
+from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep, Send
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.text.values import counted, parse_size, parse_time_us
 from tickrig.host.text.whole_file import write_whole
-from tickrig.wire.can import CanFrame
-from tickrig.wire.candump import LogLine
+from tickrig.wire.can import CanFrame, LogLine
 from tickrig.wire.canopen.eds.eds_writer import write_eds as format_eds
 
-VIRTUAL_CHANNEL: Final = "can0"
-BIT_RATE: Final = 1_000_000
-SHOWN_NODES: Final = 8
-NO_NODE: Final = (
+_VIRTUAL_CHANNEL: Final = "can0"
+_BIT_RATE: Final = 1_000_000
+_SHOWN_NODES: Final = 8
+_NO_NODE: Final = (
     "no node: give --eds FILE --node-id N, --model NAME, --rtc, --node, --rig FILE or --bus FILE"
 )
 
@@ -99,7 +94,7 @@ class CanopenRun(EmulatorRun):
         super().__init__(options, in_real_time=options.in_real_time)
         self._options = options
         self._described: list[Described] = []
-        self._channel = VIRTUAL_CHANNEL
+        self._channel = _VIRTUAL_CHANNEL
 
     def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
         file, urdf = self._options.bus_yml
@@ -108,7 +103,7 @@ class CanopenRun(EmulatorRun):
         else:
             self._described = describe_bus(file, urdf, self._options.profile)
         if not self._described:
-            raise Refused(NO_NODE)
+            raise Refused(_NO_NODE)
         wire = self._make_wire()
         bench = make_bench(wire, make_nodes(self._described, wire), self._options.body)
         senders = {"send": parse_send}
@@ -116,7 +111,7 @@ class CanopenRun(EmulatorRun):
 
     def _make_wire(self) -> CanWire:
         options = self._options
-        rate = options.bus.bitrate or self._described[0].description.bit_rate or BIT_RATE
+        rate = options.bus.bitrate or self._described[0].description.bit_rate or _BIT_RATE
         try:
             return CanWire(rate, options.seed)
         except ValueError as error:
@@ -165,7 +160,9 @@ class CanopenRun(EmulatorRun):
         wire.observers.append(trace.hear)
         return trace
 
-    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
+    def _attend(
+        self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]
+    ) -> ScenarioPlayer | None:
         options = self._options
         if not (options.scenario or options.verbose):
             return None
@@ -173,22 +170,22 @@ class CanopenRun(EmulatorRun):
         if options.verbose:
             outputs = bench.device.outputs.items()
             transcript.watch(0, *(name for name, item in outputs if not item.unit))
-        return Player(bench, scenario, transcript, stays=options.in_real_time)
+        return ScenarioPlayer(bench, scenario, transcript, stays=options.in_real_time)
 
     def _greet(self, bench: RunningEmulator) -> None:
         if self._options.bus_yml.file:
             self._greet_bus(bench, self._options.bus_yml.file)
             return
         nodes = [f"{item.name} ({item.description.file})" for item in self._described]
-        more = f" and {len(nodes) - SHOWN_NODES} more" if len(nodes) > SHOWN_NODES else ""
-        say(f"CANopen slave {', '.join(nodes[:SHOWN_NODES])}{more} on {bench.link}. Ctrl-C ends.")
+        more = f" and {len(nodes) - _SHOWN_NODES} more" if len(nodes) > _SHOWN_NODES else ""
+        say(f"CANopen slave {', '.join(nodes[:_SHOWN_NODES])}{more} on {bench.link}. Ctrl-C ends.")
         self._say_how()
 
     def _greet_bus(self, bench: RunningEmulator, file: Path) -> None:
         """Say which nodes there are, a line each."""
         say(f"{counted(len(self._described), 'CANopen slave')} of {file} on {bench.link}:")
         for item in self._described:
-            what = item.about or PROFILE_TEXTS[profile_name(item.description.application)]
+            what = item.about or _PROFILE_TEXTS[profile_name(item.description.application)]
             sheet = Path(item.description.file).name
             say(f"  {item.name}  node-ID {item.node_id}  {sheet}  {what}")
         say("Ctrl-C ends.")
@@ -209,12 +206,12 @@ def parse_send(rest: str) -> Send:
     return Send(data, data)
 
 
-PROFILE_TEXTS: Final = {"401": "CiA 401", "402": "CiA 402", "none": "its objects alone"}
-BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
-DEVICES: Final = ("eds", "dcf", "model", "rtc")
+_PROFILE_TEXTS: Final = {"401": "CiA 401", "402": "CiA 402", "none": "its objects alone"}
+_BUS_FIELDS: Final = ("interface", "channel", "bitrate", "timing", "bus_kwargs")
+_DEVICES: Final = ("eds", "dcf", "model", "rtc")
 """Options that name the device of a node, one of them at a time."""
 
-STANDARD_OUTPUT: Final = Path("-")
+_STANDARD_OUTPUT: Final = Path("-")
 
 
 def emulate(
@@ -225,9 +222,9 @@ def emulate(
     options: dict[str, Any],
 ) -> int:
     """Run slaves as the command line says, and return the exit status."""
-    given = {f"--{name}": options.pop(name) for name in DEVICES}
+    given = {f"--{name}": options.pop(name) for name in _DEVICES}
     _check_bus_yml(bus_yml, {**given, "--node-id": node_id, "--node": nodes, "--rig": rig})
-    bus = BusOptions(**{name: options.pop(name) for name in BUS_FIELDS})
+    bus = BusOptions(**{name: options.pop(name) for name in _BUS_FIELDS})
     file = RigFile(()) if rig is None else read_rig(rig)
     specs = (*_specs(given, node_id), *_more(nodes), *file.nodes)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
@@ -254,7 +251,7 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
         raise Refused("--write-eds belongs to --model or --rtc")
     description = describe_device(model or rtc or "")
     text = format_eds(description.template.description, description.info)
-    if path == STANDARD_OUTPUT:
+    if path == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
         return
     try:

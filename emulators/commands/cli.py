@@ -6,46 +6,80 @@ from typing import Final
 
 import click
 
-from tickrig.host.cli.lazy_group import LazyGroup
-from tickrig.host.cli.options import version_option
+from tickrig.host.cli.options import LazyGroup, version_option
 
-HERE: Final = "tickrig.emulators.commands"
-TESTING: Final = "tickrig.emulators.testing.commands"
-COMMANDS: Final = {
+# The command `tickrig demo`; each demonstration stands with its device.
+
+DEMOS: Final = {
+    "rrc": (
+        "tickrig.emulators.rrc.demo_cli:rrc",
+        "Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip.",
+    ),
+    "rtc-lite": (
+        "tickrig.emulators.rtc_lite.demo:rtc_lite",
+        "Send numbers through two emulated PICs, cut the power of one, and see it come back.",
+    ),
+    "tkernel": (
+        "tickrig.emulators.tkernel.demo_cli:tkernel",
+        "Let a robot keep its position by ucodes while the service that resolves them is gone.",
+    ),
+    "fig120": (
+        "tickrig.emulators.fig120:fig120",
+        "Let a potentiometer at one CANopen node turn the motor of another, without a PC in"
+        " between.",
+    ),
+}
+
+
+@click.group(cls=LazyGroup, commands=DEMOS, invoke_without_command=True)
+@click.pass_context
+def demo(context: click.Context) -> None:
+    """Show an emulated device and a host at work; each ends by itself.
+
+    Without a name it lists them.
+    """
+    if context.invoked_subcommand is None:
+        for name, (_, what) in DEMOS.items():
+            click.echo(f"tickrig demo {name:8}  {what}")
+
+
+_HERE: Final = "tickrig.emulators.commands"
+_TESTING: Final = "tickrig.emulators.testing.commands"
+_COMMANDS: Final = {
     "campaign": (
-        f"{TESTING}.campaign_cli:campaign",
+        f"{_TESTING}.campaign_cli:campaign",
         "Run tests that have a bench with many seeds and parameters, on all cores or a cluster.",
     ),
     "check": (
-        f"{TESTING}.check_cli:check",
+        f"{_TESTING}.check_cli:check",
         "Check rig files and bus.yml: say what is on the bench, or all that is wrong.",
     ),
     "compare": (
-        f"{TESTING}.compare_cli:compare_command",
+        f"{_TESTING}.compare_cli:compare_command",
         "Let the host of a recorded run talk to an emulator; say where it answers otherwise.",
     ),
     "ctl": (
-        f"{HERE}.ctl_cli:ctl",
+        f"{_HERE}.ctl_cli:ctl",
         "Operate and watch the emulator whose control socket is SOCKET.",
     ),
-    "demo": (f"{HERE}.demo_cli:demo", "Show an emulated device and a host at work."),
-    "emu": (f"{HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
+    "demo": (f"{_HERE}.cli:demo", "Show an emulated device and a host at work."),
+    "emu": (f"{_HERE}.emu_cli:emu", "Emulate a device, ours or that of an installed package."),
     "init": (
-        f"{TESTING}.init_cli:init",
+        f"{_TESTING}.init_cli:init",
         "Write a rig file to begin with: devices, and all that can be said of them.",
     ),
-    "new": (f"{HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
+    "new": (f"{_HERE}.new_cli:new", "Begin a package that adds something to tickrig."),
     "record": (
-        f"{TESTING}.record_cli:record_command",
+        f"{_TESTING}.record_cli:record_command",
         "Record what passes between a host and the device at PORT, for `tickrig compare`.",
     ),
-    "replay": (f"{TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
+    "replay": (f"{_TESTING}.replay_cli:replay_command", "Replay the trace FILE on fresh devices."),
     "report": (
-        f"{TESTING}.report_cli:report_command",
+        f"{_TESTING}.report_cli:report_command",
         "Make one HTML page of test runs that were kept as JSON.",
     ),
     "run": (
-        f"{TESTING}.run_cli:run",
+        f"{_TESTING}.run_cli:run",
         "Run the bench of a rig file: all its devices on one rig.",
     ),
     "rtc": (
@@ -55,7 +89,7 @@ COMMANDS: Final = {
 }
 
 
-@click.group(cls=LazyGroup, commands=COMMANDS)
+@click.group(cls=LazyGroup, commands=_COMMANDS)
 @version_option()
 def main() -> None:
     """Work with emulated devices.

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.cli.control import request
+from tickrig.host.cli.messages import Refused, time_us
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, time_us
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.requests import Object
 from tickrig.host.text.page_text import json_text
@@ -20,14 +20,14 @@ from tickrig.host.text.values import format_time, parse_setting
 if TYPE_CHECKING:
     from pathlib import Path
 
-PATIENCE_S: Final = 1.0
+_PATIENCE_S: Final = 1.0
 
-Complete = Callable[[click.Context, click.Parameter, str], list[str]]
-Names = Callable[[Any], Iterator[str]]
+_Complete = Callable[[click.Context, click.Parameter, str], list[str]]
+_Names = Callable[[Any], Iterator[str]]
 """Gives names of what an emulator says to `describe`."""
 
 
-def buttons(described: Any) -> Iterator[str]:
+def _buttons(described: Any) -> Iterator[str]:
     """Give what can be pressed."""
     return (each["name"] for each in described.get("inputs", ()) if each["kind"] == "button")
 
@@ -38,7 +38,7 @@ def faults(described: Any) -> Iterator[str]:
     yield from (each["name"] for each in described.get("inputs", ()) if each["kind"] == "fault")
 
 
-def settable(described: Any) -> Iterator[str]:
+def _settable(described: Any) -> Iterator[str]:
     """Give groups and inputs."""
     yield from described.get("groups", ())
     yield from (each["name"] for each in described.get("inputs", ()))
@@ -51,13 +51,13 @@ def seen(described: Any) -> Iterator[str]:
     )
 
 
-def complete(names: Names) -> Complete:
+def _complete(names: _Names) -> _Complete:
     """Return what completes a word to one of these names."""
 
     def completed(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
         assert context.parent is not None
         try:
-            with ControlClient(context.parent.params["socket"], PATIENCE_S) as client:
+            with ControlClient(context.parent.params["socket"], _PATIENCE_S) as client:
                 described = client.request("describe")
         except (OSError, ValueError):  # nobody is there, or somebody else
             return []
@@ -66,11 +66,11 @@ def complete(names: Names) -> Complete:
     return completed
 
 
-EMULATOR: Final = "emulator"
-SERVER: Final = "server"
-CART: Final = "cart"
+_EMULATOR: Final = "emulator"
+_SERVER: Final = "server"
+_CART: Final = "cart"
 
-AS_JSON: Final = "Print the answer as JSON."
+_AS_JSON: Final = "Print the answer as JSON."
 
 
 @click.group()
@@ -129,7 +129,7 @@ def _describe(answer: Any) -> list[str]:
 
 
 def verb(
-    show: Callable[[Any], list[str]] = _nothing, whom: str = EMULATOR, **settings: Any
+    show: Callable[[Any], list[str]] = _nothing, whom: str = _EMULATOR, **settings: Any
 ) -> Callable[[Callable[..., Object]], click.Command]:
     """Return a decorator that makes a command of what gives the fields of its request.
 
@@ -149,7 +149,7 @@ def verb(
                 click.echo(line)
 
         command = ctl.command(do, **settings)(click.pass_obj(run))
-        command.params.append(click.Option(["--json", "as_json"], is_flag=True, help=AS_JSON))
+        command.params.append(click.Option(["--json", "as_json"], is_flag=True, help=_AS_JSON))
         return command
 
     return decorate
@@ -162,14 +162,14 @@ def describe() -> Object:
 
 
 @verb(_values)
-@click.argument("names", nargs=-1, shell_complete=complete(seen))
+@click.argument("names", nargs=-1, shell_complete=_complete(seen))
 def get(names: tuple[str, ...]) -> Object:
     """Show inputs and outputs by NAME, all if none is named."""
     return {"names": list(names)} if names else {}
 
 
 @verb(context_settings={"ignore_unknown_options": True})
-@click.argument("name", shell_complete=complete(settable))
+@click.argument("name", shell_complete=_complete(_settable))
 @click.argument("values", nargs=-1, required=True)
 def set_(name: str, values: tuple[str, ...]) -> Object:
     """Set the input or group NAME to VALUES, as 'set stick 100 -20'."""
@@ -177,7 +177,7 @@ def set_(name: str, values: tuple[str, ...]) -> Object:
 
 
 @verb()
-@click.argument("name", shell_complete=complete(buttons))
+@click.argument("name", shell_complete=_complete(_buttons))
 @click.option("--for", "duration", default="100ms", help="How long, as 500ms.  [100ms]")
 def press(name: str, duration: str) -> Object:
     """Press the button NAME; it is let go by itself. To hold it: set NAME 1."""
@@ -185,14 +185,14 @@ def press(name: str, duration: str) -> Object:
 
 
 @verb()
-@click.argument("spec", shell_complete=complete(faults))
+@click.argument("spec", shell_complete=_complete(faults))
 def fault(spec: str) -> Object:
     """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
     return {"spec": spec}
 
 
 @verb()
-@click.argument("name", shell_complete=complete(faults))
+@click.argument("name", shell_complete=_complete(faults))
 def clear(name: str) -> Object:
     """Let the fault NAME go."""
     return {"name": name}
@@ -211,7 +211,7 @@ def status() -> Object:
     return {}
 
 
-@verb(whom=SERVER)
+@verb(whom=_SERVER)
 @click.argument("node", type=click.IntRange(1, 127))
 def restart(node: int) -> Object:
     """Reset the NODE of an rtc-canopen-server, by its node-ID, and set it up again."""
@@ -221,7 +221,7 @@ def restart(node: int) -> Object:
 _NUMBERS: Final = {"ignore_unknown_options": True}
 
 
-@verb(whom=CART, context_settings=_NUMBERS)
+@verb(whom=_CART, context_settings=_NUMBERS)
 @click.argument("x", type=float)
 @click.argument("y", type=float)
 @click.argument("deg", type=float)
@@ -230,7 +230,7 @@ def goal(x: float, y: float, deg: float) -> Object:
     return {"pose": [x, y, deg]}
 
 
-@verb(whom=CART)
+@verb(whom=_CART)
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
     """Let it drive along the points of FILE, as 'rh3 path', or along its defined path."""
@@ -245,7 +245,7 @@ def path(file: Path | None) -> Object:
     return {"points": [[x, y, degrees(heading)] for x, y, heading in points]}
 
 
-@verb(whom=CART)
+@verb(whom=_CART)
 def end() -> Object:
     """Let PositionInput go into Error when the last command has finished."""
     return {}

@@ -11,11 +11,11 @@ import click
 from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice
 from tickrig.emulators.commands.emu_cli import OURS, device_command
 from tickrig.emulators.commands.serial_run import Options
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.start import load
 from tickrig.host.text.names import near
 
-SHARED: Final = frozenset({*(item.name for item in fields(Options)), "fault", "version", "help"})
+_SHARED: Final = frozenset({*(item.name for item in fields(Options)), "fault", "version", "help"})
 """Options that say how a device is run, and nothing of the device."""
 
 
@@ -61,7 +61,7 @@ def _options_of(name: str) -> dict[str, click.Option]:
     return {
         word: option
         for word, option in named.items()
-        if option.name not in SHARED and word not in SHARED
+        if option.name not in _SHARED and word not in _SHARED
     }
 
 

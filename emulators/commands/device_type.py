@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.scenario.scenario import Encoder, Sender
+from tickrig.emulators.scenario import Encoder, Sender
 from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.host.cli.extensions import ExtensionGroup
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.trace import Config, Header
 from tickrig.host.text.user_file import SUFFIX, explain_error
 
 if TYPE_CHECKING:
     import click
 
-SEED: Final = "seed"
+_SEED: Final = "seed"
 """In a trace, that of the wire's faults: a replay has none, what came through is recorded."""
 
-MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "read")
+_MEMBERS: Final = ("tick_us", "due_us", "reset", "tick", "inputs", "outputs", "read")
 """What a device on a line has (docs/howto/extending.md)."""
 
 
@@ -85,7 +85,7 @@ class DeviceType:
             raise Refused(str(error)) from None
         except Exception as error:  # of another package, it may raise anything
             raise Refused(f"{self.name} cannot be built: {explain_error(error)}") from error
-        if missing := [name for name in MEMBERS if not hasattr(device, name)]:
+        if missing := [name for name in _MEMBERS if not hasattr(device, name)]:
             kind = type(device).__name__
             raise Refused(f"{self.name}: {kind} has no {', '.join(missing)}")
         return ConfiguredDevice(self, device, options)
@@ -102,7 +102,7 @@ class DeviceType:
         Raises:
             ValueError: it cannot be made of that.
         """
-        settings = {name: value for name, value in config.items() if name != SEED}
+        settings = {name: value for name, value in config.items() if name != _SEED}
         if self.configure is None:
             known: dict[str, Any] = {str(option.name): option.default for option in self.options}
             check_config(settings, known, f"{self.title} has no setting", typed=False)

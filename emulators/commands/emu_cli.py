@@ -9,9 +9,8 @@ import click
 
 from tickrig.emulators.commands.run_options import line_options, run_named
 from tickrig.host.cli.extensions import ExtensionError
-from tickrig.host.cli.lazy_group import LazyGroup
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.options import LazyGroup
 from tickrig.host.cli.start import loading
 from tickrig.host.text.names import near
 
@@ -35,12 +34,12 @@ OURS: Final = {
 }
 """Our devices have command lines of their own."""
 
-HELP: Final = """\
+_HELP: Final = """\
 It runs in real time until Ctrl-C. A scenario alone runs in virtual time: as
 fast as it goes, with the same transcript each time, exit status 1 if something
 expected did not come. Together with --link, --serve or --control it is
 played in real time."""
-PANEL: Final = "Show an operator panel in this terminal."
+_PANEL: Final = "Show an operator panel in this terminal."
 
 
 class DeviceGroup(LazyGroup):
@@ -81,10 +80,10 @@ def device_command(device_type: DeviceType) -> click.Command:
         context.exit(run_named(device_type.name, options))
 
     first = device_type.text or f"Emulate {device_type.title}."
-    command = click.command(device_type.name, help=f"{first}\n\n{HELP}")(run)
+    command = click.command(device_type.name, help=f"{first}\n\n{_HELP}")(run)
     command.params[:0] = device_type.options
     if device_type.panel:
-        command.params.append(click.Option(["--panel"], is_flag=True, help=PANEL))
+        command.params.append(click.Option(["--panel"], is_flag=True, help=_PANEL))
     return command
 
 

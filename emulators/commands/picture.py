@@ -7,21 +7,21 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS: Final = (".png", ".svg", ".html")
-PLOTTER: Final = "matplotlib"
+_FORMATS: Final = (".png", ".svg", ".html")
+_PLOTTER: Final = "matplotlib"
 
 
 def check_plot(path: Path) -> None:
     """Refuse before a run what could not be written after it."""
-    if path.suffix.lower() not in FORMATS:
-        raise Refused(f"--plot {path}: the name ends in {', '.join(FORMATS)}")
-    if find_spec(PLOTTER) is None:
-        raise Refused(f"--plot needs {PLOTTER}: pip install 'tickrig[plot]'")
+    if path.suffix.lower() not in _FORMATS:
+        raise Refused(f"--plot {path}: the name ends in {', '.join(_FORMATS)}")
+    if find_spec(_PLOTTER) is None:
+        raise Refused(f"--plot needs {_PLOTTER}: pip install 'tickrig[plot]'")
     from tickrig.host.text.whole_file import check_file  # noqa: PLC0415 - a TAB needs none
 
     try:

@@ -15,18 +15,22 @@ import click
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
-from tickrig.emulators.bench.keeping_time import keeping_time
-from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
-from tickrig.host.cli.messages import say, warnings_shown
-from tickrig.host.cli.refused import BusFailed, Refused, refuse_path, refused_at
-from tickrig.host.cli.serving import serving_control, stopped_by_signals
+from tickrig.emulators.bench.running_emulator import RunningEmulator, keeping_time
+from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
+from tickrig.host.cli.control import serving_control, stopped_by_signals
+from tickrig.host.cli.messages import (
+    BusFailed,
+    Refused,
+    refuse_path,
+    refused_at,
+    say,
+    warnings_shown,
+)
 from tickrig.host.control.clock import ServingClock
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.user_file import explain_error
 
-RECORDING_ENDED: Final = 3
+_RECORDING_ENDED: Final = 3
 """Exit status where the recording is not whole."""
 
 
@@ -111,7 +115,9 @@ class EmulatorRun(ABC):
         """Say where it is and how to talk to it."""
 
     @abstractmethod
-    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
+    def _attend(
+        self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]
+    ) -> ScenarioPlayer | None:
         """Have the run written down as far as that is wanted."""
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[ScenarioStep, ...]]:
@@ -137,7 +143,7 @@ class EmulatorRun(ABC):
         if self._running:
             self._running.stop()
 
-    def _sum_up(self, bench: RunningEmulator, player: Player | None) -> int:
+    def _sum_up(self, bench: RunningEmulator, player: ScenarioPlayer | None) -> int:
         """Say how it went; 3 if it was not recorded to the end, 1 if an expectation was missed."""
         rig = bench.rig
         worst = f" (up to {rig.worst_late_us / 1_000:.1f} ms)" if rig.late_ticks else ""
@@ -148,7 +154,7 @@ class EmulatorRun(ABC):
             say(f"expectations met: {player.met}; missed: {player.missed}")
         if bench.trace_error:
             say(f"the recording ended early: {bench.trace_error}")
-            return RECORDING_ENDED
+            return _RECORDING_ENDED
         return 1 if player and player.missed else 0
 
 

@@ -13,11 +13,12 @@ from tickrig.host.cli.start import load, loading
 if TYPE_CHECKING:
     from tickrig.device.physical import InputSignal
 
-Faults = Callable[[click.Context], Iterable[str]]
+
+_Faults = Callable[[click.Context], Iterable[str]]
 """Gives the faults of a device as the command line has it so far."""
 
 
-def run_options(wire_faults: str, device_faults: Faults) -> Decorator:
+def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
     """Return a decorator that adds the fields of `run.RunOptions`, and --version.
 
     Args:
@@ -92,3 +93,21 @@ def run_named(name: str, options: Mapping[str, Any]) -> int:
         from tickrig.emulators.commands.serial_run import run_device  # noqa: PLC0415 - slow
 
     return run_device(DEVICES.load(name), options)
+
+
+# The option --type: a device type by name.
+
+
+def type_option(text: str) -> Decorator:
+    """Return a decorator that adds `--type NAME`, which the shell completes.
+
+    Args:
+        text: its help.
+    """
+    return click.option("--type", "type_name", default="", shell_complete=_complete, help=text)
+
+
+def _complete(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
+    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+
+    return [name for name in DEVICES.names() if name.startswith(begun)]

@@ -11,19 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.transcript import Transcript
+from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
-from tickrig.emulators.serial.emulator import Emulator
-from tickrig.emulators.serial.network.network_port import NetworkPort
-from tickrig.emulators.serial.network.serve_url import ServeUrl, parse_serve_url
-from tickrig.emulators.serial.serial_hub import SerialHub
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused, refuse_path, refused_at
+from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
+from tickrig.emulators.serial.emulator import Emulator, SerialHub
+from tickrig.emulators.serial.network import NetworkPort, ServeUrl, parse_serve_url
+from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say
 from tickrig.host.text.trace import Header
 
 if TYPE_CHECKING:
@@ -165,14 +160,16 @@ class SerialRun(EmulatorRun):
         except OSError as error:
             refuse_path("trace", error)
 
-    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
+    def _attend(
+        self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]
+    ) -> ScenarioPlayer | None:
         options, everything = self._options, bool(self._options.scenario)
         if options.panel or not (everything or options.verbose):
             return None
         everything = everything or options.verbose > 1
         wanted = (lambda line: True) if everything else self._type.is_event
         transcript = Transcript(bench, click.echo, wanted)
-        return Player(bench, scenario, transcript, stays=options.in_real_time)
+        return ScenarioPlayer(bench, scenario, transcript, stays=options.in_real_time)
 
     def _go_on(self, bench: RunningEmulator) -> None:
         if self._options.panel and self._type.panel and isinstance(bench, Emulator):

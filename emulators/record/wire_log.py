@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.text.trace import Mark
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.serial.lines import LineSplitter
+from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.lines import LineSplitter
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +31,10 @@ class WireLine:
     source: str = ""
 
 
-MOST_BEGUN: Final = 4_096
+_MOST_BEGUN: Final = 4_096
 """Bytes that are kept of a line that does not end."""
 
-LINE_ENDS: Final = b"\r\n"
+_LINE_ENDS: Final = b"\r\n"
 
 Splitter = Callable[[int, bytes], list[bytes]]
 """Told when bytes were heard; gives what has become whole."""
@@ -70,10 +69,10 @@ class WireLog:
 
     def hear(self, at_us: int, mark: Mark, data: bytes) -> None:
         """Take what passed, cut anywhere."""
-        begun = (self._begun[mark][1] + data)[-MOST_BEGUN:]
+        begun = (self._begun[mark][1] + data)[-_MOST_BEGUN:]
         for line in self._splitters[mark](at_us, data):
             self.add(at_us, mark, line)
-            begun = begun[begun.find(line) + len(line) :].lstrip(LINE_ENDS)
+            begun = begun[begun.find(line) + len(line) :].lstrip(_LINE_ENDS)
         self._begun[mark] = at_us, begun
 
     def unfinished(self) -> tuple[WireLine, ...]:

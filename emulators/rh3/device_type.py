@@ -6,28 +6,136 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any, Final
 
+from tickrig.device.modbus import Register
 from tickrig.device.rh3.base import Rh3Base
+from tickrig.device.rh3.driver import TABLE
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
-from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.rh3.base_options import parameters_of, read_parameters
-from tickrig.emulators.rh3.frame_log import frame_splitter
-from tickrig.emulators.rh3.verbs import verbs
+from tickrig.emulators.record.wire_log import Splitter, WireLine
+from tickrig.emulators.rh3.cli import parameters_of, read_parameters
+from tickrig.emulators.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.host.text.trace import Config
+from tickrig.host.text.names import near
+from tickrig.host.text.trace import Config, Mark
+from tickrig.wire.errors import WireError
+from tickrig.wire.modbus import (
+    MAX_FRAME_BYTES,
+    READ,
+    SHORTEST_SILENCE_US,
+    WRITE,
+    Request,
+    encode_frame,
+    encode_request,
+    parse_frame,
+)
 
-CYCLE: Final = b"01 17 "
+# Cut what passes on the line into frames, shown in hex without their CRC: `01 03 00 00 00 02`.
+
+_CRC_BYTES = 2
+
+
+def _frame_splitter(mark: Mark) -> Splitter:
+    """Return what makes frames of one direction."""
+    return _FrameSplitter().split
+
+
+class _FrameSplitter:
+    """A frame is whole when its CRC matches; what silence leaves behind is shown as it is."""
+
+    def __init__(self) -> None:
+        self._begun, self._received_us = b"", 0
+
+    def split(self, at_us: int, data: bytes) -> list[bytes]:
+        out = []
+        if self._begun and at_us - self._received_us >= SHORTEST_SILENCE_US:
+            out.append(b"(no frame) " + _hex(self._begun))
+            self._begun = b""
+        self._received_us = at_us
+        self._begun = (self._begun + data)[:MAX_FRAME_BYTES]
+        try:
+            parse_frame(self._begun)
+        except WireError:
+            return out
+        whole, self._begun = self._begun, b""
+        return [*out, _hex(whole[:-_CRC_BYTES])]
+
+
+def _hex(data: bytes) -> bytes:
+    return data.hex(" ").encode()
+
+
+# What a scenario can send to a base: `read status`, `write target_speed_left 71534`, `raw`.
+
+_BY_NAME = {register.name: register for register in TABLE}
+_WORD = 0xFFFF
+
+
+def verbs(address: int) -> Mapping[str, Sender]:
+    """Return the verbs that send, to the slave of an address."""
+
+    def read(rest: str) -> Send:
+        words = rest.split()
+        if len(words) == 1 and words[0] in _BY_NAME:
+            register = _BY_NAME[words[0]]
+            return _packed(address, Request(READ, (register.address, register.words)))
+        if len(words) == 2:
+            return _packed(address, Request(READ, (_register(words[0]), _whole(words[1]))))
+        raise ValueError(f"read takes a register's name, or an address and a number, got {rest!r}")
+
+    def write(rest: str) -> Send:
+        name, *words = rest.split() or [""]
+        if name in _BY_NAME and len(words) == 1:
+            values = _split(_BY_NAME[name], _whole(words[0]))
+        elif words:
+            values = tuple(_whole(word) & _WORD for word in words)
+        else:
+            raise ValueError(f"write takes a register and its value, got {rest!r}")
+        return _packed(address, Request(WRITE, write=(_register(name), values)))
+
+    return {"read": read, "write": write, "raw": parse_raw}
+
+
+def _packed(address: int, request: Request) -> Send:
+    frame = encode_frame(address, encode_request(request))
+    return Send(frame, frame[:-_CRC_BYTES].hex(" ").encode())
+
+
+def _register(word: str) -> int:
+    if word in _BY_NAME:
+        return _BY_NAME[word].address
+    try:
+        value = int(word, 0)
+    except ValueError:
+        raise ValueError(f"no register {word!r}; {near(word, _BY_NAME)}") from None
+    if not 0 <= value <= _WORD:
+        raise ValueError(f"register {word} is not in 0..0xFFFF")
+    return value
+
+
+def _whole(word: str) -> int:
+    try:
+        return int(word, 0)
+    except ValueError:
+        raise ValueError(f"{word!r} is not a whole number") from None
+
+
+def _split(register: Register, value: int) -> tuple[int, ...]:
+    """Return the registers of a number, high half first."""
+    return tuple(value >> 16 * place & _WORD for place in reversed(range(register.words)))
+
+
+_CYCLE: Final = b"01 17 "
 """What -v leaves out: the traffic of each period."""
 
 
-def config_to_trace(parameters: BaseParameters) -> Config:
+def _config_to_trace(parameters: BaseParameters) -> Config:
     """Return all parameters, also those left alone: defaults may change one day."""
     settings = asdict(parameters)
     return {"ground_seed" if name == "seed" else name: v for name, v in settings.items()}
 
 
-def build_rh3(config: Config) -> Rh3Base:
+def _build_rh3(config: Config) -> Rh3Base:
     """Build a base.
 
     Raises:
@@ -53,19 +161,19 @@ def _configure(base: DeviceType, options: Mapping[str, Any], seed: int) -> Confi
         )
 
     base = replace(base, senders=verbs(address), line=line, talk=talk)
-    return ConfiguredDevice(base, Rh3Base(parameters), config_to_trace(parameters))
+    return ConfiguredDevice(base, Rh3Base(parameters), _config_to_trace(parameters))
 
 
 def _is_event(line: WireLine) -> bool:
-    return not line.data.startswith(CYCLE)
+    return not line.data.startswith(_CYCLE)
 
 
 RH3_BASE: Final = DeviceType(
     name="rh3-base",
     title="RH3 base",
-    build=build_rh3,
+    build=_build_rh3,
     configure=_configure,
-    config_of=lambda base: config_to_trace(base.parameters),
-    line=LineSettings(splitter=frame_splitter, wire=Rs485Line),
+    config_of=lambda base: _config_to_trace(base.parameters),
+    line=LineSettings(splitter=_frame_splitter, wire=Rs485Line),
     is_event=_is_event,
 )

@@ -9,13 +9,13 @@ from typing import Final
 from tickrig.device.twin import Part, restore, state_of
 from tickrig.wire.instant import NEVER
 
-Action = Callable[[int], None]
+_Action = Callable[[int], None]
 """Something to do; it is told the time in microseconds."""
 
-SPARE: Final = 64
+_SPARE: Final = 64
 """So many forgotten actions may stay, and as many as there are others."""
 
-_Entry = tuple[int, int, Hashable, Action]
+_Entry = tuple[int, int, Hashable, _Action]
 """When, the number of its entering, its key, and what."""
 
 
@@ -29,7 +29,7 @@ class EventQueue(Part):
         """The number of what holds for each key; others in the heap were forgotten."""
         self.due_us = NEVER
 
-    def put(self, key: Hashable, t_us: int, action: Action) -> None:
+    def put(self, key: Hashable, t_us: int, action: _Action) -> None:
         """Enter an action; one entered before under the same key is forgotten."""
         self._number += 1
         self._entered[key] = self._number
@@ -61,7 +61,7 @@ class EventQueue(Part):
             action(now_us)
 
     def _note_due(self) -> None:
-        if len(self._heap) > 2 * len(self._entered) + SPARE:
+        if len(self._heap) > 2 * len(self._entered) + _SPARE:
             self._heap = sorted(entry for entry in self._heap if self._holds(entry))
         while self._heap and not self._holds(self._heap[0]):
             heappop(self._heap)

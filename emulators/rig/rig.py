@@ -3,27 +3,228 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from heapq import heapify, heappop, heappush, heapreplace
 from itertools import compress
 from operator import not_
-from typing import TYPE_CHECKING, Any, Final, TypeVar, overload
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar, overload
 
 from tickrig.device.horizon import Horizon
-from tickrig.device.twin import Copyable, Listeners, restore, state_of, twin
+from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
-from tickrig.emulators.rig.coupling import Coupling
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
 from tickrig.emulators.rig.station import Station, next_tick_us
-from tickrig.emulators.rig.timetable import Timetable
 from tickrig.emulators.rig.wire_port import is_wire_port
-from tickrig.emulators.rig.wires import Wires
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.twin.snapshot import MachineSnapshot
 
-LATE_US: Final = 1_000
+
+# What joins devices beside their wires.
+
+
+class Coupling(Protocol):
+    """A body on the wheels of several drives, a belt between two shafts.
+
+    It acts after all devices of a step have computed: it looks at their outputs
+    and may set their inputs, which count in their next tick. So the order in which
+    devices are listed cannot matter to it either.
+    """
+
+    @property
+    def tick_us(self) -> int:
+        """It acts at multiples of this."""
+        ...
+
+    @property
+    def due_us(self) -> int:
+        """When it would change something even if no device has work; see `Device.due_us`."""
+        ...
+
+    def act(self, now_us: int, /) -> None:
+        """Look at outputs, set inputs."""
+
+
+# The wires of a rig: only those are asked that have something on them.
+
+_NOBODY: Final[tuple[Host, ...]] = ()
+
+
+class Wires(Part):
+    """Wires that are moved on together, each by itself for as long as nobody can notice.
+
+    What ends on one wire may let a station send on another, but not before its next tick.
+    Up to there each wire goes on alone; in the order of time, frame by frame, where hosts
+    wait or several wires have observers.
+
+    A wire without anything on it is left behind: `advance` brings it along.
+
+    Args:
+        periods: the control periods, in us, on whose multiples ticks fall.
+    """
+
+    def __init__(self, periods: Iterable[int]) -> None:
+        self._periods, self._wires = tuple(periods), list[Wire]()
+        self._busy: tuple[int, ...] = ()  # places of those that may have something on them
+
+    def __bool__(self) -> bool:
+        """Return whether there is any."""
+        return bool(self._wires)
+
+    def join(self, wire: Wire) -> None:
+        """Take a wire along; one that is there already is no second one."""
+        if wire not in self._wires:
+            self._wires.append(wire)
+            self._hear_of(len(self._wires) - 1, wire)
+
+    def hear_again(self) -> None:
+        """Hear of new traffic, after all this was copied."""
+        for place, wire in enumerate(self._wires):
+            self._hear_of(place, wire)
+
+    def _hear_of(self, place: int, wire: Wire) -> None:
+        wire.on_traffic.append(partial(self._begin, place))
+        self._begin(place)
+
+    def _begin(self, place: int) -> None:
+        """Ask a wire from now on: something is on it."""
+        if place not in self._busy:
+            self._busy = tuple(sorted((*self._busy, place)))
+
+    @property
+    def due_us(self) -> int:
+        """When something ends on one of them, `NEVER` if nothing is on its way."""
+        return min(self._dues())[0] if self._busy else NEVER
+
+    def _dues(self) -> list[tuple[int, int]]:
+        """Return when something ends next on those that have something on them, and where."""
+        dues = [(self._wires[place].due_us, place) for place in self._busy]
+        if any(due_us == NEVER for due_us, _ in dues):
+            self._busy = tuple(place for due_us, place in dues if due_us < NEVER)
+        return dues
+
+    def advance(self, now_us: int) -> None:
+        """Bring all wires to a time."""
+        for wire in self._wires:
+            wire.advance(now_us)
+
+    def advance_busy(self, now_us: int) -> None:
+        """Bring those to a time that have something on them."""
+        for place in self._busy:
+            self._wires[place].advance(now_us)
+
+    def advance_until_received(self, until_us: int, hosts: tuple[Host, ...] = _NOBODY) -> bool:
+        """Let things end up to a time, but not beyond a tick for which a station was woken.
+
+        Args:
+            until_us: the time.
+            hosts: who stops it, too, when something has arrived there.
+
+        Returns:
+            False if nothing is left that ends by then, and nobody was woken.
+        """
+        if not self._busy:
+            return False
+        if len(self._busy) == 1:
+            return self._wires[self._busy[0]].advance_until_received(until_us)
+        dues = self._dues()
+        first_us = min(dues)[0]
+        if first_us > until_us:
+            return False
+        for tick_us in self._periods:  # nobody who hears of it has a tick before
+            until_us = min(until_us, -(-first_us // tick_us) * tick_us)
+        if hosts or sum(bool(self._wires[place].observers) for _, place in dues) > 1:
+            self._advance_in_order(dues, until_us, hosts)
+        else:
+            for due_us, place in dues:
+                if due_us <= until_us:
+                    self._wires[place].advance(until_us)
+        return True
+
+    def _advance_in_order(
+        self, heap: list[tuple[int, int]], until_us: int, hosts: tuple[Host, ...]
+    ) -> None:
+        """Let what ends first end first, on whichever wire; stop when a host has something."""
+        heap.append((NEVER, len(self._wires)))
+        heapify(heap)
+        while heap[0][0] <= until_us:
+            place = heap[0][1]
+            wire = self._wires[place]
+            next_us, next_place = min(heap[1:3])
+            alone_us = next_us - (next_place < place)  # the first of those that end together
+            received = wire.advance_until_received(min(until_us, alone_us))
+            if received and any(host.arrived_us < NEVER for host in hosts):
+                return
+            heapreplace(heap, (wire.due_us, place))
+
+
+# Which stations of a rig have work at which tick.
+
+
+class Timetable(Part):
+    """Ticks with work, soonest first, each with its stations.
+
+    A station stands at one tick, `station.at_us`. Where it stood before it was
+    entered for an earlier tick it is simply passed over.
+
+    Attributes:
+        first_us: the soonest tick with work, `NEVER` if there is none.
+        open_us: no tick is entered before this.
+    """
+
+    __slots__ = ("_stations", "_ticks", "first_us", "open_us")
+
+    def __init__(self) -> None:
+        self.first_us, self.open_us = NEVER, 1
+        self._ticks: list[int] = []  # a heap
+        self._stations: dict[int, list[Station[Any]]] = {}
+
+    def enter(self, station: Station[Any], at_us: int) -> None:
+        """Let a station have work at the first tick from `at_us` on, unless it has some before."""
+        if at_us >= station.at_us:
+            return
+        tick_us = station.tick_us
+        at_us = -(-max(at_us, self.open_us) // tick_us) * tick_us
+        if at_us >= station.at_us:
+            return
+        station.at_us = at_us
+        stations = self._stations.get(at_us)
+        if stations is not None:
+            stations.append(station)
+            return
+        self._stations[at_us] = [station]
+        heappush(self._ticks, at_us)
+        self.first_us = min(self.first_us, at_us)
+
+    def take(self, now_us: int) -> list[Station[Any]]:
+        """Take the stations that have work by `now_us`."""
+        if self.first_us > now_us:
+            return []
+        taken = []
+        while self._ticks and self._ticks[0] <= now_us:
+            at_us = heappop(self._ticks)
+            for station in self._stations.pop(at_us):
+                if station.at_us == at_us:
+                    station.at_us = NEVER
+                    taken.append(station)
+        self._pass_over()
+        return taken
+
+    def _pass_over(self) -> None:
+        """Drop ticks whose stations all have gone elsewhere."""
+        while self._ticks:
+            at_us = self._ticks[0]
+            if any(station.at_us == at_us for station in self._stations[at_us]):
+                self.first_us = at_us
+                return
+            del self._stations[heappop(self._ticks)]
+        self.first_us = NEVER
+
+
+_LATE_US: Final = 1_000
 """A step that begins later than this counts as late."""
 
 LATE_KEPT: Final = 1_000
@@ -67,7 +268,7 @@ class Rig(Copyable):
         in_step: whether a step is being done: what is called back then cannot wait.
         now_us: time since the start of the rig.
         worst_late_us: by how much the worst step was late.
-        late_ticks: how many steps began more than `LATE_US` late.
+        late_ticks: how many steps began more than `_LATE_US` late.
         hosts: ends at which something that arrives is a step by itself; a watcher takes it.
         watchers: called with the time after each step, in the order of entering.
     """
@@ -362,7 +563,7 @@ class Rig(Copyable):
             watch(now_us)
 
     def late_since(self, t_us: int) -> int:
-        """Return by how much the worst step was late from a time on, of those beyond `LATE_US`.
+        """Return by how much the worst step was late from a time on, of those beyond `_LATE_US`.
 
         Args:
             t_us: the time; if more than `LATE_KEPT` steps were late since then, all count.
@@ -373,7 +574,7 @@ class Rig(Copyable):
 
     def _note_late(self, late_us: int) -> None:
         self.worst_late_us = max(self.worst_late_us, late_us)
-        if late_us > LATE_US:
+        if late_us > _LATE_US:
             self.late_ticks += 1
             self._late.append((self.now_us, late_us))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tickrig.emulators.rig.port import ByteEnd
 from tickrig.emulators.rig.rig import Rig
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.wire.instant import NEVER
 
 

@@ -12,7 +12,7 @@ from typing import Final, Generic, Protocol, TypeVar
 from tickrig.device.twin import Copyable, restore
 from tickrig.wire.instant import NEVER
 
-LOG = logging.getLogger(__name__)
+_LOG = logging.getLogger(__name__)
 
 EPOCH_S: Final = 946_684_800
 """The clock of hosts at the start of a rig: 2000-01-01."""
@@ -52,7 +52,7 @@ class OneThread(Copyable):
                 f"{name}: a second thread cannot make virtual time pass; {instead}, or run in real"
                 " time"
             )
-            LOG.error(self._refusal)
+            _LOG.error(self._refusal)
         return self._refusal
 
 

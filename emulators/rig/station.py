@@ -11,7 +11,7 @@ from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
-    from tickrig.emulators.rig.timetable import Timetable
+    from tickrig.emulators.rig.rig import Timetable
 
 
 class Station(Part, Generic[W]):

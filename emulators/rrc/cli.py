@@ -18,7 +18,7 @@ from tickrig.host.cli.options import HarmlessCommand
     help="Name of the power-on event, as in the field or as in the manual.",
 )
 @click.option("--panel", is_flag=True, help="Show an operator panel in this terminal.")
-@line_options("flip, drop, dup, cut", "tickrig.device.rrc.terminals:INPUTS")
+@line_options("flip, drop, dup, cut", "tickrig.device.rrc.board:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate an RRC, with the VR2 wheelchair around it, on a pseudo-terminal.

@@ -11,46 +11,46 @@ from tickrig.host.control.requests import Object
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient, RrcRefused
-from tickrig.wire.rrc import commands as cmd
-from tickrig.wire.rrc.replies import RrcEvent
-from tickrig.wire.serial.lines import LineSplitter
+from tickrig.wire import rrc as cmd
+from tickrig.wire.lines import LineSplitter
+from tickrig.wire.rrc import RrcEvent
 
-Echo = Callable[[str], None]
-Request = Callable[..., Object]
+_Echo = Callable[[str], None]
+_Request = Callable[..., Object]
 """Makes a request to the emulator, as `ControlClient.request`."""
 
-PATIENCE_US: Final = 30_000_000
+_PATIENCE_US: Final = 30_000_000
 """How long an answer or an event may take on a busy machine."""
 
-MAX_REFUSALS: Final = 1_000
+_MAX_REFUSALS: Final = 1_000
 """Renewals of a watchdog are refused while the event that ended it is still on its way."""
 
-STATUS_SHOWN: Final = 2
+_STATUS_SHOWN: Final = 2
 """So many status lines in a row are printed; the rest is counted."""
 
 
-class Sample(NamedTuple):
+class AnswerSample(NamedTuple):
     """One of the nine sample commands of the manual's test procedure."""
 
     command: cmd.Command
     effect: str
 
 
-SAMPLES: Final = (
-    Sample(cmd.Limit(50, 50), "the stick drives, at most 50 %"),
-    Sample(cmd.Output(30, 0), "the host drives, forward at 30 %"),
-    Sample(cmd.SpeedMode(4), "speed mode 4, its buttons not locked"),
-    Sample(cmd.Joystick(reverse_mode=3), "stick shaping, backing toward the stick"),
-    Sample(cmd.Watchdog(100), "VR2 stops after 1 s without a correct command"),
-    Sample(cmd.Status(1), "a status line each 10 ms from now on"),
-    Sample(
+_SAMPLES: Final = (
+    AnswerSample(cmd.Limit(50, 50), "the stick drives, at most 50 %"),
+    AnswerSample(cmd.Output(30, 0), "the host drives, forward at 30 %"),
+    AnswerSample(cmd.SpeedMode(4), "speed mode 4, its buttons not locked"),
+    AnswerSample(cmd.Joystick(reverse_mode=3), "stick shaping, backing toward the stick"),
+    AnswerSample(cmd.Watchdog(100), "VR2 stops after 1 s without a correct command"),
+    AnswerSample(cmd.Status(1), "a status line each 10 ms from now on"),
+    AnswerSample(
         cmd.StableMode(1), "CHECK wanted from now on, and no OK: 'device' behind a line confirms it"
     ),
-    Sample(cmd.PowerOff(), "VR2 is stopped by force"),
-    Sample(cmd.Beep((100,) * 4 + (10,) * 6), "two beeps of 1 s, three of 0.1 s"),
+    AnswerSample(cmd.PowerOff(), "VR2 is stopped by force"),
+    AnswerSample(cmd.Beep((100,) * 4 + (10,) * 6), "two beeps of 1 s, three of 0.1 s"),
 )
 
-MEANING: Final = {
+_MEANING: Final = {
     "EV:PowerOnTrigger": "the power button was seen",
     "EV:PowerOnSuccess": "VR2 runs; the RRC is in Standby",
     "EV:PowerOffWaitByHost": "VR2 stopped because the host said so",
@@ -62,10 +62,10 @@ MEANING: Final = {
 }
 
 
-class Transcript:
+class DemoTranscript:
     """A `Link[bytes]` that prints each line that passes through another."""
 
-    def __init__(self, link: Link[bytes], echo: Echo) -> None:
+    def __init__(self, link: Link[bytes], echo: _Echo) -> None:
         self._link, self._echo, self._start_us = link, echo, link.now_us
         self._sent, self._received, self._statuses = LineSplitter(), LineSplitter(), 0
 
@@ -85,7 +85,7 @@ class Transcript:
         data = self._link.receive(timeout_us)
         for line in self._received.push(data):
             self._statuses = self._statuses + 1 if line.startswith(b"SA:") else 0
-            if self._statuses <= STATUS_SHOWN:
+            if self._statuses <= _STATUS_SHOWN:
                 self._print("<", line.decode("latin-1"))
         return data
 
@@ -95,11 +95,11 @@ class Transcript:
 
     def _print(self, mark: str, line: str) -> None:
         time_s = (self._link.now_us - self._start_us) / 1e6
-        meaning = MEANING.get(line, "") if mark == "<" else ""
+        meaning = _MEANING.get(line, "") if mark == "<" else ""
         self._echo(f"  {time_s:7.3f} {mark} {line or '(LF)':<28} {meaning}".rstrip())
 
 
-def run_demo(echo: Echo) -> None:
+def run_demo(echo: _Echo) -> None:
     """Run the demonstration; it takes about five seconds.
 
     Raises:
@@ -108,40 +108,40 @@ def run_demo(echo: Echo) -> None:
     """
     with (
         running("tickrig.emulators.rrc.cli") as child,
-        ControlClient(child.control, PATIENCE_US / 1e6) as hand,
+        ControlClient(child.control, _PATIENCE_US / 1e6) as hand,
     ):
         echo(f"An RRC runs on {child.link.resolve()}, in a process of its own.")
         play(SerialLink(str(child.link)), hand.request, echo)
 
 
-def play(link: Link[bytes], request: Request, echo: Echo) -> None:
+def play(link: Link[bytes], request: _Request, echo: _Echo) -> None:
     """Run the demonstration on an emulator that is there.
 
     Raises:
         LinkError, DeviceRefused: something went wrong on the way.
     """
     echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
-    transcript = Transcript(link, echo)
-    with RrcClient(transcript, timeout_us=PATIENCE_US, max_refusals=MAX_REFUSALS) as rrc:
+    transcript = DemoTranscript(link, echo)
+    with RrcClient(transcript, timeout_us=_PATIENCE_US, max_refusals=_MAX_REFUSALS) as rrc:
         for title in _chapters(rrc, transcript, request, echo):
             echo(f"\n{title}")
     status = request("status")
     echo(f"\nDone. Late ticks: {status['late_steps']}, lost bytes: {status['lost_bytes']}.")
 
 
-def _chapters(rrc: RrcClient, link: Link[bytes], request: Request, echo: Echo) -> Iterator[str]:
+def _chapters(rrc: RrcClient, link: Link[bytes], request: _Request, echo: _Echo) -> Iterator[str]:
     """Give the title of each chapter, then play it."""
     yield "Begin as the manual advises: a dummy command, a pause, then talk."
     rrc.start()
     yield "The operator presses the power button."
     _switch_on(rrc, request)
     yield "The nine sample commands of the manual's test procedure."
-    for sample in SAMPLES:
+    for sample in _SAMPLES:
         echo(f"  # {sample.effect}")
         _send(rrc, sample.command, echo)
     yield "The operator switches VR2 off and on again."
     request("press", name="power_button")
-    rrc.wait_for(RrcEvent.INITIALIZED, PATIENCE_US)
+    rrc.wait_for(RrcEvent.INITIALIZED, _PATIENCE_US)
     rrc.run_for(300_000)
     _switch_on(rrc, request)
     yield "Output mode: the slowest speed mode first, then 30 % forward; the status shows it (1E)."
@@ -157,7 +157,7 @@ def _chapters(rrc: RrcClient, link: Link[bytes], request: Request, echo: Echo) -
         link.receive(500_000)
 
 
-def _send(rrc: RrcClient, command: cmd.Command, echo: Echo) -> None:
+def _send(rrc: RrcClient, command: cmd.Command, echo: _Echo) -> None:
     try:
         rrc.command(command)
     except RrcRefused:
@@ -166,6 +166,6 @@ def _send(rrc: RrcClient, command: cmd.Command, echo: Echo) -> None:
         echo("  # refused: this machine was busy for 1 s, and the watchdog stopped VR2 before")
 
 
-def _switch_on(rrc: RrcClient, request: Request) -> None:
+def _switch_on(rrc: RrcClient, request: _Request) -> None:
     request("press", name="power_button")
-    rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, PATIENCE_US)
+    rrc.wait_for(RrcEvent.POWER_ON_SUCCESS, _PATIENCE_US)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from tickrig.host.cli.start import loading, raise_of_output
-from tickrig.host.links.errors import DeviceRefused, LinkError
+from tickrig.host.links.link import DeviceRefused, LinkError
 
 
 @click.command()

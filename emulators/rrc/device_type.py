@@ -6,29 +6,29 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, Final
 
-from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
+from tickrig.device.rrc.settings import FailTarget, RrcConfig
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.text.trace import Config, Mark
-from tickrig.wire.rrc.check import check_digit
+from tickrig.wire.rrc import check_digit
 
-EVENTS: Final = (b"EV:", b"ER:")
+_EVENTS: Final = (b"EV:", b"ER:")
 
 
-def config_to_trace(config: RrcConfig) -> Config:
+def _config_to_trace(config: RrcConfig) -> Config:
     """Return all settings, also those left alone: defaults may change one day."""
     return {**asdict(config), "power_on_fail_target": config.power_on_fail_target.value}
 
 
-def build_rrc(config: Config) -> Rrc:
+def _build_rrc(config: Config) -> Rrc:
     """Build an RRC.
 
     Raises:
         ValueError: a setting that an RRC does not have, or a value that it cannot have.
     """
-    check_config(config, config_to_trace(RrcConfig()), "an RRC has no setting")
+    check_config(config, _config_to_trace(RrcConfig()), "an RRC has no setting")
     settings: dict[str, Any] = dict(config)
     if "power_on_fail_target" in settings:
         settings["power_on_fail_target"] = FailTarget(settings["power_on_fail_target"])
@@ -37,7 +37,7 @@ def build_rrc(config: Config) -> Rrc:
 
 def _configure(rrc: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
     config = RrcConfig(**options)
-    return ConfiguredDevice(rrc, Rrc(config), config_to_trace(config))
+    return ConfiguredDevice(rrc, Rrc(config), _config_to_trace(config))
 
 
 def _with_check(text: bytes) -> bytes:
@@ -45,11 +45,11 @@ def _with_check(text: bytes) -> bytes:
 
 
 def _is_event(line: WireLine) -> bool:
-    return line.mark is Mark.FROM_DEVICE and line.data.startswith(EVENTS)
+    return line.mark is Mark.FROM_DEVICE and line.data.startswith(_EVENTS)
 
 
 def _panel(emulator: Emulator) -> None:
-    from tickrig.emulators.rrc.panel_run import run_panel  # noqa: PLC0415 - the extra [tui]
+    from tickrig.emulators.rrc.panel import run_panel  # noqa: PLC0415 - the extra [tui]
 
     run_panel(emulator)
 
@@ -57,9 +57,9 @@ def _panel(emulator: Emulator) -> None:
 RRC: Final = DeviceType(
     name="rrc",
     title="RRC",
-    build=build_rrc,
+    build=_build_rrc,
     configure=_configure,
-    config_of=lambda rrc: config_to_trace(rrc.config),
+    config_of=lambda rrc: _config_to_trace(rrc.config),
     encoders={"check": _with_check},
     is_event=_is_event,
     panel=_panel,

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import ClassVar, Final
 
 from rich.text import Text
@@ -11,18 +15,18 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Static
 
-from tickrig.emulators.bench.inbox import EmulatorEnded
+from tickrig.emulators.bench.control import EmulatorControl, EmulatorEnded, RequestInbox
 from tickrig.emulators.rrc import panel_text, small_panel_text
-from tickrig.emulators.rrc.panel_text import FAULT_KEYS, Observer, View
+from tickrig.emulators.rrc.panel_text import FAULT_KEYS, Observer, PanelView
+from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import VERSION, Object
-from tickrig.host.tui.framed_app import FramedApp
-from tickrig.host.tui.key_footer import KeyFooter
+from tickrig.host.tui import FramedApp, KeyFooter
 
-SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
+_SendRequests = Callable[[Sequence[Object]], Awaitable[list[Object]]]
 """Makes requests of an emulator, those of the control socket, and brings the answers."""
 
 REFRESH_S: Final = 0.1
-STEP_PCT: Final = 10
+_STEP_PCT: Final = 10
 
 HELP: Final = """\
 arrows  move the stick by 10 %; it stays where it is
@@ -37,8 +41,8 @@ U D     hold a speed button, or let it go
 F1 ?    this help; Esc leaves it
 q       end the emulator"""
 
-LEAST: Final = (60, 15)
-ROOMY: Final = (80, 24)
+_LEAST: Final = (60, 15)
+_ROOMY: Final = (80, 24)
 """Columns and lines: with fewer than the first there is no panel, with the second all of it."""
 
 
@@ -57,8 +61,8 @@ class RrcPanel(FramedApp):
 
     ENABLE_COMMAND_PALETTE = False
     # Textual's names, never changed: classes of the screen from so many columns and lines on.
-    HORIZONTAL_BREAKPOINTS = [(0, "-tiny"), (LEAST[0], "-small"), (ROOMY[0], "-roomy")]  # noqa: RUF012
-    VERTICAL_BREAKPOINTS = [(0, "-tiny"), (LEAST[1], "-small"), (ROOMY[1], "-roomy")]  # noqa: RUF012
+    HORIZONTAL_BREAKPOINTS = [(0, "-tiny"), (_LEAST[0], "-small"), (_ROOMY[0], "-roomy")]  # noqa: RUF012
+    VERTICAL_BREAKPOINTS = [(0, "-tiny"), (_LEAST[1], "-small"), (_ROOMY[1], "-roomy")]  # noqa: RUF012
     CSS = """
     #top { height: 14; }
     #stick { width: 27; }
@@ -99,7 +103,7 @@ class RrcPanel(FramedApp):
         ],
     ]
 
-    def __init__(self, send: SendRequests, ready: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, send: _SendRequests, ready: Callable[[], None] = lambda: None) -> None:
         super().__init__()
         self._send, self._when_ready = send, ready
         self._observer = Observer()
@@ -121,7 +125,7 @@ class RrcPanel(FramedApp):
         yield KeyFooter()
 
     @property
-    def view(self) -> View:
+    def view(self) -> PanelView:
         """What is shown."""
         return self._observer.view
 
@@ -157,7 +161,7 @@ class RrcPanel(FramedApp):
     async def action_stick(self, v_steps: int, w_steps: int) -> None:
         """Move the stick by steps of 10 %."""
         stick = [
-            max(-100, min(100, self.view.number(name) + steps * STEP_PCT))
+            max(-100, min(100, self.view.number(name) + steps * _STEP_PCT))
             for name, steps in (("stick_v_pct", v_steps), ("stick_w_pct", w_steps))
         ]
         await self._do(_request("set", name="stick", value=stick))
@@ -193,7 +197,7 @@ class RrcPanel(FramedApp):
             return []
 
     def _show(self) -> None:
-        view, roomy = self.view, self.size.width >= ROOMY[0] and self.size.height >= ROOMY[1]
+        view, roomy = self.view, self.size.width >= _ROOMY[0] and self.size.height >= _ROOMY[1]
         panes = panel_text if roomy else small_panel_text
         pad = panel_text.stick_pad(view.number("stick_v_pct"), view.number("stick_w_pct"))
         self.query_one("#stick").border_subtitle = panel_text.stick_hint(view)
@@ -204,7 +208,7 @@ class RrcPanel(FramedApp):
             ("wire", panel_text.wire_pane(view, self.query_one("#wire").content_size.height)),
             ("report", panes.report_line(view)),
             ("status", panel_text.status_line(view)),
-            ("tiny", small_panel_text.too_small(self.size, LEAST)),
+            ("tiny", small_panel_text.too_small(self.size, _LEAST)),
         ):
             if self._shown.get(name) != text:
                 self._shown[name] = text
@@ -219,3 +223,49 @@ def _pane(name: str, title: str) -> Static:
 
 def _request(do: str, **fields: object) -> Object:
     return {"v": VERSION, "do": do, **fields}
+
+
+# Run an emulator in a thread of its own, and the operator panel in this one.
+
+_SWITCH_S: Final = 0.000_2
+"""How long the screen may keep the rig from running, a tick being 10 ms."""
+
+
+def run_panel(emulator: Emulator) -> None:
+    """Show the panel until it is left or the emulator is stopped."""
+    inbox = RequestInbox(EmulatorControl(emulator))
+
+    def run() -> None:
+        with _ending(emulator, inbox):
+            while emulator.running:
+                emulator.step()
+                inbox.serve()
+
+    async def send(requests: Sequence[Object]) -> list[Object]:
+        return await asyncio.wrap_future(inbox.post(requests))
+
+    started: list[Future[None]] = []
+    panel = RrcPanel(send, lambda: started.append(pool.submit(run)))
+    before_s = sys.getswitchinterval()
+    sys.setswitchinterval(_SWITCH_S)
+    try:
+        with (
+            panel.ended_by_signals(),
+            ThreadPoolExecutor(1, "rig") as pool,
+            _ending(emulator, inbox),
+        ):
+            panel.run()
+    finally:
+        sys.setswitchinterval(before_s)
+    for rig in started:
+        rig.result()
+
+
+@contextmanager
+def _ending(emulator: Emulator, inbox: RequestInbox) -> Iterator[None]:
+    """Let the emulator end, and nobody wait for it, however this ends."""
+    try:
+        yield
+    finally:
+        emulator.stop()
+        inbox.close()

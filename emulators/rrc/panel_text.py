@@ -12,11 +12,10 @@ from tickrig.host.control.requests import Object
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.wire.errors import WireError
-from tickrig.wire.rrc.load import SAFE_PCT
-from tickrig.wire.rrc.replies import StatusA, parse_reply
+from tickrig.wire.rrc import SAFE_PCT, StatusA, parse_reply
 
-Value = int | str
-Values = dict[str, Value]
+_Value = int | str
+_Values = dict[str, _Value]
 
 FAULT_KEYS: Final = {
     "1": "bus_noise",
@@ -26,32 +25,32 @@ FAULT_KEYS: Final = {
     "5": "bus_unplugged",
     "6": "cut",
 }
-BUTTONS: Final = {
+_BUTTONS: Final = {
     "power": "power_button",
     "alarm": "alarm_button",
     "speed up": "speed_up_button",
     "speed down": "speed_down_button",
 }
-STATE_STYLES: Final = {
+_STATE_STYLES: Final = {
     "Limit": "bold black on green",
     "Output": "bold black on green",
     "Standby": "bold black on cyan",
     "PowerOffByOthers": "bold white on red",
 }
-LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
+_LINE_STYLES: Final = {"EV": "bold cyan", "ER": "bold red"}
 
 ON: Final = "bold yellow"
 FAULT: Final = "bold white on red"
 DIM: Final = "bright_black"
-KEPT_LINES: Final = 60
-REPORT_US: Final = 100_000
+_KEPT_LINES: Final = 60
+_REPORT_US: Final = 100_000
 """So long the latest SA line stands; one comes each 10 ms while the status is on."""
 
-HALF: Final = 15  # cells of a bar on each side of zero
+_HALF: Final = 15  # cells of a bar on each side of zero
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class PanelView:
     """What is known of the emulator at one time.
 
     Attributes:
@@ -61,8 +60,8 @@ class View:
         report: the latest SA line.
     """
 
-    values: Mapping[str, Value] = field(default_factory=dict)
-    status: Mapping[str, Value] = field(default_factory=dict)
+    values: Mapping[str, _Value] = field(default_factory=dict)
+    status: Mapping[str, _Value] = field(default_factory=dict)
     lines: tuple[tuple[str, str, str], ...] = ()
     report: str = ""
 
@@ -86,7 +85,7 @@ class View:
         return tuple(str(self.status.get("faults", "")).split())
 
 
-class Line(NamedTuple):
+class WireRow(NamedTuple):
     """A line on the wire."""
 
     number: int
@@ -101,7 +100,7 @@ class Line(NamedTuple):
 
 
 class Observer:
-    """Makes a `View` of what an emulator answers to `get`, `status` and `lines`.
+    """Makes a `PanelView` of what an emulator answers to `get`, `status` and `lines`.
 
     Attributes:
         view: what is known now.
@@ -109,8 +108,8 @@ class Observer:
     """
 
     def __init__(self) -> None:
-        self.view, self.seen = View(), 0
-        self._report = Line(0, -REPORT_US, "", "")  # the latest SA
+        self.view, self.seen = PanelView(), 0
+        self._report = WireRow(0, -_REPORT_US, "", "")  # the latest SA
 
     def take(self, values: Object, status: Object, lines: Object) -> None:
         """Take three answers in, asked for at the same time."""
@@ -121,33 +120,33 @@ class Observer:
             if line.is_report:
                 self._report = line
         events = [(format_time(x.at_us), x.mark, x.text) for x in fresh if not x.is_report]
-        self.view = View(
+        self.view = PanelView(
             present,
             now,
-            (*self.view.lines, *events)[-KEPT_LINES:],
+            (*self.view.lines, *events)[-_KEPT_LINES:],
             self._report.text if self._reports(now, present) else "",
         )
 
-    def _reports(self, status: Values, values: Values) -> bool:
+    def _reports(self, status: _Values, values: _Values) -> bool:
         """Whether SA lines come: VR2 runs, and the latest one is fresh."""
-        fresh = self._report.at_us + REPORT_US > int(status["now_us"])
+        fresh = self._report.at_us + _REPORT_US > int(status["now_us"])
         return fresh and bool(values["vr2_power"])
 
 
-def _values(answer: object) -> Values:
+def _values(answer: object) -> _Values:
     if not isinstance(answer, dict):
         return {}
     return {name: value for name, value in answer.items() if isinstance(value, int | str)}
 
 
-def _lines(answer: Object) -> list[Line]:
+def _lines(answer: Object) -> list[WireRow]:
     lines = answer["lines"]
     if not isinstance(lines, list):
         return []
-    return [Line(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]
+    return [WireRow(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]
 
 
-STICK_HINTS: Final = {
+_STICK_HINTS: Final = {
     "Off": "the RRC has no power",
     "Standby": "waits for limit, or a",
     "Limit": "drives, within limits",
@@ -157,12 +156,12 @@ STICK_HINTS: Final = {
 }
 
 
-def stick_hint(view: View) -> str:
+def stick_hint(view: PanelView) -> str:
     """Say whether the stick drives, and what it waits for if it does not; at most 21 columns."""
     state = str(view.values.get("state", ""))
     if state == "Standby" and view.number("stick_drives"):
         return "drives"
-    return STICK_HINTS.get(state, "waits for p: VR2 off")
+    return _STICK_HINTS.get(state, "waits for p: VR2 off")
 
 
 def stick_pad(v_pct: int, w_pct: int) -> Text:
@@ -192,15 +191,15 @@ def _axis(y: int, x: int) -> str:
 
 def bar(percent: int) -> Text:
     """Draw -100..100 % as a bar to the left or right of zero."""
-    cells = round(abs(percent) * HALF / 100)
+    cells = round(abs(percent) * _HALF / 100)
     left = "█" * cells if percent < 0 else ""
     right = "█" * cells if percent > 0 else ""
     return Text.assemble(
-        ("░" * (HALF - len(left)), DIM),
+        ("░" * (_HALF - len(left)), DIM),
         (left, ON),
         "│",
         (right, ON),
-        ("░" * (HALF - len(right)), DIM),
+        ("░" * (_HALF - len(right)), DIM),
         f" {signed(percent)} %",
     )
 
@@ -210,34 +209,34 @@ def scale(value: int, top: int) -> Text:
     return Text.assemble(("■" * value, ON), ("□" * (top - value), DIM), f" {value}")
 
 
-def lamp(label: str, value: Value, style: str) -> Text:
+def _lamp(label: str, value: _Value, style: str) -> Text:
     """Draw a lamp that is on or off."""
     return Text.assemble(("● ", style) if value else ("○ ", DIM), label)
 
 
-def lamps(view: View) -> list[Text]:
+def lamps(view: PanelView) -> list[Text]:
     """Draw the three lamps."""
     return [
-        lamp("VR2 runs", view.number("vr2_power"), "bold green"),
-        lamp("error LED", view.number("error_led"), "bold red"),
-        lamp("buzzer", view.number("buzzer"), ON),
+        _lamp("VR2 runs", view.number("vr2_power"), "bold green"),
+        _lamp("error LED", view.number("error_led"), "bold red"),
+        _lamp("buzzer", view.number("buzzer"), ON),
     ]
 
 
-def load(view: View) -> Text:
+def load(view: PanelView) -> Text:
     """Show how busy the RRC is, and how much of its time is left."""
     margin_pct = view.number("margin_pct")
     style = FAULT if margin_pct < 0 else ON if margin_pct < 100 - SAFE_PCT else ""
     return Text(f"{view.number('load_pct')} %, margin {margin_pct} %", style=style)
 
 
-def state_of(view: View) -> Text:
+def state_of(view: PanelView) -> Text:
     """Show the state in its colour."""
     state = str(view.values.get("state", "?"))
-    return Text(f" {state} ", STATE_STYLES.get(state, "bold reverse"))
+    return Text(f" {state} ", _STATE_STYLES.get(state, "bold reverse"))
 
 
-def outputs_pane(view: View) -> Text:
+def outputs_pane(view: PanelView) -> Text:
     """Show what the RRC does."""
     rows = [
         Text.assemble("state  ", state_of(view)),
@@ -254,21 +253,21 @@ def outputs_pane(view: View) -> Text:
     return Text("\n").join(rows)
 
 
-def controls_pane(view: View) -> Text:
+def controls_pane(view: PanelView) -> Text:
     """Show which buttons are pressed and which faults are present."""
     rows = [Text(" ").join(faults(view, 22)[at : at + 2]) for at in range(0, len(FAULT_KEYS), 2)]
     return Text("\n").join([buttons(view), *rows])
 
 
-def buttons(view: View) -> Text:
+def buttons(view: PanelView) -> Text:
     """Show which buttons are pressed."""
     return Text(" ").join(
         Text(f" {label} ", style="bold black on yellow" if view.number(name) else "reverse dim")
-        for label, name in BUTTONS.items()
+        for label, name in _BUTTONS.items()
     )
 
 
-def faults(view: View, width: int) -> list[Text]:
+def faults(view: PanelView, width: int) -> list[Text]:
     """Show each fault and its key, in so many columns."""
     return [
         Text.assemble(
@@ -279,7 +278,7 @@ def faults(view: View, width: int) -> list[Text]:
     ]
 
 
-def report_line(view: View) -> Text:
+def report_line(view: PanelView) -> Text:
     """Show what the latest SA line says, with its raw text."""
     if (sa := view.decoded) is None:
         return Text(view.report)
@@ -291,16 +290,16 @@ def report_line(view: View) -> Text:
     )
 
 
-def wire_pane(view: View, height: int) -> Text:
+def wire_pane(view: PanelView, height: int) -> Text:
     """Show the latest lines on the wire, the newest at the bottom."""
     rows = []
     for time, mark, text in view.lines[max(0, len(view.lines) - height) :]:
-        style = "bold green" if mark == ">" else LINE_STYLES.get(text[:2], "")
+        style = "bold green" if mark == ">" else _LINE_STYLES.get(text[:2], "")
         rows.append(Text.assemble((f"{time:>11} ", DIM), (f"{mark} {text}", style)))
     return Text("\n").join(rows)
 
 
-def status_line(view: View) -> Text:
+def status_line(view: PanelView) -> Text:
     """Show how the run is going."""
     status, now_us = view.status, view.status.get("now_us", 0)
     text = Text(f" {status.get('link', '')}   {int(now_us) / 1e6:.1f} s")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from rich.text import Text
 
 from tickrig.emulators.rrc import panel_text
-from tickrig.emulators.rrc.panel_text import DIM, View, bar, scale, signed
+from tickrig.emulators.rrc.panel_text import DIM, PanelView, bar, scale, signed
 
 
-def outputs_pane(view: View) -> Text:
+def outputs_pane(view: PanelView) -> Text:
     """Show what the RRC does, and the stick beside what becomes of it."""
     rows = [
         Text(" ").join([panel_text.state_of(view), *panel_text.lamps(view)]),
@@ -35,14 +35,14 @@ def outputs_pane(view: View) -> Text:
     return Text("\n").join(rows)
 
 
-def controls_pane(view: View) -> Text:
+def controls_pane(view: PanelView) -> Text:
     """Show which buttons are pressed and which faults are present."""
     shown = panel_text.faults(view, 0)
     rows = [Text("  ").join(shown[at : at + 3]) for at in range(0, len(shown), 3)]
     return Text("\n").join([panel_text.buttons(view), *rows])
 
 
-def report_line(view: View) -> Text:
+def report_line(view: PanelView) -> Text:
     """Show what the latest SA line says; the counters are those of speed up, down and alarm."""
     if (sa := view.decoded) is None:
         return Text(view.report)

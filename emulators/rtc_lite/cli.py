@@ -50,9 +50,7 @@ def _complete_node(context: click.Context, option: click.Parameter, word: str) -
     default=Checksum.SUM8.value,
     help="How frames are summed up.  [sum8]",
 )
-@line_options(
-    "flip, drop, dup, cut, noise, ping, radio", "tickrig.device.rtc_lite.terminals:INPUTS"
-)
+@line_options("flip, drop, dup, cut, noise, ping, radio", "tickrig.device.rtc_lite.node:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate a PIC with an RTC-Lite component, on a pseudo-terminal.

@@ -8,21 +8,20 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from tickrig.device.rtc_lite.component import LiteA, LiteB, LiteComponent, LiteEcho
-from tickrig.device.rtc_lite.config import DEFAULT_RATE_HZ, LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.device.rtc_lite.server import DEFAULT_RATE_HZ, LiteConfig
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.rtc_lite.frame_log import frame_splitter
-from tickrig.emulators.rtc_lite.line import LINE_FAULTS, verbs
+from tickrig.emulators.rtc_lite.line import LINE_FAULTS, frame_splitter, verbs
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.host.cli.refused import refused_at
+from tickrig.host.cli.messages import refused_at
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Config
 from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
 
-ROUTINE: Final = tuple(
+_ROUTINE: Final = tuple(
     command.value
     for command in (
         LiteCommand.PING,
@@ -35,7 +34,7 @@ ROUTINE: Final = tuple(
 """What -v leaves out: the traffic of each period."""
 
 
-def config_to_trace(node: str, config: LiteConfig) -> Config:
+def _config_to_trace(node: str, config: LiteConfig) -> Config:
     """Return all settings, also those left alone: defaults may change one day."""
     return {
         "node": node,
@@ -47,17 +46,17 @@ def config_to_trace(node: str, config: LiteConfig) -> Config:
     }
 
 
-def build_rtc_lite(config: Config) -> RtcLiteNode:
+def _build_rtc_lite(config: Config) -> RtcLiteNode:
     """Build a node.
 
     Raises:
         ValueError: a setting that a node does not have, or a value that it cannot have.
     """
-    defaults = config_to_trace("echo", LiteConfig())
+    defaults = _config_to_trace("echo", LiteConfig())
     check_config(config, defaults, "a node has no setting")
     settings: dict[str, Any] = {**defaults, **config}
     return RtcLiteNode(
-        find_component(settings["node"]),
+        _find_component(settings["node"]),
         LiteConfig(
             Framing(settings["framing"]),
             Checksum(settings["checksum"]),
@@ -80,7 +79,7 @@ COMPONENTS: Final[Mapping[str, type[LiteComponent]]] = MappingProxyType(
 )
 
 
-def find_component(spec: str) -> type[LiteComponent]:
+def _find_component(spec: str) -> type[LiteComponent]:
     """Return the component that a name or `FILE.py:Class` stands for.
 
     Raises:
@@ -108,7 +107,7 @@ def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> Confi
             timer_hz or DEFAULT_RATE_HZ,
         )
     with refused_at("--node"):
-        device = RtcLiteNode(find_component(node), config)
+        device = RtcLiteNode(_find_component(node), config)
     lite = replace(
         lite,
         title=f"{lite.title} {device.component.type_name}",
@@ -116,12 +115,12 @@ def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> Confi
         line=LineSettings(options["baud"], LINE_FAULTS, frame_splitter(config)),
         user_code="" if node in COMPONENTS else node,
     )
-    return ConfiguredDevice(lite, device, config_to_trace(node, config))
+    return ConfiguredDevice(lite, device, _config_to_trace(node, config))
 
 
 def _config_of(lite: RtcLiteNode) -> Config | None:
     names = [name for name, kind in COMPONENTS.items() if kind is lite.make]
-    return config_to_trace(names[0], lite.config) if names else None
+    return _config_to_trace(names[0], lite.config) if names else None
 
 
 def _talk(link: str, baud: int) -> str:
@@ -129,13 +128,13 @@ def _talk(link: str, baud: int) -> str:
 
 
 def _is_event(line: WireLine) -> bool:
-    return line.data[:2] not in ROUTINE
+    return line.data[:2] not in _ROUTINE
 
 
 RTC_LITE: Final = DeviceType(
     name="rtc-lite",
     title="RTC-Lite node",
-    build=build_rtc_lite,
+    build=_build_rtc_lite,
     configure=_configure,
     config_of=_config_of,
     is_event=_is_event,

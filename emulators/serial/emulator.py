@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from tickrig.device.twin import NonCopyable
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.record.wire_log import Splitter, WireLog
@@ -16,13 +17,12 @@ from tickrig.emulators.rig.port import ByteLine, Port
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.bridge import Bridge, HostEnd, Tap
-from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
-from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
 from tickrig.host.text.trace import Mark
 from tickrig.wire.instant import NEVER
 
 
-class Outside(Port[bytes], Protocol):
+class LineOutside(Port[bytes], Protocol):
     """Where the host is: a pty, a network port, or several of these."""
 
     @property
@@ -81,7 +81,7 @@ class Emulator(RunningEmulator):
         name: str,
         device: Emulated[bytes],
         *,
-        outside: Outside | None = None,
+        outside: LineOutside | None = None,
         clock: Clock | None = None,
         seed: int = 0,
         trace: TraceFile | None = None,
@@ -126,3 +126,51 @@ class Emulator(RunningEmulator):
             **super().status(),
             "host_setting": self._outside.host_setting if self._outside else "",
         }
+
+
+# Several ports on one serial line.
+
+
+class SerialHub(NonCopyable):
+    """Ports on one line: each hears all that the device sends, and each may send.
+
+    What several hosts send at the same time arrives mixed, in pieces of a port's poll; none of
+    them hears the others.
+
+    Args:
+        ports: the ports, a pty and network ports.
+    """
+
+    why_not_copied = "its ports belong to this machine"
+
+    def __init__(self, ports: Sequence[LineOutside]) -> None:
+        self._ports = tuple(ports)
+
+    @property
+    def due_us(self) -> int:
+        """Unknown to anybody but the hosts."""
+        return NEVER
+
+    @property
+    def lost(self) -> int:
+        """Bytes that a port dropped because its host did not read."""
+        return sum(port.lost for port in self._ports)
+
+    @property
+    def host_setting(self) -> str:
+        """What hosts have set that is not the device's, as `9600 8N1`."""
+        return ", ".join(port.host_setting for port in self._ports if port.host_setting)
+
+    def poll(self, now_us: int, /) -> bytes:
+        """Take what the hosts sent."""
+        return b"".join([port.poll(now_us) for port in self._ports])
+
+    def attend(self, now_us: int, /) -> None:
+        """Let hosts come and go, and give them what is kept for them."""
+        for port in self._ports:
+            port.attend(now_us)
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        """Send to every host."""
+        for port in self._ports:
+            port.send(now_us, traffic)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ctypes
+import errno
+import fcntl
 import os
 import select
 import sys
@@ -13,11 +15,94 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.device.twin import NonCopyable
-from tickrig.emulators.serial.host_setting import HostSetting
-from tickrig.emulators.serial.pty_link import PtyLink
+from tickrig.emulators.serial.bridge import HostSetting
 from tickrig.wire.instant import NEVER
 
-BAUDS: Final = {
+# The name under which a pseudo-terminal is found, and who gave it.
+
+
+class PtyLink:
+    """A symbolic link to a terminal that tells whether its emulator lives.
+
+    Beside `NAME` lies `.NAME.emulator`, locked for as long as the link is in use: it names the
+    process and the terminal. So a link that a killed emulator left over is known for one even
+    when its terminal belongs to somebody else by now.
+
+    Args:
+        path: where the link is to be.
+        target: the terminal.
+
+    Raises:
+        FileExistsError: a running emulator has this link, or it is none of an emulator's.
+        OSError: no link can be made there.
+    """
+
+    def __init__(self, path: Path, target: str) -> None:
+        self._path, self._target = path, target
+        self._note = path.with_name(f".{path.name}.emulator")
+        try:
+            self._lock = self._take_note()
+            self._make()
+        except FileExistsError as error:
+            raise FileExistsError(errno.EEXIST, error.strerror, str(path)) from None
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from None
+
+    def close(self) -> None:
+        """Remove the link, if it is still this one, and the note."""
+        if _target(self._path) == self._target:
+            self._path.unlink()
+        self._drop_note()
+
+    def _take_note(self) -> int:
+        """Open and lock the note; whoever has it has the link."""
+        while True:
+            lock = os.open(self._note, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                if os.path.samestat(os.fstat(lock), self._note.stat()):
+                    return lock
+            except BlockingIOError:
+                process = os.read(lock, 100).partition(b" ")[0].decode("ascii", "replace") or "?"
+                os.close(lock)
+                used = f"another emulator uses it (process {process})"
+                raise FileExistsError(errno.EEXIST, used) from None
+            except FileNotFoundError:  # its owner has just removed it
+                pass
+            os.close(lock)
+
+    def _make(self) -> None:
+        """Make the link, and note whose it is."""
+        try:
+            if self._is_left_over():
+                self._path.unlink()
+            if self._path.exists():
+                raise FileExistsError(errno.EEXIST, "exists; remove it if no emulator uses it")
+            self._path.symlink_to(self._target)
+            os.ftruncate(self._lock, 0)
+            os.pwrite(self._lock, f"{os.getpid()} {self._target}\n".encode(), 0)
+        except OSError:
+            self._drop_note()
+            raise
+
+    def _is_left_over(self) -> bool:
+        """Whether the link names no terminal, ours, or that of an emulator which has ended."""
+        target = _target(self._path)
+        noted = os.read(self._lock, 4_096).decode("ascii", "replace").split()
+        return target is not None and (
+            target in (self._target, *noted[1:]) or not self._path.exists()
+        )
+
+    def _drop_note(self) -> None:
+        self._note.unlink(missing_ok=True)
+        os.close(self._lock)
+
+
+def _target(path: Path) -> str | None:
+    return os.readlink(path) if path.is_symlink() else None
+
+
+_BAUDS: Final = {
     code: int(name[1:])
     for name, code in vars(termios).items()
     if name[:1] == "B" and name[1:].isdigit()
@@ -25,7 +110,7 @@ BAUDS: Final = {
 """Bit rates by their number in a termios; others have none."""
 
 
-def setting_of(terminal: int) -> str:
+def _setting_of(terminal: int) -> str:
     """Return rate, bits, parity and stop bits, as `115200 8N1`.
 
     Linux keeps the bit rate, the stop bits and whether parity is odd. A pseudo-terminal always
@@ -35,13 +120,13 @@ def setting_of(terminal: int) -> str:
     bits = {termios.CS5: 5, termios.CS6: 6, termios.CS7: 7}.get(flags & termios.CSIZE, 8)
     parity = "O" if flags & termios.PARODD else "E" if flags & termios.PARENB else "N"
     stops = 2 if flags & termios.CSTOPB else 1
-    return f"{BAUDS.get(speed, 'another rate,')} {bits}{parity}{stops}"
+    return f"{_BAUDS.get(speed, 'another rate,')} {bits}{parity}{stops}"
 
 
-READ_BYTES: Final = 4_096
+_READ_BYTES: Final = 4_096
 
-IN_OPEN: Final = 0x20
-IN_CLOSE: Final = 0x08 | 0x10
+_IN_OPEN: Final = 0x20
+_IN_CLOSE: Final = 0x08 | 0x10
 
 
 class PtyVisits(NonCopyable):
@@ -64,7 +149,7 @@ class PtyVisits(NonCopyable):
             self._inotify = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
             if self._inotify < 0:  # the user has used up all instances
                 return
-            libc.inotify_add_watch(self._inotify, os.fsencode(path), IN_OPEN | IN_CLOSE)
+            libc.inotify_add_watch(self._inotify, os.fsencode(path), _IN_OPEN | _IN_CLOSE)
             epoll = select.epoll()
             for fd in (master, self._inotify):
                 epoll.register(fd, select.EPOLLIN)
@@ -74,7 +159,7 @@ class PtyVisits(NonCopyable):
     def any(self) -> bool:
         """Return whether a host came or left since the last call."""
         try:
-            return self._inotify >= 0 and bool(os.read(self._inotify, READ_BYTES))
+            return self._inotify >= 0 and bool(os.read(self._inotify, _READ_BYTES))
         except BlockingIOError:
             return False
 
@@ -153,19 +238,19 @@ class PtyPort(NonCopyable):
             baud: the device's rate in bit/s, with 8N1; one without a name is not watched.
             notify: called with a setting as `9600 8N1` that is not the device's.
         """
-        codes = [code for code, rate in BAUDS.items() if rate == baud]
+        codes = [code for code, rate in _BAUDS.items() if rate == baud]
         if not codes:
             return
         slave, attributes = self._slave, termios.tcgetattr(self._slave)
         attributes[4:6] = codes[0], codes[0]
         termios.tcsetattr(slave, termios.TCSANOW, attributes)
-        self._setting = HostSetting(lambda: setting_of(slave), setting_of(slave), notify)
+        self._setting = HostSetting(lambda: _setting_of(slave), _setting_of(slave), notify)
 
     def poll(self, now_us: int, /) -> bytes:
         """Read without waiting."""
         self.attend(now_us)
         try:
-            data = os.read(self._master, READ_BYTES)
+            data = os.read(self._master, _READ_BYTES)
         except BlockingIOError:
             return b""
         self.spoken = True

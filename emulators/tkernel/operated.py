@@ -15,7 +15,7 @@ from tickrig.host.control.requests import Object, RequestDispatcher, short, text
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 
-MAX_PRESS_US: Final = 10**12
+_MAX_PRESS_US: Final = 10**12
 
 
 class NoWire:
@@ -129,7 +129,7 @@ class Operated(RequestDispatcher):
         return {}
 
     def _press(self, request: Object) -> Object:
-        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, MAX_PRESS_US)
+        duration_us = whole(request.get("duration_us", PRESS_US), "duration_us", 1, _MAX_PRESS_US)
         self.operator.press(self.now_us, text_of(request, "name"), duration_us)
         return {}
 

@@ -40,7 +40,7 @@ _WORLD: Final = add_options(
     help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
 )
 @_WORLD
-@line_options("flip, drop, dup, cut", "tickrig.device.urg.terminals:INPUTS")
+@line_options("flip, drop, dup, cut", "tickrig.device.urg.sensor:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate a scanning range finder URG-04LX (SCIP 1.1 and 2.0) on a pseudo-terminal.

@@ -7,9 +7,8 @@ from dataclasses import astuple, replace
 from functools import partial
 from typing import Any, Final
 
-from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
-from tickrig.device.urg.world import Post, Wall, World, room
+from tickrig.device.urg.world import Post, UrgParameters, Wall, World, room
 from tickrig.emulators.commands.device_type import (
     ConfiguredDevice,
     DeviceType,
@@ -20,20 +19,20 @@ from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.urg.cli import USB_BAUD
-from tickrig.host.cli.refused import refused_at
+from tickrig.host.cli.messages import refused_at
 from tickrig.host.text.trace import Config, Mark
 
-USUAL_BAUD: Final = 115_200
+_USUAL_BAUD: Final = 115_200
 """What a host sets, which means nothing on USB."""
 
-BUFFER_BYTES: Final = 16_384
+_BUFFER_BYTES: Final = 16_384
 """Room for several whole scans at once."""
 
-OLD_SCIP: Final = "2.0"
+_OLD_SCIP: Final = "2.0"
 """The protocol at the start of traces that name none."""
 
 
-def config_to_trace(parameters: UrgParameters, world: World) -> Config:
+def _config_to_trace(parameters: UrgParameters, world: World) -> Config:
     """Return all parameters and the world."""
     return {
         "serial": parameters.serial,
@@ -51,35 +50,35 @@ def build_urg(config: Config) -> Urg:
     Raises:
         ValueError: a setting that a sensor does not have, or a value that it cannot have.
     """
-    defaults = {**config_to_trace(UrgParameters(), World()), "scip": OLD_SCIP}
+    defaults = {**_config_to_trace(UrgParameters(), World()), "scip": _OLD_SCIP}
     check_config(config, defaults, "a sensor has no setting", typed=False)
     settings: dict[str, Any] = {**defaults, **config}
     noise, seed = settings["noise"], settings["noise_seed"]
     if type(seed) is not int or type(noise) not in (int, float):
         raise ValueError(f"noise {noise!r} and noise_seed {seed!r} are not two numbers")
-    walls = [parse_wall(text) for text in str(settings["walls"]).split()]
-    posts = [parse_post(text) for text in str(settings["posts"]).split()]
+    walls = [_parse_wall(text) for text in str(settings["walls"]).split()]
+    posts = [_parse_post(text) for text in str(settings["posts"]).split()]
     parameters = UrgParameters(
         serial=str(settings["serial"]), noise=noise, seed=seed, scip=str(settings["scip"])
     )
     return Urg(parameters, World(tuple(walls), tuple(posts)))
 
 
-def parse_wall(text: str) -> Wall:
+def _parse_wall(text: str) -> Wall:
     """Read `X1,Y1,X2,Y2`; ValueError if it is no wall.
 
-    >>> parse_wall("1,-1,1,1")
+    >>> _parse_wall("1,-1,1,1")
     Wall(x1_m=1.0, y1_m=-1.0, x2_m=1.0, y2_m=1.0)
     """
-    return Wall(*parse_numbers(text, 4, "a wall is X1,Y1,X2,Y2 in m"))
+    return Wall(*_parse_numbers(text, 4, "a wall is X1,Y1,X2,Y2 in m"))
 
 
-def parse_post(text: str) -> Post:
+def _parse_post(text: str) -> Post:
     """Read `X,Y,RADIUS`; ValueError if it is no post."""
-    return Post(*parse_numbers(text, 3, "a post is X,Y,RADIUS in m"))
+    return Post(*_parse_numbers(text, 3, "a post is X,Y,RADIUS in m"))
 
 
-def parse_numbers(text: str, count: int, form: str) -> tuple[float, ...]:
+def _parse_numbers(text: str, count: int, form: str) -> tuple[float, ...]:
     """Read numbers between commas; ValueError with the form if they are not so many."""
     try:
         numbers = tuple(float(word) for word in text.split(","))
@@ -103,24 +102,24 @@ def _configure(urg: DeviceType, options: Mapping[str, Any], seed: int) -> Config
     world = _world(options["size"], options["walls"], options["posts"])
     line = replace(urg.line, baud=options["baud"], uart=options["baud"] != USB_BAUD)
     urg = replace(urg, line=line, talk=partial(_talk, scip))
-    return ConfiguredDevice(urg, Urg(parameters, world), config_to_trace(parameters, world))
+    return ConfiguredDevice(urg, Urg(parameters, world), _config_to_trace(parameters, world))
 
 
 def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> World:
     around = World()
     if size is not None:
         with refused_at("--room"):
-            width_m, depth_m = parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
+            width_m, depth_m = _parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
             around = room(width_m, depth_m)
     with refused_at("--wall"):
-        more = tuple(parse_wall(text) for text in walls)
+        more = tuple(_parse_wall(text) for text in walls)
     with refused_at("--post"):
-        return World(around.walls + more, tuple(parse_post(text) for text in posts))
+        return World(around.walls + more, tuple(_parse_post(text) for text in posts))
 
 
 def _talk(scip: str, link: str, baud: int) -> str:
     switch = " The line SCIP2.0 switches it to SCIP 2.0." if scip == "1.1" else ""
-    return switch + by_miniterm(link, USUAL_BAUD if baud == USB_BAUD else baud)
+    return switch + by_miniterm(link, _USUAL_BAUD if baud == USB_BAUD else baud)
 
 
 def _is_event(line: WireLine) -> bool:
@@ -132,7 +131,7 @@ URG: Final = DeviceType(
     title="URG-04LX",
     build=build_urg,
     configure=_configure,
-    config_of=lambda urg: config_to_trace(urg.parameters, urg.world),
-    line=LineSettings(wire=partial(SerialLine, buffer_bytes=BUFFER_BYTES)),
+    config_of=lambda urg: _config_to_trace(urg.parameters, urg.world),
+    line=LineSettings(wire=partial(SerialLine, buffer_bytes=_BUFFER_BYTES)),
     is_event=_is_event,
 )

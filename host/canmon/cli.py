@@ -7,33 +7,32 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.cli.lazy_group import LazyGroup
-from tickrig.host.cli.options import version_option
+from tickrig.host.cli.options import LazyGroup, version_option
 
-HERE: Final = "tickrig.host.canmon.verbs"
-VERBS: Final = {
-    "dump": (f"{HERE}.dump:command", "Show frames as they come, and what they mean."),
-    "conv": (f"{HERE}.conv:command", "Write what SOURCE holds into the file LOG."),
-    "info": (f"{HERE}.info:command", "Say what log files are."),
-    "top": (f"{HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
-    "stats": (f"{HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
-    "check": (f"{HERE}.check:command", "Hold traffic against rules."),
+_HERE: Final = "tickrig.host.canmon.verbs"
+_VERBS: Final = {
+    "dump": (f"{_HERE}.dump:command", "Show frames as they come, and what they mean."),
+    "conv": (f"{_HERE}.conv:command", "Write what SOURCE holds into the file LOG."),
+    "info": (f"{_HERE}.info:command", "Say what log files are."),
+    "top": (f"{_HERE}.top:command", "Show all identifiers: counts, rates, gaps, jitter."),
+    "stats": (f"{_HERE}.stats:command", "Count a log: rates, gaps, jitter, missed cycles."),
+    "check": (f"{_HERE}.check:command", "Hold traffic against rules."),
     "conform": (
-        f"{HERE}.conform:command",
+        f"{_HERE}.conform:command",
         "Judge one CANopen node, clause by clause.",
     ),
     "eds": ("tickrig.host.canmon.eds.group:command", "Check, mend, compare and show EDS files."),
     "net": ("tickrig.host.canmon.net.group:command", "Set a CANopen network to work."),
     "gateway": (
-        "tickrig.host.canmon.gateway.gateway_verb:command",
+        "tickrig.host.canmon.gateway:command",
         "Give other programs SOURCE in lines of text: CiA 309-3, ASCII mapping.",
     ),
-    "graph": (f"{HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
-    "nodes": (f"{HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
-    "send": (f"{HERE}.send:command", "Send frames on BUS."),
-    "seq": (f"{HERE}.seq:command", "Carry out the sequence FILE on BUS."),
-    "play": (f"{HERE}.play:command", "Send the frames of LOG again."),
-    "tui": (f"{HERE}.tui_verb:command", "Show all there is in tabs."),
+    "graph": (f"{_HERE}.graph:command", "Draw curves of SOURCE: in the terminal, or to files."),
+    "nodes": (f"{_HERE}.nodes:command", "Show all nodes: NMT state, heartbeat, boot-ups."),
+    "send": (f"{_HERE}.send:command", "Send frames on BUS."),
+    "seq": (f"{_HERE}.seq:command", "Carry out the sequence FILE on BUS."),
+    "play": (f"{_HERE}.play:command", "Send the frames of LOG again."),
+    "tui": (f"{_HERE}.tui_verb:command", "Show all there is in tabs."),
 }
 
 
@@ -46,7 +45,7 @@ class Verbs(LazyGroup):
             return super().invoke(ctx)
 
 
-@click.group(cls=Verbs, commands=VERBS)
+@click.group(cls=Verbs, commands=_VERBS)
 @version_option()
 def main() -> None:
     """Watch, decode, send, replay and check CAN traffic: a bus, a log file, or standard input.

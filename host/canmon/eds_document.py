@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from tickrig.host.canopen.data_sheet.document import Document
 
-YAML_ENDINGS = (".yml", ".yaml")
-LOOKED_AT = 4096
+_YAML_ENDINGS = (".yml", ".yaml")
+_LOOKED_AT = 4096
 """Characters at its beginning by which a binary file is known."""
 
 
@@ -38,7 +38,7 @@ def read_document(path: Path, what: str = "FILE", encoding: str = "") -> Documen
         raise Refused(f"{what} {path}: {error}") from None
     if _is_binary(data):
         raise Refused(f"{what} {path}: a binary file: no EDS")
-    if b"[" not in data[:LOOKED_AT] or path.suffix.lower() in YAML_ENDINGS:
+    if b"[" not in data[:_LOOKED_AT] or path.suffix.lower() in _YAML_ENDINGS:
         from tickrig.host.canopen.bus_file.bus_file import check_of  # noqa: PLC0415 - slow
 
         if other := check_of(data, path):
@@ -52,7 +52,7 @@ def _is_binary(data: bytes) -> bool:
     """Say whether more than each twentieth character is one that no text has."""
     from tickrig.wire.canopen.eds.eds_file import decode_text  # noqa: PLC0415 - slow
 
-    head = decode_text(data[:LOOKED_AT])
+    head = decode_text(data[:_LOOKED_AT])
     return sum(letter < " " and letter not in "\t\r\n" for letter in head) * 20 > len(head)
 
 

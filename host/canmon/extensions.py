@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from tickrig.host.canmon.model.check.rule import Rule
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.text.user_file import explain_error
 
 if TYPE_CHECKING:
@@ -17,11 +16,11 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.decode.decoder import Decoder, FrameDecoder
     from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-    from tickrig.host.canmon.model.frames.record import Record
+    from tickrig.host.canmon.model.frames import Record
 
 T = TypeVar("T")
 
-DECODER: Final = ("decode",)
+_DECODER: Final = ("decode",)
 RULE: Final = ("wants", "selection", "judge", "end")
 
 
@@ -29,11 +28,11 @@ def _is_class_with(found: object, methods: Iterable[str]) -> bool:
     return isinstance(found, type) and all(hasattr(found, name) for name in methods)
 
 
-DECODERS: Final = ExtensionGroup[Any](
+_DECODERS: Final = ExtensionGroup[Any](
     "tickrig.decoders",
     "decoder or rule",
     {},
-    lambda found: _is_class_with(found, DECODER) or _is_class_with(found, RULE),
+    lambda found: _is_class_with(found, _DECODER) or _is_class_with(found, RULE),
     "a class with `decode`, nor a check rule",
 )
 
@@ -48,8 +47,8 @@ def make_decoder(eds: Mapping[int, EdsObjects], dbc: Sequence[Path] = ()) -> Dec
     from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - slow
 
     made: list[FrameDecoder] = []
-    for name, found in DECODERS.load_foreign(say).items():
-        if _is_class_with(found, DECODER):
+    for name, found in _DECODERS.load_foreign(say).items():
+        if _is_class_with(found, _DECODER):
             try:
                 made.append(_CheckedDecoder(name, found()))
             except Exception as error:  # a foreign constructor may raise anything
@@ -64,9 +63,9 @@ def load_rule(name: str) -> Callable[[], Rule]:
         ExtensionError: there is none of this name, or it cannot be used.
     """
     try:
-        found = DECODERS.load(name)
+        found = _DECODERS.load(name)
     except ExtensionError as error:
-        hint = "" if name in DECODERS.names() else "; without a package it is as 'emcy never'"
+        hint = "" if name in _DECODERS.names() else "; without a package it is as 'emcy never'"
         raise ExtensionError(f"{error}{hint}") from None
     if not _is_class_with(found, RULE):
         raise ExtensionError(f"{name!r} is a decoder, no rule")

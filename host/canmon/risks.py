@@ -8,10 +8,10 @@ from typing import Final
 from tickrig.host.canmon.model.decode.node_memory import Entry
 from tickrig.wire.canopen.nmt import NmtCommand
 
-DRIVE_AREA: Final = range(0x6000, 0xA000)
+_DRIVE_AREA: Final = range(0x6000, 0xA000)
 """Objects of the device profiles; those of CiA 402 for eight axes, each 800h further."""
-AXIS: Final = 0x800
-COMMANDS: Final = {
+_AXIS: Final = 0x800
+_COMMANDS: Final = {
     0x40: "controlword",
     0x42: "target velocity of vl mode",
     0x5A: "quick stop option",
@@ -23,22 +23,22 @@ COMMANDS: Final = {
     0xFF: "target velocity",
 }
 """What turns a motor, by the low part of the index (CiA 402-2)."""
-MANUFACTURER: Final = range(0x2000, 0x6000)
-DRIVE_PROFILE: Final = 402
-IO_PROFILE: Final = 401
-SEVERAL: Final = 0xFFFF
+_MANUFACTURER: Final = range(0x2000, 0x6000)
+_DRIVE_PROFILE: Final = 402
+_IO_PROFILE: Final = 401
+_SEVERAL: Final = 0xFFFF
 
 
 def write_risk(is_drive: bool, entries: Iterable[Entry]) -> str:
     """Say what writing objects may move at a node, a drive of CiA 402 or another one."""
     indices = [index for index, _ in entries]
-    profile = [index for index in indices if index in DRIVE_AREA]
-    told = [name for index in profile if (name := COMMANDS.get((index - 0x6000) % AXIS))]
+    profile = [index for index in indices if index in _DRIVE_AREA]
+    told = [name for index in profile if (name := _COMMANDS.get((index - 0x6000) % _AXIS))]
     if told and is_drive:
         return f"This may turn a motor: {', '.join(dict.fromkeys(told))}"
     if profile:
         return f"This may move what the node drives: {_listed(profile)} is of its device profile"
-    maker = [index for index in indices if index in MANUFACTURER]
+    maker = [index for index in indices if index in _MANUFACTURER]
     if maker:
         return f"What {_listed(maker)} does its maker knows; it may move something"
     return ""
@@ -51,8 +51,8 @@ def nmt_risk(command: NmtCommand, device_type: int | None) -> str:
         command: what is commanded.
         device_type: 1000h of the node, None if it does not say it.
     """
-    profile = SEVERAL if device_type is None else device_type & 0xFFFF
-    may_turn = profile in (DRIVE_PROFILE, SEVERAL)
+    profile = _SEVERAL if device_type is None else device_type & 0xFFFF
+    may_turn = profile in (_DRIVE_PROFILE, _SEVERAL)
     if command is NmtCommand.START:
         if may_turn:
             return "This may turn a motor: a drive that is Operational obeys RPDOs"

@@ -43,8 +43,7 @@ from tickrig.wire.canopen.nmt import (
     NmtCommand,
     NmtState,
 )
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateResponse,
     Response,
@@ -52,12 +51,14 @@ from tickrig.wire.canopen.sdo.sdo import (
     UploadInitiateResponse,
     parse_response,
 )
-from tickrig.wire.canopen.sdo.sdo_block import (
+from tickrig.wire.canopen.sdo_frame import (
+    REQUEST_COB_ID,
+    AbortCode,
     BlockAcknowledge,
     BlockDownloadInitiateResponse,
     BlockUploadInitiateResponse,
+    ClientCommand,
 )
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, ClientCommand
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 
@@ -65,14 +66,14 @@ SDO_TIMEOUT_US: Final = 500_000
 
 LEAST_COPY_US: Final = 2_000
 """How long a copy of an answer may take: an error frame and the frame again, at 125 kbit/s."""
-MOST_COPY_US: Final = 20_000
+_MOST_COPY_US: Final = 20_000
 MISNAMED_US: Final = 100_000
 """How long the right answer may follow one that names another object, as a late copy does."""
 
 Object = tuple[int, int]
 """Index and sub-index."""
 
-NONE_NAMED: Final = (0, 0)
+_NONE_NAMED: Final = (0, 0)
 """In the abort of a server that could not read a request."""
 
 FENCES: Final[tuple[Object, ...]] = (
@@ -105,7 +106,7 @@ class SdoFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class NmtRequest:
     """Send an NMT command."""
 
     command: NmtCommand
@@ -144,7 +145,7 @@ class Pause:
     duration_us: int
 
 
-Step = SdoRequest | SdoFrame | Command | AwaitState | AwaitReport | Guard | Pause
+Step = SdoRequest | SdoFrame | NmtRequest | AwaitState | AwaitReport | Guard | Pause
 
 T = TypeVar("T")
 
@@ -332,7 +333,7 @@ class Dialogue:
         elif self._is_answer(step, answer, data):
             self._unanswered.clear()
             took_us = max(LEAST_COPY_US, now_us - self._sent_us)
-            self._answer, self._settled_us = data, now_us + min(took_us, MOST_COPY_US)
+            self._answer, self._settled_us = data, now_us + min(took_us, _MOST_COPY_US)
             self._go_on(answer)
         else:
             self._keep_misnamed(now_us, named, data)
@@ -368,7 +369,7 @@ class Dialogue:
         be answers to those.
         """
         named = _named(answer)
-        if named is not None and named != NONE_NAMED:
+        if named is not None and named != _NONE_NAMED:
             mine = named == (step.index, step.sub)
         else:
             mine = len(self._unanswered) == 1
@@ -454,7 +455,7 @@ class Dialogue:
                     self._unanswered.add(self._transfer)
             case Guard():
                 self._guard(ERROR_CONTROL_COB_ID + self._node_id)
-            case Command():
+            case NmtRequest():
                 self._send(NMT_COB_ID, bytes((step.command, self._node_id)))
         return self._step is not None
 

@@ -9,17 +9,17 @@ from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Script
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
-from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo_frame import RESPONSE_COB_ID
 
 T = TypeVar("T")
 
-STATE_BITS = 0x7F
+_STATE_BITS = 0x7F
 
-Listen = Callable[[int], tuple[int, StampedFrames]]
+_Listen = Callable[[int], tuple[int, StampedFrames]]
 """Waits for a first frame until a time; returns a time, and all that had arrived by then."""
 
 
-def run_script(talk: Dialogue, node_id: int, script: Script[T], now_us: int, listen: Listen) -> T:
+def run_script(talk: Dialogue, node_id: int, script: Script[T], now_us: int, listen: _Listen) -> T:
     """Run a script, and return or raise what it does.
 
     What came before is read first: an answer in the queue of the driver is not one to this script.
@@ -65,6 +65,6 @@ def _hand_over(talk: Dialogue, node_id: int, now_us: int, frame: CanFrame) -> No
 def state_of(frame: CanFrame) -> NmtState | None:
     """Return what a frame of error control says; None if it says no state."""
     try:
-        return NmtState(frame.data[0] & STATE_BITS) if len(frame.data) == 1 else None
+        return NmtState(frame.data[0] & _STATE_BITS) if len(frame.data) == 1 else None
     except ValueError:
         return None

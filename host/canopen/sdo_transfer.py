@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from tickrig.host.canopen.dialogue import Answer, Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -20,7 +19,7 @@ from tickrig.wire.canopen.sdo.sdo import (
     UploadInitiateResponse,
     UploadSegmentRequest,
 )
-from tickrig.wire.canopen.sdo.sdo_command import EXPEDITED_BYTES, SEGMENT_BYTES
+from tickrig.wire.canopen.sdo_frame import EXPEDITED_BYTES, SEGMENT_BYTES, AbortCode
 
 
 def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:

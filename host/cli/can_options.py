@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.shell_completion import CompletionItem
 
+from tickrig.host.cli.messages import BusUnavailable, Refused
 from tickrig.host.cli.options import Decorator, HarmlessCommand, add_options
-from tickrig.host.cli.refused import BusUnavailable, Refused
 from tickrig.host.cli.start import loading
 from tickrig.host.text.values import parse_setting
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 GREEDY: Final = ("--timing", "--bus-kwargs")
 """Options that take one or more values in python-can's tools."""
 
-HINTS: Final = {
+_HINTS: Final = {
     errno.EAFNOSUPPORT: "this kernel has no SocketCAN; udp_multicast needs none",
     errno.ENODEV: "no such CAN interface; a virtual one is made by"
     " 'ip link add dev NAME up type vcan'",
 }
-NO_MSGPACK: Final = "msgpack not installed"
+_NO_MSGPACK: Final = "msgpack not installed"
 """What python-can says where its interface udp_multicast lacks a package."""
 
 UNNAMED: Final = '"None"'
@@ -68,13 +68,13 @@ class BusOptions:
         return words + [f"--data-bitrate={self.data_bitrate}"] * bool(self.data_bitrate)
 
 
-def bit_s(text: str) -> int:
+def _bit_s(text: str) -> int:
     """Read a bit rate: 500000, 500k, 1M.
 
     Raises:
         ValueError: it is none.
 
-    >>> bit_s("500k"), bit_s("1M"), bit_s("125000")
+    >>> _bit_s("500k"), _bit_s("1M"), _bit_s("125000")
     (500000, 1000000, 125000)
     """
     match = _BIT_RATE.fullmatch(text)
@@ -91,7 +91,7 @@ class BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Read it."""
         try:
-            return bit_s(str(value))
+            return _bit_s(str(value))
         except ValueError as error:
             self.fail(str(error), param, ctx)
 
@@ -308,7 +308,7 @@ def _nothing_named(instead: str) -> str:
 
 
 def _first_line(error: BaseException) -> str:
-    from tickrig.host.links.errors import first_line  # noqa: PLC0415 - a TAB needs none
+    from tickrig.host.links.link import first_line  # noqa: PLC0415 - a TAB needs none
 
     return first_line(error)
 
@@ -316,7 +316,7 @@ def _first_line(error: BaseException) -> str:
 def bus_reason(error: BaseException) -> str:
     """Return in a line why a bus cannot be opened, and what to do where that is known."""
     number = getattr(error, "errno", None) or getattr(error, "error_code", None)
-    hint = HINTS.get(number) if isinstance(number, int) else None
-    if NO_MSGPACK in str(error):
+    hint = _HINTS.get(number) if isinstance(number, int) else None
+    if _NO_MSGPACK in str(error):
         hint = "pip install 'python-can[multicast]'"
     return f"{_first_line(error)} ({hint})" if hint else _first_line(error)

@@ -2,17 +2,135 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, Decorator, add_options
-from tickrig.host.cli.refused import Refused
 
 if TYPE_CHECKING:
-    from tickrig.host.cli.openrtm_options import OpenRtmOptions
     from tickrig.host.cli.ros2_options import Ros2Options
+
+
+# What a command line says of OpenRTM: addresses, and how components are named.
+
+FORMAT: Final = "%h.host_cxt/%n.rtc"
+"""OpenRTM's `naming.formats`, as it is if nobody says otherwise."""
+
+_LETTERS: Final = "ntmvVchMp"
+"""Of a format: instance name, type (twice), version, vendor, category, host, manager, process."""
+
+_PORT: Final = 2809
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """Where an ORB listens, and what peers are told; where a name server is.
+
+    CORBA has no access control: who reaches the address can do all that rtshell can.
+
+    Attributes:
+        host: an address, or a name of one.
+        port: TCP port, 0 for one that is free.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 0
+
+    def __str__(self) -> str:
+        """Return it as people write it."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}" if self.port else host
+
+    @property
+    def uri(self) -> str:
+        """It as omniORB wants it."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"giop:tcp:{host}:{self.port or ''}"
+
+
+@dataclass(frozen=True, slots=True)
+class OpenRtmOptions:
+    """How the components of a process take part in a system of OpenRTM.
+
+    Attributes:
+        name_server: where its name server is.
+        endpoint: where peers reach the components.
+        names: how components are named in the name server.
+    """
+
+    name_server: Endpoint
+    endpoint: Endpoint = field(default_factory=Endpoint)
+    names: str = FORMAT
+
+
+def _parse_options(name_server: str, address: str = "", names: str = "") -> OpenRtmOptions:
+    """Read the words of a command line, empty for those left out.
+
+    Raises:
+        ValueError: one of them cannot be; the line begins with the name of its option.
+    """
+    return OpenRtmOptions(
+        _parse_endpoint("--openrtm", name_server, _PORT),
+        _parse_endpoint("--openrtm-address", address, 0) if address else Endpoint(),
+        _parse_format("--openrtm-names", names) if names else FORMAT,
+    )
+
+
+def format_name(pattern: str, values: Mapping[str, str]) -> str:
+    """Make the path of a component from one of OpenRTM's `naming.formats`.
+
+    Args:
+        pattern: such as `%h.host_cxt/%n.rtc`; `%%` is a percent sign.
+        values: by letter.
+
+    >>> format_name("%h.host_cxt/%n.rtc", {"h": "robot", "n": "ConsoleIn0"})
+    'robot.host_cxt/ConsoleIn0.rtc'
+
+    Raises:
+        KeyError: a letter that has no value.
+    """
+    filled = {letter: value.replace("/", "_") for letter, value in values.items()} | {"%": "%"}
+    return re.sub(r"%(.?)", lambda match: filled[match[1]], pattern)
+
+
+def parse_endpoint(text: str, port: int = _PORT) -> Endpoint:
+    """Read `HOST:PORT`, `HOST` (the port is that given here) or `[ADDRESS]:PORT`.
+
+    >>> parse_endpoint("robot"), parse_endpoint("[::1]:2810")
+    (Endpoint(host='robot', port=2809), Endpoint(host='::1', port=2810))
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    match = re.fullmatch(r"(?:\[([0-9a-fA-F:.]+)\]|([\w.-]+))(?::(\d{1,5}))?", text, re.ASCII)
+    if match is None or int(match[3] or 1) not in range(1, 65_536):
+        raise ValueError(f"{text!r} is not HOST:PORT with a port 1..65535")
+    return Endpoint(match[1] or match[2], int(match[3] or port))
+
+
+def _parse_endpoint(option: str, text: str, port: int) -> Endpoint:
+    try:
+        return parse_endpoint(text, port)
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+def _parse_format(option: str, pattern: str) -> str:
+    """Take a format that gives each component another path."""
+    try:
+        parts = format_name(pattern, dict.fromkeys(_LETTERS, "x")).split("/")
+    except KeyError as error:
+        known = " ".join(f"%{letter}" for letter in _LETTERS)
+        raise ValueError(f"{option}: %{error.args[0]} is none of {known}") from None
+    if "%n" not in pattern or not all(parts):
+        raise ValueError(f"{option}: {pattern!r} is not like {FORMAT}, with %n")
+    return pattern
+
 
 openrtm_options: Final[Decorator] = add_options(
     click.option(
@@ -85,10 +203,9 @@ def _take_openrtm(options: dict[str, Any]) -> OpenRtmOptions | None:
             if word:
                 raise Refused(f"--openrtm-{option} is for --openrtm")
         return None
-    from tickrig.host.cli.openrtm_options import parse_options  # noqa: PLC0415 - a TAB needs none
 
     try:
-        return parse_options(server, address, names)
+        return _parse_options(server, address, names)
     except ValueError as error:
         raise Refused(str(error)) from None
 

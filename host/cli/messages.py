@@ -1,15 +1,63 @@
-"""What commands say to people on standard error: remarks, warnings, faults of EDS files."""
+"""What commands say to people on standard error: remarks, warnings, refusals."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NoReturn
 
 import click
 
 if TYPE_CHECKING:
     from tickrig.wire.canopen.eds.eds_file import Finding
+
+
+# What a command line says when it cannot do what was asked.
+
+NEEDS_YAML: Final = "a System Definition needs PyYAML: pip install 'tickrig[rtc]'"
+
+
+class Refused(click.ClickException):
+    """One line on standard error, and exit status 2."""
+
+    exit_code = 2
+
+
+class BusUnavailable(Refused):
+    """A bus that is named well and cannot be opened."""
+
+
+class BusFailed(click.ClickException):
+    """One line on standard error, and exit status 3: a bus that was open is gone."""
+
+    exit_code = 3
+
+
+@contextmanager
+def refused_at(option: str) -> Iterator[None]:
+    """Raise Refused, with the name of the option, in place of a ValueError."""
+    try:
+        yield
+    except ValueError as error:
+        raise Refused(f"{option}: {error}") from None
+
+
+def refuse_path(what: str, error: OSError) -> NoReturn:
+    """Say that a path cannot be used, and why."""
+    path = error.filename2 or error.filename
+    named = what if path is None else f"{what} {path}"
+    raise Refused(f"{named}: {error.strerror or error}") from error
+
+
+def time_us(option: str, word: str) -> int:
+    """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
+    from tickrig.host.text.values import parse_time_us  # noqa: PLC0415 - a TAB needs none
+
+    with refused_at(option):
+        return parse_time_us(word)
+
+
+# What commands say to people on standard error: remarks, warnings, faults of EDS files.
 
 
 def say(text: str) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig._version import __version__
-from tickrig.host.cli.start import standard_streams
+from tickrig.host.cli.start import load, standard_streams
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -95,7 +95,7 @@ def time_option(option: str, name: str, **attributes: Any) -> Decorator:
     """Return the option of a time, as `10s`; in microseconds, None where it is not given."""
 
     def parsed(context: click.Context, parameter: click.Parameter, text: str | None) -> int | None:
-        from tickrig.host.cli.refused import Refused  # noqa: PLC0415 - a TAB needs none
+        from tickrig.host.cli.messages import Refused  # noqa: PLC0415 - a TAB needs none
         from tickrig.host.text.values import parse_time_with_unit_us  # noqa: PLC0415
 
         try:
@@ -110,3 +110,46 @@ run_code_option: Final[Decorator] = click.option(
     "--run-code", is_flag=True, help="Run the Python files that the trace names (FILE.py:Class)."
 )
 """Of commands that make devices again of a trace."""
+
+
+# Groups of commands that are imported when they are asked for, so that each starts fast.
+
+
+class LazyCommand(click.Command):
+    """Stands in lists for a command that is not imported yet.
+
+    Args:
+        name: as it is asked for.
+        path: where it is, as `MODULE:NAME`.
+        short_help: how its help begins.
+    """
+
+    def __init__(self, name: str, path: str, short_help: str) -> None:
+        super().__init__(name, short_help=short_help)
+        self.path = path
+
+
+class LazyGroup(HarmlessCommand, click.Group):
+    """A group whose commands live in modules of their own.
+
+    Args:
+        commands: path and short help of each by its name, in the order of the list.
+        attributes: those of any group.
+    """
+
+    def __init__(self, commands: Mapping[str, tuple[str, str]], **attributes: Any) -> None:
+        awaited: dict[str, click.Command] = {
+            name: LazyCommand(name, *each) for name, each in commands.items()
+        }
+        super().__init__(commands=awaited, **attributes)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names in the order in which people meet them."""
+        return list(self.commands)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Import the command that was asked for."""
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, load(command.path) if isinstance(command, LazyCommand) else command, rest

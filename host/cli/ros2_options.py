@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-DOMAIN_VARIABLE: Final = "ROS_DOMAIN_ID"
-LAST_DOMAIN: Final = 232
+_DOMAIN_VARIABLE: Final = "ROS_DOMAIN_ID"
+_LAST_DOMAIN: Final = 232
 """Beyond it there is no port left (DDSI-RTPS, 9.6.2)."""
 
 
@@ -39,8 +39,8 @@ def parse_options(
         ValueError: the variable holds no domain.
     """
     if domain is None:
-        text = os.environ.get(DOMAIN_VARIABLE, "") or "0"
-        if not re.fullmatch(r"\d{1,3}", text, re.ASCII) or int(text) > LAST_DOMAIN:
-            raise ValueError(f"{DOMAIN_VARIABLE} {text!r} is no domain 0..{LAST_DOMAIN}")
+        text = os.environ.get(_DOMAIN_VARIABLE, "") or "0"
+        if not re.fullmatch(r"\d{1,3}", text, re.ASCII) or int(text) > _LAST_DOMAIN:
+            raise ValueError(f"{_DOMAIN_VARIABLE} {text!r} is no domain 0..{_LAST_DOMAIN}")
         domain = int(text)
     return Ros2Options(domain, interface or "", table, topics)

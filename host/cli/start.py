@@ -35,17 +35,17 @@ FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 UNWRITTEN: Final = 3
 """Exit status where standard output takes nothing more."""
 
-IMPORTER: Final = "<frozen importlib._bootstrap"
+_IMPORTER: Final = "<frozen importlib._bootstrap"
 """How the file names of Python's own importer begin."""
 
-AGAIN_S: Final = 0.01
-MOST_REPEATS: Final = 200
+_AGAIN_S: Final = 0.01
+_MOST_REPEATS: Final = 200
 """An import that takes longer than these is interrupted."""
 
-TERMINAL_MS: Final = 500
+_TERMINAL_MS: Final = 500
 """A terminal that takes nothing for so long is given up when a signal ends the command."""
 
-Handler = Callable[[int, FrameType | None], None]
+_Handler = Callable[[int, FrameType | None], None]
 
 
 def start(name: str, path: str) -> None:
@@ -91,7 +91,7 @@ def _status_of(interrupt: KeyboardInterrupt) -> int:
     return 128 + int(interrupt.args[0]) if interrupt.args else INTERRUPTED
 
 
-def open_closed_streams() -> None:
+def _open_closed_streams() -> None:
     """Open the standard streams that the caller has closed, as `>&-` does.
 
     The next file or socket would get their numbers, and messages would go into it. Standard input
@@ -170,7 +170,7 @@ def standard_streams() -> Iterator[None]:
     Standard error on a full disk ends nothing: what it does not take is dropped, and the exit
     status stays as it is.
     """
-    open_closed_streams()
+    _open_closed_streams()
     before = sys.stdout, sys.stderr
     if isinstance(sys.stdout, HarmlessStream):
         yield
@@ -242,7 +242,7 @@ class Interrupter:
     def received(self, number: int, frame: FrameType | None) -> None:
         """Take a signal; the argument of the KeyboardInterrupt is its number."""
         give_up_terminals()
-        if _is_importing(frame) and self._repeats < MOST_REPEATS:
+        if _is_importing(frame) and self._repeats < _MOST_REPEATS:
             self._repeat(number)
             return
         self.pending = self._repeats = 0
@@ -271,7 +271,7 @@ class Interrupter:
 
 
 def _send_later(number: int) -> None:
-    time.sleep(AGAIN_S)
+    time.sleep(_AGAIN_S)
     if sys.platform == "win32":
         signal.raise_signal(number)
     else:  # to the main thread, so that it ends a wait of it
@@ -280,14 +280,14 @@ def _send_later(number: int) -> None:
 
 def _is_importing(frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code.co_filename.startswith(IMPORTER):
+        if frame.f_code.co_filename.startswith(_IMPORTER):
             return True
         frame = frame.f_back
     return False
 
 
 @contextmanager
-def taking_signals(received: Handler) -> Iterator[None]:
+def taking_signals(received: _Handler) -> Iterator[None]:
     """Call `received` at Ctrl-C, SIGTERM and SIGHUP.
 
     SIGINT is taken although a script has the shell ignore it for what stands before `&`. SIGHUP
@@ -335,7 +335,7 @@ if sys.platform != "win32":
             pass
         poll = select.poll()
         poll.register(descriptor, select.POLLOUT)
-        ready = poll.poll(TERMINAL_MS)
+        ready = poll.poll(_TERMINAL_MS)
         return not ready or bool(ready[0][1] & (select.POLLERR | select.POLLHUP))
 
 

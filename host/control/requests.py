@@ -12,11 +12,11 @@ VERSION: Final = 1
 Object = dict[str, object]
 """A JSON object."""
 
-Verb = tuple[Callable[[Object], Object], tuple[str, ...]]
+_Verb = tuple[Callable[[Object], Object], tuple[str, ...]]
 """What answers a request, and the fields that it takes."""
 
-COMMON_FIELDS: Final = ("v", "do", "id")
-NOT_JSON: Final = "the line is not a JSON object"
+_COMMON_FIELDS: Final = ("v", "do", "id")
+_NOT_JSON: Final = "the line is not a JSON object"
 
 
 class RequestDispatcher:
@@ -26,7 +26,7 @@ class RequestDispatcher:
         verbs: by what a request has in `do`. A verb raises ValueError to refuse.
     """
 
-    def __init__(self, verbs: Mapping[str, Verb]) -> None:
+    def __init__(self, verbs: Mapping[str, _Verb]) -> None:
         self._verbs = verbs
 
     def answer_line(self, line: bytes) -> bytes:
@@ -34,13 +34,13 @@ class RequestDispatcher:
         try:
             request = json.loads(line.decode(), parse_constant=_refuse_constant)
             if not isinstance(request, dict):
-                return refusal_line(NOT_JSON)
+                return refusal_line(_NOT_JSON)
             return _encode(self.answer(request))
         except UnicodeDecodeError as error:
             byte = line[error.start]
             return refusal_line(f"the line is not UTF-8: byte {error.start} is {byte:02x}h")
         except (ValueError, RecursionError) as error:
-            return refusal_line(f"{NOT_JSON}: {error}")
+            return refusal_line(f"{_NOT_JSON}: {error}")
 
     def answer(self, request: Object) -> Object:
         """Answer a request: `ok`, and what was asked for or `error`."""
@@ -48,7 +48,7 @@ class RequestDispatcher:
         try:
             return {"v": VERSION, **head, "ok": True, **self._dispatch(request)}
         except ValueError as error:
-            return {**refusal(str(error)), **head}
+            return {**_refusal(str(error)), **head}
 
     def _dispatch(self, request: Object) -> Object:
         version = request.get("v")
@@ -60,20 +60,20 @@ class RequestDispatcher:
         if not isinstance(do, str) or do not in self._verbs:
             raise ValueError(f"no request {short(do)}; known: {', '.join(self._verbs)}")
         verb, fields = self._verbs[do]
-        if unknown := [key for key in request if key not in (*COMMON_FIELDS, *fields)]:
+        if unknown := [key for key in request if key not in (*_COMMON_FIELDS, *fields)]:
             known = ", ".join(fields) or "none"
             raise ValueError(f"{do} has no field {short(unknown[0])}; fields: {known}")
         return verb(request)
 
 
-def refusal(error: str) -> Object:
+def _refusal(error: str) -> Object:
     """Return the answer to a request that cannot be done."""
     return {"v": VERSION, "ok": False, "error": error}
 
 
 def refusal_line(error: str) -> bytes:
     """Return that answer as a line."""
-    return _encode(refusal(error))
+    return _encode(_refusal(error))
 
 
 def text_of(request: Mapping[str, object], key: str) -> str:

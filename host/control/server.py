@@ -3,13 +3,214 @@
 from __future__ import annotations
 
 import contextlib
+import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Final, Protocol
 
-from tickrig.host.control.line_server import LineServer
 from tickrig.host.control.requests import RequestDispatcher, refusal_line
 from tickrig.host.control.unix_socket import listen_at
+from tickrig.host.links.ready import ready
+
+# Lines and their answers over a listening socket: many clients, no thread, bounded work.
+
+MAX_LINE: Final = 4_096
+MAX_CLIENTS: Final = 32
+MAX_UNSENT: Final = 262_144
+_READ_BYTES: Final = 4_096
+IDLE_S: Final = 60.0
+"""A client that is silent so long makes room for another where none is left."""
+
+Answer = Callable[[bytes], bytes]
+"""Answers a line, given without its end; the answer has one."""
+
+
+class Readable(Protocol):
+    """What has a descriptor, as a socket; `select` says when that can be read."""
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        ...
+
+
+class LineServer:
+    """Serves a listening socket while somebody gives it time.
+
+    A round answers at most one line of each client; a client that does not
+    read its answers is not read from either.
+
+    Args:
+        listener: does not block; the server closes it.
+        begin: called with each new client: what answers its lines.
+        refuse: makes an answer that says why there is none.
+        max_line: longest line, in bytes.
+        clock: monotonic time in seconds.
+    """
+
+    def __init__(
+        self,
+        listener: socket.socket,
+        begin: Callable[[], Answer],
+        refuse: Callable[[str], bytes],
+        max_line: int = MAX_LINE,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._listener, self._begin, self._refuse = listener, begin, refuse
+        self._max_line, self._clock = max_line, clock
+        self._clients: dict[socket.socket, _Client] = {}
+        self._attached: dict[Readable, Callable[[], None]] = {}
+
+    def attach(self, source: Readable, ready: Callable[[], None]) -> None:
+        """Serve something else, too.
+
+        Args:
+            source: what has a descriptor; -1 once it is closed.
+            ready: called in a round in which that can be read.
+        """
+        self._attached[source] = ready
+
+    def serve(self, wait_us: int) -> None:
+        """Do one round; wait for something to do, but not longer than `wait_us`."""
+        clients = self._clients.values()
+        readers = [client.connection for client in clients if client.wants_more]
+        writers = [client.connection for client in clients if client.has_unsent]
+        wait_us = 0 if any(client.has_line for client in clients) else max(0, wait_us)
+        attached = [source for source in self._attached if source.fileno() >= 0]
+        sources = [self._listener, *readers, *attached]
+        can_be_read, can_be_written = ready(sources, writers, wait_us / 1e6)
+        for connection in can_be_written:
+            self._clients[connection].flush()
+            self._clients[connection].active_s = self._clock()
+        for connection in readers:
+            if connection in can_be_read:
+                self._clients[connection].read()
+                self._clients[connection].active_s = self._clock()
+        for source in attached:
+            if source in can_be_read:
+                self._attached[source]()
+        self._answer()
+        if self._listener in can_be_read:
+            self._accept()
+
+    def close(self) -> None:
+        """Send what can be sent, and hang up."""
+        for client in self._clients.values():
+            client.flush()
+            client.connection.close()
+        self._clients.clear()
+        self._listener.close()
+
+    def _accept(self) -> None:
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:  # the client is gone again, or no descriptor is left
+            return
+        connection.setblocking(False)
+        if len(self._clients) == MAX_CLIENTS:
+            self._make_room()
+        if len(self._clients) < MAX_CLIENTS:
+            too_long = self._refuse(f"the line is longer than {self._max_line} bytes")
+            client = _Client(connection, self._begin(), self._max_line, too_long)
+            client.active_s, self._clients[connection] = self._clock(), client
+            return
+        _dismiss(connection, self._refuse(f"there are {MAX_CLIENTS} clients already"))
+
+    def _make_room(self) -> None:
+        """Hang up on the client that has been silent the longest, if that was long."""
+        client = min(self._clients.values(), key=lambda client: client.active_s)
+        if self._clock() - client.active_s >= IDLE_S:
+            del self._clients[client.connection]
+            why = f"silent for {IDLE_S:g} s, and {MAX_CLIENTS} clients are the most"
+            _dismiss(client.connection, b"" if client.has_unsent else self._refuse(why))
+
+    def _answer(self) -> None:
+        for client in list(self._clients.values()):
+            if client.has_line:
+                client.answer()
+            if client.gone:
+                client.connection.close()
+                del self._clients[client.connection]
+
+
+def _dismiss(connection: socket.socket, reason: bytes) -> None:
+    with connection, contextlib.suppress(OSError):
+        connection.send(reason)
+
+
+class _Client:
+    """One connection, its unfinished line, its unsent answers, and when it last did something."""
+
+    def __init__(
+        self, connection: socket.socket, answer: Answer, max_line: int, too_long: bytes
+    ) -> None:
+        self.connection, self.active_s = connection, 0.0
+        self._answer, self._max_line, self._too_long = answer, max_line, too_long
+        self._received, self._unsent = bytearray(), bytearray()
+        self._end = -1  # where the first line in it ends; found once, whatever its length
+        self._closing = self._broken = self._skipping = False
+
+    @property
+    def has_unsent(self) -> bool:
+        return bool(self._unsent)
+
+    @property
+    def has_line(self) -> bool:
+        return self._end >= 0 and len(self._unsent) < MAX_UNSENT
+
+    @property
+    def wants_more(self) -> bool:
+        return not self._closing and self._end < 0
+
+    @property
+    def gone(self) -> bool:
+        return self._broken or (self._closing and not self._unsent and not self.has_line)
+
+    def read(self) -> None:
+        """Take what came."""
+        try:
+            data = self.connection.recv(_READ_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            self._broken = True
+            return
+        self._closing = not data
+        self._receive(data)
+
+    def answer(self) -> None:
+        """Answer the next whole line."""
+        line = bytes(self._received[: self._end])
+        del self._received[: self._end + 1]
+        self._end = self._received.find(b"\n")
+        self.send(self._too_long if len(line) > self._max_line else self._answer(line))
+
+    def send(self, data: bytes) -> None:
+        """Queue an answer and send what goes at once."""
+        self._unsent += data
+        self.flush()
+
+    def flush(self) -> None:
+        """Send what goes at once."""
+        try:
+            del self._unsent[: self.connection.send(self._unsent)]
+        except BlockingIOError:
+            return
+        except OSError:
+            self._broken = True
+
+    def _receive(self, data: bytes) -> None:
+        if self._skipping:
+            _, end, data = data.partition(b"\n")
+            self._skipping = not end
+        begin = len(self._received)
+        self._received += data
+        if self._end < 0:
+            self._end = self._received.find(b"\n", begin)
+        if self._end < 0 and len(self._received) > self._max_line:
+            self._received.clear()
+            self._skipping = True
+            self.send(self._too_long)
 
 
 class ControlServer(LineServer):

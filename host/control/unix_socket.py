@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 if TYPE_CHECKING:
     from pathlib import Path
 
-MAX_PATH_BYTES: Final = 107
+_MAX_PATH_BYTES: Final = 107
 """What the kernel takes, beside the zero at the end (unix(7), sun_path)."""
 
 
@@ -55,8 +55,8 @@ def listen_at(path: Path) -> socket.socket:
     return listener
 
 
-LOCK_TRIES: Final = 100
-LOCK_AGAIN_S: Final = 0.01
+_LOCK_TRIES: Final = 100
+_LOCK_AGAIN_S: Final = 0.01
 
 
 @contextmanager
@@ -77,11 +77,11 @@ if sys.platform != "win32":
         """Lock a folder; BlockingIOError if another program does not let go of it."""
         import fcntl  # noqa: PLC0415 - not on Windows
 
-        for _ in range(LOCK_TRIES):
+        for _ in range(_LOCK_TRIES):
             with suppress(BlockingIOError):
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 return
-            time.sleep(LOCK_AGAIN_S)
+            time.sleep(_LOCK_AGAIN_S)
         why = f"another program holds a lock on the folder {folder}; name a file in another folder"
         raise BlockingIOError(errno.EWOULDBLOCK, why)
 
@@ -99,7 +99,7 @@ def _publish(listener: socket.socket, path: Path) -> None:
 
     By a new name, not by a link: on the file system of User-Mode Linux that is another socket.
     """
-    if len(os.fsencode(path)) > MAX_PATH_BYTES:
+    if len(os.fsencode(path)) > _MAX_PATH_BYTES:
         raise OSError(errno.ENAMETOOLONG, "AF_UNIX path too long", str(path))
     hidden = path.with_name(f".{os.getpid()}")
     mask = os.umask(0o177)

@@ -1,4 +1,10 @@
-"""A CAN link to a real bus, or any other that python-can knows."""
+"""A CAN link to a real bus, or any other that python-can knows.
+
+Frames as python-can has them.
+
+>>> to_frame(to_message(CanFrame.parse("00000605#40"))) == CanFrame.parse("00000605#40")
+True
+"""
 
 from __future__ import annotations
 
@@ -14,21 +20,85 @@ from typing import Any, Final
 
 import can
 
-from tickrig.host.links.can_message import to_error_frame, to_frame, to_message
-from tickrig.host.links.errors import TRACEBACK, LinkClosed, LinkError, first_line
-from tickrig.host.links.link import StampedFrames
+from tickrig.host.links.link import TRACEBACK, LinkClosed, LinkError, StampedFrames, first_line
 from tickrig.host.links.ready import let_wait
 from tickrig.host.text.log import log_of
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import (
+from tickrig.wire.can import (
+    BRS,
     CONTROLLER_BYTE,
+    ERROR_CLASS_MASK,
+    ESI,
+    CanFrame,
     ControllerFlag,
     ErrorClass,
     ErrorFrame,
     ErrorState,
+    FdFrame,
+    Frames,
 )
 
-DRIFT: Final = 5_000
+
+def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
+    """Return a message; its timestamp is in seconds, as python-can wants it."""
+    if isinstance(frame, FdFrame):
+        return _fd_message(frame, at_us)
+    return can.Message(
+        timestamp=at_us / 1e6,
+        arbitration_id=frame.can_id,
+        is_extended_id=frame.extended,
+        is_remote_frame=frame.remote,
+        dlc=frame.dlc,
+        data=None if frame.remote else frame.data,
+    )
+
+
+def _fd_message(frame: FdFrame, at_us: int) -> can.Message:
+    return can.Message(
+        timestamp=at_us / 1e6,
+        arbitration_id=frame.can_id,
+        is_extended_id=frame.extended,
+        is_fd=True,
+        bitrate_switch=frame.brs,
+        error_state_indicator=frame.esi,
+        dlc=len(frame.data),
+        data=frame.data,
+    )
+
+
+def to_frame(message: can.Message) -> CanFrame | None:
+    """Return a frame; None for an error frame and for CAN FD."""
+    if message.is_error_frame or message.is_fd:
+        return None
+    remote = message.is_remote_frame
+    return CanFrame(
+        message.arbitration_id,
+        b"" if remote else bytes(message.data),
+        remote,
+        message.is_extended_id,
+        message.dlc if remote else 0,
+    )
+
+
+def to_fd_frame(message: can.Message) -> FdFrame | None:
+    """Return a CAN FD frame, not checked; None for any other message.
+
+    python-can takes one without data in an ASC log for a remote frame, which CAN FD has not.
+    """
+    if not message.is_fd or message.is_error_frame:
+        return None
+    flags = BRS * message.bitrate_switch | ESI * message.error_state_indicator
+    return FdFrame(message.arbitration_id, bytes(message.data), message.is_extended_id, flags)
+
+
+def to_error_frame(message: can.Message) -> ErrorFrame | None:
+    """Return what an error frame says; None for any other message."""
+    if not message.is_error_frame:
+        return None
+    data = bytes(message.data)[:8].ljust(8, b"\0")
+    return ErrorFrame(message.arbitration_id & ERROR_CLASS_MASK, data)
+
+
+_DRIFT: Final = 5_000
 """Two clocks part by less than one in so many: 200 ppm."""
 
 
@@ -64,23 +134,23 @@ class StampClock:
             return now_us
         ahead_us = now_us - stamp_us
         if self._stamp_us is not None and stamp_us >= self._stamp_us:
-            least_us = self._ahead_us + (stamp_us - self._stamp_us) // DRIFT
+            least_us = self._ahead_us + (stamp_us - self._stamp_us) // _DRIFT
             ahead_us = min(ahead_us, least_us)
         self._stamp_us, self._ahead_us = stamp_us, ahead_us
         return max(polled_us, stamp_us + ahead_us)
 
 
 INTERFACE: Final = "udp_multicast"
-IP_MULTICAST_ALL: Final = 49
-IPV6_MULTICAST_ALL: Final = 29
+_IP_MULTICAST_ALL: Final = 49
+_IPV6_MULTICAST_ALL: Final = 29
 
 
-SO_RCVBUFFORCE: Final = 33
-RECEIVE_BYTES: Final = 4 << 20
+_SO_RCVBUFFORCE: Final = 33
+_RECEIVE_BYTES: Final = 4 << 20
 """Asked of the kernel for its queue: some 10 000 frames; others than root get net.core.rmem_max."""
 
 
-def receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> can.Message | None:
+def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> can.Message | None:
     """Return the next message of a bus; None if none comes in time.
 
     python-can measures a wait by the wall clock: where that is set back by an hour meanwhile, the
@@ -107,9 +177,9 @@ def receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> ca
 def _enlarge_queue(sock: socket.socket) -> None:
     """Let the kernel keep what comes while this process is held up: 300 frames are 40 ms."""
     try:
-        sock.setsockopt(socket.SOL_SOCKET, SO_RCVBUFFORCE, RECEIVE_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BYTES)
     except OSError:  # PermissionError, and no such option beside Linux
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BYTES)
 
 
 def prepare_bus(bus: can.BusABC, interface: str) -> None:
@@ -140,22 +210,22 @@ def _has_no_traceback(record: logging.LogRecord) -> bool:
 def _keep_to_group(sock: socket.socket) -> None:
     with suppress(OSError):  # IPv6 before Linux 4.20
         if sock.family == socket.AF_INET6:
-            sock.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
+            sock.setsockopt(socket.IPPROTO_IPV6, _IPV6_MULTICAST_ALL, 0)
         else:
-            sock.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+            sock.setsockopt(socket.IPPROTO_IP, _IP_MULTICAST_ALL, 0)
 
 
 MOST_FAULTS: Final = 100
 FAULTY_S: Final = 1.0
 """A bus is given up when so many reads in a row have failed, and for so long at least."""
 
-TRIES: Final = 16
+_TRIES: Final = 16
 """So many reads that fail make one that gives nothing, so that nobody is kept by them."""
 
 GONE: Final = (errno.ENODEV, errno.ENXIO, errno.ENETDOWN)
 """What the kernel says of an adapter that was pulled out, or switched off."""
 
-SOCKETCAND_BUFFER: Final = "_SocketCanDaemonBus__receive_buffer"
+_SOCKETCAND_BUFFER: Final = "_SocketCanDaemonBus__receive_buffer"
 """python-can's socketcand leaves a frame that it cannot read in it, and those before."""
 
 _log = log_of(__name__)
@@ -209,9 +279,9 @@ class BusReceiver:
             LinkClosed: the bus is gone, or 100 reads in a row have failed for 1 s.
         """
         begun_s, wait_s = time.monotonic(), timeout_s
-        for _ in range(TRIES):
+        for _ in range(_TRIES):
             try:
-                message = self._read(None) if wait_s is None else receive(self._read, wait_s)
+                message = self._read(None) if wait_s is None else _receive(self._read, wait_s)
             except Exception as error:  # drivers raise what they like
                 self._fail(error)
             else:
@@ -224,7 +294,7 @@ class BusReceiver:
                 self._fail(ValueError(odd))
             if timeout_s is not None:
                 wait_s = max(0.0, begun_s + timeout_s - time.monotonic())
-        time.sleep(AGAIN_S if wait_s is None else min(wait_s, AGAIN_S))
+        time.sleep(_AGAIN_S if wait_s is None else min(wait_s, _AGAIN_S))
         return None
 
     def check(self, error: Exception | None = None) -> None:
@@ -262,8 +332,8 @@ class BusReceiver:
         if isinstance(error.__cause__ or error, UnicodeError) and hasattr(self._bus, "flush"):
             with suppress(can.CanError):
                 self._bus.flush()  # of slcan
-        if hasattr(self._bus, SOCKETCAND_BUFFER):
-            setattr(self._bus, SOCKETCAND_BUFFER, "")
+        if hasattr(self._bus, _SOCKETCAND_BUFFER):
+            setattr(self._bus, _SOCKETCAND_BUFFER, "")
 
 
 def _warn(text: str) -> None:
@@ -304,10 +374,10 @@ def close_bus(bus: can.BusABC) -> None:
         _log.info("closing %s: %s", bus.channel_info, reason_of(error))
 
 
-SEND_TIMEOUT_US: Final = 1_000_000
-AGAIN_S: Final = 0.001
+_SEND_TIMEOUT_US: Final = 1_000_000
+_AGAIN_S: Final = 0.001
 """A queue without room is tried again so soon: that of SocketCAN has ten places."""
-PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
+_PASSIVE = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
 
 
 class CanLink:
@@ -373,14 +443,14 @@ class CanLink:
             LinkClosed: the bus is gone, or took none for 1 s.
         """
         for frame in traffic:
-            deadline_us = self.now_us + SEND_TIMEOUT_US
+            deadline_us = self.now_us + _SEND_TIMEOUT_US
             while not self._sent(frame, deadline_us):
-                time.sleep(AGAIN_S)
+                time.sleep(_AGAIN_S)
 
     def _sent(self, frame: CanFrame, deadline_us: int) -> bool:
         """Send a frame; False if the queue of its driver has no room for now."""
         try:
-            self._bus.send(to_message(frame), 0 if self._drops else SEND_TIMEOUT_US / 1e6)
+            self._bus.send(to_message(frame), 0 if self._drops else _SEND_TIMEOUT_US / 1e6)
         except Exception as error:  # drivers raise what they like
             if self._drops and _is_full(error):
                 self.lost += 1
@@ -476,6 +546,6 @@ def _error_state(message: can.Message) -> ErrorState | None:
     if ErrorClass.CONTROLLER not in error or len(message.data) <= CONTROLLER_BYTE:
         return None
     flags = ControllerFlag(message.data[CONTROLLER_BYTE] & 0x7F)
-    if flags & PASSIVE:
+    if flags & _PASSIVE:
         return ErrorState.PASSIVE
     return ErrorState.ACTIVE if ControllerFlag.ACTIVE in flags else None

@@ -14,17 +14,22 @@ import os
 import select
 import sys
 import time
+from collections import deque
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from queue import Empty
+from threading import TIMEOUT_MAX, Lock
+from time import monotonic
 from types import SimpleNamespace
-from typing import Any, Final, Protocol, TypeVar
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 SELECTABLE: Final = 1_024
 """FD_SETSIZE: `select` knows no descriptor from here on."""
 
-SPARE: Final = 8
+_SPARE: Final = 8
 """A port opens some more beside its own."""
 
-FOREIGN: Final = (
+_FOREIGN: Final = (
     *("serial.serialposix", "serial.urlhandler.protocol_socket"),
     *("can.interfaces.socketcan.socketcan", "can.interfaces.udp_multicast.bus"),
 )
@@ -104,8 +109,8 @@ def let_wait(opened: HasDescriptor) -> None:
         number = opened.fileno()
     except (OSError, AttributeError, NotImplementedError):  # it has none
         return
-    if sys.platform != "win32" and number >= SELECTABLE - SPARE:
-        for name in FOREIGN:
+    if sys.platform != "win32" and number >= SELECTABLE - _SPARE:
+        for name in _FOREIGN:
             module: Any = sys.modules.get(name)
             if getattr(module, "select", None) is select:
                 module.select = SimpleNamespace(**{**vars(select), "select": _select})
@@ -116,3 +121,51 @@ def _select(
 ) -> tuple[list[Any], list[Any], list[Any]]:
     """Wait as `select.select` does, but for what is broken, which the others find."""
     return *ready(readers, writers, wait_s), []
+
+
+# A queue whose waits end in their time.
+
+T = TypeVar("T")
+
+
+class WaitingQueue(Generic[T]):
+    """A queue for one thread that reads and any that write.
+
+    `queue.SimpleQueue` waits for good (CPython 3.11) where its time is over before it looks
+    again: after a signal, or where its lock happens to be free. Ctrl-C in the midst of
+    `queue.Queue` and `threading.Event` can leave their lock taken.
+    """
+
+    def __init__(self) -> None:
+        self._items: deque[T] = deque()
+        self._nothing_new = Lock()
+        self._nothing_new.acquire()
+
+    def put(self, item: T) -> None:
+        """Put an item at the end; never waits."""
+        self._items.append(item)
+        with suppress(RuntimeError):  # something else is new, too
+            self._nothing_new.release()
+
+    def get(self, wait_s: float | None = None) -> T:
+        """Take the first item.
+
+        Args:
+            wait_s: for how long to wait for one; None for as long as it takes.
+
+        Raises:
+            Empty: nothing came in time.
+        """
+        deadline_s = None if wait_s is None else monotonic() + wait_s
+        while True:
+            with suppress(IndexError):
+                return self._items.popleft()
+            left_s = (
+                -1 if deadline_s is None else min(max(0, deadline_s - monotonic()), TIMEOUT_MAX)
+            )
+            if not self._nothing_new.acquire(timeout=left_s):
+                raise Empty
+
+    def clear(self) -> None:
+        """Forget all items."""
+        self._items.clear()

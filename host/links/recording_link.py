@@ -9,12 +9,12 @@ from typing import Any, Final, Generic
 from tickrig.host.links.link import Link, StampedFrames, StampedLink, W
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry, Place, WireEntry, WireType
 from tickrig.host.text.bench_record import BenchRecord, change_text
-from tickrig.host.text.line_file import LineFile
 from tickrig.host.text.trace import RESET, Mark
 from tickrig.host.text.values import Setting
+from tickrig.host.text.whole_file import LineFile
 from tickrig.wire.can import CanFrame
 
-WIRE: Final = "wire"
+_WIRE: Final = "wire"
 """What the only wire is called."""
 
 
@@ -46,7 +46,7 @@ class RecordingLink(Generic[W]):
     ) -> None:
         on_can = hasattr(link, "receive_stamped")
         wire = WireEntry(WireType.CAN if on_can else WireType.SERIAL)
-        header = BenchHeader({name: DeviceEntry(WIRE, type)}, {WIRE: wire}, place=Place.PORT)
+        header = BenchHeader({name: DeviceEntry(_WIRE, type)}, {_WIRE: wire}, place=Place.PORT)
         self._link, self._name = link, name
         self._file = LineFile(Path(path), header.encode(), "the link")
         self._lock, self._start_us, self._latest_us = threading.Lock(), link.now_us, 0

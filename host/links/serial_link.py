@@ -10,21 +10,145 @@ import sys
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from queue import Empty, Queue
+from typing import Final
 
 import serial
+from serial import PortNotOpenError, SerialException, rfc2217
+from serial.serialutil import Timeout
 
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import let_wait
-from tickrig.host.links.tcp import give_up_unanswered, tune
 
-if TYPE_CHECKING:
-    from tickrig.host.links.rfc2217_serial import Rfc2217Serial
+# What both ends of a serial line over TCP want of their connection.
 
-UNCOUNTED: Final = ("socket:",)
+_KEEP_ALIVE: Final = {"TCP_KEEPIDLE": 10, "TCP_KEEPINTVL": 5, "TCP_KEEPCNT": 3}
+_UNANSWERED_MS: Final = 25_000
+
+
+def tune(connection: socket.socket) -> None:
+    """Send each write at once, and find a machine that vanished 25 s after its last sign.
+
+    Args:
+        connection: of TCP.
+
+    Raises:
+        OSError: it is gone already, or none of TCP.
+    """
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if sys.platform == "linux":
+        for name, value in _KEEP_ALIVE.items():
+            connection.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+
+
+def _give_up_unanswered(connection: socket.socket) -> None:
+    """End a connection on which something sent has had no answer of the other machine for 25 s.
+
+    Args:
+        connection: of TCP.
+
+    Raises:
+        OSError: it is gone already, or none of TCP.
+    """
+    if sys.platform == "linux":
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, _UNANSWERED_MS)
+
+
+# pyserial's `rfc2217://` port, with time-outs that cost nothing and errors that say more.
+
+_SAID_SHOWN: Final = 200
+
+_WRITE_S: Final = 1.0
+"""How long a write waits for room; pyserial's own waits for 5 s."""
+
+
+class Rfc2217Serial(rfc2217.Serial):
+    """A serial port of another machine (RFC 2217).
+
+    pyserial agrees with the other end on all settings when one is changed, in 50 ms at least; it
+    does so even for a time-out, of which the other end knows nothing. Where the other end
+    refuses in a line of text, as ser2net and ours do, it passes the line over. And it forgets
+    what came before a connection ended.
+
+    Args and attributes are those of `serial.Serial`; `write_timeout` cannot be set.
+    """
+
+    _agreed: object = None
+
+    def open(self) -> None:
+        """Open the port.
+
+        Raises:
+            SerialException: nobody listens there, or nobody who knows RFC 2217; the text
+                has what was said instead.
+        """
+        self._agreed = None
+        try:
+            super().open()
+        except OSError as error:
+            if (queue := self._queue) is None:  # there was no connection
+                raise
+            received = b"".join(queue.get() or b"" for _ in range(queue.qsize()))
+            said = received.decode("ascii", "replace").strip()
+            instead = f"it said {said[:_SAID_SHOWN]!r}" if said else "it said nothing"
+            raise SerialException(f"no serial server answers there: {instead}") from error
+        self._socket.settimeout(_WRITE_S)  # type: ignore[attr-defined] # not in typeshed
+
+    def close(self) -> None:
+        """Close the port, and its connection even if the other end has reset it."""
+        connection = self._socket  # type: ignore[attr-defined] # not in typeshed
+        super().close()
+        if connection is not None:
+            connection.close()
+
+    def read(self, size: int = 1) -> bytes:
+        """Return up to `size` bytes, fewer if the time-out is over or the connection has ended.
+
+        Raises:
+            SerialException: it has ended, and all that came was read.
+        """
+        if not self.is_open or (queue := self._queue) is None:
+            raise PortNotOpenError
+        received = bytearray()
+        timeout = Timeout(self.timeout)  # type: ignore[arg-type] # None is for ever
+        with suppress(Empty):
+            while len(received) < size:
+                if (piece := queue.get(timeout=timeout.time_left())) is None:
+                    queue.put(None)  # the next look finds the end too
+                    if received:
+                        break
+                    raise SerialException("the connection has ended")
+                received += piece
+        return bytes(received)
+
+    def _telnet_read_loop(self) -> None:
+        """Take what comes, in a thread; what is no telnet ends it, as the end of the line does."""
+        try:
+            with suppress(TypeError, OSError):
+                super()._telnet_read_loop()  # type: ignore[misc] # not in typeshed
+        finally:
+            if (queue := self._queue) is not None:
+                queue.put(None)
+
+    @property
+    def _queue(self) -> Queue[bytes | None] | None:
+        """What its reading thread has received, None if there was no connection yet."""
+        queue: Queue[bytes | None] | None = self._read_buffer  # type: ignore[attr-defined]
+        return queue
+
+    def _reconfigure_port(self) -> None:
+        framing = (self.baudrate, self.bytesize, self.parity, self.stopbits)
+        settings = (*framing, self.xonxoff, self.rtscts, self.dsrdtr, self.write_timeout)
+        if settings != self._agreed:
+            super()._reconfigure_port()  # type: ignore[misc] # not in typeshed
+            self._agreed = settings
+
+
+_UNCOUNTED: Final = ("socket:",)
 """URLs under which pyserial only knows whether bytes are waiting, not how many."""
 
-READ_BYTES: Final = 4_096
+_READ_BYTES: Final = 4_096
 
 
 class SerialLink:
@@ -42,7 +166,7 @@ class SerialLink:
     """
 
     def __init__(self, url: str, baud: int = 115_200, *, exclusive: bool = True) -> None:
-        self._url, self._uncounted = url, url.startswith(UNCOUNTED)
+        self._url, self._uncounted = url, url.startswith(_UNCOUNTED)
         try:
             self._port = _open_port(url, baud, exclusive=exclusive)
         except (serial.SerialException, ValueError, OSError) as error:
@@ -53,7 +177,7 @@ class SerialLink:
         if self._connection is not None:
             with suppress(OSError):  # gone already, as the first look will tell
                 tune(self._connection)
-                give_up_unanswered(self._connection)
+                _give_up_unanswered(self._connection)
 
     @property
     def now_us(self) -> int:
@@ -104,7 +228,7 @@ class SerialLink:
             return self._port.read(self._port.in_waiting)
         self._port.timeout = 0
         with suppress(serial.SerialException):  # the end of it, which the next look finds too
-            return self._port.read(READ_BYTES)
+            return self._port.read(_READ_BYTES)
         return b""
 
 
@@ -114,13 +238,12 @@ def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | Rfc22
         return serial.serial_for_url(
             url, baudrate=baud, timeout=0, write_timeout=1, exclusive=exclusive or None
         )
-    from tickrig.host.links.rfc2217_serial import Rfc2217Serial  # noqa: PLC0415 - seldom wanted
 
     return Rfc2217Serial(url, baudrate=baud, timeout=0)
 
 
-LOCKS: Final = Path("/proc/locks")
-COMMAND_SHOWN: Final = 100
+_LOCKS: Final = Path("/proc/locks")
+_COMMAND_SHOWN: Final = 100
 
 
 def explain_open_error(url: str, error: Exception) -> str:
@@ -152,7 +275,7 @@ if sys.platform != "win32":
         """Return `: COMMAND (process NUMBER)` of who has locked a file, empty if not shown."""
         try:
             found = os.stat(path)
-            locks = LOCKS.read_text("ascii").splitlines()
+            locks = _LOCKS.read_text("ascii").splitlines()
         except OSError:
             return ""
         device = f"{os.major(found.st_dev):02x}:{os.minor(found.st_dev):02x}:{found.st_ino}"
@@ -168,7 +291,7 @@ if sys.platform != "win32":
         except OSError:
             return "?"
         command = " ".join(words.replace(b"\0", b" ").decode("utf-8", "replace").split())
-        return command if len(command) <= COMMAND_SHOWN else f"{command[:COMMAND_SHOWN]}..."
+        return command if len(command) <= _COMMAND_SHOWN else f"{command[:_COMMAND_SHOWN]}..."
 
     def _remedy(path: str) -> str:
         """Say how to be let in: by the group of the file, if that may read and write."""

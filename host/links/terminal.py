@@ -11,8 +11,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
-LOCAL_FLAGS: Final = 3
-CONTROL_CHARACTERS: Final = 6
+_LOCAL_FLAGS: Final = 3
+_CONTROL_CHARACTERS: Final = 6
 """Their places in what `termios.tcgetattr` returns."""
 
 
@@ -42,8 +42,8 @@ def take_keys(descriptor: int) -> Callable[[], None]:
 
         try:
             before, modes = termios.tcgetattr(descriptor), termios.tcgetattr(descriptor)
-            modes[LOCAL_FLAGS] &= ~(termios.ICANON | termios.ECHO)
-            characters = modes[CONTROL_CHARACTERS]
+            modes[_LOCAL_FLAGS] &= ~(termios.ICANON | termios.ECHO)
+            characters = modes[_CONTROL_CHARACTERS]
             characters[termios.VMIN] = characters[termios.VTIME] = 0
             characters[termios.VSUSP] = b"\0"
             termios.tcsetattr(descriptor, termios.TCSAFLUSH, modes)
@@ -55,8 +55,8 @@ def take_keys(descriptor: int) -> Callable[[], None]:
 MOST_WAITING: Final = 131_072
 """bytes"""
 
-CLOSING_S: Final = 0.5
-LOOK_S: Final = 0.5
+_CLOSING_S: Final = 0.5
+_LOOK_S: Final = 0.5
 
 
 class TerminalOutput:
@@ -116,7 +116,7 @@ class TerminalOutput:
         with self._changed:
             self._closing = True
             self._changed.notify_all()
-        self._thread.join(CLOSING_S)
+        self._thread.join(_CLOSING_S)
         return not (self._thread.is_alive() or self.gone)
 
     def _run(self) -> None:
@@ -140,7 +140,7 @@ class TerminalOutput:
         """Wait for text; return True at the end, and raise OSError if the terminal is gone."""
         with self._changed:
             while not self._waiting and not self._closing:
-                if not self._changed.wait(LOOK_S) and _is_hung_up(self._descriptor):
+                if not self._changed.wait(_LOOK_S) and _is_hung_up(self._descriptor):
                     raise OSError(errno.EIO, os.strerror(errno.EIO))
             return not self._waiting
 

@@ -1,8 +1,7 @@
 """RRC: a synchronous client for the Robotic Relay Communicator, on any link."""
 
-from tickrig.host.rrc.channel import RrcLoad
+from tickrig.host.rrc.channel import RrcLoad, RrcRefused, RrcStopped
 from tickrig.host.rrc.client import RrcClient
-from tickrig.host.rrc.errors import RrcRefused, RrcStopped
 from tickrig.host.rrc.inbox import Arrival
 from tickrig.host.rrc.reply_matcher import OnRefusals
 

@@ -1,4 +1,11 @@
-"""The line to one RRC: its pace, the watchdog's renewal, the stop after refusals."""
+"""The line to one RRC: its pace, the watchdog's renewal, the stop after refusals.
+
+What it raises beside LinkTimeout and LinkClosed:
+
+DeviceRefused            (tickrig.host.links.link)
+ +-- RrcRefused          ER: came for one command
+ +-- RrcStopped          ER: came too many times in a row; the client sends no more
+"""
 
 from __future__ import annotations
 
@@ -6,48 +13,95 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
-from tickrig.host.links.errors import LinkTimeout
-from tickrig.host.links.link import Link
-from tickrig.host.rrc.errors import RrcRefused, RrcStopped
-from tickrig.host.rrc.exchange import Exchange
-from tickrig.host.rrc.inbox import Answer, Inbox
+from tickrig.host.links.link import DeviceRefused, Link, LinkTimeout
+from tickrig.host.rrc.inbox import Answer, Exchange, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals, ReplyMatcher
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
-from tickrig.wire.rrc.load import (
+from tickrig.wire.rrc import (
     BASE_PCT,
+    COMMAND_CHECKSUM,
+    COMMAND_UNKNOWN,
     LINE_FEED_PCT,
     OVERFLOW_PCT,
     PERIOD_PCT,
     PERIOD_US,
     PERIODS_A_SECOND,
+    RECEIVE_BUFFER_OVERFLOW,
     REPLY_PCT,
     SAFE_PCT,
     STATUS_PCT,
-)
-from tickrig.wire.rrc.replies import (
-    RECEIVE_BUFFER_OVERFLOW,
+    Command,
     Event,
     Ok,
+    PowerOff,
     Refusal,
     RrcEvent,
     StatusA,
+    Watchdog,
 )
 
-PCT_US: Final = PERIOD_US // (SAFE_PCT - BASE_PCT - STATUS_PCT)
+_ONLY_WHILE_ON: Final = (
+    "allowed only while VR2 is on, from EV:PowerOnSuccess up to EV:PowerOffWaitBy...;"
+    " was its power button pressed?"
+)
+_BAD_PARAMETERS: Final = (
+    "bad parameters as the RRC sees them: noise on the line, or the RRC was restarted and wants"
+    " no CHECK any more (then call start() again)"
+)
+_HINTS: Final = {
+    COMMAND_CHECKSUM: (
+        "CHECK was missing or wrong: noise on the line, or stablemode was on before this client"
+        " came (then call start() again)"
+    ),
+    COMMAND_UNKNOWN: "allowed are the 12 commands of the manual: noise on the line?",
+    RECEIVE_BUFFER_OVERFLOW: (
+        "send at most 160 lines a second with stablemode, 100 without, and 45 while VR2 is off"
+    ),
+    **dict.fromkeys(("limit", "output", "poweroff"), _ONLY_WHILE_ON),
+}
+
+
+class RrcRefused(DeviceRefused):
+    """The RRC answered a command with ER.
+
+    Attributes:
+        code: the reason as the RRC gave it: a command's name, or `CommandChecksum`, ...
+        sent: the line that was refused, without LF.
+    """
+
+    def __init__(self, sent: str, code: str) -> None:
+        hint = _HINTS.get(code, _BAD_PARAMETERS)
+        super().__init__(f"sent {sent!r}, the RRC answered ER:{code}: {hint}", code)
+        self.sent = sent
+
+
+class RrcStopped(DeviceRefused):
+    """The RRC refused too many times in a row, and the client sends no more commands.
+
+    It ends with EV:Initialized, EV:PowerOffFinished or `RrcClient.resume()`.
+
+    Attributes:
+        code: the last reason.
+    """
+
+    def __init__(self, what: str, code: str) -> None:
+        super().__init__(f"{what} (last answer ER:{code}); resume() lifts the stop", code)
+
+
+_PCT_US: Final = PERIOD_US // (SAFE_PCT - BASE_PCT - STATUS_PCT)
 """What 1 % of the RRC's period takes of the time that its own work and a status line leave."""
 
-LINE_US: Final = LINE_FEED_PCT * PCT_US
-REPLY_US: Final = REPLY_PCT * PCT_US
+_LINE_US: Final = LINE_FEED_PCT * _PCT_US
+_REPLY_US: Final = REPLY_PCT * _PCT_US
 """What a line to the RRC takes, 6.25 ms, and what its answer takes, 3.75 ms."""
 
-SECOND_US: Final = 1_000_000
+_SECOND_US: Final = 1_000_000
 
-RENEWALS: Final = 3
+_RENEWALS: Final = 3
 """The watchdog is renewed this many times in its time: one renewal may be lost."""
 
-FORGETTING: Final = (RrcEvent.POWER_OFF_FINISHED, RrcEvent.INITIALIZED)
+_FORGETTING: Final = (RrcEvent.POWER_OFF_FINISHED, RrcEvent.INITIALIZED)
 """Events after which the RRC has none of its settings (RRC manual, notes)."""
 
 _log = log_of(__name__)
@@ -104,8 +158,8 @@ class Channel:
         """How busy the RRC is with what passed here."""
         self._forget_costs()
         load_pct = BASE_PCT + sum(pct for _, pct in self._costs) // PERIODS_A_SECOND
-        line_us = LINE_US + REPLY_US * (not self.matcher.settings.stable)
-        return RrcLoad(load_pct, PERIOD_PCT - load_pct, SECOND_US // line_us)
+        line_us = _LINE_US + _REPLY_US * (not self.matcher.settings.stable)
+        return RrcLoad(load_pct, PERIOD_PCT - load_pct, _SECOND_US // line_us)
 
     def send(self, command: Command) -> None:
         """Send a command that nobody waits for."""
@@ -159,7 +213,7 @@ class Channel:
         for reply in self._inbox.push(now_us, data):
             match reply:
                 case Event():
-                    if reply.kind in FORGETTING:
+                    if reply.kind in _FORGETTING:
                         self.matcher.initialized()
                 case StatusA():
                     self._account(STATUS_PCT)
@@ -173,7 +227,7 @@ class Channel:
         watchdog_10ms = self.matcher.settings.watchdog_10ms
         if not watchdog_10ms or self.matcher.refusals.stopped is not None:
             return NEVER
-        due_us = self._renewed_us + max(PERIOD_US, watchdog_10ms * 10_000 // RENEWALS)
+        due_us = self._renewed_us + max(PERIOD_US, watchdog_10ms * 10_000 // _RENEWALS)
         return max(due_us, self.matcher.unconfirmed.doubt_ends_us)  # VR2 is off meanwhile
 
     def _receive(self, until_us: int) -> bytes:
@@ -207,7 +261,7 @@ class Channel:
         now_us = self._link.now_us
         self._link.send(line)
         self._account(LINE_FEED_PCT)
-        self._free_us = max(now_us, self._free_us) + LINE_US + REPLY_US * replies
+        self._free_us = max(now_us, self._free_us) + _LINE_US + _REPLY_US * replies
         self._renewed_us = now_us
 
     def _account(self, cost_pct: int) -> None:
@@ -215,7 +269,7 @@ class Channel:
         self._costs.append((self._link.now_us, cost_pct))
 
     def _forget_costs(self) -> None:
-        since_us = self._link.now_us - SECOND_US
+        since_us = self._link.now_us - _SECOND_US
         while self._costs and self._costs[0][0] <= since_us:
             self._costs.popleft()
 
@@ -226,7 +280,7 @@ class Channel:
         self._account(cost_pct)
         if isinstance(reply, Refusal) and (overflow or self.matcher.settings.stable):
             # nothing was planned for this answer
-            self._free_us = max(self._link.now_us, self._free_us) + cost_pct * PCT_US
+            self._free_us = max(self._link.now_us, self._free_us) + cost_pct * _PCT_US
         if not self.matcher.take(reply, exchange):
             self._report(reply)
         if isinstance(reply, Refusal):

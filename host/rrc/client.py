@@ -6,26 +6,22 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Final, Self, TypeVar
 
-from tickrig.host.links.closing import Closing
-from tickrig.host.links.errors import LinkTimeout
-from tickrig.host.links.link import Link
+from tickrig.host.links.link import Closing, Link, LinkTimeout
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rrc.channel import Channel, RrcLoad
-from tickrig.host.rrc.errors import RrcRefused
+from tickrig.host.rrc.channel import Channel, RrcLoad, RrcRefused
 from tickrig.host.rrc.inbox import Arrival, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals
-from tickrig.wire.rrc import commands as cmd
-from tickrig.wire.rrc.commands import Command
-from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, RrcEvent, StatusA
+from tickrig.wire import rrc as cmd
+from tickrig.wire.rrc import COMMAND_CHECKSUM, Command, Event, RrcEvent, StatusA
 
 TIMEOUT_US: Final = 200_000
-SETTLE_US: Final = 100_000
+_SETTLE_US: Final = 100_000
 """Wait behind the dummy command at the start (RRC manual, notes)."""
 
-UNIT_US: Final = 10_000
+_UNIT_US: Final = 10_000
 """Times on the wire are multiples of 10 ms."""
 
-SLOWEST: Final = 1
+_SLOWEST: Final = 1
 
 T = TypeVar("T")
 
@@ -109,7 +105,7 @@ class RrcClient(Closing):
             LinkTimeout: no RRC answers.
         """
         self._link.send(b"\n" + cmd.DeviceName().encode())
-        settled_us = self._link.now_us + SETTLE_US
+        settled_us = self._link.now_us + _SETTLE_US
         while self._link.now_us < settled_us:
             self._link.receive(settled_us - self._link.now_us)
         self._inbox.clear()
@@ -401,11 +397,11 @@ class RrcClient(Closing):
         settings = self._settings
         changes = settings.drive is not drive
         if changes:
-            self.command(cmd.SpeedMode(SLOWEST, settings.locked))
+            self.command(cmd.SpeedMode(_SLOWEST, settings.locked))
         return changes
 
 
 def _units(time_us: int) -> int:
-    if time_us % UNIT_US:
-        raise ValueError(f"{time_us} us is not a multiple of {UNIT_US} us")
-    return time_us // UNIT_US
+    if time_us % _UNIT_US:
+        raise ValueError(f"{time_us} us is not a multiple of {_UNIT_US} us")
+    return time_us // _UNIT_US

@@ -7,15 +7,23 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Final, NamedTuple
 
-from tickrig.host.rrc.exchange import NAMELESS, Exchange
-from tickrig.host.rrc.inbox import Answer
-from tickrig.wire.rrc.commands import Command, Limit, Output, SpeedMode, StableMode, Watchdog
-from tickrig.wire.rrc.replies import Ok, Refusal, Text
+from tickrig.host.rrc.inbox import NAMELESS, Answer, Exchange
+from tickrig.wire.rrc import (
+    Command,
+    Limit,
+    Ok,
+    Output,
+    Refusal,
+    SpeedMode,
+    StableMode,
+    Text,
+    Watchdog,
+)
 
-SETTLED_US: Final = 100_000
+_SETTLED_US: Final = 100_000
 """An ER would have come by then: 10 periods of the RRC."""
 
-MOTION: Final = ("output", "limit")
+_MOTION: Final = ("output", "limit")
 
 
 class OnRefusals(Enum):
@@ -129,7 +137,7 @@ class UnconfirmedCommands:
     def doubt_ends_us(self) -> int:
         """When the fate of all that was sent before a restart will be known; 0 if it is."""
         in_doubt = self._sent and self._sent[0].at_us <= self._doubted_us
-        return self._doubted_us + SETTLED_US if in_doubt else 0
+        return self._doubted_us + _SETTLED_US if in_doubt else 0
 
     def doubt(self) -> None:
         """Note that the RRC was initialized: what waits in its buffer is still to come."""
@@ -154,7 +162,7 @@ class UnconfirmedCommands:
 
     def refused(self, reason: str) -> str | None:
         """Take out the command that an ER belongs to, and return its name."""
-        wanted = (*MOTION, None) if reason in NAMELESS else (reason,)
+        wanted = (*_MOTION, None) if reason in NAMELESS else (reason,)
         for name in wanted:
             for sent in self._sent:
                 if name in (None, sent.name):
@@ -165,7 +173,7 @@ class UnconfirmedCommands:
     def settle(self, now_us: int) -> list[str]:
         """Take out those that no reply came for in time; return their names."""
         settled = []
-        while self._sent and self._sent[0].at_us + SETTLED_US <= now_us:
+        while self._sent and self._sent[0].at_us + _SETTLED_US <= now_us:
             settled.append(self._sent.popleft().name)
         return settled
 

@@ -8,7 +8,7 @@ from typing import ClassVar, TypeVar
 
 from tickrig.host.rtc.component_action import ComponentAction, guarded
 from tickrig.host.rtc.configuration import Configuration
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.port import AnyPort, PortProfile
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 

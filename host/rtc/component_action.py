@@ -9,9 +9,9 @@ from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 
 if TYPE_CHECKING:
-    from tickrig.host.rtc.execution.execution_context import ExecutionContext
+    from tickrig.host.rtc.execution import ExecutionContext
 
-OK: Final = ReturnCode.RTC_OK
+_OK: Final = ReturnCode.RTC_OK
 
 _LOG: Final = log_of(__name__)
 
@@ -49,48 +49,48 @@ class ComponentAction:
 
     def on_initialize(self) -> ReturnCode:
         """Begin; it stays Created if this returns another code than RTC_OK."""
-        return OK
+        return _OK
 
     def on_finalize(self) -> ReturnCode:
         """End, whatever this returns."""
-        return OK
+        return _OK
 
     def on_startup(self, ec: ExecutionContext) -> ReturnCode:
         """Take the start of the execution context `ec`."""
-        return OK
+        return _OK
 
     def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
         """Take the stop of the execution context `ec`."""
-        return OK
+        return _OK
 
     def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
         """Take another rate of the execution context `ec`."""
-        return OK
+        return _OK
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Become Active in `ec`."""
-        return OK
+        return _OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Leave Active in `ec`, for Inactive or for Error."""
-        return OK
+        return _OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Work, once a period of `ec` in Active: the first pass."""
-        return OK
+        return _OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
         """Work, once a period in Active, after on_execute of every component of `ec`."""
-        return OK
+        return _OK
 
     def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
         """Enter Error in `ec`; what this returns is ignored."""
-        return OK
+        return _OK
 
     def on_error(self, ec: ExecutionContext) -> ReturnCode:
         """Work, once a period of `ec` in Error; what this returns is ignored."""
-        return OK
+        return _OK
 
     def on_reset(self, ec: ExecutionContext) -> ReturnCode:
         """Leave Error in `ec`, if this returns RTC_OK: for Inactive."""
-        return OK
+        return _OK

@@ -7,18 +7,18 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Final
 
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.wire.rtc_types import basic
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 from tickrig.wire.rtc_types.idl import Struct
 
-LOW: Final = -(2**31)
-HIGH: Final = 2**31 - 1
+_LOW: Final = -(2**31)
+_HIGH: Final = 2**31 - 1
 """What ConsoleIn takes."""
 
-LENGTH: Final = 10
+_LENGTH: Final = 10
 """Elements of a sequence that SeqOut writes."""
 
 _COUNTED: Final[Mapping[str, Callable[[int], float]]] = {
@@ -30,7 +30,7 @@ _COUNTED: Final[Mapping[str, Callable[[int], float]]] = {
 }
 """What SeqOut writes in period n, by the name of the port."""
 
-SEQ_PORTS: Final[Mapping[str, Any]] = {
+_SEQ_PORTS: Final[Mapping[str, Any]] = {
     name + seq: getattr(basic, f"Timed{name}{seq}") for seq in ("", "Seq") for name in _COUNTED
 }
 """Ports of SeqIn and SeqOut: type by name, in the order of OpenRTM's SeqIn."""
@@ -62,9 +62,9 @@ class ConsoleIn(RtComponent):
         try:
             number = int(line)
         except ValueError:
-            number = HIGH + 1
-        if not LOW <= number <= HIGH:
-            raise ValueError(f"{line!r} is not a number in {LOW}..{HIGH}")
+            number = _HIGH + 1
+        if not _LOW <= number <= _HIGH:
+            raise ValueError(f"{line!r} is not a number in {_LOW}..{_HIGH}")
         self.enter(number)
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
@@ -111,7 +111,7 @@ class SeqIn(RtComponent):
 
     def __init__(self, instance_name: str) -> None:
         super().__init__(instance_name)
-        self.ins = {name: self.add_port(InPort(name, kind)) for name, kind in SEQ_PORTS.items()}
+        self.ins = {name: self.add_port(InPort(name, kind)) for name, kind in _SEQ_PORTS.items()}
         self.latest: dict[str, Struct] = {}
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
@@ -133,7 +133,7 @@ class SeqOut(RtComponent):
 
     def __init__(self, instance_name: str) -> None:
         super().__init__(instance_name)
-        self.outs = {name: self.add_port(OutPort(name, kind)) for name, kind in SEQ_PORTS.items()}
+        self.outs = {name: self.add_port(OutPort(name, kind)) for name, kind in _SEQ_PORTS.items()}
         self._count = 0
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -146,7 +146,7 @@ class SeqOut(RtComponent):
         now = Time.from_us(ec.now_us)
         for name, port in self.outs.items():
             counted = _COUNTED[name.removesuffix("Seq")]
-            data: Any = tuple(counted(n) for n in range(self._count, self._count + LENGTH))
+            data: Any = tuple(counted(n) for n in range(self._count, self._count + _LENGTH))
             if name in _COUNTED:
                 data = data[0]
             elif name == "OctetSeq":

@@ -11,8 +11,8 @@ from typing import Any, Final
 
 from tickrig.host.text.trace import Config, TraceError
 
-VERSION: Final = 2
-PREFIX: Final = f"# tickrig-trace v{VERSION} "
+_VERSION: Final = 2
+PREFIX: Final = f"# tickrig-trace v{_VERSION} "
 
 NAME: Final = re.compile(r"\w[\w./:-]{0,99}", re.ASCII)
 """What devices and wires may be called in a trace."""

@@ -28,8 +28,7 @@ from tickrig.host.text.bench_header import BenchHeader
 from tickrig.host.text.byte_text import escape, unescape
 from tickrig.host.text.trace import RESET, Mark, TraceError
 from tickrig.host.text.values import Setting, format_time
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import CanFrame, ErrorState
 from tickrig.wire.errors import WireError
 
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) (?:(\w[\w./:-]*) ([<>!~]) (.*)|\.)", re.ASCII)

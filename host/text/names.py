@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
-MOST: Final = 40
+_MOST: Final = 40
 SHOWN: Final = 8
-LONGEST: Final = 200
+_LONGEST: Final = 200
 """Characters of a name that could be a slip."""
 _NUMBER: Final = re.compile(r"0x[0-9a-f]+|\d+")
 
@@ -20,7 +20,7 @@ def known(names: Iterable[str]) -> str:
     'stick, lamp'
     """
     everything = list(names)
-    if len(everything) <= MOST:
+    if len(everything) <= _MOST:
         return ", ".join(everything)
     return ", ".join(everything[:SHOWN]) + f", ... ({len(everything)} in all)"
 
@@ -56,7 +56,7 @@ def closest(name: str, names: Iterable[str]) -> list[str]:
     """
     from difflib import get_close_matches  # noqa: PLC0415 - only for mistakes
 
-    if len(name) > LONGEST:
+    if len(name) > _LONGEST:
         return []
     names, (device, slash, signal) = list(names), name.rpartition("/")
     own = [each.removeprefix(device + slash) for each in names if each.startswith(device + slash)]

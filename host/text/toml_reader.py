@@ -15,24 +15,161 @@ from __future__ import annotations
 import re
 import tomllib
 from bisect import bisect_right
-from typing import Any, Final
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, Final, NamedTuple
 
-from tickrig.host.text.toml_document import (
-    BROKEN,
-    Array,
-    Leaf,
-    Mistake,
-    Node,
-    Table,
-    TakenError,
-    TomlDocument,
-    document_of,
-)
+# A TOML text as it was read: its values, the line of each, and all that is wrong with it.
 
-MOST_DEEP: Final = 50
+
+class Broken(Enum):
+    """In place of a value that is no TOML; its mistake is told already."""
+
+    BROKEN = "broken"
+
+
+BROKEN: Final = Broken.BROKEN
+
+
+class Mistake(NamedTuple):
+    """One thing that is wrong.
+
+    Attributes:
+        line: from 1.
+        reason: for people.
+    """
+
+    line: int
+    reason: str
+
+
+TomlPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TomlDocument:
+    """A text that was read.
+
+    Attributes:
+        values: what it says, `BROKEN` in place of a value that is none.
+        lines: by path, where a value begins; of a table, its header.
+        mistakes: in the order of their lines.
+        whole: whether all headers were read; if not, tables may be missing.
+    """
+
+    values: dict[str, Any]
+    lines: dict[TomlPath, int]
+    mistakes: tuple[Mistake, ...] = ()
+    whole: bool = True
+
+    def line_of(self, path: Sequence[str | int]) -> int:
+        """Return the line of a value, or of the nearest thing around it.
+
+        Args:
+            path: keys and indices from the top.
+        """
+        for end in range(len(path), 0, -1):
+            if line := self.lines.get(tuple(path[:end])):
+                return line
+        return 1
+
+
+@dataclass(slots=True, eq=False)
+class Leaf:
+    """A scalar."""
+
+    line: int
+    value: Any
+
+
+@dataclass(slots=True, eq=False)
+class Array:
+    """An array; `frozen` unless of tables with headers `[[...]]`."""
+
+    line: int
+    items: list[_Node] = field(default_factory=list)
+    frozen: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class Table:
+    """A table; `closed` to a second header and to dotted keys, `frozen` to all."""
+
+    line: int
+    entries: dict[str, _Node] = field(default_factory=dict)
+    closed: bool = False
+    frozen: bool = False
+
+    def below(self, line: int, key: str) -> Table:
+        """Return the table on the way to that of a header, the last one of an array.
+
+        Raises:
+            TakenError: there is something else.
+        """
+        node = self.entries.setdefault(key, Table(line))
+        if isinstance(node, Array) and not node.frozen:
+            node = node.items[-1]
+        if not isinstance(node, Table) or node.frozen:
+            raise TakenError(key, node.line)
+        return node
+
+    def open(self, line: int, key: str) -> Table:
+        """Return the table of a header `[key]`; TakenError if it cannot have one."""
+        node = self.entries.setdefault(key, Table(line))
+        if not isinstance(node, Table) or node.closed or node.frozen:
+            raise TakenError(key, node.line)
+        node.line, node.closed = line, True
+        return node
+
+    def add(self, line: int, key: str) -> Table:
+        """Return a new table of a header `[[key]]`; TakenError if it cannot have one."""
+        node = self.entries.setdefault(key, Array(line, frozen=False))
+        if not isinstance(node, Array) or node.frozen:
+            raise TakenError(key, node.line)
+        node.items.append(table := Table(line, closed=True))
+        return table
+
+    def dotted(self, line: int, key: str) -> Table:
+        """Return the table of the first part of a dotted key; TakenError if there is none."""
+        node = self.entries.setdefault(key, Table(line))
+        if not isinstance(node, Table) or node.closed or node.frozen:
+            raise TakenError(key, node.line)
+        return node
+
+
+_Node = Table | Array | Leaf
+
+
+class TakenError(Exception):
+    """A key that is there already, in another way."""
+
+    def __init__(self, key: str, line: int) -> None:
+        super().__init__(f"{key!r} stands in line {line} already")
+
+
+def _document_of(top: Table, mistakes: Iterable[Mistake], *, whole: bool) -> TomlDocument:
+    """Return the document of its top table."""
+    lines: dict[TomlPath, int] = {}
+    values = {key: _plain(each, (key,), lines) for key, each in top.entries.items()}
+    return TomlDocument(values, lines, tuple(sorted(dict.fromkeys(mistakes))), whole)
+
+
+def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
+    """Return the value of a node, and enter where it and all in it stand."""
+    lines[path] = node.line
+    match node:
+        case Table():
+            return {key: _plain(each, (*path, key), lines) for key, each in node.entries.items()}
+        case Array():
+            return [_plain(each, (*path, at), lines) for at, each in enumerate(node.items)]
+    return node.value
+
+
+_MOST_DEEP: Final = 50
 """How deep arrays and inline tables may nest, and how many parts a key may have."""
 
-MOST_MISTAKES: Final = 1_000
+_MOST_MISTAKES: Final = 1_000
 """Behind so many the text is not read any further."""
 
 ONE_LINE: Final = "an inline table stands on one line; [a.table] has lines of its own"
@@ -48,7 +185,7 @@ _LONG: Final = {
     "'''": re.compile(r"'''.*?''''{0,2}", re.DOTALL),
 }
 _PLAIN: Final = re.compile(r"[^\s,\[\]{}#\"']+(?: [0-9][^\s,\[\]{}#\"']*)?")
-_PARTS: Final = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{MOST_DEEP}}}[\w\"'-]")
+_PARTS: Final = re.compile(rf"(?<![\w\"'-])(?:[\w\"'-]++[ \t]*+\.[ \t]*+){{{_MOST_DEEP}}}[\w\"'-]")
 """A key whose reading by the standard library takes the square of its length."""
 _WHOLE: Final = re.compile(r"0|[1-9][0-9]{0,17}")
 _SIMPLE: Final = re.compile(r"\"[^\"\\]*\"|'[^']*'")
@@ -70,7 +207,7 @@ def load_toml(text: str) -> dict[str, Any]:
     """
     if found := _PARTS.search(text):
         line = text.count("\n", 0, found.start()) + 1
-        reason = f"a key of more than {MOST_DEEP} parts (at line {line}, column 1)"
+        reason = f"a key of more than {_MOST_DEEP} parts (at line {line}, column 1)"
         raise tomllib.TOMLDecodeError(reason)
     try:
         return tomllib.loads(text)
@@ -125,13 +262,13 @@ class _Reader:
                     self._go_on_behind(start, error.at)
         except _EnoughError:
             self._whole = False
-        return document_of(self._top, self._mistakes, whole=self._whole)
+        return _document_of(self._top, self._mistakes, whole=self._whole)
 
     def _report(self, at: int, reason: str) -> None:
         line = self._line(at)
         self._mistakes.append(Mistake(line, reason))
-        if len(self._mistakes) == MOST_MISTAKES:
-            self._mistakes.append(Mistake(line, f"{MOST_MISTAKES} mistakes; nothing more is read"))
+        if len(self._mistakes) == _MOST_MISTAKES:
+            self._mistakes.append(Mistake(line, f"{_MOST_MISTAKES} mistakes; nothing more is read"))
             raise _EnoughError
 
     def _line(self, at: int) -> int:
@@ -230,8 +367,8 @@ class _Reader:
             self._at += 1
             self._skip(_BLANK)
             keys.append(self._simple_key())
-        if len(keys) > MOST_DEEP:
-            raise _WrongError(start, f"a key of more than {MOST_DEEP} parts")
+        if len(keys) > _MOST_DEEP:
+            raise _WrongError(start, f"a key of more than {_MOST_DEEP} parts")
         return keys
 
     def _simple_key(self) -> str:
@@ -244,11 +381,11 @@ class _Reader:
 
     # Values
 
-    def _value(self, depth: int) -> Node:
+    def _value(self, depth: int) -> _Node:
         start = self._at
         if self._is("[") or self._is("{"):
-            if depth == MOST_DEEP:
-                raise _WrongError(start, f"nested deeper than {MOST_DEEP}")
+            if depth == _MOST_DEEP:
+                raise _WrongError(start, f"nested deeper than {_MOST_DEEP}")
             self._at += 1
             return (self._array if self._text[start] == "[" else self._inline)(start, depth + 1)
         if self._is('"') or self._is("'"):

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
-    from tickrig.wire.serial.lines import LineSplitter as LineSplitter
-    from tickrig.wire.serial.uart import UartSetting as UartSetting
+    from tickrig.wire.lines import LineSplitter as LineSplitter
+    from tickrig.wire.uart import UartSetting as UartSetting
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
@@ -83,8 +83,8 @@ else:
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),
-            "tickrig.wire.serial.lines": ("LineSplitter",),
-            "tickrig.wire.serial.uart": ("UartSetting",),
+            "tickrig.wire.lines": ("LineSplitter",),
+            "tickrig.wire.uart": ("UartSetting",),
         },
     )
 

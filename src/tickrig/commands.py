@@ -43,7 +43,7 @@ def canmon() -> None:
 
 def rh3() -> None:
     """Call `rh3`."""
-    _start("rh3", "tickrig.emulators.rh3.cart.motion_cli")
+    _start("rh3", "tickrig.emulators.rh3.motion_cli")
 
 
 def rh3_emu() -> None:

@@ -6,7 +6,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig.host.rtc.component import ModuleSpec as ModuleSpec
     from tickrig.host.rtc.component import RtComponent as RtComponent
-    from tickrig.host.rtc.execution.execution_context import ExecutionContext as ExecutionContext
+    from tickrig.host.rtc.execution import ExecutionContext as ExecutionContext
     from tickrig.host.rtc.ports.data_port import InPort as InPort
     from tickrig.host.rtc.ports.data_port import OutPort as OutPort
     from tickrig.host.rtc.states import ReturnCode as ReturnCode
@@ -30,7 +30,7 @@ else:
         __name__,
         {
             "tickrig.host.rtc.component": ("ModuleSpec", "RtComponent"),
-            "tickrig.host.rtc.execution.execution_context": ("ExecutionContext",),
+            "tickrig.host.rtc.execution": ("ExecutionContext",),
             "tickrig.host.rtc.ports.data_port": ("InPort", "OutPort"),
             "tickrig.host.rtc.states": ("ReturnCode",),
             "tickrig.host.rtc.system.manager": ("Manager",),

@@ -13,35 +13,27 @@ import pytest
 
 import tickrig.device
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
-from tickrig.device.body.omni_body import OmniBody, OmniParameters
-from tickrig.device.body.pose import Pose
-from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.service import Service
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.component import CanopenEcho
-from tickrig.device.canopen.device_rtc.device import make_device_rtc
+from tickrig.device.body import BodyParameters, OmniBody, OmniParameters, Pose, WheeledBody
+from tickrig.device.canopen.device_rtc import CanopenEcho, make_device_rtc
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos, f_palette, f_palette_boot, motor_core_unit
+from tickrig.device.canopen.slave import Application, CanopenSlave, Service
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.modbus.slave import ModbusSlave
+from tickrig.device.modbus import ModbusSlave
 from tickrig.device.physical import InputSignal, OutputSignal
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.device.rtc_lite.component import LiteComponent
-from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.rtc_lite.server import LiteConfig
+from tickrig.device.servo.parameters import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.device.twin import Copyable, NonCopyable
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.device.ucode_reader.parameters import ReaderParameters
-from tickrig.device.ucode_reader.reader import UcodeReader
-from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.ucode_reader import Marker, ReaderParameters, UcodeReader
 from tickrig.device.urg.sensor import Urg
-from tickrig.device.urg.world import Post, World, room
+from tickrig.device.urg.world import Post, UrgParameters, World, room
 from tickrig.wire.can import CanFrame
 
 WHEELS: Final = BodyParameters(kind="differential", wheel_radius_m=0.1, tread_m=0.4)
@@ -133,7 +125,7 @@ def classes() -> Iterator[type]:
 
 def is_machine(kind: type) -> bool:
     is_device = all(hasattr(kind, name) for name in ("tick", "reset"))
-    is_body = ".body." in kind.__module__ and hasattr(kind, "step")
+    is_body = kind.__module__.endswith(".body") and hasattr(kind, "step")
     return is_device or is_body or issubclass(kind, Service)
 
 

@@ -10,9 +10,9 @@ from canopen.profiles.p402 import BaseNode402
 
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tests.emulators.can.can_bench import Log
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.slave import Application
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire

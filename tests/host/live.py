@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterator
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
-from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.serial.emulator import Emulator, Outside
-from tickrig.emulators.serial.network.network_port import NetworkPort
-from tickrig.emulators.serial.network.serve_url import ServeUrl
+from tickrig.emulators.serial.emulator import Emulator, LineOutside
+from tickrig.emulators.serial.network import NetworkPort, ServeUrl
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.control.clock import RealClock
 from tickrig.host.control.requests import VERSION, Object
@@ -29,7 +28,7 @@ class LiveRrc:
     ticks: a button that is pressed and let go is seen.
     """
 
-    def __init__(self, outside: Outside, config: RrcConfig) -> None:
+    def __init__(self, outside: LineOutside, config: RrcConfig) -> None:
         self._rrc = Rrc(config)
         self._emulator = Emulator("rrc", self._rrc, outside=outside, clock=RealClock())
         self._control = EmulatorControl(self._emulator)
@@ -89,7 +88,7 @@ class LiveRrc:
 
 
 @contextlib.contextmanager
-def live_rrc(outside: Outside, config: RrcConfig | None = None) -> Iterator[LiveRrc]:
+def live_rrc(outside: LineOutside, config: RrcConfig | None = None) -> Iterator[LiveRrc]:
     """Run an emulator for the length of a `with`."""
     live = LiveRrc(outside, config or RrcConfig())
     live.start()

@@ -10,7 +10,7 @@ import pytest
 
 from tests.interop.buses import Bus, patience
 from tests.interop.slave import Slave
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_link import to_frame, to_message
 from tickrig.wire.can import CanFrame
 
 pytestmark = [pytest.mark.realtime, pytest.mark.essential]

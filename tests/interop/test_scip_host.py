@@ -18,7 +18,7 @@ from hokuyolx import HokuyoLX
 
 from tickrig.emulators.bench.child import running
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.urg.client import UrgClient, UrgScan
+from tickrig.host.urg import UrgClient, UrgScan
 
 pytestmark = pytest.mark.realtime
 

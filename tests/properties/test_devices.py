@@ -16,29 +16,25 @@ from tests.device.canopen import reference
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.rtc_lite.reference_model import checked
 from tests.soak import examples
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.device_rtc.component import CanopenEcho
-from tickrig.device.canopen.device_rtc.device import make_device_rtc
+from tickrig.device.canopen.device_rtc import CanopenEcho, make_device_rtc
 from tickrig.device.canopen.ds401.module import Ds401
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
 from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
+from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rtc_lite.component import LiteEcho
-from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.device.twin import Copyable
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.device.ucode_reader.reader import UcodeReader
-from tickrig.device.urg.parameters import UrgParameters
+from tickrig.device.ucode_reader import Marker, UcodeReader
 from tickrig.device.urg.sensor import Urg
-from tickrig.device.urg.world import Post, World
+from tickrig.device.urg.world import Post, UrgParameters, World
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.rig.rig import Rig
@@ -47,10 +43,9 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.device_bench import DeviceBench
 from tickrig.emulators.testing.properties.strategies import Session
 from tickrig.testing import check_device, strategies
+from tickrig.wire import rrc as cmd
 from tickrig.wire.can import CanFrame
-from tickrig.wire.modbus.requests import Request, encode_request
-from tickrig.wire.modbus.rtu import encode_frame
-from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.modbus import Request, encode_frame, encode_request
 from tickrig.wire.rtc_lite.codes import LiteContextType
 from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.values import LONG

@@ -32,27 +32,25 @@ from tests.properties.test_devices import (
     WithInputs,
 )
 from tests.test_compiled import history
-from tickrig.device.body.omni_body import OmniBody, Velocity
-from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
+from tickrig.device.body import BodyParameters, OmniBody, Velocity, WheeledBody
 from tickrig.device.chance import Chance
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.servo.presets import PRESETS
-from tickrig.device.ucode_reader.reader import UcodeReader
+from tickrig.device.servo.parameters import PRESETS
+from tickrig.device.ucode_reader import UcodeReader
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import Post, World
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.device_bench import DeviceBench
 from tickrig.emulators.testing.properties.strategies import Act
 from tickrig.host.rtc.motion.drive import drive, start
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.can import CanFrame
-from tickrig.wire.modbus.requests import encode_request
-from tickrig.wire.modbus.rtu import encode_frame
+from tickrig.wire.modbus import encode_frame, encode_request
 
 ONE_HASH: Final = "1a10df6f27058796123e8c8222bb641057d296d30a067dcec125f617f99e357d"
 """Renew it where a device is meant to do something else than before."""

@@ -14,19 +14,18 @@ from dataclasses import dataclass, field
 from itertools import chain, islice, product
 from typing import Final, NamedTuple
 
-from tickrig.device.rrc.config import FailTarget, RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.device.rrc.states import POWERED_ON, RrcState
+from tickrig.device.rrc.settings import POWERED_ON, FailTarget, RrcConfig, RrcState
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rrc.panel_text import Observer, stick_hint
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import VERSION, Object
-from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused, RrcStopped
+from tickrig.wire import rrc as cmd
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import commands as cmd
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent
 
 MS: Final = 1_000
 AROUND_MS: Final = 40

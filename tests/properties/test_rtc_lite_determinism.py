@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from tests.device.rtc_lite.reference_model import checked
 from tickrig.device.rtc_lite.component import LiteA, LiteB, LiteEcho
-from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station

@@ -11,17 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave, ServiceMaker
 from tickrig.device.canopen.ds402.drive import Ds402
 from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.slave import TICK_US, CanopenSlave, Nonvolatile, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.servo.parameters import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.device.twin import Copyable, twin
 from tickrig.emulators.bench.running_emulator import UNSEEN_US
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames

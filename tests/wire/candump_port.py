@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.candump import LogLine
+from tickrig.wire.can import CanFrame, Frames, LogLine
 from tickrig.wire.instant import NEVER
 
 

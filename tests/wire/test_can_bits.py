@@ -6,9 +6,8 @@ import random
 
 import pytest
 
-from tickrig.wire import can_bits
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import KEPT_HEADS, frame_bits
+from tickrig.wire import can as can_bits
+from tickrig.wire.can import KEPT_HEADS, CanFrame, frame_bits
 
 
 def stream(frame: CanFrame) -> str:

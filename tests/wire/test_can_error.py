@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame, describe_error_frame
+from tickrig.wire.can import BIT_ERROR, NO_ACK, ErrorFrame, describe_error_frame
 from tickrig.wire.errors import FramingError
 
 

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdBits, FdFrame, fd_bits, parse_sent
+from tickrig.wire.can import BRS, ESI, FD_LENGTHS, CanFrame, FdBits, FdFrame, fd_bits, parse_sent
 from tickrig.wire.errors import FieldError, FramingError
 
 DATA = st.sampled_from(FD_LENGTHS).flatmap(

@@ -10,11 +10,10 @@ from tests.emulators.can.can_bench import frames, some_frames
 from tests.emulators.can.test_can_rig import Node
 from tests.wire.candump_port import CandumpPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.record.candump_file import CandumpFile
+from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.wire.can_error import BIT_ERROR, ErrorFrame
-from tickrig.wire.candump import CandumpError, LogLine, parse_line, parse_log
+from tickrig.wire.can import BIT_ERROR, CandumpError, ErrorFrame, LogLine, parse_line, parse_log
 from tickrig.wire.instant import NEVER
 
 errors = st.builds(ErrorFrame, st.integers(0, 0x1FFF_FFFF), st.binary(min_size=8, max_size=8))

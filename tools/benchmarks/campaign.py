@@ -15,13 +15,11 @@ import tickrig
 from benchmarks.table import row
 from tickrig import Bench
 from tickrig.device import Rrc
-from tickrig.emulators.testing.campaign.campaign import Campaign
-from tickrig.emulators.testing.campaign.crew import Crew
+from tickrig.emulators.testing.campaign.campaign_run import Campaign
+from tickrig.emulators.testing.campaign.crew import Crew, LocalWorkers
 from tickrig.emulators.testing.campaign.journal import CampaignJournal
-from tickrig.emulators.testing.campaign.local_workers import LocalWorkers
-from tickrig.emulators.testing.campaign.order import Order
-from tickrig.emulators.testing.campaign.plan import Plan
-from tickrig.emulators.testing.campaign.seeds import Seeds
+from tickrig.emulators.testing.campaign.order import CampaignOrder
+from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds
 
 TEST = """
 import pytest
@@ -79,7 +77,7 @@ def run(seconds: float) -> None:
 def gains(folder: str) -> None:
     """Print what a second process gains, of a loop without work and of a campaign, in turn."""
     loops, campaigns = [], []
-    crew = Crew(Order(tests=("test_rrc.py",), keyword="minute", folder=folder))
+    crew = Crew(CampaignOrder(tests=("test_rrc.py",), keyword="minute", folder=folder))
     with closing(crew):
         both = LocalWorkers(crew, crew.collect().digest, 2)
         campaign_s(folder, crew, both, 8)  # two workers are there from now on
@@ -94,7 +92,7 @@ def gains(folder: str) -> None:
 
 def campaign_s(folder: str, crew: Crew, workers: LocalWorkers, runs: int) -> float:
     """Return how long runs take by the clock, whose workers are there."""
-    plan = Plan(crew.order, crew.collect(), Seeds.parse(f"0-{runs - 1}"))
+    plan = CampaignPlan(crew.order, crew.collect(), Seeds.parse(f"0-{runs - 1}"))
     journal = CampaignJournal(Path(folder, "a.journal"), plan.head)
     began_s = time.perf_counter()
     for _ in Campaign(plan, journal, workers).verdicts():

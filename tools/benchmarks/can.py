@@ -8,8 +8,7 @@ from benchmarks.table import rates
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can import CanFrame, Frames, frame_bits
 
 NODES = 127
 SYNC_US = 20_000

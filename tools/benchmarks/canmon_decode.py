@@ -17,7 +17,7 @@ from benchmarks.table import RUNS, rates, row
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.filter import parse_filter
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 

@@ -22,12 +22,12 @@ from tickrig.host.canmon.model.check.rules import parse_rules
 from tickrig.host.canmon.model.columns.column_reader import read_columns
 from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic
 from tickrig.host.canmon.model.columns.columns import Columns
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.traffic import Snapshot, Traffic
-from tickrig.host.canmon.model.views.top_model import TopModel, View, render
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.top_model import TableView, TopModel, render
+from tickrig.host.canmon.model.traffic import Traffic, TrafficSnapshot
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.links.can_message import to_message
+from tickrig.host.links.can_link import to_message
 from tickrig.wire.can import CanFrame
 
 FRAMES = 1_000_000
@@ -106,7 +106,7 @@ def whole(what: str, path: Path) -> None:
     seconds(f"canopen-lens, {what} log", ["canopen-lens", str(path), "--lang", "en"])
 
 
-def counted(blocks: Iterable[Columns]) -> Snapshot:
+def counted(blocks: Iterable[Columns]) -> TrafficSnapshot:
     """Return the statistics of a log."""
     traffic = ColumnTraffic()
     for block in blocks:
@@ -220,7 +220,7 @@ def painting() -> None:
 
     def work() -> None:
         for _ in range(100):
-            render(traffic.snapshot(), View(styled=True), 0, 160, 60)
+            render(traffic.snapshot(), TableView(styled=True), 0, 160, 60)
 
     rates("snapshot and screen of 50 identifiers", 100, "/s", work)
 

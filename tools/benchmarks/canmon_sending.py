@@ -12,15 +12,14 @@ from functools import partial
 import can
 
 from benchmarks.table import percentiles, row
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.graph.chart import svg
 from tickrig.host.canmon.model.graph.plot import render
 from tickrig.host.canmon.model.graph.series import Series, View
-from tickrig.host.canmon.model.graph.svg import svg
-from tickrig.host.canmon.model.replay.replay_plan import ReplayPlan
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence
-from tickrig.host.canmon.model.sequence.sequence_run import SequenceRun
-from tickrig.host.canmon.output.clocks import Pace
-from tickrig.host.links.can_message import to_message
+from tickrig.host.canmon.model.sequence import SequenceRun, TomlSequence
+from tickrig.host.canmon.output.listening import Pace
+from tickrig.host.canmon.verbs.play import ReplayPlan
+from tickrig.host.links.can_link import to_message
 from tickrig.wire.can import CanFrame
 
 FRAMES_S = 2_600

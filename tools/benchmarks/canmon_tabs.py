@@ -9,16 +9,15 @@ from pathlib import Path
 from benchmarks.table import RUNS, percentiles, row
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, read_eds_objects
-from tickrig.host.canmon.model.dictionary.node_dictionary import NodeDictionary, render_dictionary
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.live_graph import MOST, LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
-from tickrig.host.canmon.model.transmit.transmit_list import parse_row_text
+from tickrig.host.canmon.model.node_dictionary import NodeDictionary, render_dictionary
+from tickrig.host.canmon.model.transmit import parse_row_text
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.panels.tabs import TABS
+from tickrig.host.canmon.tui.panels.panel import TABS, Panel
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
-from tickrig.host.canmon.tui.tasks.session import Model, Session, open_session
+from tickrig.host.canmon.tui.session import Model, Session, open_session
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.wire.can import CanFrame
 

@@ -33,8 +33,8 @@ INGEST = [
     "-c",
     f"""
 import time
-from tickrig.host.canmon.tui.tasks.session import Model
-from tickrig.host.canmon.tui.tasks.session import open_session
+from tickrig.host.canmon.tui.session import Model
+from tickrig.host.canmon.tui.session import open_session
 from tickrig.host.cli.can_options import BusOptions
 session = open_session(["udp:{GROUP}"], BusOptions(bus_kwargs=("port={PORT}",)), Model())
 session.start()

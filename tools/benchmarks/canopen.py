@@ -9,8 +9,8 @@ from time import process_time
 
 from benchmarks.canopen_peers import NODE_ID, PEERS, REPLY, REQUEST, Peer, our_slave
 from benchmarks.table import RUNS, rates, row
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import EdsCache

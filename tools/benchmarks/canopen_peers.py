@@ -9,8 +9,8 @@ from canopen.objectdictionary import ODVariable
 from durand import DatatypeEnum, Node, Variable
 from durand.network import NetworkABC
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType

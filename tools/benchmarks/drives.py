@@ -11,8 +11,8 @@ from math import cos, pi
 from typing import Final
 
 from benchmarks.table import rates
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
 from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.slave import Nonvolatile
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station

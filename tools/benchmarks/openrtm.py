@@ -10,21 +10,19 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.table import RUNS, row
-from tickrig.host.cli.openrtm_options import Endpoint
+from tickrig.host.cli.engine_options import Endpoint
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc import ExecutionContext, InPort, Manager, ModuleSpec, OutPort, ReturnCode
 from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.engines.openrtm.connector_ends import INPORT_IOR, InPortClient, texts
 from tickrig.host.rtc.engines.openrtm.orb import Orb
-from tickrig.host.rtc.engines.openrtm.ports.cdr import InPortClient
-from tickrig.host.rtc.engines.openrtm.ports.component_ports import ComponentPorts, SystemPorts
-from tickrig.host.rtc.engines.openrtm.ports.data_end import INPORT_IOR
-from tickrig.host.rtc.engines.openrtm.ports.properties import texts
+from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.remote.call_queue import CallQueue
-from tickrig.host.rtc.remote.out_port import OutPortPushConnector
-from tickrig.host.rtc.remote.peer_end import PeerEnd, cdr
-from tickrig.host.rtc.remote.peer_thread import PeerThread
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.engines.out_port import OutPortPushConnector
+from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerThread
+from tickrig.host.rtc.system.schedule import RealTime
 from tickrig.wire.rtc_types.basic import Time, TimedOctetSeq
 from tickrig.wire.rtc_types.cdr import encode
 

@@ -8,7 +8,7 @@ from math import pi, sqrt
 
 from benchmarks.pursuit import Pursuit, Tolerance, beside
 from benchmarks.table import RUNS, row
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc.motion.drive import SETTLE_US, drive, start
 from tickrig.host.rtc.motion.geometry import Pose
 

@@ -29,7 +29,7 @@ from tickrig.host.rtc import (
     RtComponent,
 )
 from tickrig.host.rtc.engines.engines_joined import engines_joined
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
@@ -43,11 +43,11 @@ SETTLE_S: Final = 2.0
 PEER: Final = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
-from tickrig.host.rtc.engines.ros2.participant import Participant
+from tickrig.host.rtc.engines.ros2.participant import DdsParticipant
 from tickrig.host.rtc.engines.ros2.message_types import message_type
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 kind, does, seconds = sys.argv[2], sys.argv[3], float(sys.argv[4])
-participant, count = Participant({domain}), 0
+participant, count = DdsParticipant({domain}), 0
 entries = [TopicEntry("", f"C{{n}}/port", kind) for n in range({ports})]
 end_s = time.monotonic() + seconds
 if does == "read":

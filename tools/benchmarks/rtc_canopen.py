@@ -7,24 +7,22 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import RUNS, percentiles, rates, row, seconds
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.device import make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import CanopenOutPort as DeviceOutPort
+from tickrig.device.canopen.device_rtc import CanopenComponent, make_device_rtc
+from tickrig.device.canopen.device_rtc import CanopenOutPort as DeviceOutPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, RtComponent
-from tickrig.host.rtc.canopen.definition.definition import NodeEntry, Role, SystemDefinition
-from tickrig.host.rtc.canopen.definition.device_file import read_device_file
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
-from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout, lay_out
+from tickrig.host.rtc.canopen.definition import NodeEntry, Role, SystemDefinition, read_device_file
+from tickrig.host.rtc.canopen.pdo_layout import PdoLayout, lay_out
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import MappedObject
-from tickrig.wire.rtc_canopen.port_types import LONG
+from tickrig.wire.rtc_canopen import LONG
 from tickrig.wire.rtc_types.basic import TimedOctet, TimedShortSeq
 
 EDS = Path(__file__).parents[2] / "examples" / "eds" / "f-palette.eds"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from benchmarks.table import RUNS, row, seconds
-from tickrig.device.servo.presets import PRESETS
+from tickrig.device.servo.parameters import PRESETS
 from tickrig.device.servo.servo import STEP_US, Servo
 
 STEPS = 20_000

@@ -7,14 +7,14 @@ import time
 from benchmarks.table import RUNS, row
 from tickrig.device.urg.sensor import Urg
 from tickrig.device.urg.world import World, room
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.options.collision_guard import CollisionGuard
-from tickrig.host.urg.client import UrgClient
+from tickrig.host.rtc.motion.options.obstacles import CollisionGuard
+from tickrig.host.urg import UrgClient
 
 SCANS = 100
 SECOND_US = 1_000_000

@@ -1,22 +1,114 @@
-"""Frames of RTC-Lite: header, Cmnd0, Cmnd1, data, checksum (paper, Fig. 2).
+r"""Frames of RTC-Lite: header, Cmnd0, Cmnd1, data, checksum (paper, Fig. 2).
 
 >>> LiteFrame(LiteCommand.STATE).encode().hex(" ")
 '0a 43 58 9b'
 >>> LiteFrame(LiteCommand.STATE, b"@C").encode(Checksum.XOR8).hex(" ")
 '0a 43 58 40 43 18'
+
+How long the data of a frame is.
+
+There is no length byte: data delimits itself (DECISION L6). A layout says how
+many bytes the data has as far as the bytes read so far can tell; the data is
+whole when it has that many.
+
+>>> REQUESTS[LiteCommand.WRITE](b""), REQUESTS[LiteCommand.WRITE](b"\x02\x04in")
+(2, 8)
+>>> REPLIES[LiteCommand.WRITE](b"@"), REPLIES[LiteCommand.ACTIVATE](b"@")
+(1, 2)
+
+Frames out of a byte stream, cut anywhere.
+
+>>> from tickrig.wire.rtc_lite.frame import REQUESTS
+>>> decoder = LiteDecoder(REQUESTS)
+>>> decoder.push(b"noise\n\x43"), decoder.begun
+([], True)
+>>> decoder.push(b"\x58\x9b")
+[LiteFrame(command=<LiteCommand.STATE: b'CX'>, data=b'')]
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import reduce
+from functools import partial, reduce
 from operator import xor
 from typing import Final
 
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault
-from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES
+from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault, LiteStatus
+
+MAX_DATA_BYTES: Final = 60
+"""The largest data; with header, commands and checksum it fills a buffer of 64 bytes."""
+
+Layout = Callable[[bytes | bytearray], int]
+"""Tells from the data so far how long it is, at least."""
+
+WITH_FIELDS: Final = (LiteStatus.OK, LiteStatus.ERROR, LiteStatus.WRONG_STATE)
+"""After any other status the reply ends."""
+
+
+def _fixed(size: int, data: bytes | bytearray) -> int:
+    return size
+
+
+def _counted(data: bytes | bytearray) -> int:
+    return 1 + data[0] if data else 1
+
+
+def _port_data(data: bytes | bytearray) -> int:
+    return 2 + data[0] + data[1] if len(data) >= 2 else 2
+
+
+def _reply(size: int, data: bytes | bytearray) -> int:
+    """A status, and fields of a fixed size where the status lets them follow."""
+    return 1 + size if data and data[0] in WITH_FIELDS else 1
+
+
+def _component(data: bytes | bytearray) -> int:
+    if data and data[0] in WITH_FIELDS:
+        return 4 + data[3] if len(data) >= 4 else 4
+    return 1
+
+
+def _polled(data: bytes | bytearray) -> int:
+    if data and data[0] == LiteStatus.OK:
+        return 2 + data[1] if len(data) >= 2 else 2
+    return 1
+
+
+WITH_STATE: Final = (
+    *(LiteCommand.INITIALIZE, LiteCommand.STATE, LiteCommand.FINALIZE),
+    *(LiteCommand.ACTIVATE, LiteCommand.DEACTIVATE, LiteCommand.EXECUTE, LiteCommand.ABORT),
+    *(LiteCommand.ERROR, LiteCommand.RESET, LiteCommand.STARTUP, LiteCommand.SHUTDOWN),
+)
+"""Commands of the life cycle: no arguments, and the state in the reply."""
+
+_FAULTS: Final = (LiteCommand.CHECKSUM_FAULT, LiteCommand.TIMEOUT_FAULT, LiteCommand.UNKNOWN_FAULT)
+"""What a device says of bytes that are no frame for it."""
+
+REQUESTS: Final[Mapping[LiteCommand, Layout]] = {
+    **dict.fromkeys((*WITH_STATE, LiteCommand.PROFILE, LiteCommand.CONTEXT), partial(_fixed, 0)),
+    LiteCommand.PING: partial(_fixed, 1),
+    LiteCommand.RATE: partial(_fixed, 2),
+    LiteCommand.WRITE: _port_data,
+    LiteCommand.POLL: _counted,
+}
+"""What a proxy sends."""
+
+REPLIES: Final[Mapping[LiteCommand, Layout]] = {
+    **dict.fromkeys((*WITH_STATE, LiteCommand.PING, LiteCommand.CONTEXT), partial(_reply, 1)),
+    **dict.fromkeys((LiteCommand.RATE, LiteCommand.WRITE), partial(_fixed, 1)),
+    **dict.fromkeys((LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE), _counted),
+    **dict.fromkeys(
+        (LiteCommand.CHECKSUM_FAULT, LiteCommand.TIMEOUT_FAULT, LiteCommand.UNKNOWN_FAULT),
+        partial(_fixed, 1),
+    ),
+    LiteCommand.PROFILE: _component,
+    LiteCommand.DATA: _port_data,
+    LiteCommand.POLL: _polled,
+}
+"""What a device sends."""
 
 
 class Framing(StrEnum):
@@ -71,3 +163,69 @@ class LiteFrame:
 def fault_frame(fault: LiteLinkFault) -> LiteFrame:
     """Return the frame that tells of bytes that were no request."""
     return LiteFrame(FAULT_COMMANDS[fault], bytes([fault]))
+
+
+_COMMANDS: Final = {command.value: command for command in LiteCommand}
+
+
+@dataclass(slots=True)
+class LiteDecoder:
+    """Reads the frames of one direction (DECISION L6, L7).
+
+    It knows no time. Whoever owns it watches the line and calls `clear` after
+    100 ms without a byte while a frame has `begun`, and after 20 ms without a
+    byte while it is `lost`.
+
+    Args:
+        layouts: `REQUESTS` at the device, `REPLIES` at the proxy.
+        checksum: how frames are summed up.
+
+    Attributes:
+        lost: an unknown command came, or more data than fit: nobody knows where
+            the next frame begins, and all is thrown away until `clear`.
+    """
+
+    layouts: Mapping[LiteCommand, Layout]
+    checksum: Checksum = Checksum.SUM8
+    lost: bool = field(default=False, init=False)
+    _frame: bytearray = field(default_factory=bytearray, init=False)  # header and what follows
+
+    @property
+    def begun(self) -> bool:
+        """Whether a frame has begun that is not whole."""
+        return bool(self._frame)
+
+    def clear(self) -> None:
+        """Forget a frame that has only begun, and look for a header again."""
+        self.lost = False
+        self._frame.clear()
+
+    def push(self, data: bytes) -> list[LiteFrame | LiteLinkFault]:
+        """Take bytes in; give whole frames out, and what was wrong with others."""
+        out = []
+        for code in data:
+            if not self.lost and (self._frame or code == HEADER[0]):
+                self._frame.append(code)
+                if (found := self._parse()) is not None:
+                    out.append(found)
+                    self._frame.clear()
+                    self.lost = found is LiteLinkFault.UNKNOWN
+        return out
+
+    def _parse(self) -> LiteFrame | LiteLinkFault | None:
+        """Return what the latest byte completed."""
+        frame = self._frame
+        if len(frame) < 3:
+            return None
+        command = _COMMANDS.get(bytes(frame[1:3]))
+        layout = None if command is None else self.layouts.get(command)
+        if command is None or layout is None:  # taken as having no data (DECISION L7)
+            return LiteLinkFault.UNKNOWN if len(frame) == 4 else None
+        size = layout(frame[3:])
+        if size > MAX_DATA_BYTES:
+            return LiteLinkFault.UNKNOWN
+        if len(frame) < 4 + size:
+            return None
+        if frame[-1] != self.checksum.of(frame[1:-1]):
+            return LiteLinkFault.CHECKSUM
+        return LiteFrame(command, bytes(frame[3:-1]))

@@ -14,8 +14,7 @@ from typing import Final
 
 from tickrig.wire.errors import FieldError, FramingError
 from tickrig.wire.rtc_lite.codes import LiteStatus
-from tickrig.wire.rtc_lite.frame import LiteFrame
-from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REPLIES
+from tickrig.wire.rtc_lite.frame import MAX_DATA_BYTES, REPLIES, LiteFrame
 
 PORT_COUNTS_BYTES: Final = 2
 """Length of the name and length of the data stand before them."""

@@ -20,11 +20,17 @@ from types import MappingProxyType
 from typing import Final, NamedTuple
 
 from tickrig.wire.rtc_lite.codes import FAULT_COMMANDS, LiteCommand, LiteLinkFault, LiteStatus
-from tickrig.wire.rtc_lite.frame import LiteFrame, fault_frame
-from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, REPLIES, REQUESTS, WITH_FIELDS
+from tickrig.wire.rtc_lite.frame import (
+    MAX_DATA_BYTES,
+    REPLIES,
+    REQUESTS,
+    WITH_FIELDS,
+    LiteFrame,
+    fault_frame,
+)
 
 HEADER: Final = b"\n\n"
-EMPTY_PACKET_BYTES: Final = 5
+_EMPTY_PACKET_BYTES: Final = 5
 
 LETTERS: Final[Mapping[LiteCommand, bytes]] = MappingProxyType(
     {
@@ -42,7 +48,7 @@ _WITHOUT_STATUS: Final = (LiteCommand.STATE, LiteCommand.CONTEXT)
 _PROFILES: Final = (LiteCommand.IN_PROFILE, LiteCommand.OUT_PROFILE)
 
 
-TYPE_NAME: Final = b"RTno"
+_TYPE_NAME: Final = b"RTno"
 """Stands for the type of a component, which a device of RTno does not tell."""
 
 _FAULT: Final = LETTERS[LiteCommand.CHECKSUM_FAULT]
@@ -130,12 +136,12 @@ class RtnoPacketDecoder:
     def _parse(self) -> RtnoPacket | LiteLinkFault | None:
         """Return what the latest byte completed."""
         packet = self._packet
-        if len(packet) < EMPTY_PACKET_BYTES:
+        if len(packet) < _EMPTY_PACKET_BYTES:
             return None
         size = packet[3]
         if size > MAX_DATA_BYTES:
             return LiteLinkFault.UNKNOWN
-        if len(packet) < EMPTY_PACKET_BYTES + size:
+        if len(packet) < _EMPTY_PACKET_BYTES + size:
             return None
         if packet[-1] != sum(packet[2:-1]) & 0xFF:
             return LiteLinkFault.CHECKSUM
@@ -213,7 +219,7 @@ class RtnoReplies(RtnoPacketDecoder):
             return data
         if command is LiteCommand.PROFILE:
             counts = bytes(self._ports.pop(profile, 0) & 0xFF for profile in _PROFILES)
-            return data + counts + bytes([len(TYPE_NAME)]) + TYPE_NAME
+            return data + counts + bytes([len(_TYPE_NAME)]) + _TYPE_NAME
         if command in _STATES:
             return data + (_STATES[command] if data[0] == LiteStatus.OK else _state_after(data[0]))
         return data

@@ -20,7 +20,7 @@ from typing import Any, Final, Generic, TypeVar, cast
 
 from tickrig.wire.errors import FieldError
 
-MAX_NAME_BYTES: Final = 15
+_MAX_NAME_BYTES: Final = 15
 
 
 def encode_name(name: str) -> bytes:
@@ -29,8 +29,8 @@ def encode_name(name: str) -> bytes:
     Raises:
         FieldError: it is empty, too long, or has other characters.
     """
-    if not 1 <= len(name) <= MAX_NAME_BYTES:
-        raise FieldError(f"name {name!r} has {len(name)} characters, 1..{MAX_NAME_BYTES} fit")
+    if not 1 <= len(name) <= _MAX_NAME_BYTES:
+        raise FieldError(f"name {name!r} has {len(name)} characters, 1..{_MAX_NAME_BYTES} fit")
     if not all("!" <= character <= "~" for character in name):
         raise FieldError(f"name {name!r} is not printable ASCII without blanks")
     return name.encode("ascii")
@@ -38,7 +38,7 @@ def encode_name(name: str) -> bytes:
 
 T = TypeVar("T")
 
-TEXT: Final = "latin-1"
+_TEXT: Final = "latin-1"
 """In place of a format of `struct`: characters."""
 
 
@@ -50,7 +50,7 @@ class LitePortType(Generic[T]):
         code: its letter; upper case for a sequence.
         name: the type of the port at the proxy, as `TimedLong`.
         size: bytes of a value, of an element in a sequence.
-        format: of an element, as `struct` has it; `TEXT` for characters.
+        format: of an element, as `struct` has it; `_TEXT` for characters.
         initial: the value before any was written.
     """
 
@@ -67,7 +67,7 @@ class LitePortType(Generic[T]):
 
     def encode(self, value: T) -> bytes:
         """Write a value; FieldError if the type does not have it."""
-        if self.format == TEXT:
+        if self.format == _TEXT:
             return self._encode_text(cast(str, value))
         values: Any = value if self.sequence else (value,)
         try:
@@ -78,7 +78,7 @@ class LitePortType(Generic[T]):
     def decode(self, data: bytes) -> T:
         """Read a value; FieldError if the bytes are not of this type."""
         self.check_size(data)
-        if self.format == TEXT:
+        if self.format == _TEXT:
             return cast(T, data.decode("latin-1"))
         values = struct.unpack(f"<{len(data) // self.size}{self.format}", data)
         return cast(T, values if self.sequence else values[0])
@@ -100,28 +100,30 @@ class LitePortType(Generic[T]):
 
 
 BOOLEAN: Final = LitePortType("b", "TimedBoolean", 1, "?", initial=False)
-CHAR: Final = LitePortType("c", "TimedChar", 1, TEXT, "\0")
-OCTET: Final = LitePortType("o", "TimedOctet", 1, "B", 0)
+CHAR: Final = LitePortType("c", "TimedChar", 1, _TEXT, "\0")
+_OCTET: Final = LitePortType("o", "TimedOctet", 1, "B", 0)
 SHORT: Final = LitePortType("s", "TimedShort", 2, "h", 0)
 LONG: Final = LitePortType("l", "TimedLong", 4, "i", 0)
 FLOAT: Final = LitePortType("f", "TimedFloat", 4, "f", 0.0)
-DOUBLE: Final = LitePortType("d", "TimedDouble", 4, "f", 0.0)
-BOOLEAN_SEQ: Final[LitePortType[tuple[bool, ...]]] = LitePortType(
+_DOUBLE: Final = LitePortType("d", "TimedDouble", 4, "f", 0.0)
+_BOOLEAN_SEQ: Final[LitePortType[tuple[bool, ...]]] = LitePortType(
     "B", "TimedBooleanSeq", 1, "?", ()
 )
-CHAR_SEQ: Final = LitePortType("C", "TimedCharSeq", 1, TEXT, "")
+CHAR_SEQ: Final = LitePortType("C", "TimedCharSeq", 1, _TEXT, "")
 OCTET_SEQ: Final[LitePortType[tuple[int, ...]]] = LitePortType("O", "TimedOctetSeq", 1, "B", ())
 SHORT_SEQ: Final[LitePortType[tuple[int, ...]]] = LitePortType("S", "TimedShortSeq", 2, "h", ())
 LONG_SEQ: Final[LitePortType[tuple[int, ...]]] = LitePortType("L", "TimedLongSeq", 4, "i", ())
-FLOAT_SEQ: Final[LitePortType[tuple[float, ...]]] = LitePortType("F", "TimedFloatSeq", 4, "f", ())
-DOUBLE_SEQ: Final[LitePortType[tuple[float, ...]]] = LitePortType("D", "TimedDoubleSeq", 4, "f", ())
+_FLOAT_SEQ: Final[LitePortType[tuple[float, ...]]] = LitePortType("F", "TimedFloatSeq", 4, "f", ())
+_DOUBLE_SEQ: Final[LitePortType[tuple[float, ...]]] = LitePortType(
+    "D", "TimedDoubleSeq", 4, "f", ()
+)
 
 PORT_TYPES: Final[Mapping[str, LitePortType[Any]]] = MappingProxyType(
     {
         port_type.code: port_type
         for port_type in (
-            *(BOOLEAN, CHAR, OCTET, SHORT, LONG, FLOAT, DOUBLE),
-            *(BOOLEAN_SEQ, CHAR_SEQ, OCTET_SEQ, SHORT_SEQ, LONG_SEQ, FLOAT_SEQ, DOUBLE_SEQ),
+            *(BOOLEAN, CHAR, _OCTET, SHORT, LONG, FLOAT, _DOUBLE),
+            *(_BOOLEAN_SEQ, CHAR_SEQ, OCTET_SEQ, SHORT_SEQ, LONG_SEQ, _FLOAT_SEQ, _DOUBLE_SEQ),
         )
     }
 )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Final, NamedTuple
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.dictionary import Dictionary, Entry
 from tickrig.device.canopen.ds401.families import (
     ERROR_MODE_OUTPUT,
     ERROR_VALUE_OUTPUT,

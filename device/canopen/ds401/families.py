@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.dictionary import Dictionary, Entry
 from tickrig.wire.canopen.datatypes import DataType
 
 

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
-from tickrig.device.canopen.core.application import Application, number_of
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.ds401.analogue_input import AnalogueInput, InterruptSource
-from tickrig.device.canopen.ds401.analogue_output import AnalogueOutput
-from tickrig.device.canopen.ds401.converter import Converter
-from tickrig.device.canopen.ds401.device_faults import (
-    INPUT_OVERCURRENT,
-    INTERNAL_FAILURE,
-    OUTPUT_OVERLOAD,
-    FaultDetector,
+from tickrig.device.canopen.dictionary import Dictionary, Entry
+from tickrig.device.canopen.ds401.analogue import (
+    AnalogueInput,
+    AnalogueOutput,
+    Converter,
+    InterruptSource,
 )
 from tickrig.device.canopen.ds401.digital import DigitalInputs, DigitalOutputs
 from tickrig.device.canopen.ds401.families import (
@@ -27,11 +22,115 @@ from tickrig.device.canopen.ds401.families import (
     DIGITAL_INTERRUPT_ENABLE,
     channels,
 )
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.device.physical import InputSignal, OutputSignal
+from tickrig.device.canopen.errors import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.slave import Application, CanopenSlave, number_of
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.device.twin import Immutable, Part
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
 
-GROUP_LINES: Final = 8
+# What a module finds wrong with itself, and what it reports.
+
+_NO_BEHAVIOUR: Final = 0
+"""1029h says nothing about it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFault(Immutable):
+    """A physical fault that the module detects.
+
+    Attributes:
+        name: of the physical input.
+        text: what it is, for people.
+        code: emergency error code.
+        register: bits of the error register.
+        behaviour: sub-index of 1029h that decides about the NMT state.
+        stops_outputs: whether error values are put out.
+    """
+
+    name: str
+    text: str
+    code: int
+    register: int
+    behaviour: int
+    stops_outputs: bool
+
+    @property
+    def input(self) -> InputSignal:
+        """The physical input."""
+        return InputSignal(self.name, self.text, SignalType.FAULT)
+
+
+_INPUT_OVERCURRENT: Final = DeviceFault(
+    "input_overcurrent",
+    "the current into an analogue input is too high",
+    0x2110,
+    ErrorRegister.CURRENT,
+    INPUT_ERROR,
+    stops_outputs=False,
+)
+_OUTPUT_OVERLOAD: Final = DeviceFault(
+    "output_overload",
+    "the current out of an output is too high",
+    0x2310,
+    ErrorRegister.CURRENT,
+    OUTPUT_ERROR,
+    stops_outputs=True,
+)
+_INTERNAL_FAILURE: Final = DeviceFault(
+    "internal_failure",
+    "the electronics of the module fail",
+    EmcyCode.HARDWARE,
+    ErrorRegister.GENERIC,
+    _NO_BEHAVIOUR,
+    stops_outputs=True,
+)
+
+
+class FaultDetector(Part):
+    """Sees faults come and go: EMCY, and what 1029h says.
+
+    Args:
+        node: where it is reported.
+        faults: those that the module can have.
+
+    Attributes:
+        faults: see above.
+    """
+
+    def __init__(self, node: CanopenSlave, faults: Sequence[DeviceFault]) -> None:
+        self._node, self.faults = node, faults
+        self._present: list[DeviceFault] = []
+
+    @property
+    def stops_outputs(self) -> bool:
+        """Whether a fault is there that lets no output be."""
+        return any(fault.stops_outputs for fault in self._present)
+
+    def forget(self) -> None:
+        """Find what is there anew."""
+        self._present.clear()
+
+    def look(self, inputs: QuantityBank) -> bool:
+        """Report what has come and gone.
+
+        Returns:
+            Whether outputs have to stop for what has come.
+        """
+        before = self._present
+        self._present = [fault for fault in self.faults if inputs[fault.name]]
+        come = [fault for fault in self._present if fault not in before]
+        for fault in come:
+            self._node.emergency(fault.code, fault.register)
+            ErrorBehaviour.of(self._node).act(fault.behaviour)
+        for fault in before:
+            if fault not in self._present:
+                self._node.emergency_clear(fault.code)
+        return any(fault.stops_outputs for fault in come)
+
+
+_GROUP_LINES: Final = 8
 
 
 class DigitalTerminal(NamedTuple):
@@ -48,10 +147,10 @@ class DigitalTerminal(NamedTuple):
         return self.outputs.level >> self.shift & self.mask
 
 
-Terminal = DigitalTerminal | AnalogueOutput
+_Terminal = DigitalTerminal | AnalogueOutput
 
 
-def digital_input_names(lines: int) -> tuple[str, ...]:
+def _digital_input_names(lines: int) -> tuple[str, ...]:
     """Return `di1` to the last one."""
     return tuple(f"di{line}" for line in range(1, lines + 1))
 
@@ -62,20 +161,20 @@ def digital_inputs(names: Sequence[str]) -> Iterator[InputSignal]:
         yield InputSignal(name, f"digital input {line}")
 
 
-def groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
+def _groups(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Return the names of eight digital inputs at once: `di`, then `di9_16` and so on."""
     found = {}
-    for first in range(0, len(names), GROUP_LINES):
-        members = tuple(names[first : first + GROUP_LINES])
+    for first in range(0, len(names), _GROUP_LINES):
+        members = tuple(names[first : first + _GROUP_LINES])
         found[f"di{first + 1}_{first + len(members)}" if first else "di"] = members
     return found
 
 
-def outputs_by_name(
+def _outputs_by_name(
     digital: DigitalOutputs, analogue: Iterable[AnalogueOutput]
-) -> dict[str, Terminal]:
+) -> dict[str, _Terminal]:
     """Return the outputs by name: `do1`.., `do` and `ao1`.."""
-    found: list[Terminal] = [
+    found: list[_Terminal] = [
         DigitalTerminal(OutputSignal(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
         for line in range(1, digital.lines + 1)
     ]
@@ -132,8 +231,8 @@ class Ds401(Application):
         self._digital_enable = dictionary.find(DIGITAL_INTERRUPT_ENABLE)
         self._analogue_enable = dictionary.find(ANALOGUE_INTERRUPT_ENABLE)
         self._faults = self._make_faults()
-        self._lines = digital_input_names(self._digital_inputs.lines)
-        self._terminals = outputs_by_name(self._digital_outputs, self._analogue_outputs)
+        self._lines = _digital_input_names(self._digital_inputs.lines)
+        self._terminals = _outputs_by_name(self._digital_outputs, self._analogue_outputs)
         self.outputs = {name: terminal.output for name, terminal in self._terminals.items()}
         self._has_physical_inputs()
         self._watch_objects()
@@ -223,18 +322,18 @@ class Ds401(Application):
         self.request()
 
     def _make_faults(self) -> FaultDetector:
-        faults = [INTERNAL_FAILURE]
+        faults = [_INTERNAL_FAILURE]
         if self.analogue_inputs:
-            faults.append(INPUT_OVERCURRENT)
+            faults.append(_INPUT_OVERCURRENT)
         if self._digital_outputs.lines or self._analogue_outputs:
-            faults.append(OUTPUT_OVERLOAD)
+            faults.append(_OUTPUT_OVERLOAD)
         return FaultDetector(self.node, faults)
 
     def _has_physical_inputs(self) -> None:
         lines = digital_inputs(self._lines)
         analogue = (channel.input for channel in self.analogue_inputs)
         faults = (fault.input for fault in self._faults.faults)
-        self.has_inputs((*lines, *analogue, *faults), groups(self._lines))
+        self.has_inputs((*lines, *analogue, *faults), _groups(self._lines))
 
     def _watch_objects(self) -> None:
         self.watch(self._digital_inputs.settings())

@@ -5,19 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.objects.parameters import clamped
-from tickrig.device.canopen.ds402.state.automaton import DriveState, Statusword
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.automaton import DriveState, Statusword
+from tickrig.device.canopen.ds402.settings import clamped
 from tickrig.device.twin import Part
 
 if TYPE_CHECKING:
-    from tickrig.device.canopen.core.dictionary import Dictionary
-    from tickrig.device.canopen.core.entry import Entry
+    from tickrig.device.canopen.dictionary import Dictionary, Entry
     from tickrig.device.canopen.ds402.drive import Ds402
 
 Measure = Callable[["Ds402"], int]
 
-STATE_BITS: Final = {state: int(state | Statusword.REMOTE) for state in DriveState}
+_STATE_BITS: Final = {state: int(state | Statusword.REMOTE) for state in DriveState}
 """What the statusword shows of a state, and that the bus is in control."""
 
 _VOLTAGE_ENABLED: Final = int(Statusword.VOLTAGE_ENABLED)
@@ -29,7 +28,7 @@ _FOLLOWING_ERROR: Final = int(Statusword.MODE_13)
 def statusword_of(drive: Ds402) -> int:
     """Return what 6041h of a drive shows now."""
     supervision, state = drive.supervision, drive.automaton.state
-    status = STATE_BITS[state]
+    status = _STATE_BITS[state]
     if supervision.has_supply:
         status |= _VOLTAGE_ENABLED
     if supervision.warns:

@@ -2,56 +2,94 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Iterable, Mapping
 from enum import IntEnum
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from tickrig._compiled import mypyc_attr
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
-from tickrig.device.canopen.ds402 import terminals
+from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
+from tickrig.device.canopen.ds402 import indices, terminals
 from tickrig.device.canopen.ds402.actual_values import MEASURES, ActualValues, Measure
-from tickrig.device.canopen.ds402.allowed import guard_values
-from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
-from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
-from tickrig.device.canopen.ds402.motion.axis import Axis
-from tickrig.device.canopen.ds402.motion.limits import Limits
-from tickrig.device.canopen.ds402.motion.motor import IdealMotor, Motor
-from tickrig.device.canopen.ds402.motion.stopping import Ramp, Stopping
-from tickrig.device.canopen.ds402.motion.switches import Switches
-from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.objects.error_codes import (
-    COMMUNICATION_ERRORS,
-    ErrorCode,
-    register_of,
-)
-from tickrig.device.canopen.ds402.objects.parameters import Parameters
-from tickrig.device.canopen.ds402.objects.settings import CONFIGURATION, read_settings
-from tickrig.device.canopen.ds402.state.automaton import (
+from tickrig.device.canopen.ds402.automaton import (
     Automaton,
+    Bounds,
     Controlword,
     DriveState,
+    Supervision,
     command_of,
 )
-from tickrig.device.canopen.ds402.state.supervision import Bounds, Supervision
+from tickrig.device.canopen.ds402.axis import (
+    Axis,
+    IdealMotor,
+    Limits,
+    Motor,
+    Ramp,
+    Stopping,
+    Switches,
+)
+from tickrig.device.canopen.ds402.modes.homing import METHODS
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
+from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
+from tickrig.device.canopen.ds402.settings import (
+    COMMUNICATION_ERRORS,
+    CONFIGURATION,
+    ErrorCode,
+    Parameters,
+    read_settings,
+    register_of,
+)
 from tickrig.device.canopen.ds402.stretch import Stretch
+from tickrig.device.canopen.ds402.trapezoid import RampShape
+from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
+from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.device.servo.servo import Servo
 
-TARGETS: Final = (
+
+# Values that objects of a drive take; others are refused with 0609 0030h (CiA 402-2).
+
+_ALLOWED: Final[dict[int, Container[Value]]] = {
+    indices.ABORT_CONNECTION: (0, 1, 2, 3),
+    indices.QUICK_STOP_OPTION: (0, 1, 2, 3, 5, 6, 7),
+    indices.SHUTDOWN_OPTION: (0, 1),
+    indices.DISABLE_OPERATION_OPTION: (0, 1),
+    indices.HALT_OPTION: (1, 2, 3),
+    indices.FAULT_REACTION_OPTION: (0, 1, 2, 3),
+    indices.MOTION_PROFILE: tuple(RampShape),
+    indices.HOMING_METHOD: (0, *METHODS),
+    indices.INTERPOLATION_SUBMODE: (0,),
+}
+"""By index; homing method 0 is none."""
+
+
+def _guard_values(dictionary: Dictionary, modes: Iterable[int]) -> None:
+    """Have the objects of a drive with some modes of operation refuse other values."""
+    for index, allowed in {**_ALLOWED, indices.MODES_OF_OPERATION: tuple(modes)}.items():
+        entry = dictionary.find(index)
+        if entry is not None:
+            entry.guard = partial(_check, allowed)
+
+
+def _check(allowed: Container[Value], entry: Entry, value: Value) -> None:
+    if value not in allowed:
+        raise SdoAbort(AbortCode.VALUE_RANGE)
+
+
+_TARGETS: Final = (
     *(indices.TARGET_TORQUE, indices.TARGET_POSITION, indices.TARGET_VELOCITY),
     *(indices.POSITION_OFFSET, indices.VELOCITY_OFFSET, indices.TORQUE_OFFSET),
     indices.INTERPOLATION_DATA,
 )
 
-MOVING: Final = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+_MOVING: Final = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
 """States in which a lost connection matters."""
 
-COOLING_US: Final = 1_000_000
+_COOLING_US: Final = 1_000_000
 """Period in which a drive at rest looks at its temperature."""
 
 
@@ -148,9 +186,9 @@ class Ds402(Application):
         self.has_inputs((*terminals.DRIVE_INPUTS, *plant))
         parameters.watch((indices.CONTROLWORD,), self._controlled)
         parameters.watch((indices.MODES_OF_OPERATION,), self._mode_written)
-        parameters.watch((*TARGETS, *self.more_targets), self._target_written)
+        parameters.watch((*_TARGETS, *self.more_targets), self._target_written)
         parameters.watch(CONFIGURATION, self._configuration_written)
-        guard_values(node.dictionary, self.offered)
+        _guard_values(node.dictionary, self.offered)
         node.sync_handlers.append(self._sync)
 
     @property
@@ -252,7 +290,7 @@ class Ds402(Application):
 
     def communication_error(self) -> None:
         """Act as 6007h says, while the motor has power."""
-        if self.state not in MOVING:
+        if self.state not in _MOVING:
             return
         self._interrupt()
         match self.parameters.number(indices.ABORT_CONNECTION):
@@ -389,7 +427,7 @@ class Ds402(Application):
         self.actual_values.keep()
         if self._winding_dc != motor.winding_dc:
             self._winding_dc = motor.winding_dc
-            self.schedule(now_us + COOLING_US)
+            self.schedule(now_us + _COOLING_US)
 
     def _controlled(self, entry: Entry) -> None:
         """Obey a new controlword, with what was configured before it."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.servo.run_ahead import RunAhead
+from tickrig.device.canopen.slave import TICK_US
+from tickrig.device.servo.servo import RunAhead
 from tickrig.device.twin import Part
 
 if TYPE_CHECKING:
+    from tickrig.device.canopen.ds402.axis import Axis
     from tickrig.device.canopen.ds402.drive import Ds402
-    from tickrig.device.canopen.ds402.motion.axis import Axis
     from tickrig.device.servo.servo import Servo
 
-FEWEST: Final = 2
+_FEWEST: Final = 2
 """Ticks that are worth it."""
 
 
@@ -51,17 +51,17 @@ class Stretch(Part):
             For how many microseconds nothing but that happens.
         """
         most, servo = self._most_us(now_us, requested=requested) // TICK_US, self._servo
-        if most < FEWEST or servo is None or not self._drive.goes_on_plainly:
+        if most < _FEWEST or servo is None or not self._drive.goes_on_plainly:
             return 0
         path = self._drive.mode.ahead(min(most, servo.plain_steps))
-        if len(path) < FEWEST:
+        if len(path) < _FEWEST:
             return 0
         axis = self._axis
         self._path = [(axis.reference.position, axis.reference.velocity), *path]
         self._counts, self._standstill = axis.unwrapped, axis.standstill
         self._error = axis.settings.following_error_window
         run = self._work_out(servo, len(path))
-        if run.steps < FEWEST:
+        if run.steps < _FEWEST:
             return 0
         self._run, self._began_us = run, now_us
         return run.steps * TICK_US

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.canopen.ds402.motion import switches
+from tickrig.device.canopen.ds402 import axis as switches
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 
 if TYPE_CHECKING:

@@ -8,25 +8,29 @@ from __future__ import annotations
 from functools import cache
 from typing import Final
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Converter, Ds401
+from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.communication_profile import (
+from tickrig.wire.canopen.eds.object_table import (
+    CONST,
+    RO,
+    ROT,
+    RW,
+    RWW,
     CommunicationProfile,
+    ObjectTable,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.eds.object_table import CONST, RO, ROT, RW, RWW, ObjectTable
 
 NODE_ID: Final = 16
 ANALOGUE_INPUTS: Final = 8
 
-FULL_SCALE_MV: Final = 5_000
+_FULL_SCALE_MV: Final = 5_000
 
-ADC: Final = Converter("v", "V", low=0.0, high=FULL_SCALE_MV / 1_000, high_raw=4095, shift=3)
+ADC: Final = Converter("v", "V", low=0.0, high=_FULL_SCALE_MV / 1_000, high_raw=4095, shift=3)
 """12 bit, left-justified in INTEGER16: 0..32760."""
 
 BOOL: Final = DataType.BOOLEAN
@@ -111,7 +115,7 @@ def _add_digital(objects: ObjectTable) -> None:
 
 def _add_analogue(objects: ObjectTable) -> None:
     count = ANALOGUE_INPUTS
-    objects.variable(0x2000, "Full scale of analogue inputs, mV", U16, CONST, FULL_SCALE_MV)
+    objects.variable(0x2000, "Full scale of analogue inputs, mV", U16, CONST, _FULL_SCALE_MV)
     objects.array(0x6401, "Read analogue input 16-bit", count, I16, ROT)
     objects.array(0x6421, "Analogue input interrupt trigger selection", count, U8, RW, 7)
     objects.array(0x6422, "Analogue input interrupt source", 1, U32, RO)

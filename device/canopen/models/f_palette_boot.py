@@ -9,12 +9,11 @@ from dataclasses import replace
 from functools import cache
 from typing import Final
 
-from tickrig.device.canopen.bus.boot_loader import BootLoader, add_program_objects
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.models import f_palette
+from tickrig.device.canopen.parameter_store import BootLoader, add_program_objects
+from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 
 NODE_ID: Final = 17

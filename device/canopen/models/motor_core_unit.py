@@ -2,25 +2,450 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 from typing import Final
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
+from tickrig._compiled import mypyc_attr
+from tickrig.device.canopen.dictionary import Dictionary, Entry
+from tickrig.device.canopen.models.motor_core_motion import (
+    ACTIONS,
+    CONTROL_US,
+    DEGREE,
+    Action,
+    Display,
+    Motion,
+    References,
+    Shaft,
+    mode_of,
+)
+from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave, Nonvolatile
 from tickrig.device.canopen.stack import make_slave
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.device.servo.parameters import MOTOR_CORE_UNIT
+from tickrig.device.servo.servo import Servo
+from tickrig.device.twin import Immutable, Part
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.communication_profile import (
+from tickrig.wire.canopen.eds.object_table import (
     OFF,
+    ROT,
+    RW,
+    RWW,
     U8,
     U16,
     U32,
     CommunicationProfile,
+    Element,
+    ObjectTable,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.eds.object_table import ROT, RW, RWW, Element, ObjectTable
+from tickrig.wire.canopen.emcy import ErrorRegister
+from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.instant import NEVER
+
+# What may go wrong in a motor core unit, how it is seen, and the EMCYs of it.
+
+
+@dataclass(frozen=True, slots=True)
+class Measurements(Immutable):
+    """What the unit measures of itself.
+
+    Attributes:
+        on: the power stage is on.
+        loops: a velocity is to be kept.
+        tripped: the comparator of the power stage has switched it off.
+        supply_mv: supply of the motor.
+        winding_dc: temperature of the winding, 0.1 degC.
+        housing_dc: temperature of the housing and of the power stage in it, 0.1 degC.
+        velocity_deg_s: velocity of the shaft by the motor encoder.
+        current_ma: current in the motor.
+        limited: limits or the supply keep the current below what the loops want.
+        deviates: the motor is far from what is wanted of it.
+        spare_mv: voltage that the supply leaves above the back-EMF, to make a current with.
+        overloaded: the I2t of the power stage is used up.
+        slip_deg: by how much motor encoder and gear encoder disagree.
+    """
+
+    on: bool
+    loops: bool
+    tripped: bool
+    supply_mv: int
+    winding_dc: int
+    housing_dc: int
+    velocity_deg_s: float
+    current_ma: int
+    limited: bool
+    deviates: bool
+    spare_mv: int
+    overloaded: bool
+    slip_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fault(Immutable):
+    """One row of the table.
+
+    Attributes:
+        name: for people.
+        code: emergency error code (CiA 402-1).
+        register: bits of the error register.
+        seen: whether the cause is there.
+        gone: whether it is not there any more; not always the opposite of `seen`.
+        after_us: for how long it must be seen.
+    """
+
+    name: str
+    code: int
+    register: ErrorRegister
+    seen: Callable[[Measurements], bool]
+    gone: Callable[[Measurements], bool]
+    after_us: int = 0
+
+    def __reduce__(self) -> tuple[Callable[[str], Fault], tuple[str]]:
+        """Stand in a pickle by its name."""
+        return _fault, (self.name,)
+
+
+def _fault(name: str) -> Fault:
+    return next(fault for fault in _FAULTS if fault.name == name)
+
+
+_SUPPLY_MV: Final = (10_000, 66_000)
+"""10 V (NEDO report, Table 6), and a tenth above its 60 V."""
+
+_SUPPLY_MARGIN_MV: Final = 1_000
+_WINDING_DC: Final = 1_180
+_HOUSING_DC: Final = 1_100
+_COOLED_DC: Final = 100
+"""A temperature must fall by so much before a fault can be cleared."""
+
+_STALLED_DEG_S: Final = 1.0
+_STALLED_US: Final = 500_000
+_OVERLOADED_US: Final = 1_000_000
+_NO_CURRENT_MA: Final = 50
+_NO_CURRENT_US: Final = 100_000
+_SPARE_MV: Final = 500
+"""With less no current is missed: the motor turns as fast as its supply lets it."""
+_SLIP_DEG: Final = 1.0
+_DIP_US: Final = 5_000
+
+_DRIVE: Final = ErrorRegister.DEVICE_PROFILE
+
+
+def _unless_tripped(measured: Measurements) -> bool:
+    """Take a cause for gone that is not seen without power or motion: it would come back."""
+    return not measured.tripped
+
+
+_FAULTS: Final = (
+    Fault("short circuit", 0x2320, ErrorRegister.CURRENT, lambda s: s.tripped, _unless_tripped),
+    Fault(
+        *("under-voltage", 0x3220, ErrorRegister.VOLTAGE),
+        seen=lambda s: s.supply_mv < _SUPPLY_MV[0],
+        gone=lambda s: s.supply_mv >= _SUPPLY_MV[0] + _SUPPLY_MARGIN_MV,
+        after_us=_DIP_US,
+    ),
+    Fault(
+        *("over-voltage", 0x3210, ErrorRegister.VOLTAGE),
+        seen=lambda s: s.supply_mv > _SUPPLY_MV[1],
+        gone=lambda s: s.supply_mv <= _SUPPLY_MV[1] - _SUPPLY_MARGIN_MV,
+    ),
+    Fault(
+        *("over-temperature of the housing", 0x4210, ErrorRegister.TEMPERATURE),
+        seen=lambda s: s.housing_dc > _HOUSING_DC,
+        gone=lambda s: s.housing_dc <= _HOUSING_DC - _COOLED_DC,
+    ),
+    Fault(
+        *("over-temperature of the motor", 0x4310, ErrorRegister.TEMPERATURE),
+        seen=lambda s: s.winding_dc > _WINDING_DC,
+        gone=lambda s: s.winding_dc <= _WINDING_DC - _COOLED_DC,
+    ),
+    Fault(
+        *("motor encoder", 0x7305, _DRIVE),
+        seen=lambda s: s.slip_deg > _SLIP_DEG,
+        gone=_unless_tripped,
+    ),
+    Fault(
+        *("motor commutation", 0x7122, _DRIVE),
+        seen=lambda s: s.deviates and abs(s.current_ma) < _NO_CURRENT_MA and s.spare_mv > _SPARE_MV,
+        gone=_unless_tripped,
+        after_us=_NO_CURRENT_US,
+    ),
+    Fault(
+        *("motor blocked", 0x7121, _DRIVE),
+        seen=lambda s: s.loops and s.limited and abs(s.velocity_deg_s) < _STALLED_DEG_S,
+        gone=_unless_tripped,
+        after_us=_STALLED_US,
+    ),
+    Fault(
+        *("continuous over-current", 0x2310, ErrorRegister.CURRENT),
+        seen=lambda s: s.overloaded and s.limited,
+        gone=_unless_tripped,
+        after_us=_OVERLOADED_US,
+    ),
+)
+"""In this order; what is seen first is reported first."""
+
+
+class Supervision(Part):
+    """The faults that there are: each is reported by EMCY, and again when it is cleared.
+
+    Args:
+        node: the slave.
+
+    Attributes:
+        faults: those that there are, in the order in which they came.
+    """
+
+    def __init__(self, node: CanopenSlave) -> None:
+        self._node = node
+        self.faults: list[Fault] = []
+        self._since_us: dict[Fault, int] = {}
+
+    @property
+    def waiting(self) -> bool:
+        """Whether a cause is seen, but not for long enough yet."""
+        return bool(self._since_us)
+
+    def start(self) -> None:
+        """Know of no fault; a cause that is still there is found anew."""
+        self.faults.clear()
+        self._since_us.clear()
+
+    def look(self, now_us: int, measured: Measurements) -> bool:
+        """Look for causes. Returns: whether there is a new fault."""
+        known = len(self.faults)
+        for fault in _FAULTS:
+            if fault in self.faults:
+                continue
+            if not fault.seen(measured):
+                self._since_us.pop(fault, None)
+            elif now_us - self._since_us.setdefault(fault, now_us) >= fault.after_us:
+                self._raise(fault)
+        return len(self.faults) > known
+
+    def clear(self, measured: Measurements) -> bool:
+        """Let go of the faults whose cause is gone. Returns: whether there were any."""
+        gone = [fault for fault in self.faults if fault.gone(measured)]
+        for fault in gone:
+            self.faults.remove(fault)
+            self._node.emergency_clear(fault.code)
+        return bool(gone)
+
+    def _raise(self, fault: Fault) -> None:
+        del self._since_us[fault]
+        self.faults.append(fault)
+        self._node.emergency(fault.code, fault.register)
+
+
+# The application of the motor core unit, with its physical side.
+
+_LOAD: Final = "torque from outside at the shaft, positive drives it forward"
+
+INPUTS: Final = (
+    InputSignal("supply_v", "supply of the motor", high=80, unit="V", initial=60, real=True),
+    InputSignal("shaft_load_nm", _LOAD, low=-100, high=100, unit="Nm", real=True),
+    InputSignal("load_kg_m2", "inertia of what is on the shaft", high=10, unit="kg m2", real=True),
+    InputSignal(
+        "ambient_c", "air around it", low=-40, high=125, unit="degC", initial=25, real=True
+    ),
+    InputSignal("shaft_blocked", "the shaft is held", SignalType.FAULT),
+    InputSignal("encoder_unplugged", "the plug of the motor encoder is off", SignalType.FAULT),
+    InputSignal("motor_phase_open", "a wire of the motor is off", SignalType.FAULT),
+    InputSignal("short_circuit", "two wires of the motor touch", SignalType.FAULT),
+)
+
+_OUTPUTS: Final = (
+    OutputSignal("angle_deg", "angle of the shaft, without the offset 2011h", "deg"),
+    OutputSignal("velocity_deg_s", "velocity of the shaft", "deg/s"),
+    OutputSignal("current_a", "current in the motor", "A"),
+    OutputSignal("winding_c", "temperature of the winding", "degC"),
+    OutputSignal("target_deg", "where the reference wants the shaft in angle mode", "deg"),
+    OutputSignal("mode", "free, current, velocity or angle"),
+    OutputSignal("status", "off, on, or the faults that are there"),
+)
+
+_READINGS: Final[Mapping[str, Callable[[Servo], float]]] = MappingProxyType(
+    {
+        "angle_deg": lambda servo: servo.shaft_deg,
+        "velocity_deg_s": lambda servo: servo.shaft_deg_s,
+        "current_a": lambda servo: servo.current_a,
+        "winding_c": lambda servo: servo.winding_c,
+    }
+)
+"""The outputs that are the motor's own."""
+
+
+def _apply_inputs(servo: Servo, inputs: QuantityBank) -> None:
+    """Let the world act on the motor, if it has changed."""
+    if inputs.changed:
+        inputs.changed = False
+        servo.supply_v, servo.ambient_c = inputs["supply_v"], inputs["ambient_c"]
+        servo.load_nm, servo.load_kg_m2 = inputs["shaft_load_nm"], inputs["load_kg_m2"]
+        servo.blocked = bool(inputs["shaft_blocked"])
+        servo.encoder_unplugged = bool(inputs["encoder_unplugged"])
+        servo.phase_open = bool(inputs["motor_phase_open"])
+
+
+_MODE: Final = 0x2000
+
+_COOLING_US: Final = 1_000_000
+"""How often a motor at rest is looked at until it has the temperature of the air."""
+
+_COOLED_C: Final = 0.1
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class MotorCoreUnit(Application):
+    """A brushless motor with strain wave gear, two encoders and driver (NEDO report, Table 5).
+
+    A reference acts only in Operational; in other NMT states a motor that has a mode
+    brakes to standstill and is held there. A control tick has 10 ms; what wakes a unit
+    at rest begins one. Faults take the power off the motor until a write to 2000h finds
+    their causes gone.
+
+    Not emulated: commutation, torque ripple, elasticity and play of the gear, power
+    that comes back into the supply while braking, failure of the control supply.
+
+    Attributes:
+        servo: motor, gear and loops.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.has_inputs(INPUTS)
+        self.outputs = {output.name: output for output in _OUTPUTS}
+        self.servo = Servo(MOTOR_CORE_UNIT)
+        self._shaft, self._references = Shaft(self.servo), References(node, self.request)
+        self._motion = Motion(self._shaft, self._references)
+        self._supervision = Supervision(node)
+        self._display = Display(node.dictionary, self._shaft, self._references)
+        self._mode = node.dictionary[_MODE, 0]
+        self._mode.written = self._mode_written
+        self.watch([self._mode, *self._references.entries])
+        self._begin_us, self._mode_was_written = 0, False
+
+    def read(self, name: str) -> int | float | str:
+        """Return the present value of a physical output."""
+        if name in _READINGS:
+            return _READINGS[name](self.servo)
+        match name:
+            case "target_deg":
+                return self._references.target_ndeg / DEGREE
+            case "mode":
+                return mode_of(self._mode.number).name.lower()
+            case "status":
+                return self._status
+        raise KeyError(name)
+
+    def power_on(self) -> None:
+        """Find a motor that has been without power since the last tick."""
+        self.servo.release()
+
+    def without_power(self, now_us: int) -> int:
+        """Let the shaft coast."""
+        self.servo.release()
+        self.servo.step_to(now_us)
+        _apply_inputs(self.servo, self.inputs)
+        return NEVER if self.servo.resting else now_us + TICK_US
+
+    def start(self) -> None:
+        """Know of no fault; the gear encoder says where the shaft is."""
+        self._supervision.start()
+        self._references.start()
+        self._mode_was_written = False
+        self._shaft.find_zero()
+        self.request()
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Let references act in Operational only."""
+        if new is NmtState.OPERATIONAL:
+            self._references.failed = False
+        self.request()
+
+    def communication_error(self) -> None:
+        """Let 6443h and 6444h give the reference."""
+        self._references.failed = True
+        self.request()
+
+    def on_execute(self, now_us: int) -> None:
+        """Let time pass for the motor, look after it, drive it."""
+        self.servo.step_to(now_us)
+        _apply_inputs(self.servo, self.inputs)
+        failed = self._supervise(now_us)
+        controls = failed or now_us - self._begin_us >= CONTROL_US
+        if controls:
+            self._control(now_us)
+        self._motion.drive(now_us - self._begin_us)
+        self.schedule(self._rested_us(now_us) if controls and self._rests else now_us + TICK_US)
+
+    def _supervise(self, now_us: int) -> bool:
+        """Find new faults, let go of old ones. Returns: whether there is a new one."""
+        if self._mode_was_written:
+            self._mode_was_written = False
+            if self._supervision.clear(self._measurements(now_us)):
+                self._shaft.find_zero()
+        failed = self._supervision.look(now_us, self._measurements(now_us))
+        self._references.failed |= failed
+        return failed
+
+    def _control(self, now_us: int) -> None:
+        """Begin a control tick."""
+        self._begin_us = now_us
+        self.servo.current_limit_a = self._references.current_limit_ma / 1_000
+        self._motion.plan(self._action)
+        self._display.show(self._motion, faulty=bool(self._supervision.faults))
+
+    @property
+    def _action(self) -> Action:
+        """What faults, NMT state and mode let the motor do."""
+        if self._supervision.faults:
+            return Action.COAST
+        action = ACTIONS[mode_of(self._mode.number)]
+        if action is Action.COAST or self.node.state is NmtState.OPERATIONAL:
+            return action
+        return Action.BRAKE
+
+    def _measurements(self, now_us: int) -> Measurements:
+        servo, on = self.servo, self._motion.on
+        return Measurements(
+            on=on,
+            loops=self._motion.loops,
+            tripped=on and bool(self.inputs["short_circuit"]),
+            supply_mv=servo.supply_mv,
+            winding_dc=servo.winding_dc,
+            housing_dc=round(servo.housing_c * 10),
+            velocity_deg_s=self._shaft.velocity_udeg_s / 1e6,
+            current_ma=servo.current_ma,
+            limited=servo.current_limited,
+            deviates=self._motion.deviates(now_us - self._begin_us),
+            spare_mv=servo.spare_mv,
+            overloaded=servo.overloaded,
+            slip_deg=self._shaft.slip_deg,
+        )
+
+    @property
+    def _status(self) -> str:
+        faults = ", ".join(fault.name for fault in self._supervision.faults)
+        return faults or ("on" if self._motion.on else "off")
+
+    @property
+    def _rests(self) -> bool:
+        return self._motion.steady and self.servo.resting and not self._supervision.waiting
+
+    def _rested_us(self, now_us: int) -> int:
+        """Return when to look at a motor at rest again: as long as it cools down or warms up."""
+        air_c, servo = self.servo.ambient_c, self.servo
+        warmer_c = max(abs(servo.winding_c - air_c), abs(servo.housing_c - air_c))
+        return now_us + _COOLING_US if warmer_c > _COOLED_C else NEVER
+
+    def _mode_written(self, entry: Entry) -> None:
+        self._mode_was_written = True
+        self.request()
+
 
 NODE_ID: Final = 32
 """Unless another is given."""
@@ -28,19 +453,19 @@ NODE_ID: Final = 32
 I16: Final = DataType.INTEGER16
 I32: Final = DataType.INTEGER32
 
-ANALOGUE_IN_AND_OUT: Final = 0x000C_0191
+_ANALOGUE_IN_AND_OUT: Final = 0x000C_0191
 """Device type: CiA 401, analogue inputs and outputs."""
 
-CHANNELS: Final = 4
+_CHANNELS: Final = 4
 
 
 def _channels(index: int) -> tuple[int, ...]:
     """Map the four 16-bit channels of an array."""
-    return tuple(index << 16 | sub << 8 | I16.bits for sub in range(1, CHANNELS + 1))
+    return tuple(index << 16 | sub << 8 | I16.bits for sub in range(1, _CHANNELS + 1))
 
 
-PROFILE: Final = CommunicationProfile(
-    device_type=ANALOGUE_IN_AND_OUT,
+_PROFILE: Final = CommunicationProfile(
+    device_type=_ANALOGUE_IN_AND_OUT,
     name="motor core unit",
     hardware="1.1",
     software="tickrig",
@@ -81,7 +506,7 @@ def dictionary() -> Dictionary:
 @cache
 def _template() -> Dictionary:
     objects = ObjectTable()
-    add_communication(objects, PROFILE)
+    add_communication(objects, _PROFILE)
     objects.variable(0x2000, "Mode", U8, RW, high=3)
     objects.variable(0x2001, "Status", U16, ROT)
     full_scales = (
@@ -91,8 +516,8 @@ def _template() -> Dictionary:
     )
     objects.record(0x2010, "Full scale", full_scales)
     objects.variable(0x2011, "Angle offset, 0.001 deg", I32, RW)
-    objects.array(0x6401, "Read analogue input 16-bit", CHANNELS, I16, ROT)
-    objects.array(0x6411, "Write analogue output 16-bit", CHANNELS, I16, RWW)
+    objects.array(0x6401, "Read analogue input 16-bit", _CHANNELS, I16, ROT)
+    objects.array(0x6411, "Write analogue output 16-bit", _CHANNELS, I16, RWW)
     objects.array(0x6443, "Analogue output error mode", 1, U8, RW, 1)
     objects.array(0x6444, "Analogue output error value", 1, I32, RW)
     return Dictionary(objects, objects.objects)

@@ -2,27 +2,298 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable, Iterator
+from functools import partial
+from operator import attrgetter
+from typing import ClassVar, Final, NamedTuple
 
-from tickrig.device.canopen.core.abort import SdoAbort, whole_number
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.pdo.mpdo import DISPATCHING_LISTS, SCANNER_LISTS
-from tickrig.device.canopen.pdo.pdo_packing import Slot, total_bits
-from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters
+from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort, whole_number
+from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters, PdoSender, TpdoMode
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.twin import Part
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.pdo import (
     DAM_MPDO,
     MAX_MAPPED_OBJECTS,
     MAX_PDO_BITS,
+    MPDO_DATA_BYTES,
     SAM_MPDO,
+    Dispatched,
     MappedObject,
+    Mpdo,
+    Scanned,
+    pack_bits,
+    unpack_bits,
 )
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
+from tickrig.wire.instant import NEVER
 
-DUMMIES: Final = {
+# From mapped entries to the bytes of a PDO and back, prepared once per mapping.
+
+Pack = Callable[[], bytes]
+Unpack = Callable[[bytes], None]
+
+
+class Slot(NamedTuple):
+    """One mapped object.
+
+    Attributes:
+        entry: None for a dummy, which takes up bits of an RPDO and goes nowhere.
+        bits: length in the PDO.
+    """
+
+    entry: Entry | None
+    bits: int
+
+    @property
+    def whole(self) -> bool:
+        """Whether all bytes of the entry are mapped, no bit more or less."""
+        return self.entry is not None and 8 * self.entry.size == self.bits
+
+
+_data: Final[attrgetter[bytes]] = attrgetter("data")
+
+
+def total_bits(slots: tuple[Slot, ...]) -> int:
+    """Return the length of a PDO in bits."""
+    return sum(slot.bits for slot in slots)
+
+
+def alone_in(slots: tuple[Slot, ...]) -> Entry | None:
+    """Return the entry whose bytes are those of a TPDO; None if it takes more to make them."""
+    entry = slots[0].entry if len(slots) == 1 and slots[0].whole else None
+    return None if entry is None or entry.source is not None else entry
+
+
+def make_pack(slots: tuple[Slot, ...]) -> Pack:
+    """Return what makes the bytes of a TPDO out of the entries.
+
+    An object that is mapped shorter than it is gives its low bytes.
+    """
+    entries = [slot.entry for slot in slots if slot.entry is not None]
+    if not all(slot.whole for slot in slots):
+        return _Bits(slots).pack
+    if any(entry.source is not None for entry in entries):
+        return partial(_join_present, entries)
+    return partial(_data, entries[0]) if len(entries) == 1 else partial(_join, entries)
+
+
+def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
+    """Return what gives the bytes of an RPDO, which must be enough, to the entries.
+
+    An object that is mapped shorter than it is gets zeros above, as CANopenNode
+    does it; bytes behind the last object are for nobody.
+    """
+    if not all(slot.whole or (slot.entry is None and slot.bits % 8 == 0) for slot in slots):
+        return _Bits(slots).unpack
+    steps, position = [], 0
+    for entry, bits in slots:
+        end = position + bits // 8
+        if entry is not None:
+            steps.append((_make_write(entry), position, end))
+        position = end
+    return partial(_split, steps)
+
+
+def _make_write(entry: Entry) -> Unpack:
+    """Return what writes an entry from a PDO: the straight way if nobody judges the entry."""
+    straight = entry.takes_all or not entry.description.writable
+    return entry.assign if straight else entry.receive
+
+
+def _present(entry: Entry) -> bytes:
+    """Return the bytes of an entry that may be made on demand; the last ones if none can be."""
+    try:
+        return entry.present()
+    except SdoAbort:
+        return entry.data
+
+
+def _join(entries: list[Entry]) -> bytes:
+    return b"".join(map(_data, entries))
+
+
+def _join_present(entries: list[Entry]) -> bytes:
+    return b"".join(map(_present, entries))
+
+
+def _split(steps: list[tuple[Unpack, int, int]], data: bytes) -> None:
+    for write, start, end in steps:
+        write(data[start:end])
+
+
+class _Bits(Part):
+    """Objects that do not fill whole bytes, behind each other."""
+
+    __slots__ = ("_slots",)
+
+    def __init__(self, slots: tuple[Slot, ...]) -> None:
+        self._slots = slots
+
+    def pack(self) -> bytes:
+        return pack_bits(
+            (int.from_bytes(_present(entry), "little"), bits)
+            for entry, bits in self._slots
+            if entry is not None
+        )
+
+    def unpack(self, data: bytes) -> None:
+        values = unpack_bits(data, [slot.bits for slot in self._slots])
+        for value, (entry, bits) in zip(values, self._slots, strict=True):
+            if entry is not None:
+                _make_write(entry)(value.to_bytes(entry.size or bits // 8, "little"))
+
+
+# Multiplexed PDOs: their lists, producers and consumers (CiA 301, MPDO).
+
+_SCANNER_LISTS: Final = range(0x1FA0, 0x1FD0)
+_DISPATCHING_LISTS: Final = range(0x1FD0, 0x2000)
+
+_Source = tuple[int, int, int]
+"""Node-ID, index and sub-index of a producer's object."""
+
+
+def _fits_mpdo(entry: Entry, direction: Access) -> bool:
+    """Return whether an object may be in an MPDO: mappable and of one to four bytes."""
+    return direction in entry.description.access and 0 < entry.size <= MPDO_DATA_BYTES
+
+
+def scanned_entries(dictionary: Dictionary) -> Iterator[Entry]:
+    """Give the objects of the scanner lists that an MPDO can carry."""
+    for value in _list_values(dictionary, _SCANNER_LISTS):
+        row = Scanned.parse(value)
+        for step in range(row.block):
+            entry = dictionary.find(row.index, row.sub + step)
+            if entry is not None and _fits_mpdo(entry, Access.TPDO):
+                yield entry
+
+
+def _dispatched_entries(dictionary: Dictionary) -> Iterator[tuple[_Source, Entry]]:
+    """Give the objects of the dispatching lists, each with where its value comes from."""
+    for value in _list_values(dictionary, _DISPATCHING_LISTS):
+        row = Dispatched.parse(value)
+        for step in range(row.block):
+            entry = dictionary.find(row.index, row.sub + step)
+            if entry is not None and _fits_mpdo(entry, Access.RPDO):
+                yield (row.node_id, row.producer_index, row.producer_sub + step), entry
+
+
+def _list_values(dictionary: Dictionary, lists: range) -> Iterator[int]:
+    """Give the entries in use: sub-index 0 says how many, 0 is an empty one."""
+    for index in lists:
+        count = dictionary.find(index)
+        if count is not None:
+            used = dictionary.elements(index)[: count.number]
+            yield from (entry.number for entry in used if entry.number)
+
+
+class MpdoQueue(TpdoMode):
+    """MPDOs: one frame an object, one frame an inhibit time, in the order of events.
+
+    An event of an object that waits already adds no frame: the newest data are sent.
+    """
+
+    timed: ClassVar[bool] = True
+
+    def __init__(self, sender: PdoSender, node_id: int = 0) -> None:
+        super().__init__(sender)
+        self._node_id = node_id
+        self._inhibit_us, self._free_us = sender.parameters.inhibit_us, 0
+        self._waiting: dict[object, bytes | Entry] = {}
+
+    def put(self, key: object, frame: bytes | Entry) -> None:
+        """Send a frame, or what an entry then holds, as soon as the inhibit time allows."""
+        self._waiting[key] = frame
+        self.due_us = self._free_us
+        self.sender.wake(self.due_us)
+
+    def run(self, now_us: int) -> None:
+        """Send the first, or all if there is no inhibit time."""
+        while self._waiting and self._free_us <= now_us:
+            frame = self._waiting.pop(next(iter(self._waiting)))
+            self.sender.send(frame if isinstance(frame, bytes) else self._frame_of(frame))
+            self._free_us = now_us + self._inhibit_us
+        self.due_us = self._free_us if self._waiting else NEVER
+
+    def answer(self) -> None:
+        """Send nothing: a remote frame cannot say which object."""
+
+    def _frame_of(self, entry: Entry) -> bytes:
+        return Mpdo(False, self._node_id, entry.index, entry.sub, _present(entry)).encode()
+
+
+class DamProducer(MpdoQueue):
+    """MPDO in destination address mode: the application says what goes where.
+
+    Its own mapping entry is not used.
+    """
+
+    def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:
+        """Write an object of another node, or of all with node-ID 0."""
+        self.put((node_id, index, sub), Mpdo(True, node_id, index, sub, data).encode())
+
+
+class SamProducer(MpdoQueue):
+    """MPDO in source address mode: each change of an object of the scanner lists is sent."""
+
+    def request(self, entry: Entry | None = None) -> None:
+        """Send an object that has changed."""
+        if entry is not None:
+            self.put(entry.key, entry)
+
+
+class DamConsumer(Part):
+    """Writes the object that an MPDO in destination address mode names.
+
+    One for another node is ignored, one for a missing object is answered with
+    EMCY 8230h, which the next good one clears.
+    """
+
+    def __init__(self, node: CanopenSlave) -> None:
+        self._node, self._missing = node, False
+
+    def unpack(self, data: bytes) -> None:
+        """Take the eight bytes of a frame."""
+        mpdo = Mpdo.parse(data[:8])
+        if not mpdo.destination or mpdo.node_id not in (0, self._node.node_id):
+            return
+        entry = self._node.dictionary.find(mpdo.index, mpdo.sub)
+        if entry is None or not _fits_mpdo(entry, Access.RPDO):
+            self._missing = True
+            self._node.emergency(
+                EmcyCode.MPDO_NO_OBJECT, ErrorRegister.COMMUNICATION, mpdo.encode()[1:4]
+            )
+            return
+        if self._missing:
+            self._missing = False
+            self._node.emergency_clear(EmcyCode.MPDO_NO_OBJECT)
+        _make_write(entry)(mpdo.data[: entry.size])
+
+
+class SamConsumer(Part):
+    """Writes the object that the dispatching list has for an object of a producer.
+
+    What is not in the list is ignored.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self._writes = {
+            source: (_make_write(entry), entry.size)
+            for source, entry in _dispatched_entries(dictionary)
+        }
+
+    def unpack(self, data: bytes) -> None:
+        """Take the eight bytes of a frame."""
+        mpdo = Mpdo.parse(data[:8])
+        found = self._writes.get((mpdo.node_id, mpdo.index, mpdo.sub))
+        if found is not None and not mpdo.destination:
+            write, size = found
+            write(mpdo.data[:size])
+
+
+_DUMMIES: Final = {
     kind.value: kind.bits
     for kind in (
         *(DataType.BOOLEAN, DataType.INTEGER8, DataType.INTEGER16, DataType.INTEGER32),
@@ -31,7 +302,7 @@ DUMMIES: Final = {
 }
 """Data types that fill up an RPDO, and their bits (CiA 301, dummy mapping)."""
 
-SAM_LISTS: Final = {Access.RPDO: DISPATCHING_LISTS, Access.TPDO: SCANNER_LISTS}
+_SAM_LISTS: Final = {Access.RPDO: _DISPATCHING_LISTS, Access.TPDO: _SCANNER_LISTS}
 """Without a dispatching or a scanner list there is no MPDO in source address mode."""
 
 _NOTHING: Final = MappedObject(0, 0, 0)
@@ -86,8 +357,8 @@ class PdoMapping(Part):
 
     def _slot(self, mapped: MappedObject) -> Slot:
         """Find an object; SdoAbort if there is none or it has not so many bits."""
-        if mapped.sub == 0 and mapped.index in DUMMIES and self._direction is Access.RPDO:
-            if not 0 < mapped.bits <= DUMMIES[mapped.index]:
+        if mapped.sub == 0 and mapped.index in _DUMMIES and self._direction is Access.RPDO:
+            if not 0 < mapped.bits <= _DUMMIES[mapped.index]:
                 raise SdoAbort(AbortCode.NOT_MAPPABLE)
             return Slot(None, mapped.bits)
         entry = self._dictionary.look_up(mapped.index.to_bytes(2, "little") + bytes((mapped.sub,)))
@@ -122,7 +393,7 @@ class PdoMapping(Part):
             raise SdoAbort(AbortCode.VALUE_RANGE)
 
     def _has_sam_list(self) -> bool:
-        return any((index, 0) in self._dictionary for index in SAM_LISTS[self._direction])
+        return any((index, 0) in self._dictionary for index in _SAM_LISTS[self._direction])
 
 
 def _fits(entry: Entry, bits: int) -> bool:

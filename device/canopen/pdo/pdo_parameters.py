@@ -1,16 +1,18 @@
-"""PDO communication parameter, 1400h.. and 1800h.. (CiA 301, PDO communication parameter)."""
+"""Communication parameters of PDOs, and what starts a TPDO."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from typing import ClassVar, Final, Protocol
 
-from tickrig.device.canopen.core.abort import SdoAbort, whole_number
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry, OnEntry
+from tickrig.device.canopen.dictionary import Dictionary, Entry, OnEntry, SdoAbort, whole_number
 from tickrig.device.twin import Part
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
 from tickrig.wire.canopen.datatypes import Value
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID, is_restricted
+from tickrig.wire.canopen.sdo_frame import AbortCode
+from tickrig.wire.instant import NEVER
+
+# PDO communication parameter, 1400h.. and 1800h.. (CiA 301, PDO communication parameter).
 
 SYNCHRONOUS: Final = range(241)
 """Transmission types 0 to 240."""
@@ -26,7 +28,7 @@ TPDO_TYPES: Final = frozenset((*SYNCHRONOUS, RTR_SYNCHRONOUS, RTR_EVENT, *EVENT_
 COB_ID, TYPE, INHIBIT_TIME, RESERVED, EVENT_TIMER, SYNC_START = range(1, 7)
 """Sub-indices. The reserved one (CiA 301, 7.5.2.37) is there only where an EDS describes it."""
 
-MAX_SYNC_START: Final = 240
+_MAX_SYNC_START: Final = 240
 _NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
 
 
@@ -110,7 +112,7 @@ class PdoParameters(Part):
                 raise SdoAbort(AbortCode.VALUE_RANGE)
             case 3 | 6 if self.valid:  # inhibit time, SYNC start value
                 raise SdoAbort(AbortCode.VALUE_RANGE)
-            case 6 if whole_number(value) > MAX_SYNC_START:
+            case 6 if whole_number(value) > _MAX_SYNC_START:
                 raise SdoAbort(AbortCode.VALUE_RANGE)
             case _:
                 return
@@ -123,3 +125,190 @@ class PdoParameters(Part):
         can_id = cob_id & CAN_ID_MASK
         if is_restricted(can_id) or (self.valid and can_id != self.can_id):
             raise SdoAbort(AbortCode.VALUE_RANGE)
+
+
+# What the transmission types of TPDOs do (CiA 301, transmission type).
+
+
+class PdoSender(Protocol):
+    """What a mode sees of its TPDO."""
+
+    @property
+    def parameters(self) -> PdoParameters:
+        """Transmission type, inhibit time and event timer."""
+        ...
+
+    def pack(self) -> bytes:
+        """Return the mapped objects as bytes."""
+        ...
+
+    def send(self, data: bytes | None = None) -> None:
+        """Send bytes, or the mapped objects as they are now."""
+
+    def wake(self, due_us: int) -> None:
+        """Have the mode run at this time, unless it is run earlier anyway."""
+
+
+class TpdoMode(Part):
+    """A TPDO that does nothing by itself; a remote frame fetches it.
+
+    Attributes:
+        due_us: when it wants to be run.
+        synchronous: whether it acts on SYNC.
+        timed: whether it ever wants to be run.
+        on_change: whether a change of a mapped object is an event.
+        on_sync: called with the counter of each SYNC, 0 if it has none.
+    """
+
+    __slots__ = ("due_us", "on_sync", "sender")
+
+    synchronous: ClassVar[bool] = False
+    timed: ClassVar[bool] = False
+    on_change: ClassVar[bool] = False
+
+    def __init__(self, sender: PdoSender) -> None:
+        self.sender, self.due_us = sender, NEVER
+        self.on_sync: Callable[[int], None] = _ignore
+
+    def request(self, entry: Entry | None = None) -> None:
+        """Take an event: the change of an object, or one that the application makes."""
+
+    def run(self, now_us: int) -> None:
+        """Do what is due."""
+
+    def retime(self, now_us: int) -> None:
+        """Follow another event timer."""
+
+    def answer(self) -> None:
+        """Send what a remote frame asks for."""
+        self.sender.send()
+
+
+class Silent(TpdoMode):
+    """A TPDO that does not exist, or carries nothing."""
+
+    def answer(self) -> None:
+        """Send nothing."""
+
+
+class SynchronousAcyclic(TpdoMode):
+    """Type 0: sent with the SYNC after an event, and with the first one."""
+
+    synchronous: ClassVar[bool] = True
+    on_change: ClassVar[bool] = True
+
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._marked = True
+        self.on_sync = self._send_if_marked
+
+    def request(self, entry: Entry | None = None) -> None:
+        """Send with the next SYNC."""
+        self._marked = True
+
+    def _send_if_marked(self, counter: int) -> None:
+        if self._marked:
+            self._marked = False
+            self.sender.send()
+
+
+class SynchronousCyclic(TpdoMode):
+    """Types 1 to 240: sent with each n-th SYNC, the n-th one is the first.
+
+    With a SYNC start value, and if SYNC carries a counter, the first is the one
+    whose counter has that value, as in CANopenNode.
+    """
+
+    __slots__ = ("_left", "_period", "_start")
+
+    synchronous: ClassVar[bool] = True
+
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._period = self._left = sender.parameters.transmission_type
+        self._start = sender.parameters.sync_start
+        self.on_sync = self._await_start if self._start else self._counting
+
+    @property
+    def _counting(self) -> Callable[[int], None]:
+        return self._each if self._period == 1 else self._nth
+
+    def _await_start(self, counter: int) -> None:
+        if counter in (0, self._start):
+            self._left = 1 if counter else self._period
+            self.on_sync = self._counting
+            self.on_sync(counter)
+
+    def _each(self, counter: int) -> None:
+        self.sender.send()
+
+    def _nth(self, counter: int) -> None:
+        self._left -= 1
+        if not self._left:
+            self._left = self._period
+            self.sender.send()
+
+
+class RtrSynchronous(TpdoMode):
+    """Type 252: sampled with SYNC, and when it begins; sent on a remote frame."""
+
+    synchronous: ClassVar[bool] = True
+
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._sample = sender.pack()
+        self.on_sync = self._take
+
+    def answer(self) -> None:
+        """Send the sample."""
+        self.sender.send(self._sample)
+
+    def _take(self, counter: int) -> None:
+        self._sample = self.sender.pack()
+
+
+class EventDriven(TpdoMode):
+    """Types 254 and 255: sent on an event or when the event timer has elapsed, and at first.
+
+    Not earlier than the inhibit time after the last one, then with the newest data.
+    """
+
+    timed: ClassVar[bool] = True
+    on_change: ClassVar[bool] = True
+
+    def __init__(self, sender: PdoSender) -> None:
+        super().__init__(sender)
+        self._inhibit_us = sender.parameters.inhibit_us
+        self._marked, self._retimed, self._free_us, self.due_us = True, False, 0, 0
+
+    def request(self, entry: Entry | None = None) -> None:
+        """Send as soon as the inhibit time allows."""
+        if not self._marked:
+            self._marked, self.due_us = True, self._free_us
+            self.sender.wake(self.due_us)
+
+    def run(self, now_us: int) -> None:
+        """Send, or wait for the end of the inhibit time or of another event timer."""
+        if self._retimed and not self._marked:
+            self._time_anew(now_us)
+        elif now_us < self._free_us:
+            self._marked, self.due_us = True, self._free_us
+        else:
+            self._marked, self._free_us = False, now_us + self._inhibit_us
+            self._time_anew(now_us)
+            self.sender.send()
+
+    def retime(self, now_us: int) -> None:
+        """Start the event timer anew with the next run."""
+        if not self._marked:
+            self._retimed, self.due_us = True, now_us
+            self.sender.wake(self.due_us)
+
+    def _time_anew(self, now_us: int) -> None:
+        """Start the event timer; it runs from each transmission."""
+        event_us = self.sender.parameters.event_us
+        self._retimed, self.due_us = False, now_us + event_us if event_us else NEVER
+
+
+def _ignore(counter: int) -> None:
+    """Do nothing on SYNC."""

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Iterable, Iterator
+from typing import Final
 
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.pdo.mpdo import DamProducer, SamProducer, scanned_entries
-from tickrig.device.canopen.pdo.pdo_mapping import PdoMapping
-from tickrig.device.canopen.pdo.pdo_packing import Pack, alone_in, make_pack
+from tickrig.device.canopen.dictionary import Entry
+from tickrig.device.canopen.pdo.pdo_mapping import (
+    DamProducer,
+    Pack,
+    PdoMapping,
+    SamProducer,
+    alone_in,
+    make_pack,
+    scanned_entries,
+)
 from tickrig.device.canopen.pdo.pdo_parameters import (
     EVENT_DRIVEN,
     EVENT_TIMER,
@@ -16,28 +22,26 @@ from tickrig.device.canopen.pdo.pdo_parameters import (
     RTR_SYNCHRONOUS,
     SYNCHRONOUS,
     TPDO_TYPES,
-    PdoParameters,
-)
-from tickrig.device.canopen.pdo.tpdo_modes import (
     EventDriven,
+    PdoParameters,
     RtrSynchronous,
     Silent,
     SynchronousAcyclic,
     SynchronousCyclic,
     TpdoMode,
 )
+from tickrig.device.canopen.slave import CanopenSlave, Handler, Service
 from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.object_table import Access
+from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import DAM_MPDO, SAM_MPDO
+from tickrig.wire.instant import NEVER
 
-if TYPE_CHECKING:
-    from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+_TPDO_PARAMETERS: Final = range(0x1800, 0x1A00)
+_TPDO_MAPPINGS: Final = 0x1A00
 
-TPDO_PARAMETERS: Final = range(0x1800, 0x1A00)
-TPDO_MAPPINGS: Final = 0x1A00
-
-RTR_MODES: Final[dict[int, type[TpdoMode]]] = {
+_RTR_MODES: Final[dict[int, type[TpdoMode]]] = {
     RTR_SYNCHRONOUS: RtrSynchronous,
     RTR_EVENT: TpdoMode,
 }
@@ -67,9 +71,9 @@ class Tpdo(Part):
         self.number, self._producer, self._node = number, producer, producer.node
         offset, dictionary = number - 1, producer.node.dictionary
         self.parameters = PdoParameters(
-            dictionary, TPDO_PARAMETERS[offset], TPDO_TYPES, self._changed
+            dictionary, _TPDO_PARAMETERS[offset], TPDO_TYPES, self._changed
         )
-        self.mapping = PdoMapping(dictionary, TPDO_MAPPINGS + offset, Access.TPDO, self.parameters)
+        self.mapping = PdoMapping(dictionary, _TPDO_MAPPINGS + offset, Access.TPDO, self.parameters)
         self.mode: TpdoMode = Silent(self)
         self.pack: Pack
         self.entries: list[Entry] = []
@@ -136,4 +140,127 @@ class Tpdo(Part):
             return Silent(self)
         if kind in SYNCHRONOUS:
             return SynchronousCyclic(self) if kind else SynchronousAcyclic(self)
-        return RTR_MODES.get(kind, EventDriven)(self)
+        return _RTR_MODES.get(kind, EventDriven)(self)
+
+
+# PDO producer: all TPDOs of a slave (CiA 301, PDO).
+
+
+class PdoProducer(Service):
+    """Sends PDOs in Operational.
+
+    They are made at the place of TPDOs in the tick, after the application: a
+    TPDO that SYNC causes has the values that the RPDOs of this SYNC and the
+    application have left at the end of the tick. It leaves in the same tick,
+    so it is never later than the synchronous window (1007h).
+    Each event-driven TPDO is sent once when the node enters Operational or the
+    TPDO is switched on, as in CANopenNode. Remote frames are answered by each
+    TPDO whose bit 30 is 0, whatever its type.
+
+    Attributes:
+        tpdos: those that the dictionary has.
+        quiet: keys of entries whose change is no event, because a profile judges
+            it; to be set before the node is Operational.
+        on_sent: called with the mapped objects of each TPDO that has been sent.
+    """
+
+    __slots__ = ("_counters", "_due_us", "_synchronous", "_timed", "on_sent", "quiet", "tpdos")
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.quiet: set[int] = set()
+        self.on_sent: list[Callable[[list[Entry]], None]] = []
+        self.tpdos = [
+            Tpdo(self, index - _TPDO_PARAMETERS[0] + 1)
+            for index in node.dictionary.within(_TPDO_PARAMETERS)
+        ]
+        self._synchronous: tuple[TpdoMode, ...] = ()
+        self._timed: tuple[TpdoMode, ...] = ()
+        self._counters: tuple[int, ...] = ()
+        self._due_us = NEVER
+        node.sync_handlers.append(self._sync)
+
+    def request(self, number: int) -> None:
+        """Let an event happen to a TPDO (254, 255: sent; 0: sent with the next SYNC)."""
+        for tpdo in self.tpdos:
+            if tpdo.number == number:
+                tpdo.mode.request()
+
+    def request_for(self, entry: Entry) -> None:
+        """Let an event happen to each TPDO that carries an entry."""
+        for tpdo in self.tpdos:
+            if entry in tpdo.entries:
+                tpdo.mode.request()
+
+    def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:  # noqa: D417
+        """Write an object of other nodes by the first MPDO in destination address mode.
+
+        Args:
+            node_id: 0 for all.
+            data: up to four bytes.
+        """
+        for tpdo in self.tpdos:
+            if isinstance(tpdo.mode, DamProducer):
+                tpdo.mode.send_to(node_id, index, sub, data)
+                return
+
+    def start(self) -> None:
+        """Send nothing."""
+        self._due_us = NEVER
+
+    def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Listen to remote frames that fetch a TPDO."""
+        if state is NmtState.OPERATIONAL:
+            for tpdo in self.tpdos:
+                if tpdo.parameters.valid and tpdo.parameters.answers_rtr:
+                    yield tpdo.parameters.can_id, tpdo.answer
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Start all TPDOs in Operational, stop them when it is left."""
+        self._counters = ()
+        for tpdo in self.tpdos:
+            if new is NmtState.OPERATIONAL:
+                tpdo.begin()
+            else:
+                tpdo.end()
+        self._collect()
+
+    def changed(self, tpdo: Tpdo) -> None:
+        """Start a TPDO anew with other communication parameters."""
+        if self.node.state is NmtState.OPERATIONAL:
+            tpdo.begin()
+            self.node.rewire()
+            self._collect()
+
+    def wake(self, due_us: int) -> None:
+        """Run a TPDO at this time, unless it comes back earlier anyway."""
+        if due_us < self._due_us:
+            self._due_us = due_us
+            self.node.await_tick(self, due_us)
+
+    def tick(self, now_us: int) -> None:
+        """Send what SYNC has asked for, then what events have."""
+        if self._counters:
+            counters, self._counters = self._counters, ()
+            for counter in counters:
+                for mode in self._synchronous:
+                    mode.on_sync(counter)
+        self._due_us = NEVER
+        if self._timed:
+            for mode in self._timed:
+                if mode.due_us <= now_us:
+                    mode.run(now_us)
+            self.wake(min([mode.due_us for mode in self._timed]))
+
+    def _sync(self, counter: int) -> None:
+        if self._synchronous:
+            self._counters += (counter,)
+            self.wake(self.node.now_us)
+
+    def _collect(self) -> None:
+        """Find out which TPDOs act on SYNC, and which on events or with time."""
+        modes = [tpdo.mode for tpdo in self.tpdos]
+        self._synchronous = tuple(mode for mode in modes if mode.synchronous)
+        self._timed = tuple(mode for mode in modes if mode.timed)
+        self._due_us = min((mode.due_us for mode in self._timed), default=NEVER)
+        self.schedule(self._due_us)

@@ -10,7 +10,7 @@ from tickrig.host.links.echo import EchoFilter
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
-HANDOVER_US: Final = 1_000
+_HANDOVER_US: Final = 1_000
 """What has arrived is handed out at least this often."""
 
 
@@ -34,7 +34,7 @@ class CanBridge:
     def due_us(self) -> int:
         """When frames are to be handed out."""
         due_us = self._end.due_us
-        return due_us if due_us == NEVER else -(-due_us // HANDOVER_US) * HANDOVER_US
+        return due_us if due_us == NEVER else -(-due_us // _HANDOVER_US) * _HANDOVER_US
 
     def take_in(self, now_us: int, /) -> None:
         """Put what the outside sent since the last look on the wire.

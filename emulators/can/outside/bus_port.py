@@ -12,10 +12,9 @@ import can
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.can.outside.bridge import CountingPort, WithoutEcho
 from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of, to_frame, to_message
 from tickrig.host.links.echo import ECHOING
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.log import log_of
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
@@ -115,7 +114,7 @@ class CanBusPort(NonCopyable):
         self._failed = failed
 
 
-class OpenBus(NamedTuple):
+class BusPortOpener(NamedTuple):
     """A bus outside.
 
     Attributes:
@@ -129,7 +128,7 @@ class OpenBus(NamedTuple):
     channel: str
 
 
-def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
+def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
     """Open the bus that options, environment or configuration files of python-can name.
 
     Raises:
@@ -140,7 +139,7 @@ def open_bus(options: BusOptions, stack: ExitStack) -> OpenBus:
     stack.callback(close_bus, bus)
     name = interface if channel is None else f"{interface} {channel}"
     label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return OpenBus(port_on(bus, interface, f"CAN bus {name}"), name, label)
+    return BusPortOpener(port_on(bus, interface, f"CAN bus {name}"), name, label)
 
 
 def port_on(

@@ -8,22 +8,20 @@ from typing import Final
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import Looks, OneThread
-from tickrig.host.links.errors import LinkClosed, LinkError, LinkTimeout
-from tickrig.host.links.link import StampedFrames
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.links.link import LinkClosed, LinkError, LinkTimeout, StampedFrames
+from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 from tickrig.wire.instant import NEVER
 
-CHUNK_US: Final = 1_000_000
+_CHUNK_US: Final = 1_000_000
 """How far the rig runs at once where there is no timeout."""
 
 
-INSTEAD: Final = (
+_INSTEAD: Final = (
     "take bench.canopen_network() in place of canopen.Network().connect(), poll in place of a"
     " can.Notifier"
 )
 
-LOOKING: Final = "give recv or receive a timeout, or sleep, with the fixture bench_time"
+_LOOKING: Final = "give recv or receive a timeout, or sleep, with the fixture bench_time"
 
 
 class Repeat:
@@ -165,7 +163,7 @@ class CanHost:
         """Count a look that found nothing; a wait that is over was none."""
         if timeout_us is None or timeout_us > 0:
             return
-        if refusal := self._looks.refusal(self.now_us, LOOKING):
+        if refusal := self._looks.refusal(self.now_us, _LOOKING):
             raise LinkError(refusal)
 
     def _step(self, deadline_us: int) -> None:
@@ -173,7 +171,7 @@ class CanHost:
         if deadline_us == NEVER:
             if self._rig.next_us == NEVER:
                 raise LinkTimeout("nothing will ever happen on this bus, and no timeout was given")
-            deadline_us = self._rig.next_us + CHUNK_US
+            deadline_us = self._rig.next_us + _CHUNK_US
         self._rig.run_to(deadline_us, self._end)
 
     def _wake(self) -> None:
@@ -196,5 +194,5 @@ class CanHost:
     def _check_usable(self) -> None:
         if self._closed:
             raise LinkClosed("the link was closed")
-        if refusal := self._thread.refusal("bus", INSTEAD):
+        if refusal := self._thread.refusal("bus", _INSTEAD):
             raise LinkError(refusal)

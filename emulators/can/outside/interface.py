@@ -14,8 +14,8 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import OneThread
-from tickrig.host.links.can_message import to_frame, to_message
-from tickrig.host.links.errors import LinkError
+from tickrig.host.links.can_link import to_frame, to_message
+from tickrig.host.links.link import LinkError
 from tickrig.host.text.names import near
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import FieldError

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import queue
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from types import FunctionType
 from typing import Final
 
 import canopen
@@ -13,16 +14,90 @@ from canopen.sdo.client import BlockUploadStream
 
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.host import CanHost, Repeat
-from tickrig.emulators.rig.retimed import retime, retimed
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import EPOCH_S, SimCondition, SimQueue, SimQueues, SimTime
-from tickrig.host.links.can_message import to_message
+from tickrig.host.links.can_link import to_message
 from tickrig.wire.can import STANDARD_MAX, CanFrame
 
-LIBRARY: Final = "canopen"
+# Run a library's classes on another clock, without touching the library.
+#
+# A function finds `time` among the global names of its module. A copy of the
+# function with other global names is the same code on another clock. `retime`
+# gives one object a class of its own with such copies: other objects of that
+# class, and everything else in the process, stay as they are.
 
-Callback = Callable[[int, bytearray, float], None]
-Data = bytes | bytearray | Iterable[int] | None
+_Names = Mapping[str, object]
+"""Global names of a module, and what they shall mean."""
+
+
+def retime(target: object, names: _Names, library: str) -> None:
+    """Let an object's methods see other global names.
+
+    Methods of classes outside the library stay as they are: a subclass that
+    reads the clock itself reads the real one.
+
+    Args:
+        target: the object; its class must not have slots.
+        names: what the names shall mean.
+        library: name of the package whose classes are meant.
+    """
+    cls = type(target)
+    if (other := retimed(cls, names, library)) is not cls:
+        target.__class__ = other
+
+
+def retimed(cls: type, names: _Names, library: str) -> type:
+    """Return a subclass whose methods see other global names; the class itself if none does."""
+    members = {
+        name: copied
+        for name, (owner, member) in _members(cls).items()
+        if owner.__module__.partition(".")[0] == library
+        and (copied := _copy(member, names)) is not None
+    }
+    return type(cls.__name__, (cls,), {"__module__": cls.__module__, **members}) if members else cls
+
+
+def _members(cls: type) -> dict[str, tuple[type, object]]:
+    """Return what each name means in a class, and which base it comes from."""
+    found: dict[str, tuple[type, object]] = {}
+    for base in cls.__mro__:
+        for name, member in vars(base).items():
+            found.setdefault(name, (base, member))
+    return found
+
+
+def _copy(member: object, names: _Names) -> object | None:
+    """Return a copy of a function or property that uses one of the names, else None."""
+    if isinstance(member, FunctionType):
+        return _copy_function(member, names) if _uses(member, names) else None
+    if isinstance(member, property):
+        parts = (member.fget, member.fset, member.fdel)
+        copies = [_copy(part, names) for part in parts]
+        if any(copies):
+            return property(*(c or p for c, p in zip(copies, parts, strict=True)))  # type: ignore[arg-type]  # copies of functions
+    return None
+
+
+def _uses(function: FunctionType, names: _Names) -> bool:
+    return not names.keys().isdisjoint(function.__code__.co_names)
+
+
+def _copy_function(function: FunctionType, names: _Names) -> FunctionType:
+    copied = FunctionType(
+        function.__code__,
+        {**function.__globals__, **names},
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+    copied.__kwdefaults__ = function.__kwdefaults__
+    return copied
+
+
+_LIBRARY: Final = "canopen"
+
+_Callback = Callable[[int, bytearray, float], None]
+_Data = bytes | bytearray | Iterable[int] | None
 
 
 class SimNetwork(canopen.Network):
@@ -49,7 +124,7 @@ class SimNetwork(canopen.Network):
         self.host = CanHost(rig, end)
         self.clock = SimTime(self)
         self._names: dict[str, object] = {"time": self.clock, "queue": SimQueues(self)}
-        self._names["BlockUploadStream"] = retimed(BlockUploadStream, dict(self._names), LIBRARY)
+        self._names["BlockUploadStream"] = retimed(BlockUploadStream, dict(self._names), _LIBRARY)
         self._adopted: dict[int, object] = {}
         self._waits = 0
         super().__init__()
@@ -108,18 +183,18 @@ class SimNetwork(canopen.Network):
         for listener in tuple(self.listeners):
             listener.on_message_received(message)  # type: ignore[no-untyped-call]  # canopen's
 
-    def send_message(self, can_id: int, data: Data, remote: bool = False) -> None:
+    def send_message(self, can_id: int, data: _Data, remote: bool = False) -> None:
         """Send a frame; no time passes."""
         self.host.send((_frame(can_id, data, remote=remote),))
 
     def send_periodic(
-        self, can_id: int, data: Data, period: float, remote: bool = False
+        self, can_id: int, data: _Data, period: float, remote: bool = False
     ) -> SimPeriodic:
         """Send a frame each `period` seconds while time passes."""
         frame = _frame(can_id, data, remote=remote)
         return SimPeriodic(self.host.repeat((frame,), round(period * 1e6)))
 
-    def subscribe(self, can_id: int, callback: Callback) -> None:
+    def subscribe(self, can_id: int, callback: _Callback) -> None:
         """Listen to a CAN-ID, and put the listener on the rig's clock."""
         self._adopt(getattr(callback, "__self__", None))
         super().subscribe(can_id, callback)
@@ -135,7 +210,7 @@ class SimNetwork(canopen.Network):
     def _adopt(self, target: object) -> None:
         """Exchange what an object of the library waits on, once."""
         bases = {base.__module__.partition(".")[0] for base in type(target).__mro__}
-        if LIBRARY not in bases or id(target) in self._adopted:
+        if _LIBRARY not in bases or id(target) in self._adopted:
             return
         self._adopted[id(target)] = target
         for name, value in tuple(vars(target).items()):
@@ -143,7 +218,7 @@ class SimNetwork(canopen.Network):
                 setattr(target, name, SimCondition(self))
             elif type(value) is queue.Queue:
                 setattr(target, name, SimQueue(self))
-        retime(target, self._names, LIBRARY)
+        retime(target, self._names, _LIBRARY)
 
 
 class SimPeriodic(canopen.network.PeriodicMessageTask):
@@ -156,13 +231,13 @@ class SimPeriodic(canopen.network.PeriodicMessageTask):
         """Send it no more."""
         self._repeat.stop()
 
-    def update(self, data: Data) -> None:
+    def update(self, data: _Data) -> None:
         """Send other data from the next time on."""
         (frame,) = self._repeat.frames
         self._repeat.frames = (frame._replace(data=bytes(data or ())),)
 
 
-def _frame(can_id: int, data: Data, *, remote: bool) -> CanFrame:
+def _frame(can_id: int, data: _Data, *, remote: bool) -> CanFrame:
     payload = bytes(data or ())
     extended = can_id > STANDARD_MAX
     if remote:

@@ -2,20 +2,298 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
-from tickrig.emulators.canopen.bus_file.node_keys import URDF
-from tickrig.emulators.canopen.bus_file.node_maker import BusNode, NodeMaker
-from tickrig.emulators.canopen.bus_file.urdf import Urdf, read_urdf
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds402 import Ds402, indices
+from tickrig.device.canopen.stack import make_slave
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.bus_file.joint_drive import (
+    NAMES,
+    UNITS,
+    JointDrive,
+    complete,
+    missing,
+    modes_listed,
+    with_factors,
+    with_values,
+)
+from tickrig.emulators.canopen.bus_file.node_keys import (
+    JOINT_KEYS,
+    URDF,
+    BusFileMistake,
+    BusMistakesError,
+    NodeKeys,
+    read_keys,
+)
+from tickrig.emulators.canopen.bus_file.urdf import PRISMATIC, Urdf, UrdfJoint, read_urdf
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.eds import EdsCache, Version, version_of
+from tickrig.emulators.canopen.eds import (
+    DeviceDescription,
+    EdsCache,
+    Version,
+    application_of,
+    in_profile,
+    version_of,
+)
+from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
-from tickrig.host.canopen.bus_file.item import Place
-from tickrig.host.canopen.bus_file.notes import Notes
+from tickrig.host.canopen.bus_file.bus_values import BusSlave
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, FilePlace
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.wire.canopen.eds.eds_file import EdsError
+
+# What each node of a bus.yml is made of: its EDS, what its master expects, and a joint.
+
+_TRAVEL_M: Final = 0.01
+"""What a turn of the shaft moves a carriage of which nobody says it."""
+_BEYOND_RAD: Final = 0.01
+_BEYOND_M: Final = 0.001
+"""How far beyond the limits of a URDF its switches are: at its limit a joint presses none."""
+_SECOND_AXIS: Final = 0x800
+"""How far the objects of a further axis are from those of the first one (CiA 402-1)."""
+_SAME_UNITS: Final = 0.001
+"""How far the units of an EDS may be off what ROS believes, as a part of them."""
+_IDENTITY: Final = 0x1018
+_SOFTWARE: Final = (0x1F56, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class BusNode:
+    """A slave.
+
+    Attributes:
+        name: of its section.
+        node_id: 1..127.
+        line: of its section.
+        description: what it is made of, with its inputs at the start.
+        about: what moves, for people; empty where nothing does.
+    """
+
+    name: str
+    node_id: int
+    line: int
+    description: DeviceDescription
+    about: str = ""
+
+
+class NodeMaker:
+    """Makes the slaves of one file.
+
+    Args:
+        bus: the file.
+        robot: its joints, None if nobody says more of them.
+        cache: of EDS files.
+        mistakes: takes what is wrong.
+        profile: of `choices.PROFILES`, for nodes that name none.
+
+    Attributes:
+        remarks: what is odd.
+        added: which objects the EDS of a node lacks: these are added.
+    """
+
+    def __init__(
+        self,
+        bus: BusFile,
+        robot: Urdf | None,
+        cache: EdsCache,
+        mistakes: list[BusFileMistake],
+        profile: str,
+    ) -> None:
+        self._bus, self._cache, self._mistakes = bus, cache, mistakes
+        self._profile = profile
+        self.remarks: list[BusFileMistake] = []
+        self.added: list[BusFileMistake] = []
+        self._joints = dict(self._joints_of(robot)) if robot else {}
+        self._robot = (Path(robot.name),) if robot else ()
+
+    def nodes(self) -> Iterator[BusNode]:
+        """Give all slaves of which something can be made."""
+        for slave in self._bus.slaves.values():
+            keys = read_keys((slave.extra, self._bus.options.extra), slave.name, self._mistakes)
+            try:
+                sheet = self._cache.read(slave.sheet, None)
+            except (EdsError, OSError):
+                continue  # the reader of the file has noted it
+            master = self._bus.master
+            rate = 1_000 * master.baudrate if master else None
+            yield self._node(
+                slave, keys, replace(sheet, node_id=slave.node_id, bit_rate=rate or None)
+            )
+
+    def _joints_of(self, robot: Urdf) -> Iterator[tuple[str, UrdfJoint]]:
+        """Give the joints of the robot by the name of their node."""
+        by_id = {slave.node_id: name for name, slave in self._bus.slaves.items()}
+        for joint in robot.joints:
+            name = joint.device_name or by_id.get(joint.node_id or 0, "")
+            if name in self._bus.slaves:
+                yield name, joint
+            else:
+                what = f"node {name!r}" if name else f"node-ID {joint.node_id}"
+                text = f"joint {joint.name!r}: no {what} in {self._bus.path.name}"
+                self.remarks.append(BusFileMistake(joint.place, text))
+
+    def _node(self, slave: BusSlave, keys: NodeKeys, sheet: DeviceDescription) -> BusNode:
+        sheet = replace(sheet, template=self._identified(slave, sheet.template))
+        profile, about = keys.profile or self._profile, ""
+        start = dict(keys.start)
+        if application_of(sheet.template, profile) is Ds402:
+            self._check_axes(slave, sheet.template)
+            joint = self._joint(slave, keys)
+            self._check_units(slave, sheet.template)
+            sheet = in_profile(sheet, profile, joint.defaults())
+            template = self._completed(slave, keys, sheet.template, joint)
+            sheet = replace(sheet, template=template, application=joint.application())
+            about, start = joint.about(template), {**joint.start, **start}
+        else:
+            sheet = in_profile(sheet, profile)
+            self._check_no_joint(slave, keys)
+        if keys.configured:
+            written = {(each.index, each.sub_index): each.data for each in slave.writes}
+            sheet = replace(sheet, template=with_values(sheet.template, written))
+        files = (slave.sheet, *self._robot)
+        description = replace(sheet, start=start, files=files)
+        self._check_start(slave, keys, description)
+        return BusNode(slave.name, slave.node_id, slave.place.line, description, about)
+
+    def _identified(self, slave: BusSlave, dictionary: Dictionary) -> Dictionary:
+        """Return the dictionary with the identity that the file says; 0 says nothing."""
+        identity = slave.identity
+        wanted = {
+            (_IDENTITY, 1): identity.vendor_id,
+            (_IDENTITY, 2): identity.product_code,
+            (_IDENTITY, 3): identity.revision_number,
+            (_IDENTITY, 4): identity.serial_number,
+            _SOFTWARE: slave.software_version,
+        }
+        return with_values(dictionary, {at: value for at, value in wanted.items() if value})
+
+    def _check_axes(self, slave: BusSlave, dictionary: Dictionary) -> None:
+        """Note a drive of several axes: the profile has one. Of others that nobody uses, tell."""
+        second = indices.CONTROLWORD + _SECOND_AXIS
+        if slave.num_channels > 1:
+            text = "a drive of several axes (CiA 402-1) is not emulated"
+            text = f"{slave.name}: {text}; profile: none for its objects"
+            self._mistakes.append(BusFileMistake(slave.place, text))
+        elif dictionary.find(second) is not None:
+            text = f"{slave.name}: of its axes (CiA 402-1) the first one is emulated"
+            self.remarks.append(BusFileMistake(slave.place, text))
+
+    def _check_units(self, slave: BusSlave, dictionary: Dictionary) -> None:
+        """Tell of speeds that the driver believes in other units; an EDS may have its own."""
+        own = (indices.SI_UNIT_VELOCITY, indices.VELOCITY_DIMENSION, indices.FEED_CONSTANT)
+        if any(index in dictionary.objects for index in own):
+            return
+        for axis in slave.channels[:1]:
+            if abs(axis.scale_vel_to_dev) != abs(axis.scale_pos_to_dev):
+                text = (
+                    f"{slave.name}: scale_vel_to_dev is {axis.scale_vel_to_dev:g}, but the drive"
+                    f" counts speeds as positions: {axis.scale_pos_to_dev:g} a second"
+                )
+                self.remarks.append(BusFileMistake(slave.place, text))
+
+    def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
+        """Note keys of a motor in a node that has none."""
+        for name in (*JOINT_KEYS, "modes"):
+            if name in slave.extra:
+                text = f"{slave.name}.tickrig.{name}: it is no CiA 402 drive, and has no motor"
+                self._mistakes.append(BusFileMistake(keys.places[name], text))
+
+    def _joint(self, slave: BusSlave, keys: NodeKeys) -> JointDrive:
+        """Return what moves a node: what its keys say, else the robot, else the driver's scale."""
+        scale = slave.channels[0].scale_pos_to_dev if slave.channels else UNITS
+        found: dict[str, Any] = {"units": abs(scale) or UNITS}
+        if robot := self._joints.get(slave.name):
+            beyond = _BEYOND_M if robot.kind == PRISMATIC else _BEYOND_RAD
+            found |= {
+                "lower": None if robot.lower is None else robot.lower - beyond,
+                "upper": None if robot.upper is None else robot.upper + beyond,
+                "max_velocity": robot.velocity,
+                "max_torque": robot.effort,
+                "gear_ratio": robot.reduction,
+            }
+            if robot.kind == PRISMATIC:
+                found["travel_m"] = _TRAVEL_M
+        found |= keys.joint
+        lower, upper = found.get("lower"), found.get("upper")
+        if lower is not None and upper is not None and lower >= upper:
+            place = keys.places.get("lower", keys.places.get("upper", slave.place))
+            text = f"{slave.name}.tickrig.lower: {lower:g} is not below upper, which is {upper:g}"
+            self._mistakes.append(BusFileMistake(place, text))
+        return JointDrive(**found)
+
+    def _completed(
+        self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
+    ) -> Dictionary:
+        """Return the objects of a drive, and remark those that its EDS has not."""
+        listed = modes_listed(dictionary)
+        modes = keys.modes or listed | self._asked_for(slave, listed)
+        wanted = modes if keys.modes else modes - listed
+        if added := missing(dictionary, wanted):
+            names = ", ".join(f"{index:04X}h" for index in added)
+            text = f"its EDS lacks {names}, which its modes need: they are added"
+            self.added.append(BusFileMistake(slave.place, f"{slave.name}: {text}"))
+        template = complete(dictionary, modes, added, joint.defaults())
+        return self._in_units(slave, keys, template, joint)
+
+    def _in_units(
+        self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
+    ) -> Dictionary:
+        """Return the objects of a drive with the units of its keys; those of others are told."""
+        written = {(each.index, each.sub_index): each.data for each in slave.writes}
+        given, place = joint.units_of(dictionary), slave.place
+        said, result = f"scale_pos_to_dev {joint.units:g}", dictionary
+        if "units" in keys.joint:
+            result = with_factors(dictionary, joint.defaults())
+            said, place = f"tickrig.units {joint.units:g}", keys.places["units"]
+        found = joint.units_of(with_values(result, written))
+        differs = (
+            f"{slave.name}: {said}, but {slave.sheet.name} says {given:g} units a {joint.unit}"
+        )
+        fix = "its 608Fh, 6091h, 6092h, 60A8h"
+        if not isclose(found, joint.units, rel_tol=_SAME_UNITS):
+            after = f" ({found:g} after the boot-up)" if not isclose(found, given) else ""
+            text = f"{differs}{after} by {fix}: its shaft turns by another angle than ROS believes"
+            self.remarks.append(BusFileMistake(place, text))
+        elif result is not dictionary and not isclose(given, joint.units, rel_tol=_SAME_UNITS):
+            self.remarks.append(BusFileMistake(place, f"{differs}: {fix} are changed"))
+        return result
+
+    def _asked_for(self, slave: BusSlave, listed: frozenset[int]) -> frozenset[int]:
+        """Return the modes that the file writes to 6060h and the EDS does not list."""
+        found = set()
+        for write in slave.writes:
+            if write.index != indices.MODES_OF_OPERATION:
+                continue
+            number = int.from_bytes(write.data, "little", signed=True)
+            if number in NAMES.keys() - listed:
+                text = f"mode {number} ({NAMES[number]}) is not in 6502h of its EDS: it is added"
+                found.add(number)
+            elif number and number not in NAMES:
+                text = f"mode {number} is not emulated: 6060h refuses it, and so fails the boot-up"
+            else:
+                continue
+            self.remarks.append(BusFileMistake(write.place, f"{slave.name}: {text}"))
+        return frozenset(found)
+
+    def _check_start(self, slave: BusSlave, keys: NodeKeys, description: DeviceDescription) -> None:
+        """Note inputs at the start that there are not, or that do not take their value."""
+        if not keys.start:
+            return
+        made = make_slave(
+            description.make_dictionary(), slave.node_id, None, description.application
+        )
+        inputs = Nodes([Node(slave.name, made, CanWire())]).inputs
+        for name, value in keys.start.items():
+            try:
+                inputs.check(name, value)
+            except ValueError as error:
+                text = f"{slave.name}.tickrig.start.{name}: {error}"
+                self._mistakes.append(BusFileMistake(keys.places.get(name, slave.place), text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +347,9 @@ def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
     """
     if not bus.slaves:
         return ()
-    told = {Place(one.file, one.line) for one in bus.errors}
+    told = {FilePlace(one.file, one.line) for one in bus.errors}
     made = _made(bus, None, EdsCache(), AUTO)
-    notes = Notes()
+    notes = BusFileNotes()
     for rule, found in (("tickrig", made.mistakes), ("joint", made.remarks)):
         for place, text in sorted(found):
             if place not in told:
@@ -90,13 +368,13 @@ class _Made(NamedTuple):
     """What became of a file: its slaves, what is wrong, what is odd, what is added."""
 
     nodes: tuple[BusNode, ...]
-    mistakes: list[Mistake]
-    remarks: list[Mistake]
-    added: list[Mistake]
+    mistakes: list[BusFileMistake]
+    remarks: list[BusFileMistake]
+    added: list[BusFileMistake]
 
 
 def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Made:
-    mistakes: list[Mistake] = []
+    mistakes: list[BusFileMistake] = []
     robot = None
     try:
         robot = _robot(bus, urdf)
@@ -108,12 +386,12 @@ def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Ma
 
 def _nodes_of(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> BusNodes:
     made = _made(bus, urdf, cache, profile)
-    mistakes = [Mistake(Place(one.file, one.line), _said(one)) for one in bus.errors]
+    mistakes = [BusFileMistake(FilePlace(one.file, one.line), _said(one)) for one in bus.errors]
     mistakes += made.mistakes
     if mistakes:
         raise BusMistakesError(mistakes)
     if not bus.slaves:
-        raise BusMistakesError([Mistake(Place(str(bus.path), 1), "no node with a dcf")])
+        raise BusMistakesError([BusFileMistake(FilePlace(str(bus.path), 1), "no node with a dcf")])
     remarks = tuple(map(str, (*bus.warnings, *made.remarks, *made.added)))
     return BusNodes(made.nodes, remarks)
 
@@ -131,10 +409,12 @@ def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
     if item is None:
         return None
     if not isinstance(item.value, str) or not item.value or "\0" in item.value:
-        raise BusMistakesError([Mistake(item.place, f"options.tickrig.urdf: {item} is no file")])
+        raise BusMistakesError(
+            [BusFileMistake(item.place, f"options.tickrig.urdf: {item} is no file")]
+        )
     file = bus.path.parent / item.value
     try:
         return read_urdf(file)
     except OSError as error:
         text = f"options.tickrig.urdf: {file}: {error.strerror}"
-        raise BusMistakesError([Mistake(item.place, text)]) from None
+        raise BusMistakesError([BusFileMistake(item.place, text)]) from None

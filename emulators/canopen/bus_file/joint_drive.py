@@ -2,39 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from math import pi
 from typing import Final
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.ds402.motion.switches import FAR_DEG
-from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.objects.parameters import Parameters
-from tickrig.device.canopen.ds402.objects.settings import Settings, read_settings
-from tickrig.device.canopen.ds402.state.supervision import Bounds
-from tickrig.device.servo.parameters import Encoders, ServoParameters
-from tickrig.device.servo.presets import PRESETS
+from tickrig.device.canopen.dictionary import Dictionary, DictionaryDescription
+from tickrig.device.canopen.ds402 import Ds402, indices
+from tickrig.device.canopen.ds402.automaton import Bounds
+from tickrig.device.canopen.ds402.axis import FAR_DEG
+from tickrig.device.canopen.ds402.modes.modes import MODES
+from tickrig.device.canopen.ds402.settings import Parameters, Settings, read_settings
+from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
+from tickrig.device.servo.parameters import (
+    PRESETS,
+    Encoders,
+    ServoParameters,
+    free_speed_rad_s,
+    of_size,
+    peak_torque_nm,
+)
 from tickrig.device.servo.servo import Servo
-from tickrig.device.servo.sizing import free_speed_rad_s, of_size, peak_torque_nm
+from tickrig.emulators.canopen.eds import PROFILE_AREA, fitting
+from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-MOTOR: Final = "epos-wheel"
+_MOTOR: Final = "epos-wheel"
 UNITS: Final = 1_000.0
 """Position units in a radian or a metre: what ros2_canopen believes unless a bus.yml says more."""
-SPARE_SPEED: Final = 1.5
+_SPARE_SPEED: Final = 1.5
 """How much faster than a joint shall be its motor turns without load, where it can be chosen."""
-LOW_SUPPLY: Final = 0.4
-HIGH_SUPPLY: Final = 1.5
-NEARLY: Final = 0.99
+_LOW_SUPPLY: Final = 0.4
+_HIGH_SUPPLY: Final = 1.5
+_NEARLY: Final = 0.99
 """How much of the motor's speed a limit may leave, to be told."""
-FINEST: Final = 100_000
+_FINEST: Final = 100_000
 """Largest denominator of the factor group that a drive begins with."""
 
-Defaults = Mapping[tuple[int, int], int]
+_Defaults = Mapping[tuple[int, int], int]
 """Values by (index, sub-index)."""
 
 
@@ -58,7 +66,7 @@ class JointDrive:
         units: position units in a radian, or in a metre.
     """
 
-    motor: str = MOTOR
+    motor: str = _MOTOR
     gear_ratio: float | None = None
     gear_efficiency: float | None = None
     friction_nm: float | None = None
@@ -124,7 +132,7 @@ class JointDrive:
         limit /= self._counts_per_unit
         words = [f"CiA 402, {self.motor}", f"gear {servo.gear.ratio:.4g}:1"]
         words.append(f"{torque:.3g} {'Nm' if unit == 'rad' else 'N'}")
-        slower = limit < speed * NEARLY
+        slower = limit < speed * _NEARLY
         words.append(f"{limit:.3g} {unit}/s of {speed:.3g}" if slower else f"{speed:.3g} {unit}/s")
         return ", ".join([*words, f"{self.units_of(dictionary):.6g} units a {unit}"])
 
@@ -143,12 +151,12 @@ class JointDrive:
         parameters = Parameters(dictionary, self.defaults())
         return read_settings(parameters, self.servo.encoders.counts_per_turn)
 
-    def defaults(self) -> Defaults:
+    def defaults(self) -> _Defaults:
         """Return what counts for objects of the drive to which its EDS gives no value."""
         servo = self.servo
         speed = free_speed_rad_s(servo) / (2 * pi) * self.per_turn * self.units
-        gear = Fraction(servo.gear.ratio).limit_denominator(FINEST)
-        feed = Fraction(self.per_turn * self.units).limit_denominator(FINEST)
+        gear = Fraction(servo.gear.ratio).limit_denominator(_FINEST)
+        feed = Fraction(self.per_turn * self.units).limit_denominator(_FINEST)
         rpm = free_speed_rad_s(servo) * servo.gear.ratio * 60 / (2 * pi)
         if self.max_velocity:
             rpm = self.max_velocity / self.per_turn * servo.gear.ratio * 60
@@ -177,13 +185,13 @@ class JointDrive:
     def application(self) -> ServiceMaker:
         """Return what makes the drive, for `make_slave`."""
         supply_mv = self.servo.stage.supply_v * 1_000
-        bounds = Bounds(supply_mv=(round(supply_mv * LOW_SUPPLY), round(supply_mv * HIGH_SUPPLY)))
+        bounds = Bounds(supply_mv=(round(supply_mv * _LOW_SUPPLY), round(supply_mv * _HIGH_SUPPLY)))
         return partial(_make_drive, self.servo, self.defaults(), bounds)
 
     def _with_supply(self, servo: ServoParameters) -> ServoParameters:
         if self.supply_v is None:
             return servo
-        low_v = self.supply_v * LOW_SUPPLY
+        low_v = self.supply_v * _LOW_SUPPLY
         return replace(
             servo, stage=replace(servo.stage, supply_v=self.supply_v, supply_min_v=low_v)
         )
@@ -200,7 +208,7 @@ class JointDrive:
 
 
 def _make_drive(
-    servo: ServoParameters, defaults: Defaults, bounds: Bounds, node: CanopenSlave, slot: int
+    servo: ServoParameters, defaults: _Defaults, bounds: Bounds, node: CanopenSlave, slot: int
 ) -> Ds402:
     drive = Ds402(node, slot, Servo(servo), defaults)
     drive.supervision.bounds = bounds
@@ -209,8 +217,149 @@ def _make_drive(
 
 def _ratio_for(servo: ServoParameters, speed_rad_s: float) -> float:
     """Return the gear ratio with which a motor is as fast as a joint needs it."""
-    return free_speed_rad_s(servo) * servo.gear.ratio / (SPARE_SPEED * speed_rad_s)
+    return free_speed_rad_s(servo) * servo.gear.ratio / (_SPARE_SPEED * speed_rad_s)
 
 
 def _units(value: float) -> int:
     return max(1, min(round(value), (1 << 32) - 2))
+
+
+# The objects of a drive: those of its EDS with values, and those that its modes need.
+
+NAMES: Final = {
+    1: "pp",
+    3: "pv",
+    4: "tq",
+    6: "hm",
+    7: "ip",
+    8: "csp",
+    9: "csv",
+    10: "cst",
+}
+"""Modes of operation as CiA 402 abbreviates them, by the number in 6060h."""
+
+NUMBERS: Final = {name: number for number, name in NAMES.items()}
+
+_PROFILE: Final = (indices.PROFILE_ACCELERATION, indices.PROFILE_DECELERATION)
+_ALWAYS: Final = (
+    *(indices.CONTROLWORD, indices.STATUSWORD, indices.MODES_OF_OPERATION),
+    *(indices.MODES_OF_OPERATION_DISPLAY, indices.POSITION_ACTUAL, indices.VELOCITY_ACTUAL),
+    indices.SUPPORTED_MODES,
+)
+_FACTORS: Final = (indices.ENCODER_RESOLUTION, indices.GEAR_RATIO, indices.FEED_CONSTANT)
+_TORQUE: Final = (indices.TARGET_TORQUE, indices.TORQUE_ACTUAL)
+_NEEDED: Final = {
+    1: (indices.TARGET_POSITION, indices.PROFILE_VELOCITY, *_PROFILE),
+    3: (indices.TARGET_VELOCITY, *_PROFILE),
+    4: (*_TORQUE, indices.TORQUE_SLOPE),
+    6: (
+        *(indices.HOME_OFFSET, indices.HOMING_METHOD, indices.HOMING_SPEEDS),
+        indices.HOMING_ACCELERATION,
+    ),
+    7: (
+        *(indices.INTERPOLATION_SUBMODE, indices.INTERPOLATION_DATA),
+        indices.INTERPOLATION_PERIOD,
+    ),
+    8: (indices.TARGET_POSITION, indices.INTERPOLATION_PERIOD),
+    9: (indices.TARGET_VELOCITY, indices.INTERPOLATION_PERIOD),
+    10: _TORQUE,
+}
+"""Objects without which a master cannot use a mode, by its number."""
+
+
+_NEVER_ZERO: Final = frozenset(
+    {
+        *(indices.FOLLOWING_ERROR_WINDOW, indices.MAX_TORQUE, indices.MAX_CURRENT),
+        *(indices.RATED_CURRENT, indices.RATED_TORQUE, indices.MAX_PROFILE_VELOCITY),
+        *(indices.MAX_MOTOR_SPEED, indices.PROFILE_VELOCITY, indices.PROFILE_ACCELERATION),
+        *(indices.PROFILE_DECELERATION, indices.QUICK_STOP_DECELERATION, indices.TORQUE_SLOPE),
+        *(indices.HOMING_SPEEDS, indices.HOMING_ACCELERATION, indices.MAX_ACCELERATION),
+        *(indices.MAX_DECELERATION, indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
+    }
+)
+"""Objects in which 0 lets nothing move: a file that has it there leaves the value open."""
+
+
+def modes_listed(dictionary: Dictionary) -> frozenset[int]:
+    """Return the modes that 6502h of a dictionary lists; all that there are if it lists none."""
+    entry = dictionary.find(indices.SUPPORTED_MODES)
+    listed = entry.number if entry else 0
+    known = (number for number in MODES if number > 0)
+    return frozenset(n for n in known if not listed or listed >> n - 1 & 1)
+
+
+def complete(
+    dictionary: Dictionary, modes: Collection[int], added: Collection[int], defaults: _Defaults
+) -> Dictionary:
+    """Return the dictionary of a drive: objects without a value have one, and some are added.
+
+    Args:
+        dictionary: of its EDS.
+        modes: the modes of operation that it shall have.
+        added: objects that its EDS lacks.
+        defaults: values for objects of the profile to which the EDS gives none.
+    """
+    given, own = dictionary.description, epos.dictionary().description
+    entries = [
+        *(_with_default(each, defaults) for each in given),
+        *(_with_default(each, defaults, anew=True) for each in _of(own, added)),
+    ]
+    objects = {**given.objects, **{index: own.objects[index] for index in added}}
+    return Dictionary((_listing(each, modes) for each in entries), objects)
+
+
+def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value]) -> Dictionary:
+    """Return a dictionary with other power-on values, or their bytes, of entries that it has."""
+    if not any(at in dictionary for at in values):
+        return dictionary
+    given = dictionary.description
+    entries = (
+        each if (value := values.get((each.index, each.sub))) is None else each.with_default(value)
+        for each in given
+    )
+    return Dictionary(entries, given.objects)
+
+
+def with_factors(dictionary: Dictionary, defaults: _Defaults) -> Dictionary:
+    """Return a dictionary whose position units are those of some defaults, not of its EDS."""
+    values = {at: value for at, value in defaults.items() if at[0] in _FACTORS}
+    found = {
+        at: fitting(entry.description, value)
+        for at, value in {**values, (indices.SI_UNIT_POSITION, 0): 0}.items()
+        if (entry := dictionary.find(*at)) is not None and entry.description.data_type.is_integer
+    }
+    return with_values(dictionary, found)
+
+
+def missing(dictionary: Dictionary, modes: Iterable[int]) -> list[int]:
+    """Return the objects that some modes need and a dictionary has not, sorted."""
+    wanted = {*_ALWAYS, *(index for mode in modes for index in _NEEDED[mode])}
+    return sorted(index for index in wanted if index not in dictionary.objects)
+
+
+def _of(own: DictionaryDescription, wanted: Collection[int]) -> Iterator[EntryDescription]:
+    return (each for each in own if each.index in wanted)
+
+
+def _with_default(
+    entry: EntryDescription, defaults: _Defaults, *, anew: bool = False
+) -> EntryDescription:
+    """Return an entry with the default of a drive, if it has none of its own; see `_NEVER_ZERO`.
+
+    It is cut to the type and the limits that the EDS gives the object.
+    """
+    value = defaults.get((entry.index, entry.sub))
+    open_zero = entry.index in _NEVER_ZERO and not any(entry.default)
+    own = entry.has_default and not (anew or open_zero)  # `in_profile` has filled the others
+    if own or value is None or entry.index not in PROFILE_AREA or not entry.data_type.is_integer:
+        return entry
+    return entry.with_default(fitting(entry, value))
+
+
+def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescription:
+    """Return an entry; 6502h lists the modes beside what else its bits say."""
+    if entry.index != indices.SUPPORTED_MODES:
+        return entry
+    known = sum(1 << number - 1 for number in NAMES)
+    more = int.from_bytes(entry.default, "little") & ~known
+    return entry.with_default(more | sum(1 << number - 1 for number in modes))

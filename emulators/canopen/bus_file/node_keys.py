@@ -1,6 +1,6 @@
 """`tickrig:` in a node of a bus.yml: its motor, gear and switches, its modes and inputs.
 
->>> from tickrig.host.canopen.bus_file.item import Item, Place
+>>> from tickrig.host.canopen.bus_file.notes import Item, Place
 >>> value = Item(100, Place("bus.yml", 7), "100")
 >>> KEYS["gear_ratio"].take(value)
 100.0
@@ -8,27 +8,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any, Final, NamedTuple
 
-from tickrig.device.servo.presets import PRESETS
-from tickrig.emulators.canopen.bus_file.drive_objects import NUMBERS
-from tickrig.emulators.canopen.bus_file.mistake import Mistake
+from tickrig.device.servo.parameters import PRESETS
+from tickrig.emulators.canopen.bus_file.joint_drive import NUMBERS
 from tickrig.emulators.canopen.choices import PROFILES
-from tickrig.host.canopen.bus_file.item import Item, Place
+from tickrig.host.canopen.bus_file.notes import FilePlace, Item
 from tickrig.host.text.names import closest, near
 from tickrig.host.text.values import Setting
 
-ALL: Final = "all"
+# What is wrong with a bus.yml and the files that it goes with, a line each.
+
+
+class BusFileMistake(NamedTuple):
+    """One thing that is wrong.
+
+    Attributes:
+        place: its file and line.
+        text: which key, what came, and what was allowed.
+    """
+
+    place: FilePlace
+    text: str
+
+    def __str__(self) -> str:
+        """Write it as compilers do."""
+        return f"{self.place}: {self.text}"
+
+
+class BusMistakesError(ValueError):
+    """Files of which no slaves can be made.
+
+    Attributes:
+        mistakes: all that is wrong, by file and line.
+    """
+
+    def __init__(self, mistakes: Iterable[BusFileMistake]) -> None:
+        self.mistakes = tuple(dict.fromkeys(sorted(mistakes)))
+        super().__init__("\n".join(map(str, self.mistakes)))
+
+
+_ALL: Final = "all"
 URDF: Final = "urdf"
 """A key of `options`: the robot that has the joints."""
 
-MOST: Final = 1e6
+_MOST: Final = 1e6
 
 
-class Key(NamedTuple):
+class NodeKey(NamedTuple):
     """A key of the mapping.
 
     Attributes:
@@ -62,7 +92,7 @@ class NodeKeys:
     profile: str | None = None
     configured: bool = False
     start: Mapping[str, Setting] = field(default_factory=dict)
-    places: Mapping[str, Place] = field(default_factory=dict)
+    places: Mapping[str, FilePlace] = field(default_factory=dict)
 
 
 def _number(low: float, high: float, *, above: bool = False) -> Callable[[Item], float]:
@@ -111,7 +141,7 @@ def _hint(text: str, names: tuple[str, ...]) -> str:
 
 
 def _pair(item: Item) -> tuple[float, float]:
-    take = _number(-MOST, MOST)
+    take = _number(-_MOST, _MOST)
     values = [take(each) for each in item.items]
     if len(values) != 2 or values[0] > values[1]:
         raise ValueError(f"{item} is no pair [FROM, TO] with FROM up to TO")
@@ -119,11 +149,11 @@ def _pair(item: Item) -> tuple[float, float]:
 
 
 def _modes(item: Item) -> frozenset[int]:
-    if item.text == ALL:
+    if item.text == _ALL:
         return frozenset(NUMBERS.values())
     take = _one_of(*NUMBERS)
     if not item.items:
-        raise ValueError(f"{item} is neither {ALL} nor a list of {', '.join(NUMBERS)}")
+        raise ValueError(f"{item} is neither {_ALL} nor a list of {', '.join(NUMBERS)}")
     return frozenset(NUMBERS[take(each)] for each in item.items)
 
 
@@ -143,62 +173,64 @@ def _settings(item: Item) -> dict[str, Setting]:
 
 _POSITION: Final = "rad, or m with `travel_m`"
 
-JOINT_KEYS: Final[Mapping[str, Key]] = {
-    "motor": Key(
+JOINT_KEYS: Final[Mapping[str, NodeKey]] = {
+    "motor": NodeKey(
         _one_of(*PRESETS),
         ", ".join(f"`{name}`" for name in PRESETS),
         "`epos-wheel`",
         "motor, power stage, encoder and gear to begin with: "
         "[presets](../reference/devices/servo.md#parameters)",
     ),
-    "supply_v": Key(_number(1, 100), "1..100", "of the motor", "supply of the power stage"),
-    "encoder_counts": Key(
+    "supply_v": NodeKey(_number(1, 100), "1..100", "of the motor", "supply of the power stage"),
+    "encoder_counts": NodeKey(
         _whole(4, 1 << 24), f"4..{1 << 24}", "of the motor", "counts in a turn of the motor"
     ),
-    "gear_ratio": Key(
-        _number(0.01, MOST),
+    "gear_ratio": NodeKey(
+        _number(0.01, _MOST),
         "0.01..1e6",
         "what `velocity` needs, else of the motor",
         "turns of the motor in a turn of the shaft",
     ),
-    "gear_efficiency": Key(
+    "gear_efficiency": NodeKey(
         _number(0, 1, above=True),
         "above 0, up to 1",
         "of the motor",
         "part of the power of a load that gets through",
     ),
-    "friction_nm": Key(_number(0, MOST), "0..1e6", "of the motor", "dry friction at the shaft"),
-    "inertia_kg_m2": Key(
-        _number(0, MOST), "0..1e6", "of the motor", "what always hangs on the shaft"
+    "friction_nm": NodeKey(
+        _number(0, _MOST), "0..1e6", "of the motor", "dry friction at the shaft"
     ),
-    "effort": Key(
-        _number(0, MOST, above=True),
+    "inertia_kg_m2": NodeKey(
+        _number(0, _MOST), "0..1e6", "of the motor", "what always hangs on the shaft"
+    ),
+    "effort": NodeKey(
+        _number(0, _MOST, above=True),
         "above 0",
         "that of the motor",
         "largest torque of the shaft in Nm, or force in N; the motor is made as large",
     ),
-    "velocity": Key(
-        _number(0, MOST, above=True),
+    "velocity": NodeKey(
+        _number(0, _MOST, above=True),
         "above 0",
         "that of the motor",
         "largest speed in rad/s, or m/s; limits the drive as 6080h does",
     ),
-    "lower": Key(
-        _number(-MOST, MOST), _POSITION, "no switch", "where it presses the negative limit switch"
+    "lower": NodeKey(
+        _number(-_MOST, _MOST), _POSITION, "no switch", "where it presses the negative limit switch"
     ),
-    "upper": Key(
-        _number(-MOST, MOST), _POSITION, "no switch", "where it presses the positive limit switch"
+    "upper": NodeKey(
+        _number(-_MOST, _MOST), _POSITION, "no switch", "where it presses the positive limit switch"
     ),
-    "home_switch": Key(
+    "home_switch": NodeKey(
         _pair, "`[FROM, TO]`, as above", "no switch", "between which it presses the home switch"
     ),
-    "travel_m": Key(
-        _number(0, MOST, above=True),
+    "travel_m": NodeKey(
+        _number(0, _MOST, above=True),
         "above 0",
         "the joint turns",
         "it is a carriage, and a turn of the shaft moves it so far",
     ),
-    "units": Key(
+    "units": NodeKey(
         _number(0, 1e9, above=True),
         "above 0",
         "`scale_pos_to_dev`, or 1000",
@@ -207,28 +239,30 @@ JOINT_KEYS: Final[Mapping[str, Key]] = {
 }
 """What makes a `JointDrive`."""
 
-KEYS: Final[Mapping[str, Key]] = {
+KEYS: Final[Mapping[str, NodeKey]] = {
     **JOINT_KEYS,
-    "modes": Key(
+    "modes": NodeKey(
         _modes,
-        f"`{ALL}`, a list of {', '.join(f'`{name}`' for name in NUMBERS)}",
+        f"`{_ALL}`, a list of {', '.join(f'`{name}`' for name in NUMBERS)}",
         "those of 6502h, and one that `sdo` writes to 6060h",
         "modes of operation; objects that they need and the EDS lacks are added",
     ),
-    "profile": Key(
+    "profile": NodeKey(
         _one_of(*PROFILES),
         ", ".join(f"`{name}`" for name in PROFILES),
         "`auto`",
         "what the node does with its objects: "
         "[profiles](../reference/devices/canopen-slave-emu.md#profiles)",
     ),
-    "configured": Key(
+    "configured": NodeKey(
         _flag,
         "`true`, `false`",
         "`false`",
         "it begins with all that the master would write to it at boot-up",
     ),
-    "start": Key(_settings, "a mapping", "as usual", "physical inputs and objects at the start"),
+    "start": NodeKey(
+        _settings, "a mapping", "as usual", "physical inputs and objects at the start"
+    ),
 }
 """All of a node."""
 
@@ -241,7 +275,7 @@ _ARGUMENTS: Final = {
 
 
 def read_keys(
-    layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[Mistake]
+    layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[BusFileMistake]
 ) -> NodeKeys:
     """Read the mappings `tickrig:` that hold for a node; the first that has a key counts.
 
@@ -251,7 +285,7 @@ def read_keys(
         mistakes: takes what is wrong.
     """
     found: dict[str, Any] = {}
-    places: dict[str, Place] = {}
+    places: dict[str, FilePlace] = {}
     for layer in layers:
         for name, item in layer.items():
             if name in places or (name == URDF and layer is not layers[0]):
@@ -259,12 +293,12 @@ def read_keys(
             places[name] = item.place
             if name not in KEYS:
                 text = f"no key {str(name)!r}; {near(str(name), list(KEYS))}"
-                mistakes.append(Mistake(item.place, f"{where}.tickrig: {text}"))
+                mistakes.append(BusFileMistake(item.place, f"{where}.tickrig: {text}"))
                 continue
             try:
                 found[name] = KEYS[name].take(item)
             except ValueError as error:
-                mistakes.append(Mistake(item.place, f"{where}.tickrig.{name}: {error}"))
+                mistakes.append(BusFileMistake(item.place, f"{where}.tickrig.{name}: {error}"))
             if name == "start":
                 places.update({str(key): each.place for key, each in item.fields.items()})
     return NodeKeys(

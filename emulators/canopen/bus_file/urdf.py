@@ -21,23 +21,23 @@ from math import isfinite
 from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError, Mistake
-from tickrig.host.canopen.bus_file.item import Place
+from tickrig.emulators.canopen.bus_file.node_keys import BusFileMistake, BusMistakesError
+from tickrig.host.canopen.bus_file.notes import FilePlace
 from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
 from tickrig.wire.canopen.eds.eds_file import decode_text
 from tickrig.wire.canopen.eds.xdd import Element, XddError, read_xml
 
-MOST_BYTES: Final = 32_000_000
-XACRO_TAGS: Final = ("macro", "include", "property", "arg")
-XACRO: Final = "xacro a.urdf.xacro > a.urdf expands it"
+_MOST_BYTES: Final = 32_000_000
+_XACRO_TAGS: Final = ("macro", "include", "property", "arg")
+_XACRO: Final = "xacro a.urdf.xacro > a.urdf expands it"
 LEAST, MOST = 1e-9, 1e9
 """Of a limit or a reduction, in rad, m, Nm, N and their rates; no joint is anywhere near."""
 
 _NODE_ID: Final = re.compile("[0-9]{1,9}")
-LIMITS: Final = ("lower", "upper", "velocity", "effort")
+_LIMITS: Final = ("lower", "upper", "velocity", "effort")
 REVOLUTE, CONTINUOUS, PRISMATIC = "revolute", "continuous", "prismatic"
-MOVES: Final = (REVOLUTE, CONTINUOUS, PRISMATIC)
-REDUCTIONS: Final = ("mechanicalReduction", "mechanical_reduction")
+_MOVES: Final = (REVOLUTE, CONTINUOUS, PRISMATIC)
+_REDUCTIONS: Final = ("mechanicalReduction", "mechanical_reduction")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,7 @@ class UrdfJoint:
     """
 
     name: str
-    place: Place
+    place: FilePlace
     device_name: str = ""
     node_id: int | None = None
     kind: str = REVOLUTE
@@ -90,19 +90,19 @@ def read_urdf(path: Path) -> Urdf:
         BusMistakesError: all that is wrong with it.
     """
     with path.open("rb") as file:
-        return parse_urdf(file.read(MOST_BYTES + 1), str(path))
+        return parse_urdf(file.read(_MOST_BYTES + 1), str(path))
 
 
 def parse_urdf(data: bytes, name: str) -> Urdf:
     """Read the bytes of a file; see `read_urdf`."""
-    if len(data) > MOST_BYTES:
+    if len(data) > _MOST_BYTES:
         raise BusMistakesError(
-            [Mistake(Place(name, 1), f"more than {MOST_BYTES:,} bytes: no URDF")]
+            [BusFileMistake(FilePlace(name, 1), f"more than {_MOST_BYTES:,} bytes: no URDF")]
         )
     try:
         robot = read_xml(decode_text(data))[0]
     except XddError as error:
-        raise BusMistakesError([Mistake(Place(name, error.line), str(error))]) from None
+        raise BusMistakesError([BusFileMistake(FilePlace(name, error.line), str(error))]) from None
     return _Reader(name).read(robot)
 
 
@@ -121,14 +121,14 @@ class _Reader:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._mistakes: list[Mistake] = []
+        self._mistakes: list[BusFileMistake] = []
 
     def read(self, robot: Element) -> Urdf:
         """Read all joints; BusMistakesError with all that is wrong."""
         if robot.name != "robot":
             self._wrong(robot, f"<{robot.name}> is no <robot>")
-        for each in itertools.islice(_named(robot, *XACRO_TAGS), 1):
-            self._wrong(each, f"<xacro:{each.name}> is not expanded: {XACRO}")
+        for each in itertools.islice(_named(robot, *_XACRO_TAGS), 1):
+            self._wrong(each, f"<xacro:{each.name}> is not expanded: {_XACRO}")
         shapes = {_name(each): each for each in _named(robot, "joint")}
         reductions = dict(self._reductions(robot))
         joints = [
@@ -154,12 +154,12 @@ class _Reader:
             self._wrong(element, f"joint {_name(element)!r}: the robot has no joint of this name")
             return None
         kind = shape.attributes.get("type", "")
-        if kind not in MOVES:
-            text = f"joint {_name(element)!r}: type {kind!r} is none of {', '.join(MOVES)}"
+        if kind not in _MOVES:
+            text = f"joint {_name(element)!r}: type {kind!r} is none of {', '.join(_MOVES)}"
             self._wrong(shape, text)
         return UrdfJoint(
             name=_name(element),
-            place=Place(self._name, element.line),
+            place=FilePlace(self._name, element.line),
             device_name=device.text.strip() if device else "",
             node_id=node_id,
             kind=kind,
@@ -171,7 +171,7 @@ class _Reader:
         """Return what `<limit>` says; an empty range, and 0 of the others, stand for none."""
         found: dict[str, float] = {}
         for limit in _named(shape, "limit"):
-            for key in LIMITS:
+            for key in _LIMITS:
                 if (text := limit.attributes.get(key)) is not None:
                     value = self._number(limit, f"joint {_name(shape)!r}: limit {key}", text)
                     if value is not None:
@@ -195,7 +195,7 @@ class _Reader:
         for owner in (robot, *_named(robot, "ros2_control")):
             for transmission in _named(owner, "transmission"):
                 parts = (transmission, *_named(transmission, "joint", "actuator"))
-                written = [value for part in parts for value in _named(part, *REDUCTIONS)]
+                written = [value for part in parts for value in _named(part, *_REDUCTIONS)]
                 for joint in _named(transmission, "joint") if written else ():
                     value = self._number(written[0], _name(joint), written[0].text.strip())
                     if value:
@@ -226,9 +226,9 @@ class _Reader:
         return None
 
     def _wrong(self, element: Element, text: str) -> None:
-        self._mistakes.append(Mistake(Place(self._name, element.line), text))
+        self._mistakes.append(BusFileMistake(FilePlace(self._name, element.line), text))
 
 
 def _hint(text: str) -> str:
     """Say that a value of xacro has to be expanded."""
-    return f": {XACRO}" if "$" in text else ""
+    return f": {_XACRO}" if "$" in text else ""

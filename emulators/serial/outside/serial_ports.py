@@ -73,14 +73,14 @@ class SerialPorts:
         Raises:
             SerialException: it is not such a URL, or no rig offers the name.
         """
-        name, mismatch = parse_url(url)
+        name, mismatch = _parse_url(url)
         if name not in self._sides:
             hint = near(url, [f"tickrig://{each}" for each in self.names])
             raise serial.SerialException(f"could not open port {url}: no rig offers it; {hint}")
         return self._sides[name], mismatch
 
 
-def parse_url(url: str) -> tuple[str, Mismatch | None]:
+def _parse_url(url: str) -> tuple[str, Mismatch | None]:
     """Return the name in a URL, and what it says of a setting that differs.
 
     Args:
@@ -89,7 +89,7 @@ def parse_url(url: str) -> tuple[str, Mismatch | None]:
     Raises:
         SerialException: it is not such a URL.
 
-    >>> parse_url("tickrig://rrc"), parse_url("tickrig://rrc?mismatch=refuse")
+    >>> _parse_url("tickrig://rrc"), _parse_url("tickrig://rrc?mismatch=refuse")
     (('rrc', None), ('rrc', 'refuse'))
     """
     scheme, _, rest = url.partition("://")

@@ -9,8 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.sdo import SdoServers
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.commands.device_config import configure
 from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.emulated import Emulated
@@ -19,13 +19,13 @@ from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, s
 from tickrig.emulators.testing.bench.plan_parts import NoNodeIdError, slave_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.devices import RIG_SUFFIXES, kind_of
-from tickrig.emulators.testing.rig_file.fields import node_id as read_node_id
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
-from tickrig.host.cli.refused import Refused
+from tickrig.emulators.testing.rig_file.section import node_id as read_node_id
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.trace import Config
 
-BUS: Final = "can"
+_BUS: Final = "can"
 """The bus that nodes share where nobody says otherwise."""
 
 BenchedDevice = Emulated[bytes] | CanopenSlave | DeviceType | str
@@ -57,11 +57,11 @@ def mounts_of(
         plan = named_device(device, Path(), name) if isinstance(device, str) else None
         is_node = plan is not None and plan.kind is not DeviceKind.SERIAL
         if is_node or isinstance(device, CanopenSlave):
-            mount = mounts.setdefault(BUS, BusMount(BUS, seed=seed))
+            mount = mounts.setdefault(_BUS, BusMount(_BUS, seed=seed))
             assert isinstance(mount, BusMount)
             if isinstance(device, CanopenSlave):
                 _set_timeout(device, sdo_timeout_us)
-                mount.add(name, device, node_entry(BUS, device))
+                mount.add(name, device, node_entry(_BUS, device))
             elif plan is not None:
                 if sdo_timeout_us is not None:
                     plan = replace(plan, sdo=replace(plan.sdo, timeout_us=sdo_timeout_us))
@@ -73,7 +73,7 @@ def mounts_of(
         mounts[name] = lone = LineMount(name, line or made.line)
         entry = DeviceEntry(name, made.type, made.config)
         lone.add(name, made.device, entry, seed_of(seed, name, alone=len(devices) == 1))
-    if sdo_timeout_us is not None and BUS not in mounts:
+    if sdo_timeout_us is not None and _BUS not in mounts:
         raise ValueError("sdo_timeout is of CANopen nodes, and none is on this bench")
     return list(mounts.values())
 
@@ -102,7 +102,7 @@ def named_device(text: str, folder: Path, name: str = "") -> DevicePlan:
     if node and kind is DeviceKind.SERIAL:
         raise ValueError(f"{text}: {rest} is on no CAN bus, and has no node-ID")
     node_id = read_node_id(int(node)) if node else None
-    return DevicePlan(name=name, kind=kind, type=place, wire=BUS, node_id=node_id)
+    return DevicePlan(name=name, kind=kind, type=place, wire=_BUS, node_id=node_id)
 
 
 def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry]:

@@ -11,21 +11,20 @@ from tickrig.emulators.record.wire_log import Splitter, WireLine, WireLog
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 KEPT: Final = 10_000
 """So many lines are kept; of those before it is known how many there were."""
 
-MAPPINGS_KEPT: Final = 4_000
+_MAPPINGS_KEPT: Final = 4_000
 """So many frames that say what PDOs carry are kept beyond that."""
 
-SDO_IDS: Final = range(0x581, 0x680)
-ERROR_CONTROL_IDS: Final = range(0x701, 0x780)
-PDO_OBJECTS: Final = range(0x1400, 0x1C00)
+_SDO_IDS: Final = range(0x581, 0x680)
+_ERROR_CONTROL_IDS: Final = range(0x701, 0x780)
+_PDO_OBJECTS: Final = range(0x1400, 0x1C00)
 """What PDOs carry is written there, by SDO; a boot-up ends what was written."""
 
-ENDS: Final = (b"host", b"device")
+_ENDS: Final = (b"host", b"device")
 
 
 class Journal(WireLog):
@@ -39,7 +38,7 @@ class Journal(WireLog):
     def __init__(self) -> None:
         super().__init__(KEPT)
         self._logs: list[tuple[str, WireLog]] = []
-        self._mappings: deque[WireLine] = deque(maxlen=MAPPINGS_KEPT)
+        self._mappings: deque[WireLine] = deque(maxlen=_MAPPINGS_KEPT)
 
     def of_line(
         self, source: str, splitter: Callable[[Mark], Splitter] | None
@@ -54,7 +53,7 @@ class Journal(WireLog):
         """Return what takes the bytes of a serial line as they were sent, and as they are heard."""
 
         def hear(at_us: int, mark: Mark, sent: bytes, received: bytes) -> None:
-            sender, receiver = ENDS if mark is Mark.TO_DEVICE else ENDS[::-1]
+            sender, receiver = _ENDS if mark is Mark.TO_DEVICE else _ENDS[::-1]
             words = (
                 b"the",
                 receiver,
@@ -99,9 +98,9 @@ class Journal(WireLog):
 
 def _maps(frame: CanFrame) -> bool:
     """Say whether a frame writes or reads what PDOs carry, or is a boot-up."""
-    if frame.can_id in SDO_IDS:
-        return int.from_bytes(frame.data[1:3], "little") in PDO_OBJECTS
-    return frame.can_id in ERROR_CONTROL_IDS and frame.data == b"\0"
+    if frame.can_id in _SDO_IDS:
+        return int.from_bytes(frame.data[1:3], "little") in _PDO_OBJECTS
+    return frame.can_id in _ERROR_CONTROL_IDS and frame.data == b"\0"
 
 
 def text_of(lines: Sequence[WireLine]) -> str:

@@ -6,15 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 from zlib import crc32
 
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.operator import WireFaults
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.nodes import Nodes
-from tickrig.emulators.record.trace_recorder import TraceRecorder
+from tickrig.emulators.canopen.node import Node, Nodes
+from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.emulated import Emulated, HasSignals
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import ByteLine

@@ -6,23 +6,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.body import BodyParameters, WheeledBody
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.bench.fault_order import FaultOrder
-from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
-from tickrig.emulators.canopen.build import describe
+from tickrig.emulators.bench.fault_spec import FaultOrder
+from tickrig.emulators.canopen.body import BodyOnDrives, DrivenWheel
+from tickrig.emulators.canopen.build import describe, store_keeper
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.store_file import StoreFile
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.commands.device_config import configure
 from tickrig.emulators.commands.device_type import ConfiguredDevice
 from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts
+from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
 from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.plan import (
@@ -34,11 +35,15 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
 )
 from tickrig.emulators.testing.rig_file.probe import eds_cache
-from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.log import log_of
 from tickrig.host.text.values import Setting
 from tickrig.wire.canopen.eds.eds_file import finding_lines
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
+
 
 _logger = log_of(__name__)
 
@@ -88,7 +93,7 @@ def _signals(plan: RigPlan) -> dict[str, SignalSpec]:
     }
 
 
-def begin_faults(plan: RigPlan, rig: BenchRig) -> None:
+def _begin_faults(plan: RigPlan, rig: BenchRig) -> None:
     """Let the faults come in their time; ValueError if there is none, or it cannot be like this."""
     for fault in plan.faults:
         name = rig.state.full_fault_name(fault.owner, fault.spec.name)
@@ -172,7 +177,47 @@ def _body(plan: BodyPlan, mounts: Iterable[Mount]) -> BodyOnDrives:
         for name, node in mount.nodes.items()
     }
     wheels = [
-        Wheel(wheel, nodes[drive], -1 if wheel in plan.mirrored else 1)
+        DrivenWheel(wheel, nodes[drive], -1 if wheel in plan.mirrored else 1)
         for wheel, drive in plan.drives.items()
     ]
     return BodyOnDrives(WheeledBody(BodyParameters(kind=plan.kind, **plan.parameters)), wheels)
+
+
+# The rig of a bench, with all that a rig file says of it.
+
+NAME = "bench"
+
+
+def rig_of(
+    parts: Parts,
+    plan: RigPlan,
+    outside: OutsideEnds | None = None,
+    *,
+    trace: Path | None = None,
+    keeps: bool = True,
+) -> BenchRig:
+    """Make a rig.
+
+    Args:
+        parts: the devices on their wires.
+        plan: what else is said of them: faults, and where nodes keep what they store.
+        outside: where hosts are; without it time is virtual.
+        trace: the file in which the run is recorded.
+        keeps: whether the run is kept in memory, if it is not in a file.
+
+    Raises:
+        ValueError: an input, signal or fault that cannot be.
+        OSError: the file of the trace cannot be opened.
+    """
+    state = RigState(
+        parts,
+        bridges=outside.bridges if outside else (),
+        clock=outside.clock if outside else None,
+        trace=trace,
+        keeps=keeps,
+    )
+    for store in parts.stores:
+        state.rig.watchers.append(store_keeper(store))
+    rig = BenchRig(NAME, state)
+    _begin_faults(plan, rig)
+    return rig

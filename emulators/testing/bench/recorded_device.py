@@ -7,28 +7,26 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.sdo import USUAL, SdoLimits, SdoServers
+from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe
 from tickrig.emulators.canopen.choices import AUTO, PROFILES, is_bus_node
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.store_file import drop_misfits, memory_values, parse_memory
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.canopen.store_file import drop_misfits, memory_values, parse_memory
 from tickrig.emulators.commands.device_type import build_recorded, check_no_code
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry
 from tickrig.host.text.trace import Header
 from tickrig.host.text.user_file import SUFFIX
 
-PROFILE: Final = "profile"
-SDO_TIMEOUT: Final = "sdo_timeout_us"
-SDO_MEMORY: Final = "sdo_memory_bytes"
+_PROFILE: Final = "profile"
+_SDO_TIMEOUT: Final = "sdo_timeout_us"
+_SDO_MEMORY: Final = "sdo_memory_bytes"
 
 
 def node_entry(
@@ -53,9 +51,9 @@ def node_entry(
     """
     file = _file_of(str(device)) if isinstance(device, str) else device
     sdo = next((x.limits for x in slave.services if isinstance(x, SdoServers)), USUAL)
-    config: dict[str, str | int] = {PROFILE: profile} if isinstance(device, Path) else {}
+    config: dict[str, str | int] = {_PROFILE: profile} if isinstance(device, Path) else {}
     if sdo != USUAL:
-        config |= {SDO_TIMEOUT: sdo.timeout_us, SDO_MEMORY: sdo.memory_bytes}
+        config |= {_SDO_TIMEOUT: sdo.timeout_us, _SDO_MEMORY: sdo.memory_bytes}
     memory = slave.nonvolatile
     stored = memory.parameters or memory.node_id or memory.bit_rate_index is not None
     return DeviceEntry(
@@ -107,7 +105,7 @@ def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
 
 def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
     device = _found(entry, folder)
-    profile = str(entry.config.get(PROFILE, AUTO))
+    profile = str(entry.config.get(_PROFILE, AUTO))
     if profile not in PROFILES:
         raise ValueError(f"profile {profile!r:.60} is not one of {', '.join(PROFILES)}")
     description = describe(cache, device, profile)
@@ -116,8 +114,8 @@ def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
     dictionary = description.make_dictionary()
     memory = _memory(entry, dictionary) if entry.stored else None
     sdo = SdoLimits(
-        int(entry.config.get(SDO_TIMEOUT) or USUAL.timeout_us),
-        int(entry.config.get(SDO_MEMORY, USUAL.memory_bytes) or 0),
+        int(entry.config.get(_SDO_TIMEOUT) or USUAL.timeout_us),
+        int(entry.config.get(_SDO_MEMORY, USUAL.memory_bytes) or 0),
     )
     slave = make_slave(dictionary, entry.node_id or 0, memory, description.application, sdo)
     return Node(name, slave, CanWire())

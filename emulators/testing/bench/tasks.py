@@ -6,24 +6,116 @@ clock of its own.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Coroutine, Generator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Generic, Protocol, TypeVar
 
+from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.bench.triggers import text_of
+from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import format_time
 from tickrig.wire.instant import NEVER
+
+# What something may wait for: a line or frame that passes, or any question about the bench.
+
+Condition = Callable[[], bool]
+"""Says whether something is so; it only looks."""
+
+_ANY: Final = ""
+
+_ORDINALS: Final = {1: "st", 2: "nd", 3: "rd"}
+
+
+class LineTrigger:
+    """True from the moment at which a line or frame has passed so often.
+
+    Args:
+        pattern: the whole line, or the frame in candump's notation; `*` stands for anything.
+        nth: the how manieth from now on, from 1.
+        source: the wire or device; any if empty.
+
+    Attributes:
+        count: how many have passed.
+
+    Raises:
+        ValueError: `nth` is less than 1.
+    """
+
+    def __init__(self, pattern: str, nth: int = 1, source: str = _ANY) -> None:
+        if nth < 1:
+            raise ValueError(f"nth counts from 1, got {nth}")
+        self._text = pattern
+        self._pattern = re.compile(".*".join(map(re.escape, pattern.split("*"))), re.DOTALL)
+        self._nth, self._source, self.count = nth, source, 0
+
+    def __call__(self) -> bool:
+        """Say whether it has passed so often."""
+        return self.count >= self._nth
+
+    def __str__(self) -> str:
+        """Say what it waits for.
+
+        >>> str(LineTrigger("OK:*", nth=3))
+        'the 3rd OK:*'
+        """
+        return f"the {_ordinal(self._nth)} {self._text}"
+
+    def hear(self, line: WireLine) -> None:
+        """Take a line of the journal."""
+        if self._source in (_ANY, line.source) and line.mark in "<>":
+            self.count += self._pattern.fullmatch(escape(line.data)) is not None
+
+
+def check_condition(condition: object) -> None:
+    """Raise TypeError unless something can be asked again and again."""
+    if not callable(condition):
+        wanted = 'a function, as lambda: bench.get("state") == "Off", or bench.on_line("OK:*")'
+        raise TypeError(f"{condition!r:.60} cannot be waited for: give {wanted}")
+
+
+def text_of(condition: Condition) -> str:
+    """Say what somebody waits for: a line, or where the question stands."""
+    if isinstance(condition, LineTrigger):
+        return str(condition)
+    code = getattr(condition, "__code__", None)
+    if code is None:
+        return f"a {type(condition).__name__}"
+    return f"the condition of {Path(code.co_filename).name}:{code.co_firstlineno}"
+
+
+def _ordinal(number: int) -> str:
+    """Write a number as people count.
+
+    >>> [_ordinal(number) for number in (1, 2, 3, 4, 11, 22, 112)]
+    ['1st', '2nd', '3rd', '4th', '11th', '22nd', '112th']
+    """
+    teens = number % 100 in (11, 12, 13)
+    return f"{number}{'th' if teens else _ORDINALS.get(number % 10, 'th')}"
+
+
+def when(rig: BenchRig, condition: Condition, act: Callable[[], None]) -> None:
+    """Act once, between two ticks, as soon as something is so: now, or after a later step."""
+
+    def watch(now_us: int) -> None:
+        if condition():
+            rig.rig.watchers.remove(watch)
+            act()
+
+    rig.rig.watchers.append(watch)
+    watch(rig.rig.now_us)
+
 
 DAY_US: Final = 86_400_000_000
 """In virtual time a body that does not say for how long it waits has waited in vain then."""
 
 T = TypeVar("T")
 
-NO_LOOP: Final = "no running event loop"
+_NO_LOOP: Final = "no running event loop"
 """What asyncio says where there is none."""
 
-WHAT_WAITS: Final = (
+_WHAT_WAITS: Final = (
     "a bench waits for bench.sleep, bench.until, bench.edge, and for tasks of bench.start,"
     " which run beside the body"
 )
@@ -47,7 +139,7 @@ class Wait:
         return came
 
 
-class Waiting(Protocol):
+class TaskWait(Protocol):
     """Whoever lets time pass for the body of a test."""
 
     @property
@@ -60,7 +152,7 @@ class Waiting(Protocol):
         ...
 
 
-def run_body(waiting: Waiting, body: Coroutine[Any, Any, T]) -> T:
+def run_body(waiting: TaskWait, body: Coroutine[Any, Any, T]) -> T:
     """Run the body of a test: time passes while it waits.
 
     Raises:
@@ -78,7 +170,7 @@ def run_body(waiting: Waiting, body: Coroutine[Any, Any, T]) -> T:
         came = _wait(waiting, wait)
 
 
-def _wait(waiting: Waiting, wait: Wait) -> bool:
+def _wait(waiting: TaskWait, wait: Wait) -> bool:
     """Let time pass until something is so; False if it was not in time."""
     begun_us, for_ever = waiting.now_us, wait.until_us == NEVER
     try:
@@ -174,12 +266,12 @@ def _step(body: Coroutine[Any, Any, Any], came: bool | None) -> Wait:
     try:
         return _wait_of(body.send(came))
     except RuntimeError as error:
-        if error.args == (NO_LOOP,):
-            error.args = (f"{NO_LOOP}: asyncio has none here; {WHAT_WAITS}",)
+        if error.args == (_NO_LOOP,):
+            error.args = (f"{_NO_LOOP}: asyncio has none here; {_WHAT_WAITS}",)
         raise
 
 
 def _wait_of(wait: object) -> Wait:
     if not isinstance(wait, Wait):
-        raise TypeError(f"{WHAT_WAITS}; not for {wait!r:.60}")
+        raise TypeError(f"{_WHAT_WAITS}; not for {wait!r:.60}")
     return wait

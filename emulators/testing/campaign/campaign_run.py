@@ -7,30 +7,117 @@ import shlex
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Final, NoReturn
+from time import monotonic
+from typing import Final, NoReturn, Protocol
 
 import click
 from click._termui_impl import ProgressBar
 
-from tickrig.emulators.testing.campaign.campaign import Campaign, Workers
-from tickrig.emulators.testing.campaign.crew import Crew
+from tickrig.emulators.testing.campaign.crew import Crew, LocalWorkers, cores
 from tickrig.emulators.testing.campaign.journal import SUFFIX, CampaignJournal, JournalFullError
-from tickrig.emulators.testing.campaign.local_workers import LocalWorkers, cores
-from tickrig.emulators.testing.campaign.order import Order, Refusal
-from tickrig.emulators.testing.campaign.plan import Plan, Shard
-from tickrig.emulators.testing.campaign.seeds import Seeds
-from tickrig.emulators.testing.campaign.table import PARQUET, WELL, Table, table_of, write_table
+from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Run, RunVerdict
+from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds, Shard
+from tickrig.emulators.testing.campaign.table import (
+    PARQUET,
+    WELL,
+    CampaignTable,
+    table_of,
+    write_table,
+)
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.start import INTERRUPTED, UNWRITTEN, as_is
 from tickrig.host.text.names import known
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file
 
-CSV: Final = ".csv"
-NEEDS_ARROW: Final = "Parquet needs pyarrow: pip install 'tickrig[campaign]'"
+# A campaign under way: runs are handed out, and verdicts come back, until all are done.
+
+_BATCH_S: Final = 1.0
+"""So long a batch takes, about: what a kill costs, and the handing out of each."""
+
+_MOST: Final = 500
+"""Runs of a batch."""
+
+
+class Workers(Protocol):
+    """Who does runs: on this machine, or on a cluster."""
+
+    @property
+    def count(self) -> int:
+        """How many runs are done at the same time."""
+        ...
+
+    def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
+        """Let runs be done; the future may raise Refusal."""
+        ...
+
+    def close(self) -> None:
+        """End all that is under way."""
+        ...
+
+
+class Campaign:
+    """Runs that are to be done, and what became of them.
+
+    Args:
+        plan: all runs.
+        journal: where verdicts are kept; runs that it has are not done again.
+        workers: who does them.
+    """
+
+    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: Workers) -> None:
+        self._plan, self._journal, self._workers = plan, journal, workers
+        done = journal.verdicts
+        self._left = (number for number in plan.numbers() if number not in done)
+        self._count = plan.size() - len(done)
+        self._under_way: dict[Future[list[RunVerdict]], float] = {}
+        self._size = 1
+
+    def verdicts(self) -> Iterator[list[RunVerdict]]:
+        """Do all runs; give verdicts as they are on the disk.
+
+        Raises:
+            Refusal: the workers cannot go on.
+            JournalFullError: nothing can be written any more.
+        """
+        while self._submit():
+            done, _ = wait(self._under_way, return_when=FIRST_COMPLETED)
+            for future in done:
+                verdicts, begun_s = future.result(), self._under_way.pop(future)
+                self._count -= len(verdicts)
+                self._learn(monotonic() - begun_s)
+                yield self._journal.add(verdicts)
+
+    def _submit(self) -> bool:
+        """Keep all workers busy, and a batch for each ready; False if all is done."""
+        workers = self._workers.count
+        while len(self._under_way) < 2 * workers:
+            numbers = list(islice(self._left, self._batch(workers)))
+            if not numbers:
+                break
+            future = self._workers.submit([self._plan.run(number) for number in numbers])
+            self._under_way[future] = monotonic()
+        return bool(self._under_way)
+
+    def _batch(self, workers: int) -> int:
+        """Return how many runs are next: less towards the end, so that all workers end together."""
+        return max(1, min(self._size, self._count // (4 * workers)))
+
+    def _learn(self, took_s: float) -> None:
+        """Make batches larger or smaller; how long they wait for another one counts, too."""
+        if took_s < _BATCH_S:
+            self._size = min(_MOST, 2 * self._size)
+        elif took_s > 4 * _BATCH_S:
+            self._size = max(1, self._size // 2)
+
+
+_CSV: Final = ".csv"
+_NEEDS_ARROW: Final = "Parquet needs pyarrow: pip install 'tickrig[campaign]'"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,12 +157,12 @@ class CampaignOptions:
         """Where the tables go; a shard's have its numbers unless they are given."""
         shard = Shard.parse(self.shard)
         part = f"-{shard.part}-of-{shard.parts}" if shard.parts > 1 else ""
-        return self.outputs or (Path(f"campaign{part}{CSV}"),)
+        return self.outputs or (Path(f"campaign{part}{_CSV}"),)
 
     @property
-    def order(self) -> Order:
+    def order(self) -> CampaignOrder:
         """What workers are asked for."""
-        return Order(
+        return CampaignOrder(
             tests=self.tests,
             parameters=self.parameters,
             bench=self.bench,
@@ -103,7 +190,7 @@ class CampaignRun:
         with _refused("--shard"):
             self._shard = Shard.parse(options.shard)
         if options.timeout_us == 0:
-            raise Refusal("--timeout 0: no run is over at once; write 60s")
+            raise CampaignRefusal("--timeout 0: no run is over at once; write 60s")
         check_outputs(options.output_paths)
         self._paths = options.output_paths
         self._journal_path = Path(f"{self._paths[0]}{SUFFIX}")
@@ -116,9 +203,11 @@ class CampaignRun:
             return
         there = [path for path in self._paths if path.exists() and path.is_file()]
         if there and not self._journal_path.exists():
-            raise Refusal(f"{there[0]} is there already: --fresh replaces it, -o takes another")
+            raise CampaignRefusal(
+                f"{there[0]} is there already: --fresh replaces it, -o takes another"
+            )
 
-    def run(self) -> Table:
+    def run(self) -> CampaignTable:
         """Do all that is left to do, and write the tables.
 
         Raises:
@@ -130,25 +219,27 @@ class CampaignRun:
         except JournalFullError as error:
             self._end(UNWRITTEN, f"{error.filename}: {error.strerror}; make room")
         except OSError as error:
-            raise Refusal(f"{error.filename or 'campaign'}: {error.strerror or error}") from None
+            raise CampaignRefusal(
+                f"{error.filename or 'campaign'}: {error.strerror or error}"
+            ) from None
         except KeyboardInterrupt:
             self._end(INTERRUPTED, "interrupted")
         finally:
             crew.close()
 
-    def _run(self, crew: Crew) -> Table:
+    def _run(self, crew: Crew) -> CampaignTable:
         collected = crew.collect()
         if not collected.tests:
             if not collected.left_out:
-                raise Refusal("no tests were collected")
+                raise CampaignRefusal("no tests were collected")
             without = known(collected.left_out)
-            raise Refusal(
+            raise CampaignRefusal(
                 f"no test takes the fixture bench, so no seed changes anything: {without};"
                 " a search takes its own: check_host(..., seed=1)"
             )
         if collected.left_out:
             say(f"{counted(len(collected.left_out), 'test')} without a bench left out")
-        plan = Plan(self._options.order, collected, self._seeds, self._shard)
+        plan = CampaignPlan(self._options.order, collected, self._seeds, self._shard)
         self._plan = plan
         self._journal = CampaignJournal(self._journal_path, plan.head)
         with closing(self._journal):
@@ -159,7 +250,7 @@ class CampaignRun:
             self._journal.remove()
         return table
 
-    def _workers(self, crew: Crew, plan: Plan) -> Workers:
+    def _workers(self, crew: Crew, plan: CampaignPlan) -> Workers:
         if not self._options.scheduler:
             return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
         try:
@@ -167,10 +258,12 @@ class CampaignRun:
                 DaskWorkers,
             )
         except ImportError:
-            raise Refusal("--scheduler needs Dask: pip install 'tickrig[campaign]'") from None
+            raise CampaignRefusal(
+                "--scheduler needs Dask: pip install 'tickrig[campaign]'"
+            ) from None
         return DaskWorkers(self._options.scheduler, plan)
 
-    def _do(self, plan: Plan, workers: Workers) -> None:
+    def _do(self, plan: CampaignPlan, workers: Workers) -> None:
         """Do all runs, with a bar on a terminal."""
         kept = self._journal.verdicts
         if kept:
@@ -207,14 +300,14 @@ def _refused(option: str) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        raise Refusal(f"{option}: {error}") from None
+        raise CampaignRefusal(f"{option}: {error}") from None
 
 
 def check_outputs(paths: Sequence[Path]) -> None:
     """Refuse tables that cannot be written."""
     for path in paths:
-        if path.suffix not in (CSV, PARQUET):
-            raise Refusal(f"-o {path}: a table is a .csv or a .parquet")
+        if path.suffix not in (_CSV, PARQUET):
+            raise CampaignRefusal(f"-o {path}: a table is a .csv or a .parquet")
         with _refused("-o"):
             check_file(path, "table")
     check_arrow(paths)
@@ -226,10 +319,10 @@ def check_arrow(paths: Sequence[Path]) -> None:
         try:
             import pyarrow  # noqa: F401, PLC0415 - whether it is there
         except ImportError:
-            raise Refusal(NEEDS_ARROW) from None
+            raise CampaignRefusal(_NEEDS_ARROW) from None
 
 
-def write_outputs(table: Table, paths: Sequence[Path]) -> None:
+def write_outputs(table: CampaignTable, paths: Sequence[Path]) -> None:
     """Write a table in each form; OSError if it cannot be."""
     for path in paths:
         write_table(table, path)

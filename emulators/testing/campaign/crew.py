@@ -2,22 +2,158 @@
 
 from __future__ import annotations
 
+import os
+import pickle
+import signal
+import subprocess
+import sys
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from multiprocessing import Pipe
+from threading import Lock
 from typing import Final
 
 from tickrig.emulators.testing.campaign.order import (
     DIED,
     HUNG,
+    CampaignOrder,
+    CampaignRefusal,
     Collected,
-    Order,
-    Refusal,
     Run,
-    Verdict,
+    RunVerdict,
+    verdicts_of,
 )
-from tickrig.emulators.testing.campaign.worker_process import RunHung, WorkerDied, WorkerProcess
 
-ATTEMPTS: Final = 3
+# A worker as who asks sees it: a process that is started, asked, and ended.
+
+_START_S: Final = 300.0
+"""So long collecting may take."""
+
+_LOOK_S: Final = 1.0
+
+_MOST_BYTES: Final = 64 << 20
+"""Of an answer."""
+
+
+class WorkerDied(Exception):  # noqa: N818 - nobody's fault
+    """The process of a worker has ended; the text says how."""
+
+
+class RunHung(Exception):  # noqa: N818 - that of the test
+    """A run took too long; its worker was ended."""
+
+
+class WorkerProcess:
+    """A process in which pytest waits with the tests of an order.
+
+    Args:
+        order: what is collected.
+
+    Raises:
+        Refusal: pytest refuses it.
+        WorkerDied: the process has ended before it could say anything.
+    """
+
+    def __init__(self, order: CampaignOrder) -> None:
+        if not os.path.isdir(order.folder):
+            raise CampaignRefusal(f"no directory {order.folder}")
+        self._lock = Lock()
+        self._conn, theirs = Pipe()
+        alive, self._alive = os.pipe()
+        words = [sys.executable, "-P", "-m", "tickrig.emulators.testing.campaign.worker"]
+        self._process = subprocess.Popen(
+            [*words, str(theirs.fileno()), str(alive)],
+            cwd=order.folder,
+            pass_fds=(theirs.fileno(), alive),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C is for who asks
+        )
+        theirs.close()
+        os.close(alive)
+        try:
+            self._conn.send(order)
+            answer = self._receive(_START_S)
+            if not isinstance(answer, Collected):
+                raise CampaignRefusal(str(answer))
+            self.collected: Collected = answer
+        except RunHung:
+            raise CampaignRefusal(f"the tests were not collected within {_START_S:g} s") from None
+        except BrokenPipeError:
+            raise self._died() from None
+        finally:
+            if not hasattr(self, "collected"):
+                self.end()
+
+    def request(self, runs: Sequence[Run]) -> None:
+        """Ask for runs; WorkerDied if nobody is there."""
+        try:
+            self._conn.send(list(runs))
+        except OSError:
+            raise self._died() from None
+
+    def verdict(self, run: Run, timeout_s: float) -> RunVerdict:
+        """Wait for the verdict of a run.
+
+        Raises:
+            RunHung: it did not come in time.
+            WorkerDied: it never will, or something else came.
+        """
+        answer = self._receive(timeout_s)
+        try:
+            return verdicts_of([answer], [run])[0]
+        except ValueError as mistake:
+            raise WorkerDied(f"when it sent {mistake}") from None
+
+    def _receive(self, timeout_s: float) -> object:
+        """Wait for an answer; time in which this process is stopped does not count."""
+        waited_s = 0.0
+        try:
+            while not self._conn.poll(_LOOK_S):
+                waited_s += _LOOK_S
+                if waited_s >= timeout_s:
+                    raise RunHung
+            data = self._conn.recv_bytes(_MOST_BYTES)
+        except (EOFError, OSError):
+            raise self._died() from None
+        try:
+            return pickle.loads(data)
+        except Exception as error:  # pickle raises anything
+            raise WorkerDied(f"when it sent what cannot be read: {error!r}") from None
+
+    def _died(self) -> WorkerDied:
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(_LOOK_S)
+        status = self._process.poll()
+        if status is not None and status < 0:
+            return WorkerDied(f"by signal {-status}, {signal.strsignal(-status)}")
+        return WorkerDied(f"with exit status {status}")
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process.poll() is None
+
+    def kill(self) -> None:
+        """End the process, and what it has started, whatever it is at."""
+        with self._lock:
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, signal.SIGKILL)
+                self._process.wait()
+
+    def end(self) -> None:
+        """End the process, and give back what it was spoken to by."""
+        self.kill()
+        self._conn.close()
+        if self._alive >= 0:
+            os.close(self._alive)
+        self._alive = -1
+
+
+_ATTEMPTS: Final = 3
 
 
 class Crew:
@@ -30,7 +166,7 @@ class Crew:
         order: the same.
     """
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: CampaignOrder) -> None:
         self.order = order
         self._idle: deque[WorkerProcess] = deque()
         self._busy: set[WorkerProcess] = set()
@@ -42,7 +178,7 @@ class Crew:
             self._idle.append(self._start())
         return self._idle[-1].collected
 
-    def do(self, runs: Sequence[Run], digest: str) -> list[Verdict]:
+    def do(self, runs: Sequence[Run], digest: str) -> list[RunVerdict]:
         """Do runs one after the other.
 
         Args:
@@ -52,28 +188,28 @@ class Crew:
         Raises:
             Refusal: they are not the same here.
         """
-        left, verdicts = deque(runs), list[Verdict]()
+        left, verdicts = deque(runs), list[RunVerdict]()
         deaths = Counter[int]()
         while left:
             if self._closed:
-                raise Refusal("the campaign is over")
+                raise CampaignRefusal("the campaign is over")
             try:
                 for verdict in self._request(left, digest):
                     verdicts.append(verdict)
                     left.popleft()
             except RunHung:
                 reason = f"no verdict within {self.order.timeout_s:g} s"
-                verdicts.append(Verdict(left.popleft().number, HUNG, 0, "", reason))
+                verdicts.append(RunVerdict(left.popleft().number, HUNG, 0, "", reason))
             except WorkerDied as death:  # its run is done again
                 number = left[0].number
                 deaths[number] += 1
-                if deaths[number] == ATTEMPTS:
+                if deaths[number] == _ATTEMPTS:
                     left.popleft()
-                    reason = f"its process ended {ATTEMPTS} times, the last {death}"
-                    verdicts.append(Verdict(number, DIED, 0, "", reason))
+                    reason = f"its process ended {_ATTEMPTS} times, the last {death}"
+                    verdicts.append(RunVerdict(number, DIED, 0, "", reason))
         return verdicts
 
-    def _request(self, runs: Sequence[Run], digest: str) -> Iterator[Verdict]:
+    def _request(self, runs: Sequence[Run], digest: str) -> Iterator[RunVerdict]:
         """Yield the verdicts of runs as they come; a worker that fails is ended."""
         worker = self._take(digest)
         self._busy.add(worker)
@@ -100,17 +236,19 @@ class Crew:
                 worker = self._start()
         if worker.collected.digest != digest:
             worker.end()
-            raise Refusal("the files of the tests are not the same everywhere: they were changed")
+            raise CampaignRefusal(
+                "the files of the tests are not the same everywhere: they were changed"
+            )
         return worker
 
     def _start(self) -> WorkerProcess:
         """Start a worker; one that dies at once is tried again."""
-        for attempt in range(ATTEMPTS):
+        for attempt in range(_ATTEMPTS):
             try:
                 return WorkerProcess(self.order)
             except WorkerDied as death:
-                if attempt == ATTEMPTS - 1:
-                    raise Refusal(f"no worker starts; the last ended {death}") from None
+                if attempt == _ATTEMPTS - 1:
+                    raise CampaignRefusal(f"no worker starts; the last ended {death}") from None
         raise AssertionError
 
     def close(self) -> None:
@@ -120,3 +258,36 @@ class Crew:
             self._idle.pop().end()
         for worker in [*self._busy]:  # whoever waits for it gives it back
             worker.kill()
+
+
+# Workers on this machine.
+
+
+class LocalWorkers:
+    """Processes of this machine, each with a thread that waits for it.
+
+    Args:
+        crew: who has collected.
+        digest: of the files of the tests.
+        count: how many.
+    """
+
+    def __init__(self, crew: Crew, digest: str, count: int) -> None:
+        self._crew, self._digest, self.count = crew, digest, count
+        self._threads = ThreadPoolExecutor(count)
+
+    def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
+        """Let a process do runs."""
+        return self._threads.submit(self._crew.do, runs, self._digest)
+
+    def close(self) -> None:
+        """End all processes."""
+        self._crew.close()
+        self._threads.shutdown(cancel_futures=True)
+
+
+def cores() -> int:
+    """Return how many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

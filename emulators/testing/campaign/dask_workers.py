@@ -18,23 +18,29 @@ from distributed.core import rpc
 
 from tickrig._version import __version__
 from tickrig.emulators.testing.campaign.crew import Crew
-from tickrig.emulators.testing.campaign.order import Order, Refusal, Run, Verdict, verdicts_of
-from tickrig.emulators.testing.campaign.plan import Plan
+from tickrig.emulators.testing.campaign.order import (
+    CampaignOrder,
+    CampaignRefusal,
+    Run,
+    RunVerdict,
+    verdicts_of,
+)
+from tickrig.emulators.testing.campaign.plan import CampaignPlan
 from tickrig.host.text.page_text import one_line
 
 CONNECT_S: Final = 10.0
-SCHEDULER: Final = "Scheduler"
+_SCHEDULER: Final = "Scheduler"
 """How a scheduler calls itself, where a worker says `Worker`."""
 
-WAIT_S: Final = 60.0
+_WAIT_S: Final = 60.0
 """So long a scheduler may be without any worker."""
 
-CLOSE_S: Final = 5.0
+_CLOSE_S: Final = 5.0
 """So long the cluster has to forget a campaign."""
 
-GONE: Final = (OSError, RuntimeError, TimeoutError, CancelledError)
+_GONE: Final = (OSError, RuntimeError, TimeoutError, CancelledError)
 
-LOSSES: Final = 3
+_LOSSES: Final = 3
 """So often a batch is begun again that Dask gives up for lost."""
 
 
@@ -47,7 +53,7 @@ class CrewPlugin(WorkerPlugin):
 
     crew: Crew
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, order: CampaignOrder) -> None:
         self._order = order
         self.name = f"tickrig-campaign-{uuid4().hex}"
 
@@ -71,25 +77,27 @@ class DaskWorkers:
         Refusal: nobody is there, or no worker.
     """
 
-    def __init__(self, url: str, plan: Plan) -> None:
+    def __init__(self, url: str, plan: CampaignPlan) -> None:
         be_quiet()
         self._url, self._plan, self._plugin = url, plan, CrewPlugin(plan.order)
         if re.fullmatch(r"\w+://.+:[0-9]+", url) is None:
-            raise Refusal(f"--scheduler {url}: write tcp://HOST:PORT")
+            raise CampaignRefusal(f"--scheduler {url}: write tcp://HOST:PORT")
         try:
             asyncio.run(asyncio.wait_for(_ask_for_scheduler(url), CONNECT_S))
             self._client = Client(url, timeout=CONNECT_S, set_as_default=False)
         except TimeoutError:
-            raise Refusal(f"--scheduler {url}: no answer within {CONNECT_S:g} s") from None
+            raise CampaignRefusal(f"--scheduler {url}: no answer within {CONNECT_S:g} s") from None
         except Exception as error:  # Dask raises anything when something else listens there
             text = one_line(str(error).partition("\n")[0]) or type(error).__name__
-            raise Refusal(f"--scheduler {url}: no Dask scheduler: {text}") from None
+            raise CampaignRefusal(f"--scheduler {url}: no Dask scheduler: {text}") from None
         try:
-            self._client.wait_for_workers(1, WAIT_S)
+            self._client.wait_for_workers(1, _WAIT_S)
             self._client.register_plugin(self._plugin)
         except TimeoutError:
             self._client.close()
-            raise Refusal(f"--scheduler {url}: it has no worker: dask worker {url}") from None
+            raise CampaignRefusal(
+                f"--scheduler {url}: it has no worker: dask worker {url}"
+            ) from None
         self._executor = self._client.get_executor(pure=False)
 
     @property
@@ -101,19 +109,19 @@ class DaskWorkers:
         except (OSError, RuntimeError, TimeoutError):
             raise self._gone() from None
 
-    def submit(self, runs: Sequence[Run]) -> Future[list[Verdict]]:
+    def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
         """Let a worker of the cluster do runs."""
-        wanted: Future[list[Verdict]] = Future()
-        self._try(list(runs), wanted, LOSSES)
+        wanted: Future[list[RunVerdict]] = Future()
+        self._try(list(runs), wanted, _LOSSES)
         return wanted
 
-    def _try(self, runs: list[Run], wanted: Future[list[Verdict]], losses: int) -> None:
+    def _try(self, runs: list[Run], wanted: Future[list[RunVerdict]], losses: int) -> None:
         digest, version = self._plan.collected.digest, self._plan.order.version
         future = self._executor.submit(_do, self._plugin.name, runs, digest, version)
         future.add_done_callback(partial(self._take, runs, wanted, losses))
 
     def _take(
-        self, runs: list[Run], wanted: Future[list[Verdict]], losses: int, future: Future[Any]
+        self, runs: list[Run], wanted: Future[list[RunVerdict]], losses: int, future: Future[Any]
     ) -> None:
         """Hand on what came of runs."""
         error = CancelledError() if future.cancelled() else future.exception()
@@ -123,31 +131,33 @@ class DaskWorkers:
             wanted.set_exception(self._gone())
         elif error is not None:
             text = f"{type(error).__name__}: {error}".partition("\n")[0]
-            wanted.set_exception(Refusal(f"--scheduler {self._url}: {text}"))
+            wanted.set_exception(CampaignRefusal(f"--scheduler {self._url}: {text}"))
         elif isinstance(answer := future.result(), str):
-            wanted.set_exception(Refusal(one_line(answer)))
+            wanted.set_exception(CampaignRefusal(one_line(answer)))
         else:
             try:
                 wanted.set_result(verdicts_of(answer, runs))
             except ValueError as mistake:
-                wanted.set_exception(Refusal(f"--scheduler {self._url}: a worker sent {mistake}"))
+                wanted.set_exception(
+                    CampaignRefusal(f"--scheduler {self._url}: a worker sent {mistake}")
+                )
 
-    def _gone(self) -> Refusal:
-        return Refusal(f"--scheduler {self._url} is gone; what was done is kept")
+    def _gone(self) -> CampaignRefusal:
+        return CampaignRefusal(f"--scheduler {self._url} is gone; what was done is kept")
 
     def close(self) -> None:
         """Let the cluster forget the campaign, if it still answers."""
-        with suppress(*GONE):
+        with suppress(*_GONE):
             self._executor.shutdown(wait=False)
         forgetting = Thread(target=self._forget, daemon=True)
         forgetting.start()
-        forgetting.join(CLOSE_S)
-        with suppress(*GONE):
+        forgetting.join(_CLOSE_S)
+        with suppress(*_GONE):
             self._client.close(timeout=1)
 
     def _forget(self) -> None:
         """Remove the plug-in; Dask waits without a limit for a scheduler or worker that stands."""
-        with suppress(*GONE):
+        with suppress(*_GONE):
             self._client.unregister_worker_plugin(self._plugin.name)
 
 
@@ -155,7 +165,7 @@ async def _ask_for_scheduler(url: str) -> None:
     """Raise unless a scheduler answers; a `Client` waits for the answer without a limit."""
     async with rpc(url, timeout=CONNECT_S) as scheduler:
         answer = await scheduler.identity()
-    if not isinstance(answer, dict) or answer.get("type") != SCHEDULER:
+    if not isinstance(answer, dict) or answer.get("type") != _SCHEDULER:
         raise ValueError(f"{one_line(repr(answer))[:60]} answers there")
 
 
@@ -165,7 +175,7 @@ def be_quiet() -> None:
         logging.getLogger(name).handlers[:] = [logging.NullHandler()]
 
 
-def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[Verdict] | str:
+def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[RunVerdict] | str:
     """Do runs on the worker that this is called on; a text is a refusal."""
     worker = get_worker()
     if __version__ != version:
@@ -174,5 +184,5 @@ def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[Verdi
         plugin = worker.plugins[name]
         assert isinstance(plugin, CrewPlugin)
         return plugin.crew.do([Run(*run) for run in runs], digest)
-    except Refusal as refusal:
+    except CampaignRefusal as refusal:
         return f"{worker.address}: {refusal}"

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any, Final
 from zlib import crc32
 
-from tickrig.emulators.testing.campaign.order import Refusal, Verdict
+from tickrig.emulators.testing.campaign.order import CampaignRefusal, RunVerdict
 from tickrig.host.text.whole_file import write_whole
 
-VERSION: Final = 1
+_VERSION: Final = 1
 SUFFIX: Final = ".journal"
 
 
@@ -41,13 +41,13 @@ class CampaignJournal:
     def __init__(self, path: Path, head: Mapping[str, Any]) -> None:
         import fcntl  # noqa: PLC0415 - POSIX
 
-        self.path, self.verdicts = path, dict[int, Verdict]()
+        self.path, self.verdicts = path, dict[int, RunVerdict]()
         self._fd = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
             fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             os.close(self._fd)
-            raise Refusal(f"{path}: another campaign runs that writes it") from None
+            raise CampaignRefusal(f"{path}: another campaign runs that writes it") from None
         try:
             self._read(head)
         except BaseException:
@@ -62,8 +62,8 @@ class CampaignJournal:
         if isinstance(first, dict):
             _check_head(self.path, first, head)
             for entry in entries[1:]:
-                self._keep(Verdict(*entry))
-        lines = [_line({"campaign": VERSION, **head})]
+                self._keep(RunVerdict(*entry))
+        lines = [_line({"campaign": _VERSION, **head})]
         lines += [_line(list(verdict)) for verdict in self.verdicts.values()]
         if (whole := b"".join(lines)) != data:
             self._rewrite(whole)
@@ -78,14 +78,14 @@ class CampaignJournal:
         self._fd = os.open(self.path, os.O_RDWR)
         fcntl.flock(self._fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
-    def _keep(self, verdict: Verdict) -> bool:
+    def _keep(self, verdict: RunVerdict) -> bool:
         """Note a verdict; False if its run has one."""
         if verdict.number in self.verdicts:
             return False
         self.verdicts[verdict.number] = verdict
         return True
 
-    def add(self, verdicts: Iterable[Verdict]) -> list[Verdict]:
+    def add(self, verdicts: Iterable[RunVerdict]) -> list[RunVerdict]:
         """Write verdicts that are not there yet, and return them; they are on the disk then.
 
         Raises:
@@ -130,12 +130,14 @@ def _entries(data: bytes) -> Iterator[Any]:
 
 def _check_head(path: Path, found: Mapping[str, Any], head: Mapping[str, Any]) -> None:
     """Refuse the journal of another campaign."""
-    if found.get("campaign") != VERSION:
-        raise Refusal(f"{path}: a journal of another version of tickrig; --fresh begins anew")
+    if found.get("campaign") != _VERSION:
+        raise CampaignRefusal(
+            f"{path}: a journal of another version of tickrig; --fresh begins anew"
+        )
     for name, value in head.items():
         if (before := found.get(name)) != value:
             changed = f"{name} {_short(before)}; now {_short(value)}"
-            raise Refusal(f"{path} is of a campaign with {changed}: --fresh begins anew")
+            raise CampaignRefusal(f"{path} is of a campaign with {changed}: --fresh begins anew")
 
 
 def _short(value: object) -> str:

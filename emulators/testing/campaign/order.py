@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.emulators.testing.report.bench_report import Outcome
 from tickrig.host.text.values import counted
 
-OPTIONS: Final = (
+_OPTIONS: Final = (
     *("-p", "no:cacheprovider", "--capture=no", "--tb=short", "--bench-mode", "virtual"),
     *("-o", "tmp_path_retention_policy=none", "-o", "bench_report=", "-o", "bench_artifacts="),
     *("-o", "bench_compare="),
@@ -17,12 +17,12 @@ OPTIONS: Final = (
 """Of pytest in a worker: nothing is shown or kept, and what was printed is not looked at."""
 
 
-class Refusal(Exception):  # noqa: N818 - what a campaign cannot do; nothing is broken
+class CampaignRefusal(Exception):  # noqa: N818 - what a campaign cannot do; nothing is broken
     """What a campaign cannot do, in a line for people."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Order:
+class CampaignOrder:
     """What a worker collects, and how long a run may take.
 
     Attributes:
@@ -45,7 +45,7 @@ class Order:
 
     def words(self) -> list[str]:
         """Return the command line of pytest."""
-        words = [*OPTIONS]
+        words = [*_OPTIONS]
         for parameter in self.parameters:
             words += ["--bench-param", parameter]
         for flag, value in (("--bench", self.bench), ("-k", self.keyword)):
@@ -95,7 +95,7 @@ class Run(NamedTuple):
     seed: int
 
 
-class Verdict(NamedTuple):
+class RunVerdict(NamedTuple):
     """How a run ended.
 
     Attributes:
@@ -116,10 +116,10 @@ class Verdict(NamedTuple):
 
 HUNG: Final = "hung"
 DIED: Final = "died"
-OUTCOMES: Final = frozenset({*(outcome.value for outcome in Outcome), HUNG, DIED})
+_OUTCOMES: Final = frozenset({*(outcome.value for outcome in Outcome), HUNG, DIED})
 
 
-def verdicts_of(answer: object, runs: Sequence[Run]) -> list[Verdict]:
+def verdicts_of(answer: object, runs: Sequence[Run]) -> list[RunVerdict]:
     """Return the verdicts that a worker has sent.
 
     Args:
@@ -135,10 +135,10 @@ def verdicts_of(answer: object, runs: Sequence[Run]) -> list[Verdict]:
     return [_verdict_of(each, run) for each, run in zip(answer, runs, strict=True)]
 
 
-def _verdict_of(answer: object, run: Run) -> Verdict:
+def _verdict_of(answer: object, run: Run) -> RunVerdict:
     match answer:
         case (run.number, str(outcome), int(virtual_us), str(where), str(reason)) if (
-            outcome in OUTCOMES and virtual_us >= 0
+            outcome in _OUTCOMES and virtual_us >= 0
         ):
-            return Verdict(run.number, outcome, int(virtual_us), where, reason)
+            return RunVerdict(run.number, outcome, int(virtual_us), where, reason)
     raise ValueError(f"{repr(answer)[:60]} in place of a verdict of run {run.number}")

@@ -10,14 +10,14 @@ from typing import Final
 import pyarrow
 from pyarrow import parquet
 
-from tickrig.emulators.testing.campaign.order import Refusal
+from tickrig.emulators.testing.campaign.order import CampaignRefusal
 
-NUMBERS: Final = ("seed", "virtual_us")
+_NUMBERS: Final = ("seed", "virtual_us")
 
 
 def parquet_of(names: Sequence[str], rows: Sequence[Sequence[str | int]]) -> bytes:
     """Return the bytes of the file; all columns but two are texts."""
-    types = [(name, pyarrow.int64() if name in NUMBERS else pyarrow.string()) for name in names]
+    types = [(name, pyarrow.int64() if name in _NUMBERS else pyarrow.string()) for name in names]
     columns = [
         pyarrow.array([cells[at] for cells in rows], kind) for at, (_, kind) in enumerate(types)
     ]
@@ -37,7 +37,9 @@ def read_parquet(path: Path) -> Iterator[Sequence[str]]:
     try:
         table = parquet.read_table(BytesIO(data))
     except pyarrow.ArrowException as error:
-        raise Refusal(f"{path} is no table of a campaign: {str(error).splitlines()[0]}") from None
+        raise CampaignRefusal(
+            f"{path} is no table of a campaign: {str(error).splitlines()[0]}"
+        ) from None
     yield table.column_names
     for row in zip(*(column.to_pylist() for column in table.columns), strict=True):
         yield [str(cell) for cell in row]

@@ -2,18 +2,86 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
-from tickrig.emulators.testing.campaign.order import Collected, Order, Refusal, Run
-from tickrig.emulators.testing.campaign.seeds import Seeds
+from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Collected, Run
 
-MOST: Final = 10_000_000
+# Seeds of a campaign, as people write them: `0-9999`, `3,17,100-199`.
+
+LARGEST: Final = (1 << 63) - 1
+_RANGE: Final = re.compile(r"([0-9]{1,19})(?:-([0-9]{1,19}))?")
+
+
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """Seeds in ascending order, each once.
+
+    Attributes:
+        ranges: first and last seed of each, neither touching nor overlapping the next.
+
+    >>> seeds = Seeds.parse("7,0-3,2-4")
+    >>> str(seeds), len(seeds), seeds[5]
+    ('0-4,7', 6, 7)
+    """
+
+    ranges: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def parse(cls, text: str) -> Seeds:
+        """Read seeds.
+
+        Raises:
+            ValueError: what is wrong with them.
+        """
+        return cls.of_ranges([_range(part.strip()) for part in text.split(",")])
+
+    @classmethod
+    def of_ranges(cls, ranges: list[tuple[int, int]]) -> Seeds:
+        """Return those of ranges, which may overlap."""
+        joined: list[tuple[int, int]] = []
+        for first, last in sorted(ranges):
+            if joined and first <= joined[-1][1] + 1:
+                joined[-1] = joined[-1][0], max(last, joined[-1][1])
+            else:
+                joined.append((first, last))
+        return cls(tuple(joined))
+
+    def __len__(self) -> int:
+        return sum(last - first + 1 for first, last in self.ranges)
+
+    def __getitem__(self, index: int) -> int:
+        for first, last in self.ranges:
+            if index <= last - first:
+                return first + index
+            index -= last - first + 1
+        raise IndexError(index)
+
+    def __str__(self) -> str:
+        return ",".join(
+            str(first) if first == last else f"{first}-{last}" for first, last in self.ranges
+        )
+
+
+def _range(text: str) -> tuple[int, int]:
+    match = _RANGE.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is no seed and no range: write 7, 0-9999 or 3,17,100-199")
+    first, last = int(match[1]), int(match[2] or match[1])
+    if last < first:
+        raise ValueError(f"{text} runs backwards: write {last}-{first}")
+    if last > LARGEST:
+        raise ValueError(f"{text}: the largest seed is {LARGEST}")
+    return first, last
+
+
+_MOST: Final = 10_000_000
 """Runs of a campaign: their numbers fit into memory."""
 
-KEPT: Final = "kept"
+_KEPT: Final = "kept"
 """The folder of traces in the commands that replay."""
 
 
@@ -40,11 +108,11 @@ class Shard(NamedTuple):
         return f"{self.part}/{self.parts}"
 
 
-WHOLE: Final = Shard()
+_WHOLE: Final = Shard()
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class CampaignPlan:
     """The runs of a campaign: each test with each seed, seed by seed.
 
     Attributes:
@@ -54,14 +122,16 @@ class Plan:
         shard: which of all runs are done here.
     """
 
-    order: Order
+    order: CampaignOrder
     collected: Collected
     seeds: Seeds
-    shard: Shard = WHOLE
+    shard: Shard = _WHOLE
 
     def __post_init__(self) -> None:
-        if (runs := len(self.seeds) * len(self.collected.tests)) > MOST:
-            raise Refusal(f"--seeds {self.seeds}: that makes {runs} runs; {MOST} are the most")
+        if (runs := len(self.seeds) * len(self.collected.tests)) > _MOST:
+            raise CampaignRefusal(
+                f"--seeds {self.seeds}: that makes {runs} runs; {_MOST} are the most"
+            )
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -101,7 +171,7 @@ class Plan:
         words += ["--bench-seed", str(self.run(number).seed)]
         for name, value in test.values.items():
             words += ["--bench-param", f"{name}={value}"]
-        return shlex.join([*words, "--bench-artifacts", KEPT])
+        return shlex.join([*words, "--bench-artifacts", _KEPT])
 
     @property
     def head(self) -> dict[str, str | list[str]]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.emulators.testing.campaign.order import Refusal, Verdict
-from tickrig.emulators.testing.campaign.plan import Plan
+from tickrig.emulators.testing.campaign.order import CampaignRefusal, RunVerdict
+from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds
 from tickrig.emulators.testing.report.overview import natural
+from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
 
 FIRST: Final = ("test", "seed")
@@ -20,7 +22,7 @@ PARQUET: Final = ".parquet"
 WELL: Final = ("passed", "skipped")
 
 
-class Row(NamedTuple):
+class CampaignRow(NamedTuple):
     """A run.
 
     Attributes:
@@ -48,7 +50,7 @@ class Row(NamedTuple):
         return (self.test, self.seed, *self.values, *self[3:])
 
 
-class Table(NamedTuple):
+class CampaignTable(NamedTuple):
     """All runs, by test and seed.
 
     Attributes:
@@ -57,7 +59,7 @@ class Table(NamedTuple):
     """
 
     parameters: tuple[str, ...]
-    rows: Sequence[Row]
+    rows: Sequence[CampaignRow]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -65,22 +67,22 @@ class Table(NamedTuple):
         return (*FIRST, *self.parameters, *LAST)
 
 
-def table_of(plan: Plan, verdicts: Iterable[Verdict]) -> Table:
+def table_of(plan: CampaignPlan, verdicts: Iterable[RunVerdict]) -> CampaignTable:
     """Return the table of runs that are done."""
-    return Table(plan.parameters, _sorted(_row(plan, verdict) for verdict in verdicts))
+    return CampaignTable(plan.parameters, _sorted(_row(plan, verdict) for verdict in verdicts))
 
 
-def _row(plan: Plan, verdict: Verdict) -> Row:
+def _row(plan: CampaignPlan, verdict: RunVerdict) -> CampaignRow:
     number, outcome, virtual_us, where, reason = verdict
     run, values = plan.run(number), plan.values(number)
     replay = "" if outcome in WELL else plan.command(number)
-    return Row(run.nodeid, run.seed, values, outcome, virtual_us, where, reason, replay)
+    return CampaignRow(run.nodeid, run.seed, values, outcome, virtual_us, where, reason, replay)
 
 
-def _sorted(rows: Iterable[Row]) -> list[Row]:
+def _sorted(rows: Iterable[CampaignRow]) -> list[CampaignRow]:
     places: dict[str, tuple[object, object, str]] = {}
 
-    def place(row: Row) -> tuple[object, int]:
+    def place(row: CampaignRow) -> tuple[object, int]:
         if row.test not in places:
             test, _, values = row.test.partition("[")
             places[row.test] = (natural(test), _by_value(values), row.test)
@@ -95,7 +97,7 @@ def _by_value(values: str) -> list[tuple[float, str]]:
     return [(float(each), "") if each[:1].isdecimal() else (-1, each) for each in pieces]
 
 
-def write_table(table: Table, path: Path) -> None:
+def write_table(table: CampaignTable, path: Path) -> None:
     """Write it, as Parquet or CSV by the suffix; the file is there whole or as it was.
 
     Raises:
@@ -115,7 +117,7 @@ def write_table(table: Table, path: Path) -> None:
     write_whole(path, text.getvalue())
 
 
-def read_table(path: Path) -> Table:
+def read_table(path: Path) -> CampaignTable:
     """Read what `write_table` wrote.
 
     Raises:
@@ -132,42 +134,107 @@ def read_table(path: Path) -> Table:
         with path.open(encoding="utf-8", newline="") as file:
             return _table(path, csv.reader(file, strict=True))
     except (UnicodeDecodeError, csv.Error) as error:
-        raise Refusal(f"{path} is no table of a campaign: {error}") from None
+        raise CampaignRefusal(f"{path} is no table of a campaign: {error}") from None
 
 
-def _table(path: Path, lines: Iterable[Sequence[str]]) -> Table:
+def _table(path: Path, lines: Iterable[Sequence[str]]) -> CampaignTable:
     numbered = enumerate(lines, 1)
     _, columns = next(numbered, (1, ()))
     if tuple(columns[:2]) != FIRST or tuple(columns[-len(LAST) :]) != LAST:
-        raise Refusal(f"{path} is no table of a campaign: its columns are {', '.join(columns)}")
-    return Table(tuple(columns[2 : -len(LAST)]), list(_rows(path, len(columns), numbered)))
+        raise CampaignRefusal(
+            f"{path} is no table of a campaign: its columns are {', '.join(columns)}"
+        )
+    return CampaignTable(tuple(columns[2 : -len(LAST)]), list(_rows(path, len(columns), numbered)))
 
 
-def _rows(path: Path, width: int, lines: Iterator[tuple[int, Sequence[str]]]) -> Iterator[Row]:
+def _rows(
+    path: Path, width: int, lines: Iterator[tuple[int, Sequence[str]]]
+) -> Iterator[CampaignRow]:
     for number, cells in lines:
         seed, virtual = (cells[1], cells[1 - len(LAST)]) if len(cells) == width else ("", "")
         if not (seed.isdecimal() and virtual.isdecimal()):
-            raise Refusal(f"{path}:{number}: no row of a campaign: {','.join(cells)[:60]}")
+            raise CampaignRefusal(f"{path}:{number}: no row of a campaign: {','.join(cells)[:60]}")
         values, (outcome, _, *ended) = tuple(cells[2 : -len(LAST)]), cells[-len(LAST) :]
-        yield Row(cells[0], int(seed), values, outcome, int(virtual), *ended)
+        yield CampaignRow(cells[0], int(seed), values, outcome, int(virtual), *ended)
 
 
-def merge_tables(tables: Sequence[tuple[Path, Table]]) -> Table:
+def merge_tables(tables: Sequence[tuple[Path, CampaignTable]]) -> CampaignTable:
     """Join the tables of shards; a run that is in several counts once.
 
     Raises:
         Refusal: their columns differ, or a run has ended otherwise in two.
     """
     first, table = tables[0]
-    rows: dict[tuple[str, int], tuple[Row, Path]] = {}
+    rows: dict[tuple[str, int], tuple[CampaignRow, Path]] = {}
     for path, other in tables:
         if other.columns != table.columns:
             ours, theirs = (", ".join(t.parameters) or "none" for t in (table, other))
-            raise Refusal(f"{path} has the parameters {theirs}; {first} has {ours}")
+            raise CampaignRefusal(f"{path} has the parameters {theirs}; {first} has {ours}")
         for row in other.rows:
             before, where = rows.setdefault((row.test, row.seed), (row, path))
             if before != row:
                 run = f"{row.test} with seed {row.seed}"
                 ended = f"{before.outcome} in {where}, {row.outcome} in {path}"
-                raise Refusal(f"{run} is not the same in two tables: {ended}")
-    return Table(table.parameters, _sorted(row for row, _ in rows.values()))
+                raise CampaignRefusal(f"{run} is not the same in two tables: {ended}")
+    return CampaignTable(table.parameters, _sorted(row for row, _ in rows.values()))
+
+
+# What a campaign found, for people.
+
+_ORDER: Final = ("passed", "failed", "error", "blocked", "hung", "died", "skipped")
+_COMMANDS: Final = 10
+"""So many commands are shown for each way to fail; the table has them all."""
+
+_MOST: Final = 120
+"""Characters of a reason."""
+
+_LISTED: Final = 200
+"""Characters of seeds that are listed."""
+
+
+def summary(table: CampaignTable, file: str) -> Iterator[str]:
+    """Give the lines: how many ended how, and of what did not pass why, where, and the commands.
+
+    Args:
+        table: the runs.
+        file: the name of the table.
+    """
+    counts = Counter(row.outcome for row in table.rows)
+    ended = ", ".join(f"{counts[name]} {name}" for name in _ORDER if counts[name])
+    yield f"{file}: {counted(len(table.rows), 'run')}, {ended or 'none'}"
+    of = Counter(row.test for row in table.rows)
+    for (test, outcome, where), rows in _alike(table.rows).items():
+        reason = rows[0].reason if len(rows[0].reason) <= _MOST else f"{rows[0].reason[:_MOST]}..."
+        yield ""
+        yield f"{test}: {len(rows)} of {of[test]} {outcome}"
+        yield f"  {where}: {reason}" if where else f"  {reason}"
+        yield f"  seeds {_seeds(rows)}"
+        yield from (f"  {row.replay}" for row in rows[:_COMMANDS])
+        if len(rows) > _COMMANDS:
+            yield f"  ... and {len(rows) - _COMMANDS} more in the column replay"
+
+
+def _alike(rows: Sequence[CampaignRow]) -> dict[tuple[str, str, str], list[CampaignRow]]:
+    """Return the runs that did not pass, by test, outcome and place."""
+    alike: dict[tuple[str, str, str], list[CampaignRow]] = {}
+    for row in rows:
+        if row.outcome not in WELL:
+            alike.setdefault((row.test, row.outcome, row.where), []).append(row)
+    return alike
+
+
+def _seeds(rows: Sequence[CampaignRow]) -> str:
+    text = str(Seeds.of_ranges([(row.seed, row.seed) for row in rows]))
+    cut = text if len(text) <= _LISTED else text[:_LISTED].rpartition(",")[0] + ",..."
+    return f"{cut} ({len(rows)})"
+
+
+def missing_seeds(table: CampaignTable) -> Iterator[str]:
+    """Say of each test between which seeds runs are missing: a shard that was forgotten."""
+    tests: dict[str, list[int]] = {}
+    for row in table.rows:
+        tests.setdefault(row.test, []).append(row.seed)
+    for test, seeds in tests.items():
+        first, last = min(seeds), max(seeds)
+        if missing := last - first + 1 - len(seeds):
+            yield f"{test}: {missing} of the seeds {first}-{last} are missing: is a shard?"

@@ -24,22 +24,28 @@ from typing import Final
 
 import pytest
 
-from tickrig.emulators.testing.campaign.order import Collected, CollectedTest, Order, Run, Verdict
+from tickrig.emulators.testing.campaign.order import (
+    CampaignOrder,
+    Collected,
+    CollectedTest,
+    Run,
+    RunVerdict,
+)
 from tickrig.emulators.testing.plugin import pytest_plugin
-from tickrig.emulators.testing.plugin.evidence.outcome import outcome_of
+from tickrig.emulators.testing.plugin.failure_report import outcome_of
 from tickrig.emulators.testing.plugin.parameters import words_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.plugin.warm_up import SNAPSHOTS
 from tickrig.emulators.testing.report.bench_report import Outcome
 
-IDLE_S: Final = 60.0
+_IDLE_S: Final = 60.0
 """Who asks for nothing for so long has forgotten the worker; another one is started when needed."""
 
-MOST: Final = 300
+_MOST: Final = 300
 """Characters of a reason."""
 
-REPORTER: Final = "terminalreporter"
+_REPORTER: Final = "terminalreporter"
 """The name of the plug-in that writes to the terminal."""
 
 _ADDRESS: Final = re.compile(r"\b0x[0-9a-f]{8,16}\b")
@@ -53,7 +59,7 @@ class Worker:
         order: what was asked for.
     """
 
-    def __init__(self, conn: Connection, order: Order) -> None:
+    def __init__(self, conn: Connection, order: CampaignOrder) -> None:
         self._conn, self._order = conn, order
         self._reports: list[pytest.TestReport] = []
         self.refusal = ""
@@ -62,9 +68,9 @@ class Worker:
     @pytest.hookimpl(trylast=True)
     def pytest_configure(self, config: pytest.Config) -> None:
         """Show nothing; pytest up to 9.0 needs a reporter to explain what `assert` compared."""
-        config.pluginmanager.unregister(name=REPORTER)
+        config.pluginmanager.unregister(name=_REPORTER)
         self._silent = pytest.TerminalReporter(config, open(os.devnull, "w"))  # noqa: SIM115
-        config.pluginmanager.register(self._silent, REPORTER)
+        config.pluginmanager.register(self._silent, _REPORTER)
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         """Note the first file that cannot be collected."""
@@ -85,7 +91,7 @@ class Worker:
         self._conn.send(collected(session))
         self.ready, sys.stderr = True, open(os.devnull, "w")  # noqa: SIM115 - to the end
         with contextlib.suppress(EOFError):
-            while self._conn.poll(IDLE_S):
+            while self._conn.poll(_IDLE_S):
                 for run in self._conn.recv():
                     self._conn.send(self._run(items[run.nodeid], run))
         return True
@@ -94,7 +100,7 @@ class Worker:
         """Note how a phase of the test ended."""
         self._reports.append(report)
 
-    def _run(self, item: pytest.Item, run: Run) -> Verdict:
+    def _run(self, item: pytest.Item, run: Run) -> RunVerdict:
         """Run a test as if it were alone; what belongs to the session stays."""
         settings = item.config.stash[SETTINGS]
         item.config.stash[SETTINGS] = settings._replace(seed=run.seed)
@@ -108,12 +114,12 @@ class Worker:
         except pytest.exit.Exception as error:
             item.session._setupstate.teardown_exact(None)
             item._request = False  # type: ignore[attr-defined] # its fixtures are made again
-            return Verdict(run.number, Outcome.ERROR.value, reason=one_line(f"exit: {error}"))
+            return RunVerdict(run.number, Outcome.ERROR.value, reason=_one_line(f"exit: {error}"))
         outcome, reason, _ = outcome_of(item, self._reports)
         where = "" if outcome is Outcome.PASSED else _where(item, self._reports)
         test = item.stash.get(BENCHED, None)
         now_us = test.bench.now_us if test is not None and test.bench is not None else 0
-        return Verdict(run.number, outcome.value, now_us, where, one_line(reason))
+        return RunVerdict(run.number, outcome.value, now_us, where, _one_line(reason))
 
 
 def _where(item: pytest.Item, reports: list[pytest.TestReport]) -> str:
@@ -127,14 +133,14 @@ def _where(item: pytest.Item, reports: list[pytest.TestReport]) -> str:
     return f"{shown}:{crash.lineno}"
 
 
-def one_line(reason: str) -> str:
+def _one_line(reason: str) -> str:
     """Return a reason that is the same in each process: no address, and no end of a line.
 
-    >>> one_line("<Lamp object at 0x7f3d9cdb2d10> is dark")
+    >>> _one_line("<Lamp object at 0x7f3d9cdb2d10> is dark")
     '<Lamp object at 0x...> is dark'
     """
     text = " ".join(_ADDRESS.sub("0x...", reason).split())
-    return text if len(text) <= MOST else f"{text[: MOST - 3]}..."
+    return text if len(text) <= _MOST else f"{text[: _MOST - 3]}..."
 
 
 def collected(session: pytest.Session) -> Collected:
@@ -171,7 +177,7 @@ def _digest(config: pytest.Config, items: list[pytest.Item]) -> str:
 def main(conn: Connection, alive: int) -> None:
     """Do what is asked over a pipe."""
     threading.Thread(target=_end_with, args=(alive,), daemon=True).start()
-    order: Order = conn.recv()
+    order: CampaignOrder = conn.recv()
     worker, said = Worker(conn, order), io.StringIO()
     plugins: list[object] = [worker]
     if not any(point.name == "tickrig" for point in entry_points(group="pytest11")) or (

@@ -9,30 +9,25 @@ from typing import Final
 
 import click
 
-from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.transcript import STATE
+from tickrig.emulators.bench.running_emulator import STATE, RunningEmulator
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import read_signal
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import ScenarioParser, ScenarioStep
+from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.journal import line_text
-from tickrig.emulators.testing.bench.modes.real.outside import Outside
+from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
-from tickrig.emulators.testing.bench.plan_parts import parts_of
-from tickrig.emulators.testing.bench.plan_rig import rig_of
-from tickrig.emulators.testing.rig_file.plan import RigPlan
-from tickrig.emulators.testing.rig_file.summary import bus_text, device_text
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of
+from tickrig.emulators.testing.rig_file.plan import RigPlan, bus_text, device_text
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
 
-ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
-NOWHERE: Final = "-"
+_ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
+_NOWHERE: Final = "-"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +54,7 @@ class BenchRun(EmulatorRun):
     def __init__(self, plan: RigPlan, options: BenchOptions) -> None:
         super().__init__(options, in_real_time=not options.virtual)
         self._plan, self._options = plan, options
-        self._outside: Outside | None = None
+        self._outside: OutsideEnds | None = None
         self._mounts: list[Mount] = []
         self._is_over = False
 
@@ -78,9 +73,9 @@ class BenchRun(EmulatorRun):
         except OSError as error:
             refuse_path("trace", error)
 
-    def _open_outside(self, stack: ExitStack) -> Outside:
+    def _open_outside(self, stack: ExitStack) -> OutsideEnds:
         try:
-            outside = Outside(self._mounts, self._plan.real)
+            outside = OutsideEnds(self._mounts, self._plan.real)
         except PortGone as error:
             raise Refused(str(error)) from None
         except OSError as error:
@@ -94,7 +89,9 @@ class BenchRun(EmulatorRun):
                     port.watch_setting(mount.settings.baud, _setting_shown(mount))
         return outside
 
-    def _attend(self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]) -> Player | None:
+    def _attend(
+        self, bench: RunningEmulator, scenario: tuple[ScenarioStep, ...]
+    ) -> ScenarioPlayer | None:
         options = self._options
         if options.for_us is not None:
             bench.event_queue.put(self, options.for_us, lambda now_us: self._end(bench))
@@ -124,8 +121,8 @@ class BenchRun(EmulatorRun):
             else "Add --control PATH to press buttons and make faults."
         )
         for mount in self._mounts:
-            if isinstance(mount, BusMount) and self._place(mount) == NOWHERE:
-                say(ALONE.format(wire=mount.name))
+            if isinstance(mount, BusMount) and self._place(mount) == _NOWHERE:
+                say(_ALONE.format(wire=mount.name))
 
     def _row(self, mount: Mount) -> tuple[str, ...]:
         """Return the name of a wire, where it is, what it is, and which devices are on it."""
@@ -141,7 +138,7 @@ class BenchRun(EmulatorRun):
         door = self._plan.real.doors.get(mount.name)
         if isinstance(mount, BusMount):
             bus = door.bus if door else None
-            return bus_text(bus) if bus else NOWHERE
+            return bus_text(bus) if bus else _NOWHERE
         ports = self._outside.ports[mount.name] if self._outside else []
         pty = door.link if door and door.link else None
         return " ".join(

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import PATH, VERSION, time_option
-from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.campaign.table import Table
+    from tickrig.emulators.testing.campaign.table import CampaignTable
 
-RUN: Final = "run"
-OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
-NOT_PASSED: Final = 1
+_RUN: Final = "run"
+_OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
+_NOT_PASSED: Final = 1
 
 
 class CampaignGroup(click.Group):
@@ -26,13 +25,13 @@ class CampaignGroup(click.Group):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the words behind the command; those that name no command are for `run`."""
         if args and args[0] not in (*self.commands, *ctx.help_option_names):
-            args = [RUN, *args]
+            args = [_RUN, *args]
         return super().parse_args(ctx, args)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[Any]:
         """Complete commands, and what `run` takes."""
-        run = self.commands[RUN]
-        with run.make_context(RUN, [], parent=ctx, resilient_parsing=True) as own:
+        run = self.commands[_RUN]
+        with run.make_context(_RUN, [], parent=ctx, resilient_parsing=True) as own:
             return [
                 *super().shell_complete(ctx, incomplete),
                 *run.shell_complete(own, incomplete),
@@ -56,7 +55,7 @@ def campaign() -> None:
     """  # noqa: D301 - click wants the backspace
 
 
-@campaign.command(RUN)
+@campaign.command(_RUN)
 @click.argument("tests", nargs=-1, required=True, type=click.Path())
 @click.option("--seeds", required=True, help="As 0-9999, or 3,17,100-199.")
 @click.option(
@@ -68,7 +67,7 @@ def campaign() -> None:
 )
 @click.option("--shard", default="1/1", metavar="K/N", help="Do the K-th of N parts of the runs.")
 @click.option(
-    "-o", "--output", "outputs", multiple=True, type=PATH, help=OUTPUT + "  [campaign.csv]"
+    "-o", "--output", "outputs", multiple=True, type=PATH, help=_OUTPUT + "  [campaign.csv]"
 )
 @click.option("-j", "--workers", type=click.IntRange(1, 1000), help="Processes.  [one a core]")
 @time_option("--timeout", "timeout_us", default="60s", help="What a run takes at most.  [60s]")
@@ -93,19 +92,19 @@ def run(context: click.Context, /, **options: Any) -> None:
             CampaignOptions,
             CampaignRun,
         )
-        from tickrig.emulators.testing.campaign.order import Refusal  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.campaign.order import CampaignRefusal  # noqa: PLC0415 - slow
 
     try:
         wanted = CampaignOptions(version=VERSION, **options)
         table = CampaignRun(wanted).run()
-    except Refusal as refusal:
+    except CampaignRefusal as refusal:
         raise Refused(str(refusal)) from None
     context.exit(_shown(table, wanted.output_paths[0]))
 
 
 @campaign.command()
 @click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=PATH)
-@click.option("-o", "--output", "outputs", multiple=True, required=True, type=PATH, help=OUTPUT)
+@click.option("-o", "--output", "outputs", multiple=True, required=True, type=PATH, help=_OUTPUT)
 @click.pass_context
 def merge(context: click.Context, tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
     """Join the tables of shards, and say what they found.
@@ -120,10 +119,10 @@ def merge(context: click.Context, tables: tuple[Path, ...], outputs: tuple[Path,
             check_outputs,
             write_outputs,
         )
-        from tickrig.emulators.testing.campaign.order import Refusal  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.campaign.summary import missing_seeds  # noqa: PLC0415
+        from tickrig.emulators.testing.campaign.order import CampaignRefusal  # noqa: PLC0415 - slow
         from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
             merge_tables,
+            missing_seeds,
             read_table,
         )
 
@@ -132,7 +131,7 @@ def merge(context: click.Context, tables: tuple[Path, ...], outputs: tuple[Path,
         check_arrow(tables)
         table = merge_tables([(path, read_table(path)) for path in tables])
         write_outputs(table, outputs)
-    except Refusal as refusal:
+    except CampaignRefusal as refusal:
         raise Refused(str(refusal)) from None
     except OSError as error:
         raise Refused(f"{error.filename}: {error.strerror}") from None
@@ -141,11 +140,13 @@ def merge(context: click.Context, tables: tuple[Path, ...], outputs: tuple[Path,
     context.exit(_shown(table, outputs[0]))
 
 
-def _shown(table: Table, path: Path) -> int:
+def _shown(table: CampaignTable, path: Path) -> int:
     """Show what was found; return the exit status."""
-    from tickrig.emulators.testing.campaign.summary import summary  # noqa: PLC0415 - slow
-    from tickrig.emulators.testing.campaign.table import WELL  # noqa: PLC0415
+    from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
+        WELL,
+        summary,
+    )
 
     for line in summary(table, str(path)):
         click.echo(line)
-    return 0 if all(row.outcome in WELL for row in table.rows) else NOT_PASSED
+    return 0 if all(row.outcome in WELL for row in table.rows) else _NOT_PASSED

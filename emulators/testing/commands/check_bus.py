@@ -15,7 +15,7 @@ from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
 from tickrig.host.canopen.data_sheet.rule import Severity
 from tickrig.host.canopen.master.cia402.bus_load import check_load
 
-MISTAKES: Final = 1
+_MISTAKES: Final = 1
 
 
 def check_bus(file: Path, *, strict: bool) -> int:
@@ -38,7 +38,7 @@ def check_bus(file: Path, *, strict: bool) -> int:
     severities = [one.rule.severity for one in found]
     warnings = severities.count(Severity.WARNING)
     if Severity.ERROR in severities or (strict and warnings):
-        return MISTAKES
+        return _MISTAKES
     click.echo("\n".join([f"{file}: {_verdict(warnings)}: {_head(bus)}", *_slaves(bus)]))
     return 0
 

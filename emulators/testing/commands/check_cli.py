@@ -12,10 +12,10 @@ from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading, raise_of_output
 
-MISTAKES: Final = 1
-UNREADABLE: Final = 2
-EDS_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
-LOOKED_AT: Final = 65_536
+_MISTAKES: Final = 1
+_UNREADABLE: Final = 2
+_EDS_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
+_LOOKED_AT: Final = 65_536
 """Bytes at its beginning by which a bus.yml is known."""
 
 
@@ -42,19 +42,19 @@ def check(context: click.Context, /, files: tuple[Path, ...], strict: bool) -> N
 
 def _check(file: Path, strict: bool) -> int:
     """Check a file, and return the exit status."""
-    if file.suffix.lower() in EDS_ENDINGS:
+    if file.suffix.lower() in _EDS_ENDINGS:
         say(f"Error: {file}: an EDS, no rig file or bus.yml; use: canmon eds check {file}")
-        return UNREADABLE
+        return _UNREADABLE
     kind = _kind(file)
     if "System Definition" in kind:
         say(f"Error: {file}: no rig file or bus.yml, but {kind}")
-        return UNREADABLE
+        return _UNREADABLE
     try:
         return _check_bus(file, strict) if kind else _check_rig(file)
     except OSError as error:
         raise_of_output(error)
         say(f"Error: {file}: {error.strerror}")
-        return UNREADABLE
+        return _UNREADABLE
 
 
 def _kind(file: Path) -> str:
@@ -64,7 +64,7 @@ def _kind(file: Path) -> str:
     with suppress(OSError):
         if file.is_file():
             with file.open("rb") as opened:
-                return check_of(opened.read(LOOKED_AT), file)
+                return check_of(opened.read(_LOOKED_AT), file)
     return ""
 
 
@@ -76,19 +76,19 @@ def _check_bus(file: Path, strict: bool) -> int:
         return check_bus(file, strict=strict)
     except ImportError as error:
         say(f"Error: {file}: {error}")
-        return UNREADABLE
+        return _UNREADABLE
 
 
 def _check_rig(file: Path) -> int:
     with loading():
+        from tickrig.emulators.testing.rig_file.plan import summary  # noqa: PLC0415
         from tickrig.emulators.testing.rig_file.reader import read_rig_file  # noqa: PLC0415 - slow
         from tickrig.emulators.testing.rig_file.section import RigFileError  # noqa: PLC0415
-        from tickrig.emulators.testing.rig_file.summary import summary  # noqa: PLC0415
 
     try:
         first, *wires = summary(read_rig_file(file))
     except RigFileError as error:
         click.echo(str(error))
-        return MISTAKES
+        return _MISTAKES
     click.echo("\n".join([f"{file}: ok: {first}", *wires]))
     return 0

@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.emulators.testing.commands.type_option import type_option
-from tickrig.host.cli.messages import say
+from tickrig.emulators.commands.run_options import type_option
+from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say
 from tickrig.host.cli.options import PATH, add_options, run_code_option, time_option
-from tickrig.host.cli.refused import Refused, refuse_path, refused_at
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
     from tickrig.emulators.commands.device_type import ConfiguredDevice
-    from tickrig.emulators.record.bench_replay import BenchRecording
-    from tickrig.emulators.record.tolerance import Tolerance
-    from tickrig.emulators.testing.commands.compare.compared_line import ComparedRun
+    from tickrig.emulators.record.comparison import Tolerance
+    from tickrig.emulators.record.replay import BenchRecording
+    from tickrig.emulators.testing.commands.compare import ComparedRun
 
-BIT_RATE: Final = 1_000_000
+_BIT_RATE: Final = 1_000_000
 
 _device: Final = add_options(
     type_option("Device type, if the trace has none."),
@@ -74,10 +73,10 @@ def compare_command(
     """  # noqa: D301 - click wants the backspace
     with loading():
         from tickrig.emulators.commands.run import mistakes_in  # noqa: PLC0415 - slow
-        from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
         from tickrig.emulators.record.comparison import compare  # noqa: PLC0415 - slow
+        from tickrig.emulators.record.replay import read_bench_recording  # noqa: PLC0415
         from tickrig.emulators.testing.bench.recorded_device import user_code  # noqa: PLC0415
-        from tickrig.emulators.testing.commands.compare.comparison_text import report  # noqa: PLC0415
+        from tickrig.emulators.testing.commands.compare import report  # noqa: PLC0415
 
     tolerance = _read_tolerance(options)
     try:
@@ -109,7 +108,7 @@ def _given_code(options: Mapping[str, Any]) -> list[str]:
 
 
 def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
-    from tickrig.emulators.record.tolerance import Tolerance, parse_number_rule  # noqa: PLC0415
+    from tickrig.emulators.record.comparison import Tolerance, parse_number_rule  # noqa: PLC0415
 
     with refused_at("--number"):
         numbers = [parse_number_rule(text) for text in options["numbers"]]
@@ -136,8 +135,10 @@ def _ticked(
     from tickrig.emulators.canopen.eds import EdsCache  # noqa: PLC0415 - slow
     from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice  # noqa: PLC0415
     from tickrig.emulators.testing.bench.recorded_device import make_recorded  # noqa: PLC0415
-    from tickrig.emulators.testing.commands.compare.compared_bus import compare_node_ticks  # noqa: PLC0415
-    from tickrig.emulators.testing.commands.compare.compared_line import compare_ticks  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare import (  # noqa: PLC0415
+        compare_node_ticks,
+        compare_ticks,
+    )
 
     header = recording.header
     entry, on_can = header.devices[name], header.on_can(name)
@@ -154,7 +155,7 @@ def _on_line(
     recording: BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> ComparedRun:
     """Compare what passed a serial port."""
-    from tickrig.emulators.testing.commands.compare.compared_line import compare_port  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare import compare_port  # noqa: PLC0415
 
     recorded = recording.header.devices[name].type
     if not (recorded or options["type_name"]):
@@ -171,15 +172,15 @@ def _on_bus(
 ) -> ComparedRun:
     """Compare what passed a bus."""
     from tickrig.emulators.canopen.build import describe_nodes, make_nodes  # noqa: PLC0415 - slow
-    from tickrig.emulators.canopen.node.node_spec import parse_node  # noqa: PLC0415
-    from tickrig.emulators.testing.commands.compare.compared_bus import compare_bus  # noqa: PLC0415
+    from tickrig.emulators.canopen.choices import parse_node  # noqa: PLC0415
+    from tickrig.emulators.testing.commands.compare import compare_bus  # noqa: PLC0415
 
     specs = [spec for text in options["nodes"] for spec in parse_node(text)]
     if not specs:
         raise ValueError("which nodes were on the bus? add --node, as --node 5=epos")
     described = describe_nodes(specs)
     wire = recording.header.wires[recording.header.devices[name].wire]
-    bit_rate = wire.config.get("bit_rate", BIT_RATE)
+    bit_rate = wire.config.get("bit_rate", _BIT_RATE)
     if not isinstance(bit_rate, int):
         raise ValueError(f"its bit rate is {bit_rate!r:.60}")
     return compare_bus(

@@ -8,12 +8,12 @@ from typing import Final
 
 import click
 
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
 
-RIG: Final = "rig.toml"
-STANDARD_OUTPUT: Final = "-"
+_RIG: Final = "rig.toml"
+_STANDARD_OUTPUT: Final = "-"
 
 
 def _complete_type(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
@@ -33,7 +33,7 @@ def _complete_type(context: click.Context, parameter: click.Parameter, begun: st
     shell_complete=_complete_type,
     help="Device type, CANopen model, EDS or DCF file, or FILE.py:Class; may be repeated.  [rrc]",
 )
-@click.option("-o", "--output", "file", type=PATH, default=RIG, help=f"File to write.  [{RIG}]")
+@click.option("-o", "--output", "file", type=PATH, default=_RIG, help=f"File to write.  [{_RIG}]")
 def init(types: tuple[str, ...], file: Path) -> None:
     """Write a rig file to begin with: devices, and all that can be said of them.
 
@@ -51,10 +51,10 @@ def init(types: tuple[str, ...], file: Path) -> None:
             rig_template,
         )
 
-    on_output = str(file) == STANDARD_OUTPUT
+    on_output = str(file) == _STANDARD_OUTPUT
     folder = Path() if on_output else file.parent
     try:
-        text = rig_template(types or ("rrc",), RIG if on_output else file.name, folder)
+        text = rig_template(types or ("rrc",), _RIG if on_output else file.name, folder)
     except TypeRefusedError as error:
         raise Refused(f"--device {error}") from None
     if on_output:

@@ -9,17 +9,17 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.emulators.serial.pty_port import PtyPort
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import ready
 from tickrig.host.links.recording_link import RecordingLink
 
-LOOK_S: Final = 0.05
+_LOOK_S: Final = 0.05
 """How often the tap looks whether it is to end."""
 
-STOPPED_S: Final = 0.5
+_STOPPED_S: Final = 0.5
 """A look that is later than this was not made in time: the process was stopped, or starved."""
 
-READ_BYTES: Final = 4_096
+_READ_BYTES: Final = 4_096
 
 
 class PortTap:
@@ -64,7 +64,7 @@ class PortTap:
         watched = [self._pty.fileno(), *([] if terminal is None else [terminal])]
         while not self._stopped and not self.gone:
             began_s = time.monotonic()
-            can_be_read, _ = ready(watched, wait_s=LOOK_S)
+            can_be_read, _ = ready(watched, wait_s=_LOOK_S)
             self._read_pty()
             if (
                 terminal is not None
@@ -72,7 +72,7 @@ class PortTap:
                 and not self._read_terminal(terminal)
             ):
                 watched.remove(terminal)
-            if (late_s := time.monotonic() - began_s - LOOK_S) > STOPPED_S:
+            if (late_s := time.monotonic() - began_s - _LOOK_S) > _STOPPED_S:
                 self._late(late_s)
         self._stopped = True
         reader.join()
@@ -85,7 +85,7 @@ class PortTap:
         """Hand on what the device says, in a thread of its own."""
         try:
             while not self._stopped:
-                if data := self._link.receive(round(LOOK_S * 1e6)):
+                if data := self._link.receive(round(_LOOK_S * 1e6)):
                     self.received += len(data)
                     with self._lock:
                         self._pty.send(0, data)
@@ -106,7 +106,7 @@ class PortTap:
     def _read_terminal(self, terminal: int) -> bool:
         """Take what was typed; False at its end."""
         try:
-            data = os.read(terminal, READ_BYTES)
+            data = os.read(terminal, _READ_BYTES)
         except OSError:  # it is gone, or this job is in the background
             data = b""
         *lines, self._line = (self._line + data).split(b"\n")

@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from tickrig.emulators.testing.commands.type_option import type_option
-from tickrig.host.cli.messages import say, warnings_shown
+from tickrig.emulators.commands.run_options import type_option
+from tickrig.host.cli.control import stopped_by_signals
+from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, warnings_shown
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path, refused_at
-from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
@@ -23,11 +22,11 @@ if TYPE_CHECKING:
     from tickrig.emulators.serial.pty_port import PtyPort
     from tickrig.host.links.recording_link import RecordingLink
 
-BAUD: Final = 115_200
-RESET: Final = "reset"
+_BAUD: Final = 115_200
+_RESET: Final = "reset"
 
-PORT_GONE: Final = 1
-RECORDING_ENDED: Final = 3
+_PORT_GONE: Final = 1
+_RECORDING_ENDED: Final = 3
 
 
 @click.command("record")
@@ -81,13 +80,13 @@ def record_command(  # noqa: PLR0913 - options
         say(f"the port is gone: {tap.gone}")
     if recorded.recording_error:
         say(f"the recording ended early: {recorded.recording_error}")
-    context.exit(RECORDING_ENDED if recorded.recording_error else PORT_GONE if tap.gone else 0)
+    context.exit(_RECORDING_ENDED if recorded.recording_error else _PORT_GONE if tap.gone else 0)
 
 
 def _known(type_name: str) -> tuple[int, Inputs | None]:
     """Return the baud rate and the inputs of a device type."""
     if not type_name:
-        return BAUD, None
+        return _BAUD, None
     from tickrig.emulators.commands.device_config import configure  # noqa: PLC0415 - slow
     from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
     from tickrig.host.text.names import near  # noqa: PLC0415
@@ -100,7 +99,7 @@ def _known(type_name: str) -> tuple[int, Inputs | None]:
 
 
 def _open_port(port: str, baud: int, out: Path, type_name: str) -> RecordingLink[bytes]:
-    from tickrig.host.links.errors import LinkClosed  # noqa: PLC0415 - slow
+    from tickrig.host.links.link import LinkClosed  # noqa: PLC0415 - slow
     from tickrig.host.links.recording_link import RecordingLink  # noqa: PLC0415
     from tickrig.host.links.serial_link import SerialLink  # noqa: PLC0415
 
@@ -154,7 +153,7 @@ def _typing(link: RecordingLink[bytes], inputs: Inputs | None) -> Callable[[str]
 
     def take(line: str) -> None:
         try:
-            if line == RESET:
+            if line == _RESET:
                 link.note_reset()
             elif line:
                 for name, value in _changes(line, inputs):

@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import PATH, run_code_option
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.values import counted, format_time
 
 if TYPE_CHECKING:
-    from tickrig.emulators.record.bench_replay import BenchRecording
-    from tickrig.emulators.record.replay_port import Difference
+    from tickrig.emulators.record.replay import BenchRecording, ReplayDifference
 
 
 @click.command("replay")
@@ -74,8 +73,10 @@ def _replay_host(file: Path, host: str) -> int:
     """Do a scenario again; return 1 if something is wrong."""
     with loading():
         from tickrig.emulators.testing.machine.bench_machine import BenchMachine  # noqa: PLC0415
-        from tickrig.emulators.testing.machine.host_runs import HostRuns  # noqa: PLC0415
-        from tickrig.emulators.testing.machine.step import parse_steps  # noqa: PLC0415
+        from tickrig.emulators.testing.machine.host_runs import (  # noqa: PLC0415
+            HostRuns,
+            parse_steps,
+        )
         from tickrig.host.text.user_file import find_class  # noqa: PLC0415
 
     try:
@@ -101,7 +102,7 @@ class _Played(NamedTuple):
     name: str
     type: str
     ticks: int
-    difference: Difference[Any] | None
+    difference: ReplayDifference[Any] | None
 
 
 def _replay(file: Path, data: bytes, run_code: bool) -> list[_Played]:
@@ -121,7 +122,7 @@ def _replay(file: Path, data: bytes, run_code: bool) -> list[_Played]:
 def _replay_bench(file: Path, data: bytes, run_code: bool) -> list[_Played]:
     """Replay each device of a bench."""
     with loading():
-        from tickrig.emulators.record.bench_replay import read_bench_recording  # noqa: PLC0415
+        from tickrig.emulators.record.replay import read_bench_recording  # noqa: PLC0415
 
     recording = read_bench_recording(data)
     if recording.at_port:
@@ -138,9 +139,9 @@ def _replay_bench(file: Path, data: bytes, run_code: bool) -> list[_Played]:
 
 def _differences(
     file: Path, recording: BenchRecording, run_code: bool
-) -> list[tuple[str, Difference[Any] | None]]:
+) -> list[tuple[str, ReplayDifference[Any] | None]]:
     from tickrig.emulators.canopen.eds import EdsCache  # noqa: PLC0415 - slow
-    from tickrig.emulators.record.bench_replay import replay_device  # noqa: PLC0415
+    from tickrig.emulators.record.replay import replay_device  # noqa: PLC0415
     from tickrig.emulators.testing.bench.recorded_device import (  # noqa: PLC0415
         make_recorded,
     )
@@ -164,7 +165,7 @@ def _warn(file: Path, *, ended: bool) -> None:
         click.echo(f"{file}: no end line (killed?); its last tick is left out", err=True)
 
 
-def _describe(name: str, difference: Difference[Any], file: Path) -> str:
+def _describe(name: str, difference: ReplayDifference[Any], file: Path) -> str:
     place = f" ({file}:{difference.line})" if difference.line else ""
     then, now = _text(difference.recorded), _text(difference.replayed)
     at = format_time(difference.at_us)

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:

@@ -16,20 +16,20 @@ from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.emulators.testing.rig_file.probe import Probe, probe
 from tickrig.host.text.names import SHOWN
 
-HEAD: Final = """\
+_HEAD: Final = """\
 # A rig file: what is on the bench. Lines behind a # are proposals.
 #   tickrig check {file}
 #   tickrig run {file}
 
 seed = 0                        # of all chance
 """
-BUS: Final = """\
+_BUS: Final = """\
 [wire.can0]
 type = "can"
 bitrate = {bit_rate}
 """
-BIT_RATE: Final = 1_000_000
-MOST_NODES: Final = 127
+_BIT_RATE: Final = 1_000_000
+_MOST_NODES: Final = 127
 _NO_NAME: Final = re.compile(r"\W+", re.ASCII)
 
 
@@ -50,10 +50,10 @@ def rig_template(types: Iterable[str], file: str, folder: Path) -> str:
     """
     made = list(_make(types, folder))
     nodes = [found for _, found in made if found.baud is None]
-    parts = [HEAD.format(file=file)]
+    parts = [_HEAD.format(file=file)]
     if nodes:
         rates = [each.bit_rate for each in nodes if each.bit_rate]
-        parts.append(BUS.format(bit_rate=rates[0] if rates else BIT_RATE))
+        parts.append(_BUS.format(bit_rate=rates[0] if rates else _BIT_RATE))
     parts += ["\n".join(_device_lines(*each)) for each in made]
     parts.append("\n".join(_fault_lines(made)))
     parts.append("\n".join(_safe_lines(made)))
@@ -92,7 +92,7 @@ def _name(given: str, taken: set[str]) -> str:
 
 def _free(node_id: int, taken: set[int]) -> int:
     while node_id in taken:
-        node_id = node_id % MOST_NODES + 1
+        node_id = node_id % _MOST_NODES + 1
     taken.add(node_id)
     return node_id
 

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import PATH, time_option
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import loading
 
-MISTAKES = 2
+_MISTAKES = 2
 
 
 @click.command()
@@ -75,7 +74,7 @@ def run(  # noqa: PLR0913 - options
         plan = read_rig_file(file)
     except RigFileError as error:
         say(str(error))
-        context.exit(MISTAKES)
+        context.exit(_MISTAKES)
     except OSError as error:
         refuse_path("file", error)
     plan = plan if seed is None else replace(plan, seed=seed)

@@ -2,24 +2,161 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.core.slave import CanopenSlave
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+from tickrig.device.canopen.dictionary import SdoAbort
+from tickrig.device.canopen.ds401 import Ds401
+from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.emulators.can.outside.host import CanHost
-from tickrig.emulators.testing.bench.bench_device import BenchDevice
+from tickrig.emulators.testing.bench.bench import Bench, BenchDevice
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.bench.mounts import BusMount
-from tickrig.emulators.testing.conformance.bench_stimulus import BenchStimulus
-from tickrig.emulators.testing.conformance.crash import Crashes, guarded
+from tickrig.emulators.testing.conformance.slave import Crashes, guarded
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, RigPlan
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.host.canopen.conform.bus.exchange import NotAllowed
 from tickrig.host.canopen.conform.conform_run import ConformRun
+from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_eds
+from tickrig.wire.errors import FieldError
 
-BOOT_US = 100_000
+# Moves the inputs of a slave of ours from the inside, in the words of the tester.
+
+_LINES: Final = 8
+"""`di1` is lines 1 to 8, `di2` those that follow."""
+
+_ANALOGUE: Final = 0x6401
+_INPUTS: Final = {0x6000: "di", _ANALOGUE: "ai"}
+"""Objects of CiA 401 that show what is at the inputs."""
+
+
+class SlaveStimulus:
+    """The hands at a slave.
+
+    Args:
+        slave: the slave; its supply is switched elsewhere.
+    """
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        self._slave, self._application = slave, Application.of(slave)
+
+    def __call__(self, *words: str) -> str:
+        """Do it, and return what was read; NotAllowed if the slave has nothing of the kind."""
+        slave, application = self._slave, self._application
+        match words:
+            case ("input", name, data) if ":" in name:
+                self._assign(name, bytes.fromhex(data))
+            case ("output", "time"):
+                time = slave.time_of_day
+                return "none" if time is None else f"{time.ms}.{time.days}"
+            case ("emergency", code, register):
+                slave.emergency(int(code, 16), int(register, 16))
+            case ("emergency-clear", code):
+                slave.emergency_clear(int(code, 16))
+            case ("node-id", node_id):
+                slave.configured_id = int(node_id, 16)
+            case ("fault", code) if isinstance(application, Ds402):
+                application.fault(int(code, 16))
+            case _ if isinstance(application, Ds401):
+                return _module(application, words)
+            case _:
+                raise _unknown(words)
+        return ""
+
+    def _assign(self, name: str, data: bytes) -> None:
+        """Write an object from the inside; one that shows inputs by moving these."""
+        index, sub = (int(part, 16) for part in name.split(":"))
+        if isinstance(self._application, Ds401) and index in _INPUTS:
+            value = int.from_bytes(data, "little", signed=index == _ANALOGUE)
+            text = f"{value}" if index == _ANALOGUE else f"{value:02X}"
+            _module(self._application, ("input", f"{_INPUTS[index]}{sub}", text))
+            return
+        entry = self._slave.dictionary.find(index, sub)
+        if entry is None:
+            raise NotAllowed(f"input {name}: the device has no such object")
+        try:
+            entry.data_type.decode(data)
+            entry.assign(data)
+        except (FieldError, SdoAbort) as error:
+            raise NotAllowed(f"input {name} {data.hex().upper()}: {error}") from None
+
+
+def _module(module: Ds401, words: tuple[str, ...]) -> str:
+    """Move lines, eight at once and in hex, and channels, in counts, of a CiA 401 module."""
+    try:
+        match words[0], words[1][:2], int(words[1][2:]), words[2:]:
+            case "input", "di", number, (data,):
+                for bit in range(_LINES):
+                    line = _LINES * (number - 1) + bit + 1
+                    module.inputs.set(f"di{line}", int(data, 16) >> bit & 1)
+            case "input", "ai", number, (data,):
+                _set_counts(module, number, int(data))
+            case "output", "do", number, ():
+                return f"{int(module.read('do')) >> _LINES * (number - 1) & 0xFF:02X}"
+            case "output", "ao", number, ():
+                return str(module.read(f"ao{number}"))
+            case _:
+                raise _unknown(words)
+    except (ValueError, KeyError) as error:
+        raise NotAllowed(f"{' '.join(words)}: {error}") from None
+    return ""
+
+
+def _set_counts(module: Ds401, number: int, counts: int) -> None:
+    """Let an analogue input have what its converter turns into these counts."""
+    found = (each.channel for each in module.analogue_inputs if each.number == number)
+    channel = next(found, None)
+    if channel is None:
+        raise ValueError(f"there is no analogue input {number}")
+    converter = channel.converter
+    value = converter.quantity(counts) if converter else counts
+    if converter and converter.counts(value) != counts:
+        raise ValueError(f"the converter of {channel.name} has no step of {counts} counts")
+    module.inputs.set(channel.name, value)
+
+
+def _unknown(words: tuple[str, ...]) -> NotAllowed:
+    return NotAllowed(f"{' '.join(words)}: the device has nothing of the kind")
+
+
+# Moves the inputs of a device on a bench.
+
+
+class BenchStimulus:
+    """The hands at a device of a bench in virtual time.
+
+    Args:
+        device: a CANopen node.
+        slave: what it is.
+    """
+
+    def __init__(self, device: BenchDevice, slave: CanopenSlave) -> None:
+        self._device, self._inside = device, SlaveStimulus(slave)
+
+    def __call__(self, *words: str) -> str:
+        """Do it, and return what was read."""
+        match words:
+            case ("power", "on"):
+                self._device.switch_on()
+            case ("power", "off"):
+                self._device.switch_off()
+            case _:
+                return self._inside(*words)
+        return ""
+
+
+_BOOT_US = 100_000
 """All nodes have booted by then."""
 
-Buses = dict[str, dict[str, CanopenSlave]]
+_Buses = dict[str, dict[str, CanopenSlave]]
 """The slaves on each CAN bus, by their names."""
 
 
@@ -40,7 +177,7 @@ def bench_source(
     """
     if not isinstance(mode, VirtualMode):
         raise ValueError("the bench is not in virtual time: canmon conform judges what is there")
-    mode.run_for(BOOT_US)
+    mode.run_for(_BOOT_US)
     buses = {bus: on for bus, on in mode.act(_slaves).items() if not device or device in on}
     if device and not buses:
         raise ValueError(f"{device} is no CANopen node")
@@ -64,7 +201,7 @@ def bench_source(
     )
 
 
-def _bus_of(buses: Buses, node_id: int | None, name: str) -> str:
+def _bus_of(buses: _Buses, node_id: int | None, name: str) -> str:
     """Return the bus on which a node is; that of the lowest node-ID if none is given."""
     nodes = sorted((slave.node_id, bus) for bus, on in buses.items() for slave in on.values())
     if not nodes:
@@ -83,7 +220,7 @@ def eds_of(slave: CanopenSlave, name: str) -> EdsFile:
     return EdsFile(name, write_eds(slave.dictionary.description))
 
 
-def _slaves(rig: BenchRig) -> Buses:
+def _slaves(rig: BenchRig) -> _Buses:
     """Return the slaves on each CAN bus, by their names."""
     return {
         mount.name: {name: node.slave for name, node in mount.nodes.items()}
@@ -115,3 +252,33 @@ def _mount(rig: BenchRig, bus: str) -> BusMount:
     mount = rig.state.mounts[bus]
     assert isinstance(mount, BusMount)
     return mount
+
+
+# Rig files as where `canmon conform` finds its node: in virtual time, without a bus outside.
+
+
+def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
+    """Open a rig file, whatever it says of real time.
+
+    Args:
+        path: of the file.
+        node_id: of the node whose bus it is; that of the first node if nobody says it.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: something is wrong in it, or no node of it has this node-ID.
+        Refused: a device cannot be made.
+    """
+    plan = read_rig_file(path)
+    bench = Bench.of_plan(plan)
+    source = bench_source(bench._mode, node_id, str(path))
+    files = dict(_eds_files(plan, source.nodes))
+    return replace(source, eds={**source.eds, **files}, close=bench.close)
+
+
+def _eds_files(plan: RigPlan, nodes: dict[int, str]) -> Iterator[tuple[int, EdsFile]]:
+    """Yield the files that nodes were made of: what they say is judged too."""
+    for node_id, name in nodes.items():
+        device = plan.devices[name]
+        if device.kind is DeviceKind.EDS:
+            yield node_id, open_eds(Path(device.type))

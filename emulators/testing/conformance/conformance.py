@@ -2,34 +2,163 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, cast
+from warnings import warn
 
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.emulators.testing.bench.bench_device import BenchDevice
-from tickrig.emulators.testing.conformance.bench_source import bench_source, eds_of
-from tickrig.emulators.testing.conformance.called_slave import CalledSlave
-from tickrig.emulators.testing.conformance.crash import guarded
-from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall, is_slave
-from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
-from tickrig.emulators.testing.conformance.slave_stimulus import SlaveStimulus
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.emulators.can.outside.host import CanHost
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
+from tickrig.emulators.testing.bench.bench import BenchDevice
+from tickrig.emulators.testing.conformance.bench_source import SlaveStimulus, bench_source, eds_of
+from tickrig.emulators.testing.conformance.slave import (
+    CalledSlave,
+    Crashes,
+    Slave,
+    SlaveCall,
+    checked_frames,
+    guarded,
+    is_slave,
+)
 from tickrig.host.canmon.conform.chosen import patterns, unknown
 from tickrig.host.canmon.conform.conform_source import ConformSource
 from tickrig.host.canmon.conform.consent import Consent
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canmon.conform.report_files import decoded_frames, file_text
+from tickrig.host.canopen.conform.bus.exchange import NotAllowed
+from tickrig.host.canopen.conform.check import ConformancePlan, Level, Stimulus
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan, Stimulus
+from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
+from tickrig.host.canopen.conform.report.report_json import report_json
+from tickrig.host.canopen.conform.report.text import text_report
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
+from tickrig.host.text.page_text import one_line
+from tickrig.host.text.whole_file import write_whole
+from tickrig.wire.can import Frames
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.instant import NEVER
+
+# A slave with a switch in its supply, for the stimulus `power`.
+
+
+class PoweredSlave:
+    """A slave that can be switched off and on.
+
+    What it raises is told, and then its program begins anew, as after a watchdog; one that cannot
+    is dead until the power is switched.
+
+    Args:
+        slave: what is judged; it is on.
+
+    Attributes:
+        on_crash: is told what it has raised.
+    """
+
+    def __init__(self, slave: Slave) -> None:
+        self.slave, self._on = slave, True
+        self._woken = self._dead = False
+        self.on_crash: Callable[[Exception], object] = lambda error: None
+
+    @property
+    def tick_us(self) -> int:
+        """That of the slave."""
+        return self.slave.tick_us
+
+    @property
+    def due_us(self) -> int:
+        """That of the slave, `NEVER` while it is off."""
+        if not self._on or self._dead:
+            return NEVER
+        return 0 if self._woken else self.slave.due_us
+
+    def reset(self) -> None:
+        """Lose and get back the power."""
+        self.slave.reset()
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Let the slave do what it does, if it is on."""
+        self._woken = False
+        if not self._on or self._dead:
+            return ()
+        try:
+            sent = self.slave.tick(now_us, rx)
+            return checked_frames(sent) if sent != () else sent
+        except Exception as error:
+            self._begin_anew(error)
+            return ()
+
+    def switch(self, *, on: bool) -> None:
+        """Switch the power; on when it is on does nothing."""
+        if on and not self._on:
+            self._reset()
+        self._on = on
+
+    def _begin_anew(self, error: Exception) -> None:
+        self.on_crash(error)
+        self._reset()
+
+    def _reset(self) -> None:
+        self._woken, self._dead = True, False
+        try:
+            self.slave.reset()
+        except Exception as error:
+            self._dead = True
+            self.on_crash(error)
+
+
+# A slave of anybody on a bus of its own, in virtual time.
+
+_BOOT_US = 100_000
+"""The slave has booted by then."""
+
+
+class SlaveBench:
+    """A slave and the tester on a bus.
+
+    Args:
+        slave: what is judged.
+        bit_rate: of the bus, 10 000 to 1 000 000 bit/s.
+        stimulus: moves its inputs; `power` never reaches it: the supply is switched here.
+
+    Attributes:
+        source: where the tester finds it.
+    """
+
+    def __init__(self, slave: Slave, bit_rate: int, stimulus: Stimulus | None = None) -> None:
+        self._slave, self._stimulus = PoweredSlave(slave), stimulus
+        wire = CanWire(bit_rate)
+        rig = Rig(Station(self._slave, wire.end()))
+        self.source = ConformSource(
+            CanHost(rig, wire.end()),
+            type(slave).__name__,
+            "a bus in virtual time",
+            bit_rate,
+            virtual=True,
+            stimulus=lambda node_id: guarded(self.stimulate),
+            watch=lambda node_id, run: crashes.watch(run.crash),
+        )
+        self._slave.on_crash = crashes = Crashes("your slave")
+        rig.run_for(_BOOT_US)
+
+    def stimulate(self, *words: str) -> str:
+        """Move an input, or switch the supply; NotAllowed if nobody can."""
+        if words[0] == "power":
+            self._slave.switch(on=words[1] == "on")
+            return ""
+        if self._stimulus is None:
+            raise NotAllowed(f"{' '.join(words)}: nobody moves the inputs of this slave")
+        return self._stimulus(*words)
+
 
 BIT_RATE: Final = 1_000_000
-NODE_IDS: Final = range(1, 128)
-LEVELS: Final = tuple(level.word for level in Level)
+_NODE_IDS: Final = range(1, 128)
+_LEVELS: Final = tuple(level.word for level in Level)
 
 Called = Callable[[], SlaveCall]
 Node = Slave | CanopenSlave | BenchDevice | Called
@@ -81,7 +210,7 @@ def conformance(  # noqa: PLR0913 - by keyword
     chosen_level, names = level_of(level), names_of(only)
     with closing(_source(node, node_id, bit_rate, stimulus)) as source:
         number = node_id_of(node, node_id)
-        plan = Plan(
+        plan = ConformancePlan(
             level=chosen_level,
             only=names,
             allow=frozenset(allow),
@@ -116,9 +245,9 @@ def _source(
 
 def level_of(word: str) -> Level:
     """Return a level; ValueError if it is none."""
-    if word not in LEVELS:
-        raise ValueError(f"level {word!r} is none of {', '.join(LEVELS)}")
-    return Level(LEVELS.index(word))
+    if word not in _LEVELS:
+        raise ValueError(f"level {word!r} is none of {', '.join(_LEVELS)}")
+    return Level(_LEVELS.index(word))
 
 
 def names_of(only: str | Iterable[str]) -> tuple[str, ...]:
@@ -135,10 +264,79 @@ def node_id_of(node: Node, node_id: int | None) -> int:
         node_id = int(node.get("node_id"))
     if node_id is None:
         node_id = getattr(node, "node_id", None)
-    if node_id is None or node_id not in NODE_IDS:
+    if node_id is None or node_id not in _NODE_IDS:
         raise ValueError(f"node_id is 1..127, not {node_id}; this slave does not tell it itself")
     return node_id
 
 
 def _eds(eds: Path | str | EdsFile | None) -> EdsFile | None:
     return open_eds(Path(eds)) if isinstance(eds, Path | str) else eds
+
+
+# A report as text and as files: what `canmon conform` writes, for who judges in a program.
+
+_KINDS: Final[Mapping[str, str]] = {
+    ".html": "--html",
+    ".xml": "--junit",
+    ".svg": "--badge",
+    ".md": "--issue",
+    ".txt": "--write-baseline",
+}
+JSON: Final = ".json"
+
+
+def conformance_text(report: Report, *, baseline: Path | str | None = None) -> str:
+    """Return a report as `canmon conform` prints it.
+
+    Args:
+        report: of `conformance`.
+        baseline: a file of known failures, which are named and not shown.
+
+    Raises:
+        OSError: the baseline cannot be read.
+        ValueError: it is none.
+    """
+    return text_report(report, known_failures(baseline), decoded_frames({}))
+
+
+def write_conformance(
+    report: Report, path: Path | str, *, baseline: Path | str | None = None
+) -> None:
+    """Write a report into a file, whole or not at all.
+
+    Args:
+        report: of `conformance`.
+        path: its ending says what is written: `.html` one page with all frames, `.xml` JUnit,
+            `.svg` a badge, `.md` the failures to file as issues, `.json`, or `.txt` the failures
+            as a baseline.
+        baseline: a file of known failures.
+
+    Raises:
+        OSError: a file cannot be written or read.
+        ValueError: another ending, or a baseline that is none.
+        ImportError: a page, and Jinja2 is not there (extra `report`).
+    """
+    known, ending = known_failures(baseline), Path(path).suffix
+    if ending == JSON:
+        text = report_json(report, known)
+    elif ending in _KINDS:
+        text = file_text(_KINDS[ending], report, known, decoded_frames({}))
+    else:
+        endings = ", ".join([*_KINDS, JSON])
+        raise ValueError(f"{path}: nobody knows what to write, its ending is none of {endings}")
+    write_whole(Path(path), text)
+
+
+def known_failures(path: Path | str | None) -> Baseline:
+    """Read a baseline, none without a file; an id in it that is no check is warned of.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is none.
+    """
+    if path is None:
+        return NONE_KNOWN
+    baseline = Baseline.read(Path(path))
+    for text in unknown(sorted(baseline.known)):
+        warn(one_line(f"baseline {path}: {text}"), stacklevel=3)
+    return baseline

@@ -10,33 +10,32 @@ from typing import Any, Final, cast
 
 import pytest
 
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked
 from tickrig.emulators.testing.conformance.bench_source import eds_of
-from tickrig.emulators.testing.conformance.called_slave import is_step
 from tickrig.emulators.testing.conformance.conformance import (
     Node,
     conformance,
+    known_failures,
     level_of,
     names_of,
     node_id_of,
 )
-from tickrig.emulators.testing.conformance.written import known_failures
-from tickrig.host.canmon.model.views.conform_frames import decoded_frames
-from tickrig.host.canopen.conform.notation.suite import suite_checks
-from tickrig.host.canopen.conform.objects.object_checks import object_checks
-from tickrig.host.canopen.conform.plan import Plan
+from tickrig.emulators.testing.conformance.slave import is_step
+from tickrig.host.canmon.conform.report_files import decoded_frames
+from tickrig.host.canopen.conform.check import ConformancePlan
+from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.report.baseline import Baseline
-from tickrig.host.canopen.conform.report.evidence import cut
-from tickrig.host.canopen.conform.report.hints import hint
-from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.canopen.conform.report.overview import cut, hint
+from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 
-MOST_LINES: Final = 60
-ANY_NODE_ID: Final = 1
+_MOST_LINES: Final = 60
+_ANY_NODE_ID: Final = 1
 """Names of checks do not depend on the node-ID."""
 
 Test = Callable[..., None]
@@ -76,7 +75,7 @@ def conformance_tests(
     >>> test_drive = conformance_tests(lambda: make_epos(5), only="NMT")
     """
     __tracebackhide__ = True
-    plan = Plan(level_of(level), names_of(only))
+    plan = ConformancePlan(level_of(level), names_of(only))
     known = open_eds(Path(eds)) if eds is not None else None
     given = options.get("node_id")
     if not isinstance(node, str) and (known is None or given is None):
@@ -84,7 +83,7 @@ def conformance_tests(
         node_id_of(made, given)
         known = known or _told_by(made)
     options |= {"eds": eds, "level": level}
-    objects = object_checks(read_device(known), ANY_NODE_ID) if known else ()
+    objects = object_checks(read_device(known), _ANY_NODE_ID) if known else ()
     known_to_fail = known_failures(baseline)
     names = [check.id for check in (*suite_checks(), *objects) if plan.chooses(check)]
     parametrised = pytest.mark.parametrize("check_id", names)
@@ -174,21 +173,23 @@ def _judge(report: Report, check_id: str, baseline: Baseline) -> None:
         raise BenchBlocked(report.aborted or f"{check_id} was not judged")
     verdict, reason = result.outcome.verdict, result.outcome.reason
     match verdict:
-        case Verdict.FAIL if baseline.knows(result):
+        case CheckVerdict.FAIL if baseline.knows(result):
             pytest.xfail(f"known: {reason}")
-        case Verdict.FAIL:
+        case CheckVerdict.FAIL:
             pytest.fail(_text(result, report.node_id), pytrace=False)
-        case Verdict.NOT_APPLICABLE:
+        case CheckVerdict.NOT_APPLICABLE:
             pytest.skip(reason)
-        case Verdict.INCONCLUSIVE | Verdict.BLOCKED:
-            raise BenchBlocked(reason if verdict is Verdict.BLOCKED else f"{verdict}: {reason}")
+        case CheckVerdict.INCONCLUSIVE | CheckVerdict.BLOCKED:
+            raise BenchBlocked(
+                reason if verdict is CheckVerdict.BLOCKED else f"{verdict}: {reason}"
+            )
         case _:
             return
 
 
 def _text(result: Result, node_id: int) -> str:
     check = result.check
-    frames = cut(decoded_frames({})(result.outcome.evidence), MOST_LINES)
+    frames = cut(decoded_frames({})(result.outcome.evidence), _MOST_LINES)
     where = [f"look at {text}"] if (text := hint(result)) else []
     head = f"{check.id}: {check.title}"
     return "\n".join([result.outcome.reason, head, check.source, *frames, *where])

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import linecache
+from collections.abc import Callable, Iterable, Iterator
+from inspect import signature
+from pathlib import Path
+from traceback import walk_tb
 from typing import Final, Protocol, TypeGuard
 
-from tickrig.wire.can import Frames
+from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed
+from tickrig.host.canopen.conform.check import Stimulus
+from tickrig.host.canopen.conform.conform_run import Crash
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.errors import FieldError
 
 TICK_US: Final = 1_000
 
@@ -50,10 +58,186 @@ class Slave(Protocol):
 SlaveCall = Callable[[int, Frames], Frames]
 """The `tick` of a slave alone, called each millisecond."""
 
-MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
+_MEMBERS: Final = ("tick", "due_us", "tick_us", "reset")
 """What a `Slave` has."""
 
 
 def is_slave(node: object) -> TypeGuard[Slave]:
     """Say whether a node has the members of a `Slave`, by `__getattr__` too."""
-    return all(hasattr(node, name) for name in MEMBERS)
+    return all(hasattr(node, name) for name in _MEMBERS)
+
+
+# A slave of a callable: what makes it at each power-on, or what is wrong with that.
+
+STEP: Final = (0, ())
+"""A time and frames."""
+_EXAMPLE: Final = "what makes the slave at each power-on, as `lambda: Mini(5).step`"
+
+
+class NoFrames(Exception):  # noqa: N818 - what the slave has returned
+    """What a slave has returned cannot go onto a bus; the text says what it was."""
+
+
+class CalledSlave:
+    """A slave of a callable: it is called each millisecond.
+
+    Args:
+        make: makes the callable, fresh from power-on; called once more at each power-on.
+
+    Raises:
+        ValueError: it makes none.
+    """
+
+    tick_us: int = TICK_US
+
+    def __init__(self, make: Callable[[], SlaveCall]) -> None:
+        if not callable(make):
+            raise ValueError(_no_slave(make))
+        if is_step(make):
+            raise ValueError(f"{_name(make)} takes a time and frames: give {_EXAMPLE}")
+        call = make()
+        if is_slave(call):
+            raise ValueError(f"{_name(make)} makes a slave: give the slave itself")
+        if not _takes(call, *STEP):
+            given = f"{_name(make)} makes {_name(call)}"
+            raise ValueError(f"{given}, which takes no time and frames: give {_EXAMPLE}")
+        self._make, self._call, self.due_us = make, call, 0
+
+    def reset(self) -> None:
+        """Make it anew."""
+        self._call, self.due_us = self._make(), 0
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Call it."""
+        self.due_us = now_us + self.tick_us
+        return self._call(now_us, rx)
+
+
+def is_step(node: object) -> bool:
+    """Say whether it is what is called each millisecond, not what makes it."""
+    return not is_slave(node) and _takes(node, *STEP) and not _takes(node)
+
+
+def checked_frames(sent: object) -> Frames:
+    """Return what a slave has sent, if that can go onto a bus.
+
+    Raises:
+        NoFrames: it cannot.
+    """
+    if isinstance(sent, CanFrame | str | bytes) or not isinstance(sent, Iterable):
+        raise NoFrames(f"returned {_short(sent)}, not a list of CanFrame")
+    frames = tuple(sent)
+    for frame in frames:
+        if not isinstance(frame, CanFrame):
+            raise NoFrames(f"returned {_short(frame)} where a CanFrame should be")
+        can_id, data, *_ = tuple[object, ...](frame)
+        if not (isinstance(can_id, int) and isinstance(data, bytes | bytearray)):
+            raise NoFrames(f"returned {_short(frame)}: can_id is an int, data are bytes")
+        try:
+            frame.checked()
+        except FieldError as error:
+            raise NoFrames(f"returned {_short(frame)}: {error}") from None
+    return frames
+
+
+def _takes(call: object, *given: object) -> bool:
+    """Say whether it can be called so; of what C has made nobody knows it."""
+    if not callable(call):
+        return False
+    try:
+        signature(call).bind(*given)
+    except TypeError:
+        return False
+    except ValueError:
+        return bool(given)
+    return True
+
+
+def _no_slave(node: object) -> str:
+    has = [name for name in _MEMBERS if hasattr(node, name)]
+    lacks = ", ".join(name for name in _MEMBERS if name not in has)
+    what = f"{_name(node)} is no slave: it has no {lacks}"
+    return what if has else f"{what}; give {_EXAMPLE}"
+
+
+def _name(thing: object) -> str:
+    return str(getattr(thing, "__qualname__", type(thing).__qualname__))
+
+
+def _short(thing: object) -> str:
+    text = repr(thing)
+    return text if len(text) <= _MOST else f"{text[:_MOST]}..."
+
+
+_MOST: Final = 120
+"""Characters of what a slave has returned."""
+
+
+# What the program of a slave, or the hands at it, have raised, in a line, and where.
+
+_OURS: Final = "tickrig."
+
+
+class Crashes:
+    """What a program raises: kept until somebody wants to be told.
+
+    Args:
+        who: whose program it is, for people.
+    """
+
+    def __init__(self, who: str) -> None:
+        self._who, self._kept = who, list[tuple[str, list[str]]]()
+        self._report: Crash = lambda reason, where: self._kept.append((reason, where))
+
+    def __call__(self, error: Exception) -> None:
+        """Take what it has raised."""
+        self._report(_crash_text(error, self._who), _crash_lines(error))
+
+    def watch(self, report: Crash) -> None:
+        """Tell of them from now on, and of those before."""
+        self._report = report
+        for reason, where in self._kept:
+            report(reason, where)
+
+
+def guarded(stimulus: Stimulus) -> Stimulus:
+    """Let a check be inconclusive when the hands at the inputs raise what they should not."""
+
+    def act(*words: str) -> str:
+        try:
+            return stimulus(*words)
+        except (ValueError, NotAllowed, StepFailed, Disturbed):
+            raise
+        except Exception as error:
+            raise Disturbed(_crash_text(error, "the stimulus")) from error
+
+    return act
+
+
+def _crash_text(error: Exception, who: str) -> str:
+    """Return what was raised, in a line.
+
+    >>> _crash_text(KeyError("x"), "your slave")
+    "your slave raised KeyError: 'x'"
+    """
+    if isinstance(error, NoFrames):
+        return f"{who} {error}"
+    kind = type(error)
+    name = kind.__name__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__name__}"
+    text = " ".join(str(error).split())
+    return f"{who} raised {name}: {text}" if text else f"{who} raised {name}"
+
+
+def _crash_lines(error: Exception) -> list[str]:
+    """Return the lines at which it was raised, outermost first, but for ours before its own."""
+    if isinstance(error, NoFrames):
+        return []
+    return list(_lines(error, _OURS)) or list(_lines(error, "no module"))
+
+
+def _lines(error: Exception, but_for: str) -> Iterator[str]:
+    for frame, line in walk_tb(error.__traceback__):
+        if not str(frame.f_globals.get("__name__", "")).startswith(but_for):
+            code = frame.f_code
+            text = linecache.getline(code.co_filename, line, frame.f_globals).strip()
+            yield f"{Path(code.co_filename).name}:{line} in {code.co_name}: {text}"

@@ -13,15 +13,15 @@ from threading import get_ident
 from typing import Any, Final, TypeVar, TypeVarTuple
 
 from tickrig.emulators.rig.sim_waits import Passing
-from tickrig.emulators.testing.host_clock.errors import HostTimeError
+from tickrig.emulators.testing.host_clock.host_code import HostTimeError
 
 T = TypeVar("T")
 Ts = TypeVarTuple("Ts")
 
-EXECUTOR_S: Final = 5.0
+_EXECUTOR_S: Final = 5.0
 """So long, in real time, a loop waits for a function that it runs in a thread."""
 
-Events = list[tuple[SelectorKey, int]]
+_Events = list[tuple[SelectorKey, int]]
 
 
 class BenchLoop(asyncio.SelectorEventLoop):
@@ -59,7 +59,7 @@ class BenchLoop(asyncio.SelectorEventLoop):
                 self._threads = ThreadPoolExecutor(thread_name_prefix="asyncio")
             executor = self._threads
         running = executor.submit(func, *args)
-        wait([running], EXECUTOR_S)
+        wait([running], _EXECUTOR_S)
         return asyncio.wrap_future(running, loop=self)
 
     def close(self) -> None:
@@ -115,9 +115,9 @@ class _PassingSelector(selectors.BaseSelector):
     def close(self) -> None:
         self._inner.close()
 
-    def select(self, timeout: float | None = None) -> Events:
+    def select(self, timeout: float | None = None) -> _Events:
         """Return what is there; if nothing is, let time pass until something is, or the timeout."""
-        found: Events = self._inner.select(0)
+        found: _Events = self._inner.select(0)
 
         def come() -> bool:
             found[:] = self._inner.select(0)

@@ -9,7 +9,22 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
-KEPT: Final = frozenset(
+# What is raised where a host deals with time as it cannot in virtual time.
+#
+# RuntimeError
+#   HostTimeError         it waits where nobody can make time pass
+#     UnpatchedTimeError  it waits for the clock of this machine
+
+
+class HostTimeError(RuntimeError):
+    """A host waits where nobody can make time pass."""
+
+
+class UnpatchedTimeError(HostTimeError):
+    """A host waits for the clock of this machine, or looks at it."""
+
+
+_KEPT: Final = frozenset(
     {
         *("tickrig", "serial", "can", "canopen"),
         *("pytest", "_pytest", "pluggy", "iniconfig", "xdist", "execnet"),
@@ -22,10 +37,10 @@ pyserial, python-can and canopen are on a rig by objects of ours (`SimSerial`, t
 `tickrig`, `SimNetwork`), which wait on it by themselves; on a real port they need real time.
 """
 
-KEPT_BEGINNINGS: Final = ("pytest_", "pydev", "_pydev")
+_KEPT_BEGINNINGS: Final = ("pytest_", "pydev", "_pydev")
 
-INSTALLED: Final = tuple(f"{os.sep}{name}{os.sep}" for name in ("site-packages", "dist-packages"))
-PYTHON: Final = tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdlib", "platstdlib"))
+_INSTALLED: Final = tuple(f"{os.sep}{name}{os.sep}" for name in ("site-packages", "dist-packages"))
+_PYTHON: Final = tuple(f"{sysconfig.get_path(name)}{os.sep}" for name in ("stdlib", "platstdlib"))
 
 
 @cache
@@ -40,15 +55,15 @@ def is_host(module: str, file: str) -> bool:
     (True, False)
     """
     package = module.partition(".")[0]
-    if package in KEPT or package.startswith(KEPT_BEGINNINGS) or file.startswith("<frozen"):
+    if package in _KEPT or package.startswith(_KEPT_BEGINNINGS) or file.startswith("<frozen"):
         return False
-    return is_installed(file) or not file.startswith(PYTHON)
+    return is_installed(file) or not file.startswith(_PYTHON)
 
 
 @cache
 def is_installed(file: str) -> bool:
     """Return whether a file is of an installed package."""
-    return any(folder in file for folder in INSTALLED)
+    return any(folder in file for folder in _INSTALLED)
 
 
 def package_of(frame: FrameType) -> str:

@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine
-from tickrig.emulators.testing.machine.host_runs import HostRuns
-from tickrig.emulators.testing.machine.step import HostStep, parse_steps
+from tickrig.emulators.testing.machine.host_runs import HostRuns, HostStep, parse_steps
 
-HEAD: Final = "# a scenario of {place}, {count}"
-REPLAY: Final = "put it into a file, and: tickrig replay FILE --host {place}"
-WANTED: Final = "a search wants Hypothesis: pip install 'tickrig[test]'"
+_HEAD: Final = "# a scenario of {place}, {count}"
+_REPLAY: Final = "put it into a file, and: tickrig replay FILE --host {place}"
+_WANTED: Final = "a search wants Hypothesis: pip install 'tickrig[test]'"
 
 
 def check_host(
@@ -56,7 +55,7 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
         import hypothesis  # noqa: PLC0415 - an extra
         from hypothesis import HealthCheck, Phase, given, settings  # noqa: PLC0415 - an extra
     except ImportError:
-        raise ModuleNotFoundError(WANTED, name="hypothesis") from None
+        raise ModuleNotFoundError(_WANTED, name="hypothesis") from None
     from tickrig.emulators.testing.machine import strategies  # noqa: PLC0415 - with it
 
     others: dict[str, Any] = {} if seed is None else {"database": None}
@@ -101,19 +100,19 @@ def replay_host(machine: type[BenchMachine], scenario: Path | str) -> None:
             raise
 
 
-def scenario_of(runs: HostRuns) -> str:
+def _scenario_of(runs: HostRuns) -> str:
     """Write the last run as a scenario."""
     done = runs.done
     count = f"{len(done)} step{'' if len(done) == 1 else 's'}"
-    head = HEAD.format(place=_place(type(runs.machine)), count=count)
+    head = _HEAD.format(place=_place(type(runs.machine)), count=count)
     return "\n".join([head, *map(str, done)])
 
 
 def note_of(runs: HostRuns) -> str:
     """Write the last run as a scenario, how it is replayed, and what passed last."""
-    replay = REPLAY.format(place=_place(type(runs.machine)))
+    replay = _REPLAY.format(place=_place(type(runs.machine)))
     passed = f"what passed last:\n{runs.last_lines()}"
-    return f"{scenario_of(runs)}\n\n{replay}\n\n{passed}"
+    return f"{_scenario_of(runs)}\n\n{replay}\n\n{passed}"
 
 
 def _place(machine: type) -> str:

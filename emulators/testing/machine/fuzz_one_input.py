@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz
+from tickrig.emulators.testing.fuzz import DeviceFuzz
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine
 from tickrig.emulators.testing.machine.check_host import note_of, search_of
 from tickrig.emulators.testing.machine.host_runs import HostRuns

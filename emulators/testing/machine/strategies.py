@@ -8,9 +8,8 @@ from typing import Any, Final
 from hypothesis import strategies as st
 
 from tickrig.emulators.testing.bench.bench import Bench
-from tickrig.emulators.testing.machine.bench_machine import BenchMachine
-from tickrig.emulators.testing.machine.step import SEED, HostStep
-from tickrig.emulators.testing.machine.world import World, WorldInput
+from tickrig.emulators.testing.machine.bench_machine import BenchMachine, World, WorldInput
+from tickrig.emulators.testing.machine.host_runs import SEED, HostStep
 from tickrig.emulators.testing.properties.strategies import (
     Act,
     Session,
@@ -39,15 +38,15 @@ __all__ = (
     "waits",
 )
 
-RATES: Final = ("1", "0.5", "0.1", "0.02", "0.003", "0.0003")
-SEEDS: Final = 9_999
-PRESSES: Final = ("10ms", "100ms", "500ms", "2s")
-WAITS_US: Final = (0, 0, 0, 1_000, 10_000, 50_000, 100_000, 300_000, 1_000_000, 3_000_000)
+_RATES: Final = ("1", "0.5", "0.1", "0.02", "0.003", "0.0003")
+_SEEDS: Final = 9_999
+_PRESSES: Final = ("10ms", "100ms", "500ms", "2s")
+_WAITS_US: Final = (0, 0, 0, 1_000, 10_000, 50_000, 100_000, 300_000, 1_000_000, 3_000_000)
 
 
 def timing() -> st.SearchStrategy[int]:
     """Draw how long nothing is done before a step, in microseconds: mostly nothing, up to 3 s."""
-    return st.sampled_from(WAITS_US)
+    return st.sampled_from(_WAITS_US)
 
 
 def faults(
@@ -93,7 +92,7 @@ def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
     def fault(draw: st.DrawFn) -> HostStep:
         wait_us = draw(timing())
         name = draw(st.sampled_from(list(world.faults)))
-        rate = f"={draw(st.sampled_from(RATES))}" if world.faults[name] else ""
+        rate = f"={draw(st.sampled_from(_RATES))}" if world.faults[name] else ""
         return HostStep(wait_us, "fault", name + rate, us_of(draw(st.sampled_from(for_))))
 
     return fault()
@@ -104,7 +103,7 @@ def _operator(world: World) -> st.SearchStrategy[HostStep]:
     def act(draw: st.DrawFn) -> HostStep:
         wait_us, item = draw(timing()), draw(st.sampled_from(world.inputs))
         if item.type == "button":
-            return HostStep(wait_us, "press", item.name, us_of(draw(st.sampled_from(PRESSES))))
+            return HostStep(wait_us, "press", item.name, us_of(draw(st.sampled_from(_PRESSES))))
         return HostStep(wait_us, "set", f"{item.name} {draw(_values(item))}")
 
     return act()
@@ -153,7 +152,9 @@ def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]
 
     drawn = st.lists(step(), max_size=most)
     return (
-        st.builds(_with_seed, drawn, st.integers(0, SEEDS)) if any(world.faults.values()) else drawn
+        st.builds(_with_seed, drawn, st.integers(0, _SEEDS))
+        if any(world.faults.values())
+        else drawn
     )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
 from copy import deepcopy
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from os.path import relpath
 from pathlib import Path
 from types import FunctionType
@@ -13,32 +14,37 @@ from typing import Any, Final, NamedTuple
 
 import pytest
 
+from tickrig.device.physical import SignalType
 from tickrig.emulators.commands.device_type import DeviceType
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import HARDWARE, Bench
 from tickrig.emulators.testing.bench.build import BenchedDevice, name_of, named_device
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.plugin.health import ERRORS, LOST
+from tickrig.emulators.testing.plugin.host_checks import CLOCK, THREADS
+from tickrig.emulators.testing.plugin.settings import MODES
 from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXES
 from tickrig.emulators.testing.rig_file.plan import RigPlan
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
+from tickrig.host.text.names import closest, known, near
 from tickrig.host.text.values import Setting
 
-Source = BenchedDevice | Mapping[str, Any] | Path
-BenchSource = Source | Callable[[], Source] | None
+_Source = BenchedDevice | Mapping[str, Any] | Path
+BenchSource = _Source | Callable[[], _Source] | None
 """A device or what makes one, arguments of `Bench` by name, or a rig file (`.toml`, `.yml`).
 
 A device may be a text too: what a rig file has as its `type`."""
 
-NO_DEVICES: Final = ("seed", "line", "mode")
+_NO_DEVICES: Final = ("seed", "line", "mode")
 """Arguments of `Bench` that are something else."""
 
-NO_DEVICE: Final = (str, int, Path, type, DeviceType, LineSettings, FunctionType, type(None))
+_NO_DEVICE: Final = (str, int, Path, type, DeviceType, LineSettings, FunctionType, type(None))
 
-USED: Final = pytest.StashKey[list[object]]()
+_USED: Final = pytest.StashKey[list[object]]()
 """The devices of the test before."""
 
 
-def fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
+def _fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
     """Return a source whose devices no other test has used.
 
     What stands in the parameters of a test is copied.
@@ -50,15 +56,15 @@ def fresh(item: pytest.Item, source: BenchSource) -> BenchSource:
     if params is not None and any(source is value for value in params.params.values()):
         return deepcopy(source)
     values = source.values() if isinstance(source, Mapping) else [source]
-    devices = [value for value in values if not isinstance(value, NO_DEVICE)]
-    before = item.config.stash.get(USED, [])
+    devices = [value for value in values if not isinstance(value, _NO_DEVICE)]
+    before = item.config.stash.get(_USED, [])
     if any(device is used for device in devices for used in before):
         raise ValueError("bench_config gives a device that a test has used: make one in each call")
-    item.config.stash[USED] = devices
+    item.config.stash[_USED] = devices
     return source
 
 
-class Wanted(NamedTuple):
+class WantedBench(NamedTuple):
     """What a test asked for.
 
     Attributes:
@@ -73,13 +79,13 @@ class Wanted(NamedTuple):
     seed: int | None
     folder: Path
 
-    def settled(self, item: pytest.Item) -> Wanted:
+    def settled(self, item: pytest.Item) -> WantedBench:
         """Return it with what is on the bench of this test itself: made, and of a whole path.
 
         Raises:
             ValueError: nothing is, or what another test has used.
         """
-        source = fresh(item, self.source)
+        source = _fresh(item, self.source)
         made = source() if callable(source) else source
         if made is None:
             raise ValueError(
@@ -127,7 +133,7 @@ class Wanted(NamedTuple):
         """What is on the bench, for people."""
         if isinstance(self.source, Path):
             return relpath(self.source)
-        names = [name for name in self._options if name not in NO_DEVICES]
+        names = [name for name in self._options if name not in _NO_DEVICES]
         return ", ".join(name or name_of(self._options[name]) for name in names)
 
     @property
@@ -136,7 +142,7 @@ class Wanted(NamedTuple):
         return self.source if isinstance(self.source, Mapping) else {"": self.source}
 
 
-def _placed(source: Source, folder: Path) -> Source:
+def _placed(source: _Source, folder: Path) -> _Source:
     """Return a source whose files are found beside the test.
 
     Raises:
@@ -144,14 +150,14 @@ def _placed(source: Source, folder: Path) -> Source:
     """
     if isinstance(source, Mapping):
         return {
-            name: value if name in NO_DEVICES else _placed_device(value, folder)
+            name: value if name in _NO_DEVICES else _placed_device(value, folder)
             for name, value in source.items()
         }
     if isinstance(source, Path) and source.suffix.lower() not in EDS_SUFFIXES:
         return folder / source
     if isinstance(source, str) and source.lower().endswith(RIG_SUFFIXES):
         return folder / source
-    placed: Source = _placed_device(source, folder)
+    placed: _Source = _placed_device(source, folder)
     return placed
 
 
@@ -176,3 +182,121 @@ def plan_of(path: Path) -> RigPlan:
 @lru_cache(maxsize=16)
 def _plan_of(path: Path, changed_ns: int) -> RigPlan:
     return read_rig_file(path)
+
+
+# What a test needs of its bench, and what of it is not there.
+
+ALLOWED: Final = (ERRORS, LOST, CLOCK, THREADS)
+HAND: Final = "hand"
+_OR: Final = " or "
+_MEANT: Final = "did you mean"
+_DIGIT: Final = re.compile("[0-9]")
+"""Names that differ in a number alone, as `arm1` and `arm2`, are of different things."""
+
+
+def _words_of(item: pytest.Item, marker: str) -> tuple[str, ...]:
+    """Return the words of all markers of a name, in the order of writing."""
+    marks = list(item.iter_markers(marker))[::-1]
+    return tuple(str(word) for mark in marks for word in mark.args)
+
+
+def allowed_of(item: pytest.Item) -> tuple[str, ...]:
+    """Return what all markers `allows` of a test name.
+
+    Raises:
+        ValueError: what no marker can allow.
+    """
+    allowed = _words_of(item, "allows")
+    for word in allowed:
+        if word not in ALLOWED:
+            raise ValueError(f"allows({word!r}): it can allow {', '.join(map(repr, ALLOWED))}")
+    return allowed
+
+
+def needs_of(item: pytest.Item) -> tuple[str, ...]:
+    """Return what all markers `needs` of a test name, in the order of writing.
+
+    Raises:
+        ValueError: something that nobody could have.
+    """
+    needs = _words_of(item, "needs")
+    for choice in (choice for need in needs for choice in need.split(_OR)):
+        kind, _, name = choice.partition(":")
+        if choice not in (*MODES, HAND) and not (kind in KINDS and name):
+            kinds = [*MODES, HAND, *(f"{kind}:{name or 'NAME'}" for kind in KINDS)]
+            raise ValueError(f"needs({choice!r}): nobody has that; {near(choice, kinds)}")
+    return needs
+
+
+def check_mode(needs: Iterable[str], mode: str) -> None:
+    """Raise NotOnThisBench if a test needs another kind of bench, before this one is opened."""
+    for need in needs:
+        choices = need.split(_OR)
+        if mode not in choices and all(choice in MODES for choice in choices):
+            raise NotOnThisBench(f"needs {need}, and this bench is {mode}")
+
+
+def check_needs(needs: Iterable[str], bench: Bench) -> None:
+    """Raise NotOnThisBench if a bench has not all of what a test needs.
+
+    Raises:
+        ValueError: a name is misspelt, so that the test would be skipped on every bench.
+    """
+    for need in needs:
+        lacks = [_lack(choice, bench) for choice in need.split(_OR)]
+        if all(lacks):
+            for choice, lack in zip(need.split(_OR), lacks, strict=True):
+                if _MEANT in lack and not _is_elsewhere(choice):
+                    raise ValueError(f"needs({choice!r}): {lack}")
+            raise NotOnThisBench(f"needs {need}: {' and '.join(lacks)}")
+
+
+def _lack(choice: str, bench: Bench) -> str:
+    """Say why a bench has not what is needed; empty if it has."""
+    if choice in MODES:
+        return "" if choice == bench.mode else f"this bench is {bench.mode}"
+    if choice == HAND:
+        return "" if bench.describe().inputs else "nobody can set anything here"
+    kind, _, name = choice.partition(":")
+    there = [each.rpartition("/")[2] for each in KINDS[kind](bench)]  # of any device
+    if name in there or name in KINDS[kind](bench):
+        return ""
+    others = [each for each in there if _DIGIT.sub("", each) != _DIGIT.sub("", name)]
+    hint = f"{_MEANT} {close[0]!r}?" if (close := closest(name, others)) else ""
+    return f"no {kind} {name!r}; {hint or f'known: {known(dict.fromkeys(there))}'}"
+
+
+def _is_elsewhere(choice: str) -> bool:
+    """Return whether a device of another type than those of the bench has what is needed."""
+    kind, _, name = choice.partition(":")
+    return name in _names_anywhere().get(kind, ())
+
+
+@cache
+def _names_anywhere() -> dict[str, set[str]]:
+    """Return the names of what device types and models have, which are made once for it."""
+    from tickrig.emulators.canopen.choices import MODELS  # noqa: PLC0415 - seldom wanted
+    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415
+    from tickrig.emulators.testing.rig_file.devices import kind_of  # noqa: PLC0415
+    from tickrig.emulators.testing.rig_file.plan import DevicePlan  # noqa: PLC0415
+    from tickrig.emulators.testing.rig_file.probe import Probe, probe  # noqa: PLC0415
+
+    names: dict[str, set[str]] = {"fault": set(), "input": set(), "output": set()}
+    for each in (*DEVICES.names(), *MODELS):
+        kind, place = kind_of(each, Path())
+        found = probe(DevicePlan(name=each, kind=kind, type=place, wire=""))
+        if isinstance(found, Probe):
+            inputs = found.physical.inputs
+            names["fault"] |= {*inputs.names(SignalType.FAULT), *found.wire_faults}
+            names["input"] |= {*inputs.table, *inputs.groups}
+            names["output"] |= {*found.physical.outputs}
+    return names
+
+
+KINDS: Final[Mapping[str, Callable[[Bench], Iterable[str]]]] = {
+    "fault": lambda bench: bench.describe().faults,
+    "input": lambda bench: [*bench.describe().inputs, *bench.describe().groups],
+    "output": lambda bench: bench.describe().outputs,
+    "device": lambda bench: bench.devices,
+}
+"""What can be needed by name: how a bench tells what it has."""

@@ -15,30 +15,33 @@ from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import LineMount
-from tickrig.emulators.testing.host_clock.errors import UnpatchedTimeError
-from tickrig.emulators.testing.plugin.bench_source import BenchSource, Wanted
-from tickrig.emulators.testing.plugin.checks.dead_threads import THREADS, dead_threads
-from tickrig.emulators.testing.plugin.checks.health import Health
-from tickrig.emulators.testing.plugin.checks.never_awaited import never_awaited
-from tickrig.emulators.testing.plugin.checks.safe_state import (
+from tickrig.emulators.testing.host_clock.host_code import UnpatchedTimeError
+from tickrig.emulators.testing.plugin.bench_source import (
+    BenchSource,
+    WantedBench,
+    allowed_of,
+    check_mode,
+    check_needs,
+    needs_of,
+)
+from tickrig.emulators.testing.plugin.compare import Fingerprint
+from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
+from tickrig.emulators.testing.plugin.health import (
+    Health,
     SafeState,
     check_safe,
     unsafe,
     with_plan,
 )
-from tickrig.emulators.testing.plugin.checks.time_of_test import guard
-from tickrig.emulators.testing.plugin.evidence.artifacts import keep
-from tickrig.emulators.testing.plugin.evidence.failure_report import sections_of
-from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
-from tickrig.emulators.testing.plugin.needs import allowed_of, check_mode, check_needs, needs_of
+from tickrig.emulators.testing.plugin.host_checks import THREADS, dead_threads, guard, never_awaited
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make_error
 from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.evidence.bench_evidence import (
+    from tickrig.emulators.testing.plugin.bench_evidence import (
         BenchEvidence,
         BenchWitness,
     )
@@ -64,7 +67,7 @@ class BenchedTest:
     """
 
     def __init__(
-        self, item: pytest.Function, wanted: Wanted, safe: SafeState, warm_up: WarmUp = None
+        self, item: pytest.Function, wanted: WantedBench, safe: SafeState, warm_up: WarmUp = None
     ) -> None:
         self.item, self.wanted, self._safe, self._warm_up = item, wanted, safe, warm_up
         self._settings = item.config.stash[SETTINGS]
@@ -99,7 +102,7 @@ class BenchedTest:
         _offer(bench)
         self._health = Health(bench)
         if self._settings.report:
-            from tickrig.emulators.testing.plugin.evidence.bench_evidence import (  # noqa: PLC0415
+            from tickrig.emulators.testing.plugin.bench_evidence import (  # noqa: PLC0415
                 BenchWitness,
             )
 
@@ -229,7 +232,7 @@ def benched(
     settings = request.config.stash[SETTINGS]
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
-    wanted = Wanted(source, mode, settings.seed, request.path.parent)
+    wanted = WantedBench(source, mode, settings.seed, request.path.parent)
     test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe, warm_up)
     try:
         yield _opened(test)

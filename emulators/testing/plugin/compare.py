@@ -5,25 +5,89 @@ from __future__ import annotations
 from collections.abc import Generator
 from functools import partial
 from hashlib import sha256
-from typing import TYPE_CHECKING, Final
+from itertools import zip_longest
+from typing import Final
 
 import pytest
 from _pytest.runner import runtestprotocol
 
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.mounts import LineMount
+from tickrig.emulators.testing.plugin.journal_text import signals_of
 from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting, format_time
+from tickrig.wire.can import CanFrame, ErrorFrame
 
-if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.evidence.fingerprint import Fingerprint
+# All that is on the wires of a bench, and all that its devices show, line by line.
 
-HASH: Final = "bench_hash"
+
+class Fingerprint:
+    """Takes down what happens on a bench: traffic as it passes, signals when they change.
+
+    Args:
+        rig: of the bench.
+
+    Attributes:
+        lines: what was taken down.
+    """
+
+    def __init__(self, rig: BenchRig) -> None:
+        self._rig, self.lines = rig, list[str]()
+        self._signals = signals_of(rig)
+        self._values: dict[str, Setting] = {}
+        for name, mount in rig.state.mounts.items():
+            if isinstance(mount, LineMount):
+                mount.tap.listeners.append(partial(self._pass, name))
+            else:
+                mount.wire.observers.append(partial(self._frame, name))
+        rig.rig.watchers.append(self._look)
+        self._look(rig.rig.now_us)
+
+    def end(self) -> None:
+        """Take down when it all ended."""
+        self._take(self._rig.rig.now_us, "(the end)")
+
+    @property
+    def digest(self) -> str:
+        """The hash of all that was taken down."""
+        return sha256("\n".join(self.lines).encode()).hexdigest()
+
+    def difference(self, other: Fingerprint) -> str:
+        """Return the first line that is not the same in another run; empty if all are."""
+        pairs = zip_longest(self.lines, other.lines, fillvalue="nothing")
+        for number, (first, second) in enumerate(pairs, 1):
+            if first != second:
+                return f"line {number}\n  first run:  {first}\n  second run: {second}"
+        return ""
+
+    def _pass(self, wire: str, at_us: int, mark: Mark, data: bytes) -> None:
+        self._take(at_us, f"{wire} {mark} {escape(data)}")
+
+    def _frame(self, wire: str, at_us: int, frame: CanFrame | ErrorFrame) -> None:
+        self._take(at_us, f"{wire} {frame}")
+
+    def _look(self, now_us: int) -> None:
+        for name, read in self._signals.items():
+            value = read()
+            if name not in self._values or self._values[name] != value:
+                self._values[name] = value
+                self._take(now_us, f"{name}={value}")
+
+    def _take(self, at_us: int, text: str) -> None:
+        self.lines.append(f"{format_time(at_us)} {text}")
+
+
+_HASH: Final = "bench_hash"
 """The property of a test that has the hash of all that happened on its bench."""
 
-FIRST: Final[pytest.StashKey[Fingerprint]] = pytest.StashKey()
+_FIRST: Final[pytest.StashKey[Fingerprint]] = pytest.StashKey()
 """Of the first run, while a test runs for the second time."""
 
-CALL: Final = pytest.StashKey[pytest.TestReport]()
+_CALL: Final = pytest.StashKey[pytest.TestReport]()
 
-Reports = list[pytest.TestReport]
+_Reports = list[pytest.TestReport]
 
 
 class Compare:
@@ -40,7 +104,7 @@ class Compare:
         if "bench" not in getattr(item, "fixturenames", ()):
             return None
         item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
-        for report in run_twice(item, nextitem):
+        for report in _run_twice(item, nextitem):
             item.ihook.pytest_runtest_logreport(report=report)
         item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
         return True
@@ -52,8 +116,8 @@ class Compare:
         """Judge a test when its second run is over."""
         report = yield
         if call.when == "call":
-            item.stash[CALL] = report
-        elif call.when == "teardown" and (first := item.stash.get(FIRST, None)):
+            item.stash[_CALL] = report
+        elif call.when == "teardown" and (first := item.stash.get(_FIRST, None)):
             _judge(item, first, report)
         return report
 
@@ -61,8 +125,8 @@ class Compare:
         """Note the hash of a test, of whatever process."""
         if report.when == "call":
             properties = dict(report.user_properties)
-            if HASH in properties:
-                self._hashes[str(report.nodeid)] = str(properties[HASH])
+            if _HASH in properties:
+                self._hashes[str(report.nodeid)] = str(properties[_HASH])
 
     def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
         """Say how many tests were compared, and the hash of all."""
@@ -74,22 +138,22 @@ class Compare:
         )
 
 
-def run_twice(item: pytest.Item, nextitem: pytest.Item | None) -> Reports:
+def _run_twice(item: pytest.Item, nextitem: pytest.Item | None) -> _Reports:
     """Run a test, and again if it passed; return the reports of the run that counts."""
     properties = list(item.user_properties)
     reports = _run(item, item.parent)  # what it shares with others stays
     before = _fingerprint(item)
     if before is None or not all(report.passed for report in reports):
         return [*reports, *_end(item, nextitem)]
-    item.user_properties[:], item.stash[FIRST] = properties, before
+    item.user_properties[:], item.stash[_FIRST] = properties, before
     return _run(item, nextitem)
 
 
-def _run(item: pytest.Item, nextitem: pytest.Item | pytest.Collector | None) -> Reports:
+def _run(item: pytest.Item, nextitem: pytest.Item | pytest.Collector | None) -> _Reports:
     return runtestprotocol(item, log=False, nextitem=nextitem)  # type: ignore[arg-type]
 
 
-def _end(item: pytest.Item, nextitem: pytest.Item | None) -> Reports:
+def _end(item: pytest.Item, nextitem: pytest.Item | None) -> _Reports:
     """Give back what a test shared with others, which there are none of."""
     end = partial(item.session._setupstate.teardown_exact, nextitem)
     call = pytest.CallInfo.from_call(end, when="teardown")
@@ -105,12 +169,12 @@ def _fingerprint(item: pytest.Item) -> Fingerprint | None:
 
 def _judge(item: pytest.Item, first: Fingerprint, last: pytest.TestReport) -> None:
     """Fail a test whose runs differ; note the hash of one whose runs are the same."""
-    second, report = _fingerprint(item), item.stash.get(CALL, None)
+    second, report = _fingerprint(item), item.stash.get(_CALL, None)
     if second is None or report is None:
         return
     if not (difference := first.difference(second)):
         for one in (report, last):
-            one.user_properties.append((HASH, second.digest))
+            one.user_properties.append((_HASH, second.digest))
         return
     if report.passed:
         report.outcome = "failed"

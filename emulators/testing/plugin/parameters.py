@@ -6,19 +6,19 @@ from collections.abc import Mapping
 
 import pytest
 
-from tickrig.emulators.testing.plugin.settings import SETTINGS, Parameter
+from tickrig.emulators.testing.plugin.settings import SETTINGS, BenchParameter
 from tickrig.host.text.names import near
 from tickrig.host.text.values import parse_setting
 
 
-class Parameters:
+class ParameterPlugin:
     """Gives tests the values of `--bench-param`, in place of those of the fixture of this name.
 
     Args:
         parameters: what was asked for.
     """
 
-    def __init__(self, parameters: tuple[Parameter, ...]) -> None:
+    def __init__(self, parameters: tuple[BenchParameter, ...]) -> None:
         self._parameters = parameters
         self._taken: set[str] = set()
         self._names: dict[str, None] = {}

@@ -6,19 +6,27 @@ Entry point `pytest11`: every pytest of an environment with tickrig loads this m
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from inspect import iscoroutinefunction
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from tickrig.emulators.testing.plugin.settings import OPTIONS, RANDOM, SETTINGS, Settings
+from tickrig.emulators.testing.plugin.settings import (
+    MODES,
+    OPTIONS,
+    RANDOM,
+    SETTINGS,
+    PluginSettings,
+)
 from tickrig.emulators.testing.plugin.stash import BENCHED, is_blocked, skipped_where_it_cannot
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
     from tickrig.emulators.testing.plugin.bench_source import BenchSource
-    from tickrig.emulators.testing.plugin.checks.safe_state import SafeState
+    from tickrig.emulators.testing.plugin.health import SafeState
     from tickrig.emulators.testing.plugin.warm_up import WarmUp
+
 
 MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
@@ -29,10 +37,10 @@ MARKERS: Final = (
     "time (tickrig)",
 )
 
-EXAMPLES: Final = {"needs": "fault:cut", "req": "SAF-12", "allows": "lost"}
+_EXAMPLES: Final = {"needs": "fault:cut", "req": "SAF-12", "allows": "lost"}
 """What each marker could name."""
 
-OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
+_OTHER_LOOPS: Final = ("asyncio", "anyio", "trio", "twisted")
 """Markers of async tests that are run by others."""
 
 
@@ -55,12 +63,10 @@ def pytest_configure(config: pytest.Config) -> None:
         config.addinivalue_line("markers", line)
     if (config.getoption("bench_seed") or config.getini("bench_seed")) == RANDOM:
         config.option.bench_seed = _any_seed()  # so the workers of pytest-xdist get it too
-    settings = config.stash[SETTINGS] = Settings.of(config)
+    settings = config.stash[SETTINGS] = PluginSettings.of(config)
     config.pluginmanager.register(_mode_fixture(settings.modes), "tickrig-bench-mode")
-    if settings != Settings():
-        from tickrig.emulators.testing.plugin.preparation import prepare  # noqa: PLC0415
-
-        prepare(config, settings)
+    if settings != PluginSettings():
+        _prepare(config, settings)
 
 
 def pytest_report_header(config: pytest.Config) -> str | None:
@@ -101,7 +107,7 @@ def _check_markers(collector: pytest.Collector, item: pytest.Function) -> None:
     """Raise CollectError for a marker without names; other packages may have markers like ours."""
     benched = "bench" in item.fixturenames
     for marker in item.iter_markers():
-        example = EXAMPLES.get(marker.name)
+        example = _EXAMPLES.get(marker.name)
         if example is None or not (benched or marker.name == "req"):
             continue
         place, wrong = f"{item.name}: @{marker.name}", ""
@@ -156,7 +162,7 @@ def bench(
 @pytest.fixture
 def bench_time(bench: Bench) -> Iterator[Any]:
     """The clock of the bench: `time.sleep` and `time.monotonic` of hosts are on it, too."""
-    from tickrig.emulators.testing.host_clock.errors import HostTimeError  # noqa: PLC0415 - asked for
+    from tickrig.emulators.testing.host_clock.host_code import HostTimeError  # noqa: PLC0415 - asked for
 
     try:
         with bench.patched_time() as clock:
@@ -220,7 +226,61 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     test = pyfuncitem.stash.get(BENCHED, None)
     if test is None or not iscoroutinefunction(pyfuncitem.obj):
         return None
-    if any(pyfuncitem.get_closest_marker(name) for name in OTHER_LOOPS):
+    if any(pyfuncitem.get_closest_marker(name) for name in _OTHER_LOOPS):
         return None
     test.run_body(pyfuncitem)
     return True
+
+
+# What is done before the first test, if anything was asked for.
+
+
+def _prepare(config: pytest.Config, settings: PluginSettings) -> None:
+    """Look at the rig file, and register what a run asks for.
+
+    Raises:
+        pytest.UsageError: the rig file cannot be used, or what was asked for does not fit together.
+    """
+    if settings.rig_file and settings.ordered:
+        from tickrig.emulators.testing.plugin.bench_source import plan_of  # noqa: PLC0415 - slow
+
+        with _usage():
+            plan_of(settings.rig_file)
+    if settings.compare:
+        from tickrig.emulators.testing.plugin.compare import Compare  # noqa: PLC0415 - asked for
+
+        if MODES[0] not in settings.modes:
+            raise pytest.UsageError("--bench-compare compares runs in virtual time only")
+        config.pluginmanager.register(Compare(), "tickrig-bench-compare")
+    if settings.parameters:
+        from tickrig.emulators.testing.plugin.parameters import ParameterPlugin  # noqa: PLC0415 - asked
+
+        config.pluginmanager.register(ParameterPlugin(settings.parameters), "tickrig-bench-param")
+    if settings.artifacts:
+        from tickrig.host.text.whole_file import check_writable  # noqa: PLC0415 - asked for
+
+        try:
+            check_writable(settings.artifacts)
+        except OSError as error:
+            where = f"--bench-artifacts {settings.artifacts}"
+            raise pytest.UsageError(f"{where}: {error.strerror}") from None
+    if settings.report:
+        from tickrig.emulators.testing.plugin.report_plugin import (  # noqa: PLC0415 - asked for
+            ReportPlugin,
+        )
+        from tickrig.emulators.testing.report.report_file import check_report  # noqa: PLC0415
+
+        with _usage():
+            check_report(settings.report)
+            plugin = ReportPlugin(config, settings)
+        config.pluginmanager.register(plugin, "tickrig-bench-report")
+
+
+@contextmanager
+def _usage() -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise pytest.UsageError(f"{error.filename}: {error.strerror}") from None
+    except ValueError as error:
+        raise pytest.UsageError(str(error)) from None

@@ -13,9 +13,8 @@ from typing import Final
 
 import pytest
 
-from tickrig.emulators.testing.plugin.evidence.failure_report import repeat_command
-from tickrig.emulators.testing.plugin.evidence.outcome import outcome_of
-from tickrig.emulators.testing.plugin.settings import Settings
+from tickrig.emulators.testing.plugin.failure_report import outcome_of, repeat_command
+from tickrig.emulators.testing.plugin.settings import PluginSettings
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
@@ -24,23 +23,22 @@ from tickrig.emulators.testing.report.bench_report import (
 )
 from tickrig.emulators.testing.report.overview import (
     UNWELL,
-    Verdict,
+    OverallVerdict,
     natural,
+    read_requirements,
     reported,
     requirement_rows,
 )
-from tickrig.emulators.testing.report.report_file import write_report
-from tickrig.emulators.testing.report.report_json import from_data, to_data
-from tickrig.emulators.testing.report.requirement_file import read_requirements
+from tickrig.emulators.testing.report.report_file import from_data, to_data, write_report
 from tickrig.host.text.values import counted
 
-RECORD: Final = "tickrig_record"
+_RECORD: Final = "tickrig_record"
 """The attribute of the last report of a test that has its record as JSON."""
 
-OWN: Final = frozenset({"req", "parametrize", "usefixtures"})
-REPORTS: Final = pytest.StashKey[list[pytest.TestReport]]()
-EXPECTED: Final = pytest.StashKey[str]()
-MOST: Final = 400
+_OWN: Final = frozenset({"req", "parametrize", "usefixtures"})
+_REPORTS: Final = pytest.StashKey[list[pytest.TestReport]]()
+_EXPECTED: Final = pytest.StashKey[str]()
+_MOST: Final = 400
 """Characters of what was expected."""
 
 _Place = tuple[str, int, list[tuple[int, str]]]
@@ -58,7 +56,7 @@ class ReportPlugin:
         ValueError: what is wrong with it.
     """
 
-    def __init__(self, config: pytest.Config, settings: Settings) -> None:
+    def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
         self._config, self._settings = config, settings
         path = settings.requirements
         self._requirements = read_requirements(path) if path else ()
@@ -73,18 +71,18 @@ class ReportPlugin:
         """Add the record of a test to its last report."""
         report = yield
         if call.when == "setup":
-            item.stash[REPORTS] = []
-        reports = item.stash.setdefault(REPORTS, [])
+            item.stash[_REPORTS] = []
+        reports = item.stash.setdefault(_REPORTS, [])
         reports.append(report)
-        if report.failed and call.excinfo and not item.stash.get(EXPECTED, ""):
-            item.stash[EXPECTED] = _statement(item, call.excinfo)
-        if call.when == "teardown" and is_reported(item):
-            setattr(report, RECORD, json.dumps(to_data(record_of(item, reports))))
+        if report.failed and call.excinfo and not item.stash.get(_EXPECTED, ""):
+            item.stash[_EXPECTED] = _statement(item, call.excinfo)
+        if call.when == "teardown" and _is_reported(item):
+            setattr(report, _RECORD, json.dumps(to_data(_record_of(item, reports))))
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Take the record of a test, of whatever process."""
-        if data := getattr(report, RECORD, None):
+        if data := getattr(report, _RECORD, None):
             record = from_data(TestRecord, json.loads(data))
             self._records[record.nodeid] = _place(report), record
 
@@ -113,7 +111,7 @@ class ReportPlugin:
             return
         rows = requirement_rows(self._report(), reported(self._tests()))
         listed = [row for row in rows if row.listed]
-        shown = sum(row.verdict is Verdict.SHOWN for row in listed)
+        shown = sum(row.verdict is OverallVerdict.SHOWN for row in listed)
         yield f"{shown} of {counted(len(listed), 'requirement')} shown"
         if untested := [row.name for row in listed if not row.tests]:
             yield f"no test names {', '.join(untested)}"
@@ -152,16 +150,16 @@ def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) ->
     for entry in reversed(error.traceback):
         if Path(entry.path) == item.path:
             with suppress(Exception):  # who has compiled the test need not have left its source
-                return " ".join(str(entry.statement).split())[:MOST]
+                return " ".join(str(entry.statement).split())[:_MOST]
     return ""
 
 
-def is_reported(item: pytest.Item) -> bool:
+def _is_reported(item: pytest.Item) -> bool:
     """Say whether a report tells of a test: it has a bench, or shows a requirement."""
     return BENCHED in item.stash or item.get_closest_marker("req") is not None
 
 
-def record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord:
+def _record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord:
     """Return the record of a test.
 
     Args:
@@ -174,9 +172,9 @@ def record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecord
         outcome,
         wall_us=sum(round(report.duration * 1e6) for report in reports),
         requirements=tuple(str(value) for name, value in item.user_properties if name == "req"),
-        markers=tuple(dict.fromkeys(m.name for m in item.iter_markers() if m.name not in OWN)),
+        markers=tuple(dict.fromkeys(m.name for m in item.iter_markers() if m.name not in _OWN)),
         reason=reason,
-        expected=item.stash.get(EXPECTED, "") if outcome in UNWELL else "",
+        expected=item.stash.get(_EXPECTED, "") if outcome in UNWELL else "",
         longrepr=longrepr,
         command=repeat_command(item),
     )

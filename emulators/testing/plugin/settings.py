@@ -10,8 +10,8 @@ import pytest
 
 MODES: Final = ("virtual", "real", "hardware")
 RANDOM: Final = "random"
-FAILED: Final = "failed"
-EVERY: Final = "every"
+_FAILED: Final = "failed"
+_EVERY: Final = "every"
 
 
 class Option(NamedTuple):
@@ -48,7 +48,7 @@ OPTIONS: Final = (
 )
 
 
-class Parameter(NamedTuple):
+class BenchParameter(NamedTuple):
     """What tests take by name, as an argument or through fixtures.
 
     Attributes:
@@ -60,7 +60,7 @@ class Parameter(NamedTuple):
     words: tuple[str, ...]
 
 
-class Settings(NamedTuple):
+class PluginSettings(NamedTuple):
     """What was asked for.
 
     Attributes:
@@ -85,10 +85,10 @@ class Settings(NamedTuple):
     compare: bool = False
     report: Path | None = None
     requirements: Path | None = None
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[BenchParameter, ...] = ()
 
     @classmethod
-    def of(cls, config: pytest.Config) -> Settings:
+    def of(cls, config: pytest.Config) -> PluginSettings:
         """Return those of a test run; UsageError if one is wrong."""
         wanted = {option.name: _wanted(config, option) for option in OPTIONS}
         return cls(
@@ -97,7 +97,7 @@ class Settings(NamedTuple):
             _modes(wanted["bench_mode"] or MODES[0]),
             _seed(wanted["bench_seed"]),
             _path(config, "bench_artifacts", wanted["bench_artifacts"]),
-            _every(wanted["bench_artifacts_of"] or FAILED),
+            _every(wanted["bench_artifacts_of"] or _FAILED),
             wanted["bench_compare"].lower() in {"true", "1", "yes", "on"},
             _path(config, "bench_report", wanted["bench_report"]),
             _requirements(config, wanted),
@@ -107,13 +107,13 @@ class Settings(NamedTuple):
     @property
     def head(self) -> str:
         """What a run begins with; empty if nothing was asked."""
-        if self == Settings():
+        if self == PluginSettings():
             return ""
         seed = "" if self.seed is None else f", seed {self.seed}"
         return f"bench: {self.rig_file or 'of each test'}, {', '.join(self.modes)}{seed}"
 
 
-SETTINGS: Final = pytest.StashKey[Settings]()
+SETTINGS: Final = pytest.StashKey[PluginSettings]()
 
 
 def _wanted(config: pytest.Config, option: Option) -> str:
@@ -158,9 +158,9 @@ def _seed(text: str) -> int | None:
     return int(text)
 
 
-def _parameters(text: str) -> tuple[Parameter, ...]:
+def _parameters(text: str) -> tuple[BenchParameter, ...]:
     """Read the lines `NAME=VALUE,VALUE`."""
-    found: dict[str, Parameter] = {}
+    found: dict[str, BenchParameter] = {}
     for line in filter(None, map(str.strip, text.splitlines())):
         name, _, values = line.partition("=")
         words = tuple(dict.fromkeys(word.strip() for word in values.split(",")))
@@ -168,11 +168,11 @@ def _parameters(text: str) -> tuple[Parameter, ...]:
             raise pytest.UsageError(f"--bench-param {line}: write NAME=VALUE,VALUE, as flip=0.001")
         if name in found:
             raise pytest.UsageError(f"--bench-param {line}: {name} has values already")
-        found[name] = Parameter(name, words)
+        found[name] = BenchParameter(name, words)
     return tuple(found.values())
 
 
 def _every(text: str) -> bool:
-    if text not in (FAILED, EVERY):
-        raise pytest.UsageError(f"--bench-artifacts-of {text}: it is {FAILED} or {EVERY}")
-    return text == EVERY
+    if text not in (_FAILED, _EVERY):
+        raise pytest.UsageError(f"--bench-artifacts-of {text}: it is {_FAILED} or {_EVERY}")
+    return text == _EVERY

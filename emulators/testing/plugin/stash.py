@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 BENCHED: Final[pytest.StashKey[BenchedTest]] = pytest.StashKey()
 """Of a test that asked for a bench."""
 
-ERRORS: Final = "tickrig.emulators.testing.bench.errors"
+_ERRORS: Final = "tickrig.emulators.testing.bench.errors"
 
 
 def is_blocked(error: BaseException) -> bool:
     """Say whether a test came to no verdict about its device."""
-    errors = sys.modules.get(ERRORS)
+    errors = sys.modules.get(_ERRORS)
     return errors is not None and isinstance(error, errors.BenchBlocked)
 
 
@@ -30,7 +30,7 @@ def skipped_where_it_cannot() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        errors = sys.modules.get(ERRORS)
+        errors = sys.modules.get(_ERRORS)
         if errors is None or not isinstance(error, errors.NotOnThisBench):
             raise
         skip = pytest.skip.Exception(str(error), _use_item_location=True)

@@ -14,23 +14,23 @@ import tickrig
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked, BenchError
 
-PACKAGE: Final = Path(tickrig.__file__).parent
+_PACKAGE: Final = Path(tickrig.__file__).parent
 
-MISTAKES: Final = (TypeError, AttributeError, NameError, ImportError, SyntaxError)
+_MISTAKES: Final = (TypeError, AttributeError, NameError, ImportError, SyntaxError)
 """What is wrong with a program, however late it runs."""
 
-REFUSALS: Final = (ValueError, LookupError, BenchError)
+_REFUSALS: Final = (ValueError, LookupError, BenchError)
 """How the bench refuses what it is asked for."""
 
-OF_STATE: Final = ("WireError", "RtcRefused", "ServerRefused")
+_OF_STATE: Final = ("WireError", "RtcRefused", "ServerRefused")
 """Refusals that depend on what has come, or on the state of a component."""
 
-CHECKS: Final = tuple(
+_CHECKS: Final = tuple(
     f"tickrig.emulators.testing.{room}" for room in ("properties", "machine", "fuzz", "conformance")
 )
 """What judges devices and hosts by AssertionError."""
 
-LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
+_LIBRARIES: Final = sys.stdlib_module_names | {"can", "canopen", "serial"}
 """What raises for whoever has called it."""
 
 
@@ -71,12 +71,12 @@ def is_mistake(error: BaseException) -> bool:
         return any(map(is_mistake, error.exceptions))
     raiser = _raiser(error)
     ours, of_pytest = (raiser.partition(".")[0] == name for name in ("tickrig", "_pytest"))
-    if isinstance(error, MISTAKES):
+    if isinstance(error, _MISTAKES):
         return ours or "NoneType" not in str(error)
-    if isinstance(error, (RuntimeError, *REFUSALS)) and ours:
-        return not any(kind.__name__ in OF_STATE for kind in type(error).__mro__)
+    if isinstance(error, (RuntimeError, *_REFUSALS)) and ours:
+        return not any(kind.__name__ in _OF_STATE for kind in type(error).__mro__)
     if type(error) is AssertionError and ours:
-        return not raiser.startswith(CHECKS)
+        return not raiser.startswith(_CHECKS)
     return isinstance(error, MisusedError | pytest.FixtureLookupError) or of_pytest
 
 
@@ -84,7 +84,7 @@ def _raiser(error: BaseException) -> str:
     """Return the module that has raised an error, or has called the library that did."""
     names = [frame.f_globals.get("__name__") or "" for frame, _ in walk_tb(error.__traceback__)]
     named = [name for name in names if name != "_pytest.outcomes"]
-    own = (name for name in reversed(named) if name.partition(".")[0] not in LIBRARIES)
+    own = (name for name in reversed(named) if name.partition(".")[0] not in _LIBRARIES)
     return next(own, "")
 
 
@@ -99,7 +99,7 @@ def end_at_caller(error: BaseException) -> None:
         if _package_of(entry) not in ("tickrig", "contextlib"):
             last = entry
         entry = entry.tb_next
-    refused = isinstance(error, (TypeError, *REFUSALS))
+    refused = isinstance(error, (TypeError, *_REFUSALS))
     if refused and last and _package_of(last) not in ("_pytest", "pluggy"):
         last.tb_next = None
 
@@ -145,4 +145,4 @@ def _is_ours(entry: object) -> bool:
     if place is None:
         return False
     path = Path(place.path).absolute()
-    return path.is_relative_to(PACKAGE) or path.name == "contextlib.py"
+    return path.is_relative_to(_PACKAGE) or path.name == "contextlib.py"

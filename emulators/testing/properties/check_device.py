@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from hypothesis.errors import Flaky
 
 from tickrig.device.core import Device
 from tickrig.emulators.can.wire import CanWire
@@ -14,13 +16,125 @@ from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties import strategies
-from tickrig.emulators.testing.properties.acts import check_start
 from tickrig.emulators.testing.properties.checks import DeviceChecks
 from tickrig.emulators.testing.properties.contract import check_members
-from tickrig.emulators.testing.properties.device_bench import NOTHING, DeviceBench
-from tickrig.emulators.testing.properties.difference import TicksDifferError, explain_ticks
-from tickrig.emulators.testing.properties.search import search
+from tickrig.emulators.testing.properties.device_bench import (
+    NOTHING,
+    DeviceBench,
+    TicksDifferError,
+    explain_ticks,
+)
 from tickrig.emulators.testing.properties.strategies import Session
+from tickrig.host.text.names import near
+from tickrig.wire.can import CanFrame
+
+# What is done before each session, looked at before it is done.
+
+_VERBS: Final = ("send", "set", "reset")
+
+
+def _check_start(start: Session, device: Any, nothing: Any) -> None:
+    """Look whether each act of `start` can be done.
+
+    Args:
+        start: the acts.
+        device: one of its kind; it is looked at only.
+        nothing: traffic without anything in it.
+
+    Raises:
+        ValueError: one cannot; the text says which, and why.
+    """
+    for number, act in enumerate(start):
+        try:
+            _check(act, device, nothing)
+        except ValueError as error:
+            raise ValueError(f"start[{number}]: {error}") from None
+
+
+def _check(act: Any, device: Any, nothing: Any) -> None:
+    if not isinstance(act, tuple) or len(act) != 3:
+        raise ValueError(f"an act is (wait in us, verb, what), got {act!r}")
+    wait_us, verb, what = act
+    if type(wait_us) is not int or wait_us < 0:
+        raise ValueError(f"the wait is in whole microseconds, got {wait_us!r}")
+    if verb not in _VERBS:
+        raise ValueError(f"no act {verb!r}; {near(str(verb), _VERBS)} (send, set, reset)")
+    if verb == "reset":
+        if what is not None:
+            raise ValueError(f"reset takes None, got {what!r}")
+    elif verb == "send":
+        _check_traffic(what, nothing)
+    elif not isinstance(what, tuple) or len(what) != 2:
+        raise ValueError(f"set takes (name, value), got {what!r}")
+    elif not hasattr(device, "inputs"):
+        raise ValueError(f"{type(device).__name__} has no inputs to set")
+    else:
+        device.inputs.check(*what)
+
+
+def _check_traffic(what: Any, nothing: Any) -> None:
+    if type(what) is not type(nothing):
+        wanted = "bytes" if nothing == b"" else "a tuple of CanFrame"
+        raise ValueError(f"send takes {wanted}, got {what!r}")
+    if nothing != b"" and not all(isinstance(frame, CanFrame) for frame in what):
+        raise ValueError(f"send takes a tuple of CanFrame, got {what!r}")
+
+
+# The search for a session in which a device does something wrong; once found, it ends soon.
+
+_SLOW: Final = (HealthCheck.too_slow, HealthCheck.data_too_large)
+
+_TRIES: Final = 200
+"""So often something shorter is looked for, once something was found."""
+
+
+def search(
+    check: Callable[..., None],
+    drawn: st.SearchStrategy[Session],
+    names: tuple[str, ...],
+    max_examples: int,
+) -> None:
+    """Draw sessions until a check raises, then shorter ones.
+
+    Args:
+        check: takes sessions by name.
+        drawn: the sessions.
+        names: what they are called.
+        max_examples: how many of each, if nothing is found.
+
+    Raises:
+        Exception: what the check raised of the shortest found, with a note of what was met.
+    """
+    found: dict[str, Exception] = {}
+    tries = [_TRIES]
+
+    @settings(
+        max_examples=max_examples,
+        deadline=None,
+        suppress_health_check=_SLOW,
+        report_multiple_bugs=False,
+        print_blob=False,
+        phases=[phase for phase in settings().phases if phase is not Phase.explain],
+    )
+    @given(**dict.fromkeys(names, drawn))
+    def it_meets(**sessions: Session) -> None:
+        key = repr(sessions)
+        if known := found.get(key):
+            raise known
+        tries[0] -= bool(found)
+        if tries[0] < 0:
+            return  # whatever else is tried is taken for right: what was found stays the shortest
+        try:
+            check(**sessions)
+        except Exception as error:
+            found[key] = error
+            raise
+
+    try:
+        it_meets()
+    except Flaky:  # chance: it was so once
+        raise min(found.items(), key=lambda each: len(each[0]))[1] from None
+
 
 WireMaker = Callable[[], ByteLine | CanWire]
 
@@ -77,7 +191,7 @@ def check_device(  # noqa: PLR0913 - by name
     nothing: Any = () if on_can else b""
     device = make()
     check_members(device, nothing)
-    check_start(start, device, nothing)
+    _check_start(start, device, nothing)
     if traffic is None:
         traffic = strategies.frames() if on_can else strategies.chunks()
     bench = partial(DeviceBench, make=make, wire=wire, start=start)

@@ -9,32 +9,245 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
 
+from tickrig.device.physical import InputSignal, SignalType
 from tickrig.device.twin import twin
 from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.replay import read_recording, replay
+from tickrig.emulators.rig.station import next_tick_us
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.testing.properties.contract import check_acts, must
-from tickrig.emulators.testing.properties.device_bench import DeviceBench, Observation, drive
-from tickrig.emulators.testing.properties.difference import TicksDifferError, difference
-from tickrig.emulators.testing.properties.due_probe import (
-    SETTLES,
-    changed_input,
-    check_due_us,
-    some_inputs,
+from tickrig.emulators.testing.properties.device_bench import (
+    DeviceBench,
+    Observation,
+    TicksDifferError,
+    difference,
+    drive,
+    due_text,
+    in_ms,
+    outputs_of,
+    shorten,
 )
-from tickrig.emulators.testing.properties.pauses import check_pauses
-from tickrig.emulators.testing.properties.strategies import Session
+from tickrig.emulators.testing.properties.strategies import Session, Word
 from tickrig.host.text.trace import Header
 
-Benches = Callable[..., DeviceBench]
+# Words that come with a pause in them: a line means the same, whenever its second half comes.
 
-FRESH: Final = (
+_WORDS_WITH_PAUSES: Final = 2
+"""So many words of a session are tried; there are many sessions."""
+
+_Answer = tuple[bytes, list[Any]]
+"""What is sent, and the outputs then."""
+
+_TICKS: Final = 20
+"""So many ticks an answer is waited for."""
+
+
+def _check_pauses(played: DeviceBench, session: Session) -> None:
+    """Let words come in two ticks, each half in its own.
+
+    The word counts when its end is there, so it must be answered as if all of it came with the
+    end. What is before the first byte that is as the last one is its beginning: a word of several
+    lines is cut in the first.
+
+    Args:
+        played: a bench with a device at work.
+        session: what was done to it.
+
+    Raises:
+        AssertionError: it is answered otherwise.
+    """
+    words = list(dict.fromkeys(what for _, _, what in session if isinstance(what, Word)))
+    for word in words[:_WORDS_WITH_PAUSES]:
+        inside = word.index(word[-1:])
+        wanted = _answer(played, b"", word)
+        for at in sorted({1, inside // 2, inside} - {0}):
+            if at > inside:
+                continue
+            answer = _answer(played, word[:at], word[at:])
+            same = sorted(answer[0]) == sorted(wanted[0]) and answer[1] == wanted[1]
+            must(same, _message(word, at, wanted, answer))
+
+
+def _answer(played: DeviceBench, first: bytes, rest: bytes) -> _Answer:
+    """Return what a copy of the device answers to two halves, and what is seen then."""
+    device = twin(played.device)
+    if hasattr(device, "horizon"):
+        device.horizon = None
+    now_us = played.rig.now_us - played.rig.now_us % device.tick_us
+    sent = []
+    for rx in [first, rest, *[b""] * _TICKS]:
+        now_us += device.tick_us
+        sent.append(device.tick(now_us, rx))
+    return b"".join(sent), outputs_of(device)
+
+
+def _message(word: Word, at: int, wanted: _Answer, got: _Answer) -> str:
+    what = f"{bytes(word[:at])!r}, and {bytes(word[at:])!r} in the next tick"
+    told = f"a pause in a word makes a difference: after {what} it sends {shorten(got[0])}, "
+    told += f"after {bytes(word)!r} at once {shorten(wanted[0])}"
+    if got[1] != wanted[1]:
+        told += f"; its outputs are {got[1]!r} and {wanted[1]!r}"
+    return f"{told}. Where a pause ends what is sent, as in Modbus RTU: check_device(pauses=False)"
+
+
+# Ticks long before and just before a device is due: they must change nothing.
+
+_DAY_US: Final = 86_400_000_000
+
+_AHEAD_US: Final = (0, 10_000, 100_000, 1_000_000, 10_000_000, 60_000_000, 600_000_000)
+"""So long after now a tick is tried; and a last one, just before it is due, or after a day."""
+
+_MOST_WORDS: Final = 3
+"""So many of the words of a session are said after it."""
+
+_MOST_INPUTS: Final = 8
+"""So many inputs are tried at the end of a session."""
+
+_SETTLES: Final = 50
+"""In so many ticks a device comes to rest after an input has changed, or is not looked at."""
+
+
+def _check_due_us(bench: Callable[..., DeviceBench], session: Session) -> None:
+    """Tick copies of a device before it is due, at the end of each wait of a session.
+
+    Timers of hours are found so, without ticks of hours. At the end of the session it is also
+    done after a change of each input, alone.
+
+    Args:
+        bench: makes one.
+        session: what is done.
+
+    Raises:
+        AssertionError: such a tick changes something.
+    """
+    played = bench()
+    words = dict.fromkeys(what for _, verb, what in reversed(session) if verb == "send" and what)
+    for act in played.with_end(session):
+        played.rig.run_for(act[0])
+        probe = _Probe(played.device, played.rig.now_us, played.nothing)
+        probe.check()
+        played.do(act)
+    probe.check_answers([*words][:_MOST_WORDS])
+    for item in _some_inputs(played.device, len(session)):
+        _probe_after(played, item)
+
+
+def _some_inputs(device: Any, number: int) -> list[InputSignal]:
+    """Return a part of the inputs, in each session another one."""
+    table = device.inputs.table.values() if hasattr(device, "inputs") else ()
+    items = [item for item in table if item.type is not SignalType.TEXT]
+    parts = -(-len(items) // _MOST_INPUTS) or 1
+    return items[number % parts :: parts]
+
+
+def _changed_input(played: DeviceBench, item: InputSignal) -> tuple[Any, int]:
+    """Change an input of a copy, and let it come to rest.
+
+    Returns:
+        The copy, and the time.
+    """
+    device, now_us = _copy(played.device), played.rig.now_us
+    value = item.low if device.inputs[item.name] == item.high else item.high
+    device.inputs.set(item.name, value if item.real else int(value))  # compiled, bounds are floats
+    for _ in range(_SETTLES):
+        now_us = next_tick_us(now_us, 0, device.tick_us)
+        device.tick(now_us, played.nothing)
+        if device.due_us > now_us + device.tick_us:
+            break
+    return device, now_us
+
+
+def _probe_after(played: DeviceBench, item: InputSignal) -> None:
+    """Look whether a copy is due in time after a change of an input."""
+    device, now_us = _changed_input(played, item)
+    try:
+        _Probe(device, now_us, played.nothing).check()
+    except AssertionError as error:
+        raise AssertionError(f"{error} (when {item.name} was set)") from None
+
+
+def _copy(device: Any) -> Any:
+    copied = twin(device)
+    if hasattr(copied, "horizon"):
+        copied.horizon = None  # somebody looks after each tick
+    return copied
+
+
+class _Probe:
+    """Ticks of copies of a device, from now on."""
+
+    def __init__(self, device: Any, now_us: int, nothing: Any) -> None:
+        self._device, self._nothing = device, nothing
+        self._now_us, self._tick_us = now_us, device.tick_us
+        self._due_us = device.due_us
+        self._first_us = self._now_us - self._now_us % self._tick_us + self._tick_us
+        last_us = min(self._due_us - 1, self._now_us + _DAY_US)
+        self._last_us = last_us - last_us % self._tick_us
+
+    def check(self) -> None:
+        """Raise AssertionError if a tick before it is due changes something."""
+        if self._last_us < self._first_us:
+            return
+        copied = _copy(self._device)
+        before = outputs_of(copied)
+        for at_us in self._times():
+            if self._changes(copied, at_us, before):
+                self._refuse(at_us, before)
+
+    def _times(self) -> list[int]:
+        times = {self._first_us + ahead - ahead % self._tick_us for ahead in _AHEAD_US}
+        return sorted({*(each for each in times if each < self._last_us), self._last_us})
+
+    def _changes(self, copied: Any, at_us: int, before: list[Any]) -> bool:
+        sent = copied.tick(at_us, self._nothing)
+        return bool(sent) or outputs_of(copied) != before
+
+    def _refuse(self, late_us: int, before: list[Any]) -> None:
+        """Look for the first tick that changes something, and raise."""
+        low, high = 0, (late_us - self._first_us) // self._tick_us
+        while low < high:
+            middle = (low + high) // 2
+            if self._changes(_copy(self._device), self._first_us + middle * self._tick_us, before):
+                high = middle
+            else:
+                low = middle + 1
+        at_us = self._first_us + high * self._tick_us
+        copied = _copy(self._device)
+        now = (at_us, copied.tick(at_us, self._nothing), *outputs_of(copied))
+        then: Observation = (at_us, self._nothing, *before)
+        text = difference(copied, [now], [then], "after a tick there", "without it")
+        said = f"{in_ms(self._now_us)} due_us said {due_text(self._due_us)}"
+        raise AssertionError(
+            f"a tick that is not due changes something: {text or 'it, after others'}; "
+            f"at {said}, it must be at most {at_us}"
+        )
+
+    def check_answers(self, words: list[Any]) -> None:
+        """Raise AssertionError if one that was ticked answers otherwise than one that was not."""
+        if self._last_us < self._first_us:
+            return
+        for word in words:
+            ticked, other = _copy(self._device), _copy(self._device)
+            ticked.tick(self._last_us, self._nothing)
+            at_us = self._last_us + self._tick_us
+            one, two = (
+                [(at_us, each.tick(at_us, word), *outputs_of(each))] for each in (ticked, other)
+            )
+            text = difference(other, one, two, "after a tick before", "without it")
+            said = f"{in_ms(self._now_us)} due_us said {due_text(self._due_us)}"
+            told = f"a tick that is not due changes what follows {word!r}: {text}; at {said}"
+            must(not text, told)
+
+
+_Benches = Callable[..., DeviceBench]
+
+_FRESH: Final = (
     "two fresh devices that met the same differ (chance, the machine's clock, or state that they"
     " share)"
 )
 
 
-KEEPS: Final = "reset keeps something (if it is to: check_device(remembers=True))"
+_KEEPS: Final = "reset keeps something (if it is to: check_device(remembers=True))"
 
 
 class DeviceChecks:
@@ -46,7 +259,7 @@ class DeviceChecks:
         pauses: what a host sends means the same with pauses in it.
     """
 
-    def __init__(self, bench: Benches, remembers: bool, pauses: bool) -> None:
+    def __init__(self, bench: _Benches, remembers: bool, pauses: bool) -> None:
         self._bench, self._remembers, self._pauses = bench, remembers, pauses
 
     def check_ticks(self, session: Session) -> None:
@@ -55,14 +268,14 @@ class DeviceChecks:
         check_acts(bench(start=()).device, [*played.start, *session], played.nothing)
         wanted = played.play(session)
         again = bench().play(session)
-        _same(played, wanted, again, FRESH, "of one", "of the other")
+        _same(played, wanted, again, _FRESH, "of one", "of the other")
         dense = bench(dense=True).play(session)
         if text := difference(played.device, dense, wanted, "dense", "sparse"):
             raise TicksDifferError(f"dense and sparse ticks differ: {text}", session)
         self._check_pieces(session, wanted)
-        check_due_us(bench, session)
+        _check_due_us(bench, session)
         if self._pauses and played.nothing == b"":
-            check_pauses(played, session)
+            _check_pauses(played, session)
 
     def _check_pieces(self, session: Session, wanted: list[Observation]) -> None:
         pieces = self._bench(pieces=True)
@@ -86,14 +299,14 @@ class DeviceChecks:
         """What an input does, and a reset after it, leaves the input alone."""
         played = self._bench()
         played.play(session)
-        for item in some_inputs(played.device, len(session)):
-            device, _ = changed_input(played, item)
+        for item in _some_inputs(played.device, len(session)):
+            device, _ = _changed_input(played, item)
             self._check_fresh(played, device, ())
 
     def _check_fresh(self, once: DeviceBench, device: Any, after: Session) -> None:
         """A device that was reset is as one that was made now, or at 0, with the same inputs."""
         was_reset, now_us = twin(device), once.rig.now_us
-        now_us += (SETTLES + 1) * device.tick_us  # it may have been ticked so often since then
+        now_us += (_SETTLES + 1) * device.tick_us  # it may have been ticked so often since then
         was_reset.reset()
         devices = (was_reset, once.make(), once.make())
         for name in device.inputs.table if hasattr(device, "inputs") else ():
@@ -102,7 +315,7 @@ class DeviceChecks:
         times = (now_us, now_us, 0)
         one, *others = map(drive, devices, times, [after] * 3, [once.nothing] * 3)
         if one not in others:
-            _same(once, one, others[-1], KEEPS, "after a reset", "of a fresh one")
+            _same(once, one, others[-1], _KEEPS, "after a reset", "of a fresh one")
 
     def check_replay(self, session: Session) -> None:
         """A device that is made anew does the same from its trace."""
@@ -125,7 +338,7 @@ class DeviceChecks:
         original, unchanged = self._bench(), self._bench()
         original.play(session)
         unchanged.play(session)
-        forks = {way: original.fork(copied) for way, copied in COPIES.items()}
+        forks = {way: original.fork(copied) for way, copied in _COPIES.items()}
         alone = [copied(original.device) for copied in (copy.deepcopy, _pickled)]
         original.fork(twin).play(otherwise)
         now_us, wanted = original.rig.now_us, unchanged.play(after)
@@ -164,7 +377,7 @@ def _fork(parts: tuple[Any, ...]) -> Any:
     return rig.fork(*others)
 
 
-COPIES: Final[dict[str, Callable[[Any], Any]]] = {
+_COPIES: Final[dict[str, Callable[[Any], Any]]] = {
     "copy.deepcopy": copy.deepcopy,
     "pickle": _pickled,
     "rig.fork": _fork,

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from tickrig.emulators.testing.properties.strategies import Act
 
-MEMBERS: Final = {
+_MEMBERS: Final = {
     "tick_us": "its control period in us",
     "due_us": "the earliest time at which it does something unasked, or NEVER",
     "tick": "tick(now_us, rx) returns what it sends",
@@ -14,7 +14,7 @@ MEMBERS: Final = {
 }
 """What a device on any wire has."""
 
-SIGNALS: Final = {
+_SIGNALS: Final = {
     "inputs": "an InputBank, InputBank(()) if there are none",
     "outputs": "a dict of OutputSignal by name, {} if there are none",
 }
@@ -38,7 +38,7 @@ def check_members(device: Any, nothing: Any) -> None:
         AssertionError: something is not there, or a period is none.
     """
     kind = type(device).__name__
-    for name, text in (MEMBERS | SIGNALS if nothing == b"" else MEMBERS).items():
+    for name, text in (_MEMBERS | _SIGNALS if nothing == b"" else _MEMBERS).items():
         must(hasattr(device, name), f"{kind} has no {name}: {text}")
     check_period(device)
 
@@ -48,10 +48,10 @@ def check_period(device: Any) -> None:
     tick_us, kind = device.tick_us, type(device).__name__
     good = type(tick_us) is int and tick_us > 0
     must(good, f"{kind}.tick_us is {tick_us!r}: whole microseconds above 0")
-    check_due(device)
+    _check_due(device)
 
 
-def check_due(device: Any) -> None:
+def _check_due(device: Any) -> None:
     """Raise AssertionError unless `due_us` is a time."""
     due_us, kind = device.due_us, type(device).__name__
     must(type(due_us) is int, f"{kind}.due_us is {due_us!r}: whole microseconds, or NEVER")
@@ -85,7 +85,7 @@ def _tick(device: Any, now_us: int, rx: Any, nothing: Any) -> None:
     sent = device.tick(now_us, rx)
     told = f"{kind}.tick returned {_said(sent)}: it returns {wanted.__name__}, {nothing!r} for none"
     must(isinstance(sent, wanted), told)
-    check_due(device)
+    _check_due(device)
     if nothing == b"":
         told = f"{kind}.tick leaves inputs.changed set: it is cleared in each tick"
         must(not device.inputs.changed, told)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, Final
 
 from tickrig.emulators.can.wire import CanWire
@@ -14,10 +15,11 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station, next_tick_us
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.strategies import Act, Session
+from tickrig.wire.instant import NEVER
 
 NOTHING: Final[Session] = ()
 
-AFTERWARDS_US: Final = 2_000_000
+_AFTERWARDS_US: Final = 2_000_000
 """How long a session is watched when nothing more is done."""
 
 Observation = tuple[Any, ...]
@@ -63,11 +65,11 @@ class DeviceBench:
         other.reset = other.device.reset
         return other
 
-    def with_end(self, session: Session, afterwards_us: int = AFTERWARDS_US) -> list[Act]:
+    def with_end(self, session: Session, afterwards_us: int = _AFTERWARDS_US) -> list[Act]:
         """Return a session, and that nothing is done for a while after it."""
         return [*session, (afterwards_us, "send", self.nothing)]
 
-    def play(self, session: Session, afterwards_us: int = AFTERWARDS_US) -> list[Observation]:
+    def play(self, session: Session, afterwards_us: int = _AFTERWARDS_US) -> list[Observation]:
         """Play a session; return what was received of the device and seen on it."""
         log = []
         for act in self.with_end(session, afterwards_us):
@@ -106,7 +108,7 @@ def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Obse
         What it sends and what is seen, with times since `now_us`.
     """
     log, begin_us = [], now_us
-    for wait_us, verb, what in [*session, (AFTERWARDS_US, "send", nothing)]:
+    for wait_us, verb, what in [*session, (_AFTERWARDS_US, "send", nothing)]:
         sent, until_us = [], now_us + wait_us
         while (at_us := next_tick_us(now_us, device.due_us, device.tick_us)) <= until_us:
             now_us = at_us
@@ -121,3 +123,104 @@ def drive(device: Any, now_us: int, session: Session, nothing: Any) -> list[Obse
             sent.append((now_us - begin_us, device.tick(now_us, what)))
         log.append((now_us - begin_us, [each for each in sent if each[1]], *outputs_of(device)))
     return log
+
+
+# What differs between two runs, and when: one line for people.
+
+_SENDS: Final = "it sends"
+
+_LONGEST: Final = 100
+"""More of a value is not shown."""
+
+DENSE, SPARSE = "if every tick is run", "if those that due_us passes over are not"
+
+
+class TicksDifferError(AssertionError):
+    """Dense and sparse ticks differ."""
+
+
+def in_ms(time_us: int) -> str:
+    """Write a time for people.
+
+    >>> in_ms(2_000), in_ms(86_400_000_000)
+    ('2.000 ms', '86400.000000 s')
+    """
+    return f"{time_us / 1_000:.3f} ms" if time_us < 10_000_000 else f"{time_us / 1e6:.6f} s"
+
+
+def due_text(due_us: int) -> str:
+    """Write what `due_us` says.
+
+    >>> due_text(NEVER), due_text(2_000)
+    ('NEVER', '2000')
+    """
+    return "NEVER" if due_us >= NEVER else str(due_us)
+
+
+def difference(
+    device: Any, one: Sequence[Observation], other: Sequence[Observation], first: str, second: str
+) -> str:
+    """Return in what two runs differ first; empty if they do not.
+
+    Args:
+        device: whose outputs are seen.
+        one: what was seen in one run.
+        other: what was seen in the other one.
+        first: which run is the one, behind its value.
+        second: which is the other.
+    """
+    names = [_SENDS, *getattr(device, "outputs", ())]
+    for (at_us, *seen), (_, *others) in zip(one, other, strict=True):
+        for name, value, another in zip(names, seen, others, strict=True):
+            if value != another:
+                return _message(at_us, name, (value, first), (another, second))
+    return ""
+
+
+def _message(at_us: int, name: str, one: tuple[Any, str], other: tuple[Any, str]) -> str:
+    (value, first), (another, second) = one, other
+    if isinstance(value, list):  # of what is sent, with the times
+        pairs = zip_longest(value, another, fillvalue=None)
+        value, another = next(pair for pair in pairs if pair[0] != pair[1])
+        at_us = min(sent[0] for sent in (value, another) if sent)
+    by = "by" if name == _SENDS else "at"
+    shown, other_shown = shorten(value), shorten(another)
+    return f"{by} {in_ms(at_us)} {name} {shown} {first}, {other_shown} {second}"
+
+
+def shorten(value: Any) -> str:
+    """Write a value, in the middle of a line.
+
+    >>> shorten((2_000, b"ok")), shorten(None)
+    ("b'ok' at 2.000 ms", 'nothing')
+    """
+    if value is None:
+        return "nothing"
+    if isinstance(value, tuple) and len(value) == 2 and isinstance(value[0], int):
+        return f"{shorten(value[1])} at {in_ms(value[0])}"
+    text = repr(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+
+
+def explain_ticks(bench: Callable[..., DeviceBench], start: Session, session: Session) -> str:
+    """Return at which tick dense and sparse ticks differ first, in what, and what was due.
+
+    Args:
+        bench: makes one.
+        start: what is done before the session.
+        session: one in which they differ.
+    """
+    sparse, dense = bench(start=()), bench(start=(), dense=True)
+    for act in sparse.with_end([*start, *session]):
+        until_us = sparse.rig.now_us + act[0]
+        while (now_us := sparse.rig.now_us) < until_us:
+            due_us = sparse.device.due_us
+            at_us = min(until_us, next_tick_us(now_us, 0, sparse.device.tick_us))
+            for each in (sparse, dense):
+                each.rig.run_to(at_us)
+            found = difference(sparse.device, [dense.look()], [sparse.look()], DENSE, SPARSE)
+            if found:
+                return f"dense and sparse ticks differ: {found}; due_us said {due_text(due_us)}"
+        for each in (sparse, dense):
+            each.do(act)
+    return ""

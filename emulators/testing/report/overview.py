@@ -1,4 +1,10 @@
-"""What a report says of all tests together: counts, requirements, the slowest."""
+r"""What a report says of all tests together: counts, requirements, the slowest.
+
+Read what has to be shown by tests: a text file with a requirement a line.
+
+>>> parse_requirements("# Wheelchair\nSAF-12  A pulled bus stops the chair\n", "req.txt")
+(Requirement(name='SAF-12', text='A pulled bus stops the chair'),)
+"""
 
 from __future__ import annotations
 
@@ -8,12 +14,18 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
+from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.testing.report.bench_report import BenchReport, Outcome, TestRecord
+from tickrig.emulators.testing.report.bench_report import (
+    BenchReport,
+    Outcome,
+    Requirement,
+    TestRecord,
+)
 
-SLOWEST: Final = 10
-LONGEST_ANCHOR: Final = 120
+_SLOWEST: Final = 10
+_LONGEST_ANCHOR: Final = 120
 UNWELL: Final = (Outcome.FAILED, Outcome.ERROR, Outcome.BLOCKED)
 """What somebody has to look at."""
 
@@ -37,7 +49,7 @@ class ReportedTest:
     name: str
 
 
-class Verdict(StrEnum):
+class OverallVerdict(StrEnum):
     """What tests say about a requirement.
 
     Attributes:
@@ -73,12 +85,12 @@ class RequirementRow:
         return sum(test.record.outcome is Outcome.PASSED for test in self.tests)
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> OverallVerdict:
         """What its tests say; a blocked one says nothing."""
         outcomes = {test.record.outcome for test in self.tests}
         if outcomes & {Outcome.FAILED, Outcome.ERROR}:
-            return Verdict.FAILED
-        return Verdict.SHOWN if Outcome.PASSED in outcomes else Verdict.NOT_SHOWN
+            return OverallVerdict.FAILED
+        return OverallVerdict.SHOWN if Outcome.PASSED in outcomes else OverallVerdict.NOT_SHOWN
 
 
 def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
@@ -87,7 +99,7 @@ def reported(tests: Iterable[TestRecord]) -> tuple[ReportedTest, ...]:
     places = []
     for test in tests:
         file, _, name = test.nodeid.partition("::")
-        anchor = "t-" + _NO_ANCHOR.sub("-", test.nodeid).strip("-")[:LONGEST_ANCHOR]
+        anchor = "t-" + _NO_ANCHOR.sub("-", test.nodeid).strip("-")[:_LONGEST_ANCHOR]
         used[anchor] += 1
         while used[anchor] > 1:
             anchor = f"{anchor}-{used[anchor]}"
@@ -124,7 +136,7 @@ def requirement_rows(report: BenchReport, tests: Iterable[ReportedTest]) -> list
         RequirementRow(name, texts.get(name, ""), tuple(shown), name in texts or not texts)
         for name, shown in shown_by.items()
     ]
-    order = list(Verdict)
+    order = list(OverallVerdict)
     return sorted(rows, key=lambda row: (order.index(row.verdict), natural(row.name)))
 
 
@@ -138,4 +150,50 @@ def natural(name: str) -> list[tuple[int, str]]:
 
 def slowest(tests: Iterable[ReportedTest]) -> list[ReportedTest]:
     """Return the tests that took longest, the slowest first."""
-    return sorted(tests, key=lambda test: -test.record.wall_us)[:SLOWEST]
+    return sorted(tests, key=lambda test: -test.record.wall_us)[:_SLOWEST]
+
+
+_COMMENT: Final = "#"
+
+
+def read_requirements(path: Path) -> tuple[Requirement, ...]:
+    """Read a file of requirements.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: all that is wrong with it, a line each.
+    """
+    try:
+        return parse_requirements(path.read_text("utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: not UTF-8 at byte {error.start}") from None
+
+
+def parse_requirements(text: str, file: str) -> tuple[Requirement, ...]:
+    """Return the requirements of a text.
+
+    Args:
+        text: in each line the name, as the marker `req` has it, and after blanks what it demands;
+            a line that begins with `#` is a comment.
+        file: where it stands, for people.
+
+    Raises:
+        ValueError: a name stands twice, or there is none at all.
+    """
+    found: dict[str, Requirement] = {}
+    lines: dict[str, int] = {}
+    mistakes: list[str] = []
+    for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
+        name, *demand = line.split(maxsplit=1) or [_COMMENT]
+        if name.startswith(_COMMENT):
+            continue
+        if name in found:
+            mistakes.append(f"{file}:{number}: {name} stands in line {lines[name]} already")
+            continue
+        found[name] = Requirement(name, "".join(demand).rstrip())
+        lines[name] = number
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    if not found:
+        raise ValueError(f"{file}: no requirement: write one a line, as SAF-12 It stops")
+    return tuple(found.values())

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum, auto
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
 from typing import Final
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
@@ -32,22 +33,97 @@ from tickrig.emulators.testing.report.overview import (
     requirement_rows,
     slowest,
 )
-from tickrig.emulators.testing.report.page_room import (
-    JOURNAL_LINES,
-    PAGE_BYTES,
-    TEXT_BYTES,
-    TRACE_BYTES,
-    PageRoom,
-    Part,
-    cut,
-)
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 from tickrig.host.text import page_text
 from tickrig.host.text.values import counted, format_time
 
-PACKAGE: Final = __package__
-FOLDER: Final = "template"
-MOST_OPEN: Final = 12
+# Which parts of which tests have room on a page: a browser has to open it in a few seconds.
+
+_PAGE_BYTES: Final = 16_000_000
+"""For what tests bring; what stands around it comes on top."""
+
+_JOURNAL_LINES: Final = 200
+_LINE_CHARACTERS: Final = 2_000
+_TEXT_BYTES: Final = 64_000
+"""Of what pytest tells about a failure."""
+_TRACE_BYTES: Final = 256_000
+_LINE_BYTES: Final = 48
+"""What a line of a journal has around its text."""
+
+
+class PagePart(Enum):
+    """A part of a test, in the order in which parts are given room."""
+
+    TEXT = auto()
+    TIMELINE = auto()
+    JOURNAL = auto()
+    TRACE = auto()
+
+
+@dataclass(slots=True)
+class PageRoom:
+    """Gives room to what matters most: of each part, first that of failed tests.
+
+    Args:
+        tests: all tests.
+        timelines: theirs.
+        room_bytes: how much there is.
+
+    Attributes:
+        admitted: number of the test and part, of all that have room.
+    """
+
+    tests: Sequence[TestRecord]
+    timelines: Sequence[Timeline | None]
+    room_bytes: int = _PAGE_BYTES
+    admitted: set[tuple[int, PagePart]] = field(init=False, default_factory=set)
+
+    def __post_init__(self) -> None:
+        """Share the room."""
+        order = list(Outcome)
+        first = sorted(range(len(self.tests)), key=lambda n: order.index(self.tests[n].outcome))
+        for part in PagePart:
+            for number in first:
+                size = self._size(number, part)
+                if size <= self.room_bytes:
+                    self.admitted.add((number, part))
+                    self.room_bytes -= size
+
+    def _size(self, number: int, part: PagePart) -> int:
+        test, timeline = self.tests[number], self.timelines[number]
+        match part:
+            case PagePart.TEXT:
+                return _size_of(test.longrepr[:_TEXT_BYTES])
+            case PagePart.TIMELINE:
+                return timeline.size if timeline else 0
+            case PagePart.JOURNAL:
+                return _size_of("".join(_journal_texts(test)))
+            case PagePart.TRACE:
+                return _size_of(cut(test.trace, _TRACE_BYTES)[0])
+
+
+def _journal_texts(test: TestRecord) -> Iterator[str]:
+    """Yield the texts of the lines that are shown, each with room for what is around it."""
+    for line in test.journal[-_JOURNAL_LINES:]:
+        yield line.text[:_LINE_CHARACTERS] + " " * _LINE_BYTES
+
+
+def _size_of(text: str) -> int:
+    """Return how many bytes a text takes on a page."""
+    return len(str(escape(text)).encode("utf-8", "replace"))
+
+
+def cut(text: str, most: int) -> tuple[str, int]:
+    """Return whole lines of at most so many characters from the beginning, and how many are cut."""
+    if len(text) <= most:
+        return text, 0
+    end = text.rfind("\n", 0, most) + 1 or most
+    return text[:end], len(text) - end
+
+
+_PACKAGE: Final = __package__
+_FOLDER: Final = "template"
+_MOST_OPEN: Final = 12
 """Up to so many failed tests are unfolded at once."""
 
 
@@ -76,7 +152,7 @@ class TestOnPage:
     opened: bool
 
 
-def html_page(report: BenchReport, room_bytes: int = PAGE_BYTES) -> str:
+def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
     """Return the page.
 
     Args:
@@ -106,7 +182,7 @@ def html_page(report: BenchReport, room_bytes: int = PAGE_BYTES) -> str:
 def _environment() -> Environment:
     """Return what has the templates; they are compiled once."""
     environment = Environment(
-        loader=PackageLoader(PACKAGE, FOLDER),
+        loader=PackageLoader(_PACKAGE, _FOLDER),
         autoescape=True,
         finalize=page_text.harmless,
         undefined=StrictUndefined,
@@ -125,7 +201,7 @@ def _environment() -> Environment:
 
 
 def _resource(name: str) -> str:
-    return files(PACKAGE).joinpath(FOLDER, name).read_text("utf-8")
+    return files(_PACKAGE).joinpath(_FOLDER, name).read_text("utf-8")
 
 
 def _policy(style: str, script: str) -> str:
@@ -144,40 +220,40 @@ def _on_page(places: Sequence[ReportedTest], room_bytes: int) -> Iterator[TestOn
     admitted = PageRoom(tests, timelines, room_bytes).admitted
     unwell = sum(test.outcome in UNWELL for test in tests)
     for number, place in enumerate(places):
-        parts = {part for part in Part if (number, part) in admitted}
-        opened = place.record.outcome in UNWELL and unwell <= MOST_OPEN
+        parts = {part for part in PagePart if (number, part) in admitted}
+        opened = place.record.outcome in UNWELL and unwell <= _MOST_OPEN
         yield _test_on_page(place, timelines[number], parts, opened)
 
 
 def _test_on_page(
-    place: ReportedTest, timeline: Timeline | None, parts: set[Part], opened: bool
+    place: ReportedTest, timeline: Timeline | None, parts: set[PagePart], opened: bool
 ) -> TestOnPage:
     test = place.record
-    lines = test.journal[-JOURNAL_LINES:]
+    lines = test.journal[-_JOURNAL_LINES:]
     return TestOnPage(
         place,
-        timeline if Part.TIMELINE in parts else None,
-        cut(test.longrepr, TEXT_BYTES)[0] if Part.TEXT in parts else "",
-        lines if Part.JOURNAL in parts else (),
+        timeline if PagePart.TIMELINE in parts else None,
+        cut(test.longrepr, _TEXT_BYTES)[0] if PagePart.TEXT in parts else "",
+        lines if PagePart.JOURNAL in parts else (),
         test.journal_left_out + len(test.journal) - len(lines),
-        cut(test.trace, TRACE_BYTES)[0] if Part.TRACE in parts else "",
+        cut(test.trace, _TRACE_BYTES)[0] if PagePart.TRACE in parts else "",
         tuple(_left_out(test, timeline, parts)),
         opened,
     )
 
 
-def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[Part]) -> Iterator[str]:
+def _left_out(test: TestRecord, timeline: Timeline | None, parts: set[PagePart]) -> Iterator[str]:
     """Yield what of a test is not on the page, for people."""
     texts = (
-        (Part.TEXT, "the text", test.longrepr, TEXT_BYTES),
-        (Part.TRACE, "the trace", test.trace, TRACE_BYTES),
+        (PagePart.TEXT, "the text", test.longrepr, _TEXT_BYTES),
+        (PagePart.TRACE, "the trace", test.trace, _TRACE_BYTES),
     )
     for part, name, text, most in texts:
         if text and part not in parts:
             yield f"{name}, {page_text.size(len(text))}"
         elif missing := cut(text, most)[1]:
             yield f"the last {page_text.size(missing)} of {name}"
-    if timeline and Part.TIMELINE not in parts:
+    if timeline and PagePart.TIMELINE not in parts:
         yield "the plots"
-    if test.journal and Part.JOURNAL not in parts:
+    if test.journal and PagePart.JOURNAL not in parts:
         yield counted(len(test.journal), "journal line")

@@ -1,16 +1,190 @@
-"""Reports in files: the page, and the JSON that it can be made of later."""
+"""Reports in files: the page, and the JSON that it can be made of later.
+
+Reports as JSON: what workers hand over, and what several runs are merged from.
+
+>>> from tickrig.emulators.testing.report.bench_report import Outcome, TestRecord
+>>> data = to_data(TestRecord("test_a.py::test_a", Outcome.PASSED, virtual_us=1_000))
+>>> from_data(TestRecord, data).virtual_us
+1000
+"""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, asdict, fields, is_dataclass
+from enum import Enum
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
-from tickrig.emulators.testing.report.bench_report import BenchReport
-from tickrig.emulators.testing.report.report_json import from_json, to_json
+from tickrig.emulators.testing.report.bench_report import VERSION, BenchReport
 from tickrig.host.text.whole_file import check_file, is_special, write_whole
 
-PAGES: Final = (".html", ".htm", "")
+_VERSION_KEY: Final = "tickrig-report"
+
+_MOST: Final = 2**63 - 1
+"""Of whole numbers: of times in microseconds 292,000 years."""
+
+T = TypeVar("T")
+
+_Reader = Callable[[Any], Any]
+"""Makes a value of what JSON gives."""
+
+_NAMES: Final[Mapping[type, str]] = {
+    int: "a whole number",
+    float: "a number",
+    bool: "true or false",
+    str: "a text",
+    type(None): "null",
+}
+
+
+class ReportError(ValueError):
+    """JSON that is no report of this version; the text says where and what."""
+
+
+def to_data(value: Any) -> Any:  # what a value holds is open
+    """Return a value of a report as dicts, lists, texts and numbers, as JSON has them."""
+    return asdict(value)
+
+
+def from_data(kind: type[T], data: object) -> T:
+    """Make a value of a report out of what `to_data` gave.
+
+    Args:
+        kind: `BenchReport`, `TestRecord`, ...
+        data: dicts, lists, texts and numbers.
+
+    Raises:
+        ReportError: a key or value that it cannot have.
+    """
+    hint: Any = kind
+    value: T = _reader(hint)(data)
+    return value
+
+
+def to_json(report: BenchReport) -> str:
+    """Write a report, on one line."""
+    data = {_VERSION_KEY: VERSION, **_values(report)}
+    return json.dumps(data, separators=(",", ":"), default=_values)
+
+
+def _values(value: Any) -> dict[str, Any]:
+    return {field.name: getattr(value, field.name) for field in fields(value)}
+
+
+def from_json(text: str) -> BenchReport:
+    """Read a report.
+
+    Raises:
+        ReportError: no JSON, no report, a report of another version, or a wrong value.
+    """
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise ReportError(f"not JSON: {error}") from None
+    if not isinstance(data, dict) or _VERSION_KEY not in data:
+        raise ReportError(f"no report: there is no key {_VERSION_KEY!r}")
+    version = data.pop(_VERSION_KEY)
+    if version != VERSION:
+        raise ReportError(f"report version {version!r:.20}; this program reads {VERSION}")
+    return from_data(BenchReport, data)
+
+
+@cache
+def _reader(hint: Any) -> _Reader:
+    """Return what reads a type of a field."""
+    if get_origin(hint) is tuple:
+        return _tuple_reader(get_args(hint))
+    if isinstance(hint, type) and is_dataclass(hint):
+        return _fields_reader(hint)
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return _enum_reader(hint)
+    if isinstance(hint, type) and issubclass(hint, tuple):
+        values = _tuple_reader(tuple(get_type_hints(hint).values()))
+        return lambda data: hint(*values(data))
+    return _plain_reader(get_args(hint) or (hint,))
+
+
+def _plain_reader(kinds: tuple[type, ...]) -> _Reader:
+    allowed = frozenset({*kinds, int} if float in kinds else kinds)
+    names = " or ".join(_NAMES[kind] for kind in kinds if not (kind is int and float in kinds))
+
+    def read(data: Any) -> Any:
+        if type(data) not in allowed:  # bool is an int
+            raise ReportError(f": {data!r:.40} is not {names}")
+        if type(data) is int and not -_MOST <= data <= _MOST:
+            raise ReportError(f": a number of {data.bit_length()} bits is too large")
+        return data
+
+    return read
+
+
+def _enum_reader(kind: type[Enum]) -> _Reader:
+    def read(data: Any) -> Enum:
+        try:
+            return kind(data)
+        except ValueError:
+            known = ", ".join(str(member.value) for member in kind)
+            raise ReportError(f": {data!r:.40} is none of {known}") from None
+
+    return read
+
+
+def _tuple_reader(hints: tuple[Any, ...]) -> _Reader:
+    endless = hints[-1] is ...
+    many = "values" if hints[-1] is ... else len(hints)
+    readers = [_reader(hint) for hint in hints if hint is not ...]
+
+    def read(data: Any) -> tuple[Any, ...]:
+        if not isinstance(data, list | tuple) or not (endless or len(data) == len(readers)):
+            raise ReportError(f": {data!r:.40} is no list of {many}")
+        done: list[Any] = []
+        try:
+            if endless:
+                done.extend(map(readers[0], data))
+            else:
+                done.extend(reader(value) for reader, value in zip(readers, data, strict=True))
+        except ReportError as error:
+            raise ReportError(f"[{len(done)}]{error}") from None
+        return tuple(done)
+
+    return read
+
+
+def _fields_reader(kind: type[Any]) -> _Reader:
+    hints = get_type_hints(kind)
+    readers = {field.name: _reader(hints[field.name]) for field in fields(kind)}
+    needed = {field.name for field in fields(kind) if field.default is MISSING}
+
+    def read(data: Any) -> Any:
+        if not isinstance(data, dict):
+            raise ReportError(f": {data!r:.40} is no object")
+        if unknown := data.keys() - readers.keys():
+            raise ReportError(f": unknown key {min(unknown)!r:.40}")
+        if missing := needed - data.keys():
+            raise ReportError(f": no {min(missing)}")
+        values: dict[str, Any] = {}
+        for name, value in data.items():
+            try:
+                values[name] = readers[name](value)
+            except ReportError as error:
+                raise ReportError(f".{name}{error}") from None
+        return _made(kind, values)
+
+    return read
+
+
+def _made(kind: type[Any], values: Mapping[str, Any]) -> Any:
+    try:
+        return kind(**values)
+    except ValueError as error:
+        raise ReportError(f": {error}") from None
+
+
+_PAGES: Final = (".html", ".htm", "")
 JSON: Final = ".json"
 """Ends the name of a report that is kept as JSON."""
 
@@ -22,7 +196,7 @@ def check_report(path: Path) -> None:
         ValueError: Jinja2 is not there, the folder is not, or nothing can be written to it; or
             the name is that of a folder, or of a kind of file that no report is.
     """
-    if path.suffix.lower() not in (*PAGES, JSON) and not is_special(path):
+    if path.suffix.lower() not in (*_PAGES, JSON) and not is_special(path):
         raise ValueError(f"report {path}: it is a page, as report.html, or JSON, as report.json")
     if path.suffix.lower() != JSON and find_spec("jinja2") is None:
         raise ValueError("a report needs Jinja2: pip install 'tickrig[report]'")

@@ -4,22 +4,209 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final, NamedTuple
 
-from tickrig.emulators.testing.report.axis import Axis, Span
-from tickrig.emulators.testing.report.bench_report import JournalLine, PlannedFault, TestRecord
-from tickrig.emulators.testing.report.lane import WORD_CHARACTERS, Lane, lane_of
+from tickrig.emulators.testing.report.bench_report import (
+    JournalLine,
+    PlannedFault,
+    Point,
+    SignalSeries,
+    TestRecord,
+    Value,
+    thinned,
+)
+from tickrig.host.canmon.model.graph.chart import ticks, widened
+from tickrig.host.text.page_text import DASH
 from tickrig.host.text.values import counted
 
-MOST_FAULTS: Final = 40
-MOST_EVENTS: Final = 200
-MOST_LANES: Final = 40
-EVENT_CHARACTERS: Final = 200
-ACTION: Final = "!"
-MISS: Final = "?"
+# The axis of time that faults, actions and values of a test share.
+#
+# Positions are per cent of it, and so fit any width.
+
+_WIDE: Final = 25
+"""Per cent of the axis on which a text has room, even on a phone."""
 
 
-class Event(NamedTuple):
+class TimeAxis(NamedTuple):
+    """The span of time that is shown.
+
+    Attributes:
+        from_us: its beginning,
+        to_us: its end, later.
+    """
+
+    from_us: int
+    to_us: int
+
+    def part(self, at_us: int) -> float:
+        """Return where a time is, in per cent from the left; what is outside is at the edge."""
+        part = (at_us - self.from_us) * 100 / (self.to_us - self.from_us)
+        return round(min(max(part, 0), 100), 2)
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Round times: where, and what is written there, in seconds."""
+        marks = ticks(self.from_us / 1e6, self.to_us / 1e6, 5)
+        return [(self.part(round(second * 1e6)), text) for second, text in marks]
+
+
+class TimeSpan(NamedTuple):
+    """Something that lasted.
+
+    Attributes:
+        left: where it begins, in per cent.
+        width: in per cent.
+        text: what it was.
+    """
+
+    left: float
+    width: float
+    text: str
+
+    @property
+    def place(self) -> str:
+        """Where its text has room: `inside`, `behind` or `before`."""
+        if self.width >= _WIDE:
+            return "inside"
+        return "behind" if self.left + self.width <= 100 - _WIDE else "before"
+
+
+# How a signal is drawn: a curve in a field of `_WIDTH` times `_HEIGHT`, or its words.
+
+_WIDTH: Final = 1000
+_HEIGHT: Final = 100
+_MOST_POINTS: Final = 800
+"""Of a curve; more cannot be seen."""
+_MOST_WORDS: Final = 200
+_WORD_CHARACTERS: Final = 80
+CURVE_PX: Final = 64
+SWITCH_PX: Final = 32
+_SWITCH: Final[tuple[float, float]] = (0, 1)
+"""The scale of what is on or off."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A signal on the axis.
+
+    Attributes:
+        name: of the signal.
+        unit: of its numbers.
+        path: its curve, empty for words.
+        words: its values, if they are words, or its only number.
+        low: its least number,
+        high: its greatest one.
+        scale: the numbers at the lower and the upper edge of the field.
+        zero: how far from the top zero is, in per cent; None if it is at an edge or outside.
+        rows: what a table tells: first, least, greatest and last value, number of samples.
+    """
+
+    name: str
+    unit: str
+    path: str
+    words: tuple[TimeSpan, ...]
+    low: str
+    high: str
+    scale: tuple[float, float]
+    zero: float | None
+    rows: tuple[str, ...]
+
+    @property
+    def constant(self) -> bool:
+        """It never changed."""
+        return not self.path and len(self.words) == 1
+
+    @property
+    def height(self) -> int:
+        """How high its picture is, in pixels; switches need little."""
+        return SWITCH_PX if self.scale == _SWITCH else CURVE_PX
+
+
+def _lane_of(series: SignalSeries, axis: TimeAxis) -> Lane:
+    """Return how a signal with samples is drawn on an axis."""
+    values = [value for _, value in series.points if value is not None]
+    numbers = [value for value in values if not isinstance(value, str)]
+    if not numbers or len(numbers) < len(values):
+        words = tuple(_words(series.points, axis))
+        return Lane(series.name, "", "", words, "", "", (0, 0), None, _row(series.points, []))
+    if min(numbers) == max(numbers) and len(values) == len(series.points):
+        return _constant(series, axis)
+    low, high = widened(min(numbers), max(numbers))
+    path = _path(series.points, axis, (low, high), series.steps)
+    zero = round(_height(0, (low, high)), 2) if low < 0 < high else None
+    least, greatest = _text_of(min(numbers)), _text_of(max(numbers))
+    rows = _row(series.points, numbers)
+    return Lane(series.name, series.unit, path, (), least, greatest, (low, high), zero, rows)
+
+
+def _constant(series: SignalSeries, axis: TimeAxis) -> Lane:
+    """Return a lane that says a number once."""
+    value = series.points[0][1]
+    text = f"{_text_of(value)} {series.unit}".rstrip()
+    left = axis.part(series.points[0][0])
+    words = (TimeSpan(left, round(100 - left, 2), text),)
+    row = _row(series.points, [value] if isinstance(value, int | float) else [])
+    return Lane(series.name, series.unit, "", words, "", "", (0, 0), None, row)
+
+
+def _row(points: Sequence[Point], numbers: Sequence[float]) -> tuple[str, ...]:
+    ends = (min(numbers), max(numbers)) if numbers else (None, None)
+    cells = points[0][1], *ends, points[-1][1]
+    return (*map(_text_of, cells), f"{len(points)}")
+
+
+def _text_of(value: Value) -> str:
+    """Write a value for people."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return DASH if value is None else str(value)[:_WORD_CHARACTERS]
+
+
+def _words(points: Sequence[Point], axis: TimeAxis) -> Iterator[TimeSpan]:
+    """Yield one span for each value that stays for a while."""
+    changes = [points[0]]
+    changes += [now for before, now in pairwise(points) if now[1] != before[1]]
+    changes = thinned(changes, _MOST_WORDS)
+    for (at_us, value), (until_us, _) in pairwise([*changes, (axis.to_us, None)]):
+        left = axis.part(at_us)
+        if value is not None:
+            yield TimeSpan(left, round(axis.part(until_us) - left, 2), _text_of(value))
+
+
+def _path(points: Sequence[Point], axis: TimeAxis, scale: tuple[float, float], steps: bool) -> str:
+    parts: list[str] = []
+    before = ""
+    for at_us, value in thinned(points, _MOST_POINTS):
+        x = f"{axis.part(at_us) * _WIDTH / 100:g}"
+        y = f"{_height(value, scale):.4g}" if isinstance(value, int | float) else ""
+        if not before:
+            parts += [f"M{x} {y}"] if y else []
+        elif not steps:
+            parts += [f"L{x} {y}"] if y else []
+        elif y != before:
+            parts += [f"H{x}", f"V{y}"] if y else [f"H{x}"]
+        before = y
+    if steps and before:
+        parts.append(f"H{_WIDTH}")
+    return "".join(parts)
+
+
+def _height(value: float, scale: tuple[float, float]) -> float:
+    """Return how far a value is from the top; halves, for their difference is never infinite."""
+    low, high = scale
+    return (high / 2 - value / 2) / (high / 2 - low / 2) * _HEIGHT
+
+
+_MOST_FAULTS: Final = 40
+_MOST_EVENTS: Final = 200
+_MOST_LANES: Final = 40
+_EVENT_CHARACTERS: Final = 200
+_ACTION: Final = "!"
+_MISS: Final = "?"
+
+
+class TimelineEvent(NamedTuple):
     """Something at a moment.
 
     Attributes:
@@ -45,9 +232,9 @@ class Timeline:
         left_out: what is not drawn, for people.
     """
 
-    axis: Axis
-    faults: tuple[Span, ...]
-    events: tuple[Event, ...]
+    axis: TimeAxis
+    faults: tuple[TimeSpan, ...]
+    events: tuple[TimelineEvent, ...]
     lanes: tuple[Lane, ...]
     left_out: tuple[str, ...]
 
@@ -66,17 +253,17 @@ def timeline_of(test: TestRecord) -> Timeline | None:
     axis = _axis_of(test)
     came = [fault for fault in test.faults if fault.from_us is not None]
     drawn = [series for series in test.series if series.points]
-    many = ((len(came) - MOST_FAULTS, "fault"), (len(drawn) - MOST_LANES, "signal"))
+    many = ((len(came) - _MOST_FAULTS, "fault"), (len(drawn) - _MOST_LANES, "signal"))
     return Timeline(
         axis,
-        tuple(_fault_span(fault, axis) for fault in came[:MOST_FAULTS]),
+        tuple(_fault_span(fault, axis) for fault in came[:_MOST_FAULTS]),
         tuple(_events(test.journal, axis)),
-        tuple(lane_of(series, axis) for series in drawn[:MOST_LANES]),
+        tuple(_lane_of(series, axis) for series in drawn[:_MOST_LANES]),
         tuple(counted(number, noun) for number, noun in many if number > 0),
     )
 
 
-def _axis_of(test: TestRecord) -> Axis:
+def _axis_of(test: TestRecord) -> TimeAxis:
     times = [at_us for series in test.series for at_us, _ in series.points]
     for fault in test.faults:
         times += [at_us for at_us in (fault.from_us, fault.to_us) if at_us is not None]
@@ -85,16 +272,18 @@ def _axis_of(test: TestRecord) -> Axis:
     from_us = min(times, default=0)
     if from_us < to_us / 2:
         from_us = min(0, from_us)
-    return Axis(from_us, max(to_us, from_us + 1))
+    return TimeAxis(from_us, max(to_us, from_us + 1))
 
 
-def _fault_span(fault: PlannedFault, axis: Axis) -> Span:
+def _fault_span(fault: PlannedFault, axis: TimeAxis) -> TimeSpan:
     left = axis.part(fault.from_us or 0)
     right = 100.0 if fault.to_us is None else axis.part(fault.to_us)
-    return Span(left, round(right - left, 2), fault.name[:WORD_CHARACTERS])
+    return TimeSpan(left, round(right - left, 2), fault.name[:_WORD_CHARACTERS])
 
 
-def _events(journal: Sequence[JournalLine], axis: Axis) -> Iterator[Event]:
-    seen = [line for line in journal if line.mark in (ACTION, MISS)][-MOST_EVENTS:]
+def _events(journal: Sequence[JournalLine], axis: TimeAxis) -> Iterator[TimelineEvent]:
+    seen = [line for line in journal if line.mark in (_ACTION, _MISS)][-_MOST_EVENTS:]
     for line in seen:
-        yield Event(axis.part(line.at_us), line.text[:EVENT_CHARACTERS], line.mark == MISS)
+        yield TimelineEvent(
+            axis.part(line.at_us), line.text[:_EVENT_CHARACTERS], line.mark == _MISS
+        )

@@ -8,30 +8,29 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
+from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.emulators.canopen.choices import MODELS, is_bus_node
-from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
+from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
-from tickrig.emulators.testing.rig_file.fields import check_name, shown
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, WirePlan, WireType
-from tickrig.emulators.testing.rig_file.schema import CANOPEN_DEVICE, SERIAL_DEVICE
-from tickrig.emulators.testing.rig_file.section import Schema, Section
+from tickrig.emulators.testing.rig_file.schema import CANOPEN_DEVICE, SERIAL_DEVICE, WIRES
+from tickrig.emulators.testing.rig_file.section import RigFileTable, Schema, check_name, shown
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import SUFFIX
 
-BUS: Final = "can"
+_BUS: Final = "can"
 """The bus that a file leaves out."""
 
-RESERVED: Final = ("control", "tolerance", "body", BUS)
+RESERVED: Final = ("control", "tolerance", "body", _BUS)
 """Names that mean something else beside those of devices."""
 
 RIG_SUFFIXES: Final = (".toml", ".yml", ".yaml")
 """Of rig files, and of a bus.yml, which is one."""
 EDS_SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
-EVERYTHING: Final[Schema] = {**SERIAL_DEVICE, **CANOPEN_DEVICE}
-READ_LATER: Final = "start"
+_DEVICE_KEYS: Final[Schema] = {**SERIAL_DEVICE, **CANOPEN_DEVICE}
+_READ_LATER: Final = "start"
 
-Wires = dict[str, WirePlan | None]
+_Wires = dict[str, WirePlan | None]
 
 
 class DeviceReader:
@@ -48,11 +47,11 @@ class DeviceReader:
         sections: the table of each.
     """
 
-    def __init__(self, section: Section | None, wires: Wires, folder: Path) -> None:
+    def __init__(self, section: RigFileTable | None, wires: _Wires, folder: Path) -> None:
         self._wires, self._folder = wires, folder
         self._given, self._types = dict(wires), cache(DEVICES.names)
         self.plans: dict[str, DevicePlan | None] = {}
-        self.sections: dict[str, Section] = {}
+        self.sections: dict[str, RigFileTable] = {}
         for name, table in section.subs() if section else ():
             self.plans[name] = None
             if table is not None:
@@ -81,7 +80,7 @@ class DeviceReader:
                 wire = self._wire_of(self.sections[name], plan)
                 self.plans[name] = replace(plan, wire=wire) if wire else None
 
-    def _check_name(self, name: str, section: Section) -> None:
+    def _check_name(self, name: str, section: RigFileTable) -> None:
         try:
             check_name(name)
             if name in self._given:
@@ -91,7 +90,7 @@ class DeviceReader:
         except ValueError as error:
             section.wrong(str(error))
 
-    def _read(self, name: str, section: Section) -> DevicePlan | None:
+    def _read(self, name: str, section: RigFileTable) -> DevicePlan | None:
         given = section.values.get("type")
         kind, place = None, ""
         if isinstance(given, str) and given:
@@ -99,8 +98,8 @@ class DeviceReader:
                 kind, place = kind_of(given, self._folder, self._types)
             except ValueError as error:
                 section.wrong(str(error), "type")
-        schema = {None: EVERYTHING, DeviceKind.SERIAL: SERIAL_DEVICE}.get(kind, CANOPEN_DEVICE)
-        values = section.read(schema, READ_LATER)
+        schema = {None: _DEVICE_KEYS, DeviceKind.SERIAL: SERIAL_DEVICE}.get(kind, CANOPEN_DEVICE)
+        values = section.read(schema, _READ_LATER)
         if (wire := values.get("wire", "")) and wire not in self._given:
             section.unknown(f"no wire {wire!r}; {near(wire, list(self._given))}", "wire")
         if kind is None:
@@ -122,7 +121,7 @@ class DeviceReader:
             ),
         )
 
-    def _wire_of(self, section: Section, plan: DevicePlan) -> str | None:
+    def _wire_of(self, section: RigFileTable, plan: DevicePlan) -> str | None:
         """Return the wire of a device; None if it cannot be said."""
         is_node = plan.kind is not DeviceKind.SERIAL
         if not plan.wire:
@@ -136,7 +135,7 @@ class DeviceReader:
             return None
         return plan.wire
 
-    def _bus_of(self, section: Section) -> str | None:
+    def _bus_of(self, section: RigFileTable) -> str | None:
         """Return the only bus, made if the file has none."""
         if None in self._given.values():
             return None
@@ -145,8 +144,8 @@ class DeviceReader:
             section.wrong(f"no key 'wire': there are {' and '.join(buses)}")
             return None
         if not buses:
-            self._wires.setdefault(BUS, WirePlan(name=BUS, type=WireType.CAN, given=False))
-        return buses[0] if buses else BUS
+            self._wires.setdefault(_BUS, WirePlan(name=_BUS, type=WireType.CAN, given=False))
+        return buses[0] if buses else _BUS
 
     def _line_of(self, name: str) -> str:
         """Return the line of a device's own."""
@@ -189,3 +188,56 @@ def _beside(config: Mapping[str, Any], folder: Path) -> dict[str, object]:
         key: str(folder / value) if isinstance(value, str) and f"{SUFFIX}:" in value else value
         for key, value in config.items()
     }
+
+
+# `[wire.NAME]`, and the wires that a file leaves out.
+
+_WIRE_KEYS: Final[Schema] = {key: each for schema in WIRES.values() for key, each in schema.items()}
+_OPTIONAL: Final = {"framing", "buffer_bytes", "echo", "bursts"}
+
+
+def read_wires(section: RigFileTable | None) -> dict[str, WirePlan | None]:
+    """Read all wires; None for one of which it is not known what it is."""
+    wires: dict[str, WirePlan | None] = {}
+    for name, table in section.subs() if section else ():
+        try:
+            check_name(name)
+        except ValueError as error:
+            section.wrong(str(error), name)  # type: ignore[union-attr]
+        wires[name] = _read(name, table) if table else None
+    return wires
+
+
+def _read(name: str, section: RigFileTable) -> WirePlan | None:
+    types = {each.value: each for each in WireType}
+    given = section.values.get("type")
+    wire_type = types.get(given) if isinstance(given, str) else None
+    if wire_type is None:
+        section.read(_WIRE_KEYS)
+        return None
+    values: Mapping[str, Any] = section.read(WIRES[wire_type])
+    return WirePlan(
+        name=name,
+        type=wire_type,
+        bit_rate=values.get("baud", values.get("bitrate")),
+        **{key: values[key] for key in _OPTIONAL if key in values},
+    )
+
+
+def check_wires(
+    top: RigFileTable,
+    wires: Mapping[str, WirePlan | None],
+    devices: Mapping[str, DevicePlan | None],
+) -> None:
+    """Note wires with nothing on them, and serial lines of several devices."""
+    all_known = None not in devices.values() and top.notes.document.whole
+    for name, wire in wires.items():
+        if wire is None or not wire.given:
+            continue
+        on_it = [each.name for each in devices.values() if each and each.wire == name]
+        if not on_it and all_known:
+            top.wrong(f"no device is on it: write wire = {name!r} at one", "wire", name)
+        if wire.type is WireType.SERIAL:
+            for other in on_it[1:]:
+                reason = f"{on_it[0]!r} is on this serial line; one of type rs485 takes several"
+                top.wrong(reason, "device", other, "wire")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from tickrig.emulators.serial.network.serve_url import parse_serve_url
+from tickrig.emulators.serial.network import parse_serve_url
 from tickrig.emulators.testing.rig_file.plan import (
     BusPlan,
     DevicePlan,
@@ -29,11 +29,11 @@ from tickrig.emulators.testing.rig_file.schema import (
     REAL_LINE,
     TOLERANCE,
 )
-from tickrig.emulators.testing.rig_file.section import Schema, Section
+from tickrig.emulators.testing.rig_file.section import RigFileTable, Schema
 from tickrig.host.text.names import closest, near
 
-CONTROL = "control"
-TOLERANCE_TABLE = "tolerance"
+_CONTROL = "control"
+_TOLERANCE_TABLE = "tolerance"
 
 
 class DoorReader:
@@ -53,11 +53,11 @@ class DoorReader:
     ) -> None:
         self._wires, self._devices, self._folder = wires, devices, folder
 
-    def read_real(self, section: Section) -> RealPlan:
+    def read_real(self, section: RigFileTable) -> RealPlan:
         """Read `[real]`."""
         values = section.read(REAL, *(key for key in section.values if key not in REAL))
         doors: dict[str, DoorPlan] = {}
-        for name, wire, table in self._tables(section, CONTROL):
+        for name, wire, table in self._tables(section, _CONTROL):
             if wire is None:
                 device = self._devices[name]
                 shared = device.wire if device else "WIRE"
@@ -67,16 +67,18 @@ class DoorReader:
             else:
                 doors[wire.name] = self._door(wire, table)
         self._check_twice(section, doors)
-        return RealPlan(control=self._file(values.get(CONTROL)), doors=doors)
+        return RealPlan(control=self._file(values.get(_CONTROL)), doors=doors)
 
-    def read_hardware(self, section: Section) -> HardwarePlan:
+    def read_hardware(self, section: RigFileTable) -> HardwarePlan:
         """Read `[hardware]`."""
         values = section.read(HARDWARE, *(key for key in section.values if key not in HARDWARE))
-        control = {name: self._file(values[CONTROL]) for name in self._devices if CONTROL in values}
+        control = {
+            name: self._file(values[_CONTROL]) for name in self._devices if _CONTROL in values
+        }
         ports: dict[str, PortPlan] = {}
         buses: dict[str, BusPlan] = {}
         power: dict[str, PowerPlan] = {}
-        for name, wire, table in self._tables(section, CONTROL, TOLERANCE_TABLE):
+        for name, wire, table in self._tables(section, _CONTROL, _TOLERANCE_TABLE):
             schema = _hardware_schema(wire, is_device=name in self._devices)
             found = table.read(schema)
             if wire is not None and "port" in found:
@@ -85,8 +87,8 @@ class DoorReader:
                 ports[wire.name] = PortPlan(port=found["port"], baud=found.get("baud"))
             if wire is not None and "interface" in found:
                 buses[wire.name] = _bus(table, found)
-            if name in self._devices and CONTROL in found:
-                control[name] = self._file(found[CONTROL])
+            if name in self._devices and _CONTROL in found:
+                control[name] = self._file(found[_CONTROL])
             if switched := _power(table, found):
                 power[name] = switched
         return HardwarePlan(
@@ -94,12 +96,12 @@ class DoorReader:
             ports=ports,
             buses=buses,
             power=power,
-            tolerance=_tolerance(section.sub(TOLERANCE_TABLE)),
+            tolerance=_tolerance(section.sub(_TOLERANCE_TABLE)),
         )
 
     def _tables(
-        self, section: Section, *but: str
-    ) -> Iterator[tuple[str, WirePlan | None, Section]]:
+        self, section: RigFileTable, *but: str
+    ) -> Iterator[tuple[str, WirePlan | None, RigFileTable]]:
         """Yield each table with the wire of its name, or that of a device alone on its line."""
         names = [*self._devices, *(name for name in self._wires if name not in self._devices)]
         for name in section.values:
@@ -122,7 +124,7 @@ class DoorReader:
         sharing = [each for each in self._devices.values() if each and each.wire == wire.name]
         return wire.type is not WireType.CAN and len(sharing) == 1
 
-    def _door(self, wire: WirePlan, section: Section) -> DoorPlan:
+    def _door(self, wire: WirePlan, section: RigFileTable) -> DoorPlan:
         if wire.type is WireType.CAN:
             found = section.read(REAL_BUS)
             return DoorPlan(bus=_bus(section, found) if "interface" in found else None)
@@ -130,7 +132,7 @@ class DoorReader:
         serve = [url for url in found.get("serve", ()) if _is_url(section, url)]
         return DoorPlan(link=self._file(found.get("link")), serve=tuple(serve))
 
-    def _check_twice(self, section: Section, doors: Mapping[str, DoorPlan]) -> None:
+    def _check_twice(self, section: RigFileTable, doors: Mapping[str, DoorPlan]) -> None:
         """Note links and addresses that two wires would have."""
         seen: dict[object, str] = {}
         for wire, door in doors.items():
@@ -146,7 +148,7 @@ class DoorReader:
         return None if name is None else self._folder / name
 
 
-def _is_url(section: Section, url: str) -> bool:
+def _is_url(section: RigFileTable, url: str) -> bool:
     """Return whether a line can be served there; else it is noted."""
     try:
         parse_serve_url(url)
@@ -166,7 +168,7 @@ def _hardware_schema(wire: WirePlan | None, *, is_device: bool) -> Schema:
     return {**HARDWARE_LINE, **of_device}
 
 
-def _bus(section: Section, found: Mapping[str, Any]) -> BusPlan:
+def _bus(section: RigFileTable, found: Mapping[str, Any]) -> BusPlan:
     """Return a bus; a driver that is not here may be there on another machine."""
     from can import VALID_INTERFACES  # noqa: PLC0415 - slow
 
@@ -181,7 +183,7 @@ def _bus(section: Section, found: Mapping[str, Any]) -> BusPlan:
     )
 
 
-def _power(section: Section, found: Mapping[str, Any]) -> PowerPlan | None:
+def _power(section: RigFileTable, found: Mapping[str, Any]) -> PowerPlan | None:
     missing = [key for key in ("power_on", "power_off") if key not in section.values]
     if len(missing) == 1:
         section.wrong(f"no key {missing[0]!r}: power_on and power_off come together")
@@ -190,7 +192,7 @@ def _power(section: Section, found: Mapping[str, Any]) -> PowerPlan | None:
     return None
 
 
-def _tolerance(section: Section | None) -> Tolerances:
+def _tolerance(section: RigFileTable | None) -> Tolerances:
     found = section.read(TOLERANCE) if section else {}
     given: dict[str, Any] = {}
     if "stick_pct" in found:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Final, Generic, NamedTuple, TypeVar
 
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.physical import SignalType
+from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.can.wire import CanWire
@@ -17,14 +17,13 @@ from tickrig.emulators.canopen.build import ANY_ID, describe
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.commands.device_config import configure, option_names
 from tickrig.emulators.commands.device_type import ConfiguredDevice
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.host.cli.extensions import ExtensionError
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 from tickrig.host.text.values import Setting
@@ -65,7 +64,7 @@ def eds_cache() -> EdsCache:
     return EdsCache()
 
 
-class Wrong(NamedTuple):
+class WrongDevice(NamedTuple):
     """Why a device cannot be made.
 
     Attributes:
@@ -77,7 +76,7 @@ class Wrong(NamedTuple):
     keys: tuple[str, ...]
 
 
-def probe(plan: DevicePlan) -> Probe | list[Wrong]:
+def probe(plan: DevicePlan) -> Probe | list[WrongDevice]:
     """Make a device.
 
     Args:
@@ -92,9 +91,9 @@ def probe(plan: DevicePlan) -> Probe | list[Wrong]:
     try:
         found = describe(eds_cache(), device, plan.profile or AUTO)
     except Refused as error:
-        return [Wrong(reason, ("type",)) for reason in str(error).splitlines()]
+        return [WrongDevice(reason, ("type",)) for reason in str(error).splitlines()]
     except SystemExit as error:  # a user's file may do anything
-        return [Wrong(f"{plan.type}: {explain_error(error)}", ("type",))]
+        return [WrongDevice(f"{plan.type}: {explain_error(error)}", ("type",))]
     slave = make_slave(found.make_dictionary(), ANY_ID, None, found.application)
     node = Nodes([Node(plan.name, slave, CanWire())])
     title = found.info.product_name or Path(plan.type).name
@@ -110,15 +109,15 @@ def probe(plan: DevicePlan) -> Probe | list[Wrong]:
     )
 
 
-def _serial(name: str, config: Mapping[str, object]) -> Probe | list[Wrong]:
+def _serial(name: str, config: Mapping[str, object]) -> Probe | list[WrongDevice]:
     """Make a device on a serial line."""
     made = _configured(name, config)
     if isinstance(made, ConfiguredDevice):
         line = made.type.line
         return Probe(made.device, line.faults, made.type.title, baud=line.baud)
     alone = [(key, _reason(name, key, value)) for key, value in config.items()]
-    wrong = [Wrong(reason, ("config", key)) for key, reason in alone if reason]
-    return wrong or [Wrong(made, ("config" if config else "type",))]
+    wrong = [WrongDevice(reason, ("config", key)) for key, reason in alone if reason]
+    return wrong or [WrongDevice(made, ("config" if config else "type",))]
 
 
 def _reason(name: str, key: str, value: object) -> str:
@@ -144,3 +143,72 @@ def _configured(name: str, config: Mapping[str, object]) -> ConfiguredDevice | s
         return str(error)
     except (Exception, SystemExit) as error:  # a foreign type may raise anything
         return explain_error(error)
+
+
+# What stands in for a device that cannot be made: it has every name, and takes every value.
+
+T = TypeVar("T")
+
+
+class _Everything(Mapping[str, T], Generic[T]):
+    """A table that has every name, with the same behind it."""
+
+    def __init__(self, item: T) -> None:
+        self._item = item
+
+    def __getitem__(self, name: str) -> T:
+        return self._item
+
+    def __contains__(self, name: object) -> bool:
+        return True
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(())
+
+    def __len__(self) -> int:
+        return 0
+
+
+_ANY: Final = InputSignal("any", "", low=float("-inf"), high=float("inf"), real=True)
+
+
+class UnknownInputs:
+    """Inputs that take everything."""
+
+    changed = False
+    table: Mapping[str, InputSignal] = _Everything(_ANY)
+    groups: Mapping[str, tuple[str, ...]] = {}
+
+    def __getitem__(self, name: str) -> Setting:
+        """Return nothing of interest."""
+        return 0
+
+    def set(self, name: str, value: Setting) -> None:
+        """Take a value."""
+
+    def check(self, name: str, value: Setting) -> Setting:
+        """Return the value."""
+        return value
+
+    def names(self, signal_type: SignalType) -> tuple[str, ...]:
+        """Return nothing: it has all."""
+        return ()
+
+    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
+        """Return something of this name."""
+        return self.table[name]
+
+
+class UnknownDevice:
+    """Stands in for a device that cannot be made: that is told, and nothing more about it."""
+
+    tick_us = 1_000
+    inputs = UnknownInputs()
+    outputs: Mapping[str, OutputSignal] = _Everything(OutputSignal("any", ""))
+
+    def read(self, name: str, /) -> Setting:
+        """Return nothing of interest."""
+        return 0
+
+
+UNKNOWN: Final = UnknownDevice()

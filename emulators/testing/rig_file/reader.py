@@ -2,40 +2,178 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
-from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.body import SIDES
+from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.device.chance import check_rate
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
+from tickrig.emulators.canopen.body import SHAFTS
 from tickrig.emulators.canopen.choices import is_bus_node
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.testing.rig_file.body import read_body
-from tickrig.emulators.testing.rig_file.devices import DeviceReader, kind_of
+from tickrig.emulators.testing.rig_file.bus_yml import bus_as_rig, is_bus_yml, with_nodes
+from tickrig.emulators.testing.rig_file.devices import (
+    DeviceReader,
+    check_wires,
+    kind_of,
+    read_wires,
+)
 from tickrig.emulators.testing.rig_file.doors import DoorReader
-from tickrig.emulators.testing.rig_file.faults import FaultRates, read_faults
-from tickrig.emulators.testing.rig_file.formats.bus_yml import bus_as_rig, is_bus_yml, with_nodes
-from tickrig.emulators.testing.rig_file.formats.old_formats import in_new_words, no_rig_file
+from tickrig.emulators.testing.rig_file.old_formats import in_new_words, no_rig_file
 from tickrig.emulators.testing.rig_file.plan import (
+    BodyPlan,
     DeviceKind,
     DevicePlan,
+    FaultPlan,
     RigPlan,
     WirePlan,
     WireType,
 )
-from tickrig.emulators.testing.rig_file.probe import Probe, Wrong, probe
-from tickrig.emulators.testing.rig_file.schema import TOP
-from tickrig.emulators.testing.rig_file.section import Notes, RigFileError, Section
+from tickrig.emulators.testing.rig_file.probe import UNKNOWN, Probe, WrongDevice, probe
+from tickrig.emulators.testing.rig_file.schema import BODY, TOP
+from tickrig.emulators.testing.rig_file.section import (
+    RigFileError,
+    RigFileNotes,
+    RigFileTable,
+    is_broken,
+    shown,
+    texts,
+)
 from tickrig.emulators.testing.rig_file.starts import Start, StartReader, read_safe
-from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
-from tickrig.emulators.testing.rig_file.wires import check_wires, read_wires
-from tickrig.host.text.toml_document import Mistake
-from tickrig.host.text.toml_reader import read_toml
+from tickrig.host.text.names import near
+from tickrig.host.text.toml_reader import Mistake, read_toml
 
-SEED: Final = "seed"
-MAX_MB: Final = 4
+# `[fault]`: faults of devices and wires, each in a word as on command lines.
+
+_FaultRates = Mapping[str, bool]
+"""Whether each fault of a device or wire wants a rate."""
+
+
+def _read_faults(
+    section: RigFileTable, owners: Mapping[str, _FaultRates | None]
+) -> Iterator[FaultPlan]:
+    """Yield the faults that can be.
+
+    Args:
+        section: the table.
+        owners: devices and wires by name; None for one whose faults are not known.
+    """
+    for owner, value in section.values.items():
+        if owner not in owners:
+            section.unknown(f"no device or wire {owner!r}; {near(owner, list(owners))}", owner)
+        elif not is_broken(value):
+            yield from _read(section, owner, value, owners[owner])
+
+
+def _read(
+    section: RigFileTable, owner: str, value: object, faults: _FaultRates | None
+) -> Iterator[FaultPlan]:
+    try:
+        specs = texts(value)
+    except ValueError as error:
+        section.wrong(f"{error}, as cut@2s-3s", owner)
+        return
+    for at, text in enumerate(specs):
+        try:
+            if faults is None:
+                spec = parse_fault_spec(text)
+            else:
+                spec = parse_fault_spec(text, partial(_check_name, faults))
+                check_rate(spec.name, spec.rate, rated=faults[spec.name])
+        except ValueError as error:
+            section.wrong(str(error), owner, *([at] if isinstance(value, list) else []))
+        else:
+            yield FaultPlan(owner, spec)
+
+
+def _check_name(faults: _FaultRates, name: str) -> None:
+    if name not in faults:
+        raise ValueError(f"no fault {name!r}; {near(name, faults)}")
+
+
+# `[body]`: what the shafts of drives move.
+
+_PARAMETERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
+
+
+def _read_body(
+    section: RigFileTable, devices: Mapping[str, HasSignals], node_ids: Mapping[int, str]
+) -> BodyPlan | None:
+    """Read the table.
+
+    Args:
+        section: the table.
+        devices: by name; the drives are looked for among them.
+        node_ids: names of nodes by their node-IDs, which may stand for them.
+
+    Returns:
+        The body, None if it cannot be.
+    """
+    kind = section.values.get("kind")
+    sides = SIDES.get(kind) if isinstance(kind, str) else None
+    wheels = [wheel for side in sides for wheel in side] if sides else []
+    others = wheels or [wheel for both in SIDES.values() for side in both for wheel in side]
+    values = section.read(BODY, *others)
+    drives = {wheel: _drive(section, wheel, devices, node_ids) for wheel in wheels}
+    for wheel, drive in drives.items():
+        first = next(each for each in drives if drives[each] == drive)
+        if drive and first != wheel:
+            section.wrong(f"{drive!r} drives {first} already", wheel)
+    mirrored = _mirrored(section, values.get("mirrored", ()), wheels)
+    needed = [key for key, each in BODY.items() if not each.default]
+    if not sides or not all(drives.values()) or not all(key in values for key in needed):
+        return None
+    return BodyPlan(
+        kind=values["kind"],
+        drives={wheel: drive for wheel, drive in drives.items() if drive},
+        mirrored=mirrored,
+        parameters={key: float(values[key]) for key in _PARAMETERS if key in values},
+    )
+
+
+def _drive(
+    section: RigFileTable,
+    wheel: str,
+    devices: Mapping[str, HasSignals],
+    node_ids: Mapping[int, str],
+) -> str | None:
+    """Return the device of a wheel, None if it cannot be one."""
+    value = section.values.get(wheel)
+    if type(value) is int:
+        value = node_ids.get(value, str(value))
+    if value is None:
+        section.wrong(f"no key {wheel!r}: the drive of this wheel, the name of a device")
+    elif is_broken(value):
+        return None
+    elif not isinstance(value, str):
+        section.wrong(f"it takes the name of a device, not {shown(value)}", wheel)
+    elif value not in devices and UNKNOWN in devices.values() and value.isdecimal():
+        return None  # it may be the node-ID of that one
+    elif value not in devices:
+        section.unknown(f"no device {value!r}; {near(value, list(devices))}", wheel)
+    elif not any(angle in devices[value].outputs for angle, *_ in SHAFTS):
+        section.wrong(f"{value!r} has no shaft: it is no CANopen drive", wheel)
+    else:
+        return value
+    return None
+
+
+def _mirrored(section: RigFileTable, names: tuple[str, ...], wheels: list[str]) -> tuple[str, ...]:
+    if wheels:
+        for name in names:
+            if name not in wheels:
+                section.wrong(f"no wheel {name!r}; {near(name, wheels)}", "mirrored")
+    return names
+
+
+_SEED: Final = "seed"
+_MAX_MB: Final = 4
 """Size of a rig file at most, in MB of 2^20 bytes; somebody's log or trace is told to be none."""
 
 
@@ -54,7 +192,7 @@ def read_rig_file(path: Path) -> RigPlan:
     """
     try:
         with path.open("rb") as file:
-            data = file.read((MAX_MB << 20) + 1)
+            data = file.read((_MAX_MB << 20) + 1)
     except FileNotFoundError as error:
         if is_bus_node(str(path)):
             text = f"no such file; it is a node of a bus.yml: Bench({str(path)!r}) has it alone"
@@ -78,9 +216,9 @@ def decode_rig_file(data: bytes, path: Path) -> RigPlan:
     """Read the bytes of a rig file; see `read_rig_file`."""
     if is_bus_yml(path, data):
         return _plan(bus_as_rig(path), path)
-    if len(data) > MAX_MB << 20:
+    if len(data) > _MAX_MB << 20:
         head = data[:1_000].decode("utf-8", "replace")
-        reason = no_rig_file(head) or f"more than {MAX_MB} MB: this is no rig file"
+        reason = no_rig_file(head) or f"more than {_MAX_MB} MB: this is no rig file"
         raise RigFileError(str(path), (Mistake(1, reason),))
     try:
         text = data.decode("utf-8")
@@ -101,11 +239,11 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
     if reason := no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
-    top = in_new_words(Section(Notes(document), (), document.values))
+    top = in_new_words(RigFileTable(RigFileNotes(document), (), document.values))
     return _plan(with_nodes(top, path.parent), path)
 
 
-def _plan(top: Section, path: Path) -> RigPlan:
+def _plan(top: RigFileTable, path: Path) -> RigPlan:
     plan = _Reader(top, path).read()
     if top.notes.all:
         raise RigFileError(str(path), top.notes.all)
@@ -115,7 +253,7 @@ def _plan(top: Section, path: Path) -> RigPlan:
 class _Reader:
     """Reads one file."""
 
-    def __init__(self, top: Section, path: Path) -> None:
+    def __init__(self, top: RigFileTable, path: Path) -> None:
         self._top, self._path, self._folder = top, path, path.parent
         self._wires = read_wires(top.sub("wire"))
         self._devices = DeviceReader(top.sub("device"), self._wires, self._folder)
@@ -125,7 +263,7 @@ class _Reader:
     def read(self) -> RigPlan:
         """Read all of it; what is wrong is noted."""
         top = self._top
-        seed = top.read({SEED: TOP[SEED]}, *(name for name in TOP if name != SEED)).get(SEED, 0)
+        seed = top.read({_SEED: TOP[_SEED]}, *(name for name in TOP if name != _SEED)).get(_SEED, 0)
         missing = "device" not in top.values or (not self._devices.plans and not top.notes.all)
         if missing and top.notes.document.whole:
             top.wrong("no device: a rig file has tables [device.NAME] with a type")
@@ -147,9 +285,9 @@ class _Reader:
             wires={name: self._with_rate(wire) for name, wire in self._wires.items() if wire},
             devices=devices,
             signals=signals,
-            faults=tuple(read_faults(fault, self._fault_owners())) if fault else (),
+            faults=tuple(_read_faults(fault, self._fault_owners())) if fault else (),
             safe=read_safe(safe, self._physical) if safe else {},
-            body=read_body(body, self._physical, node_ids) if body else None,
+            body=_read_body(body, self._physical, node_ids) if body else None,
             real=doors.read_real(real) if real else RigPlan().real,
             hardware=doors.read_hardware(hardware) if hardware else None,
             path=self._path,
@@ -157,7 +295,7 @@ class _Reader:
 
     def _make_probes(self) -> None:
         """Make each device, of those that are the same one."""
-        made: dict[str, Probe | list[Wrong]] = {}
+        made: dict[str, Probe | list[WrongDevice]] = {}
         for name, plan in self._devices.plans.items():
             found = None
             if plan is not None:
@@ -208,7 +346,7 @@ class _Reader:
         probes = [found for node in nodes if (found := self._probes[node.name])]
         return replace(wire, bit_rate=next((x.bit_rate for x in probes if x.bit_rate), None))
 
-    def _wire_faults(self, wire: WirePlan | None) -> FaultRates | None:
+    def _wire_faults(self, wire: WirePlan | None) -> _FaultRates | None:
         """Return the faults of a wire, None if they are not known."""
         if wire is None:
             return None
@@ -221,8 +359,8 @@ class _Reader:
             faults = first.wire_faults
         return {name: kind.rated for name, kind in faults.items()}
 
-    def _fault_owners(self) -> dict[str, FaultRates | None]:
-        owners: dict[str, FaultRates | None] = {
+    def _fault_owners(self) -> dict[str, _FaultRates | None]:
+        owners: dict[str, _FaultRates | None] = {
             name: self._wire_faults(wire) for name, wire in self._wires.items()
         }
         for name, each in self._probes.items():

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from tickrig.device.body.wheeled_body import SIDES
+from tickrig.device.body import SIDES
 from tickrig.emulators.canopen.choices import AUTO, PROFILES
-from tickrig.emulators.testing.rig_file.fields import (
+from tickrig.emulators.testing.rig_file.plan import WireType
+from tickrig.emulators.testing.rig_file.section import (
+    FileKey,
+    Schema,
     command,
     duration,
     flag,
@@ -22,19 +25,17 @@ from tickrig.emulators.testing.rig_file.fields import (
     texts,
     whole,
 )
-from tickrig.emulators.testing.rig_file.plan import WireType
-from tickrig.emulators.testing.rig_file.section import Key, Schema
 
-MOST_BAUD: Final = 50_000_000
-NONE: Final = "none"
-ITS_DEVICE: Final = "that of its device"
+_MOST_BAUD: Final = 50_000_000
+_NONE: Final = "none"
+_ITS_DEVICE: Final = "that of its device"
 
-_BAUD: Final = Key(whole(50, MOST_BAUD), f"50..{MOST_BAUD}", "bits a second", ITS_DEVICE)
-_BITRATE: Final = Key(
+_BAUD: Final = FileKey(whole(50, _MOST_BAUD), f"50..{_MOST_BAUD}", "bits a second", _ITS_DEVICE)
+_BITRATE: Final = FileKey(
     whole(10_000, 1_000_000), "10000..1000000", "bits a second", "that of a DCF, or 1000000"
 )
 _TYPE: Final = {
-    "type": Key(
+    "type": FileKey(
         one_of(*(each.value for each in WireType)),
         ", ".join(f'"{each.value}"' for each in WireType),
         "what the wire is",
@@ -42,14 +43,14 @@ _TYPE: Final = {
 }
 _LINE: Final = {
     "baud": _BAUD,
-    "framing": Key(framing, '"8N1", "7E2", ...', "data bits, parity, stop bits", '"8N1"'),
-    "buffer_bytes": Key(
-        whole(1, 1 << 24), f"1..{1 << 24}", "room of each sender and receiver", ITS_DEVICE
+    "framing": FileKey(framing, '"8N1", "7E2", ...', "data bits, parity, stop bits", '"8N1"'),
+    "buffer_bytes": FileKey(
+        whole(1, 1 << 24), f"1..{1 << 24}", "room of each sender and receiver", _ITS_DEVICE
     ),
 }
 _RS485: Final = {
-    "echo": Key(flag, "true, false", "each end hears its own bytes too", "false"),
-    "bursts": Key(
+    "echo": FileKey(flag, "true, false", "each end hears its own bytes too", "false"),
+    "bursts": FileKey(
         flag,
         "true, false",
         "a receiver takes what was sent back to back when it has ended",
@@ -65,82 +66,88 @@ WIRES: Final[Mapping[WireType, Schema]] = {
 """Of `[wire.NAME]`."""
 
 _DEVICE: Final = {
-    "type": Key(
+    "type": FileKey(
         text,
         "device type, CANopen model, EDS or DCF file, `FILE.yml:NODE`, `FILE.py:Class`",
         "what it is",
     ),
-    "wire": Key(text, "name of a wire", "what it is connected to", "its own line; the only bus"),
-    "start": Key(table, "a table", "its inputs at the start, see below", NONE),
+    "wire": FileKey(
+        text, "name of a wire", "what it is connected to", "its own line; the only bus"
+    ),
+    "start": FileKey(table, "a table", "its inputs at the start, see below", _NONE),
 }
 
 SERIAL_DEVICE: Final[Schema] = _DEVICE | {
-    "config": Key(
-        table, "a table", "options of `tickrig emu TYPE`: `--run-s` is `run-s` or `run_s`", NONE
+    "config": FileKey(
+        table, "a table", "options of `tickrig emu TYPE`: `--run-s` is `run-s` or `run_s`", _NONE
     )
 }
 CANOPEN_DEVICE: Final[Schema] = _DEVICE | {
-    "node_id": Key(node_id, '1..127, "lss"', "its node-ID", "that of the DCF or model"),
-    "profile": Key(
+    "node_id": FileKey(node_id, '1..127, "lss"', "its node-ID", "that of the DCF or model"),
+    "profile": FileKey(
         one_of(*PROFILES),
         ", ".join(f'"{name}"' for name in PROFILES),
         "what it does with the objects of an EDS or DCF",
         f'"{AUTO}"',
     ),
-    "store": Key(path, "a file", "where it keeps what 1010h and LSS store", NONE),
-    "sdo_timeout": Key(
+    "store": FileKey(path, "a file", "where it keeps what 1010h and LSS store", _NONE),
+    "sdo_timeout": FileKey(
         duration, '"500ms"', "silence of a client after which an SDO transfer is aborted", '"5s"'
     ),
-    "sdo_memory": Key(size, '"64k"', "what its strings and domains hold together", '"64M"'),
+    "sdo_memory": FileKey(size, '"64k"', "what its strings and domains hold together", '"64M"'),
 }
 
 BODY: Final[Schema] = {
-    "kind": Key(one_of(*SIDES), ", ".join(f'"{name}"' for name in SIDES), "how it is driven"),
-    "wheel_radius_m": Key(number(1e-4, 100), "above 0", "of each wheel, in m"),
-    "tread_m": Key(number(1e-3, 1_000), "above 0", "between left and right wheels, in m"),
-    "mass_kg": Key(number(0, 1e6), "0 or more", "on the driven wheels, in kg", "0"),
-    "friction": Key(number(0, 10), "0..10", "between wheels and ground", "they never slip"),
-    "mirrored": Key(texts, "a list of wheels", "their drive is mounted the other way round", NONE),
+    "kind": FileKey(one_of(*SIDES), ", ".join(f'"{name}"' for name in SIDES), "how it is driven"),
+    "wheel_radius_m": FileKey(number(1e-4, 100), "above 0", "of each wheel, in m"),
+    "tread_m": FileKey(number(1e-3, 1_000), "above 0", "between left and right wheels, in m"),
+    "mass_kg": FileKey(number(0, 1e6), "0 or more", "on the driven wheels, in kg", "0"),
+    "friction": FileKey(number(0, 10), "0..10", "between wheels and ground", "they never slip"),
+    "mirrored": FileKey(
+        texts, "a list of wheels", "their drive is mounted the other way round", _NONE
+    ),
 }
 """Beside the wheels of its kind."""
 
 _BUS: Final[Schema] = {
-    "interface": Key(text, "a driver of python-can", "of the bus outside"),
-    "channel": Key(text, "a text", "of the driver, as can0", NONE),
-    "bitrate": Key(_BITRATE.field, _BITRATE.values, "for the driver to set", "as it is"),
-    "options": Key(table, "a table", "more for the driver", NONE),
+    "interface": FileKey(text, "a driver of python-can", "of the bus outside"),
+    "channel": FileKey(text, "a text", "of the driver, as can0", _NONE),
+    "bitrate": FileKey(_BITRATE.field, _BITRATE.values, "for the driver to set", "as it is"),
+    "options": FileKey(table, "a table", "more for the driver", _NONE),
 }
 
-REAL: Final[Schema] = {"control": Key(path, "a file", "control socket of the bench", NONE)}
+REAL: Final[Schema] = {"control": FileKey(path, "a file", "control socket of the bench", _NONE)}
 REAL_LINE: Final[Schema] = {
-    "link": Key(path, "a file", "symbolic link to its pty", NONE),
-    "serve": Key(texts, "a URL or several", "`rfc2217://` or `socket://[HOST:]PORT`", NONE),
+    "link": FileKey(path, "a file", "symbolic link to its pty", _NONE),
+    "serve": FileKey(texts, "a URL or several", "`rfc2217://` or `socket://[HOST:]PORT`", _NONE),
 }
 REAL_BUS: Final[Schema] = _BUS
 
 HARDWARE: Final[Schema] = {
-    "control": Key(path, "a file", "control socket of an emulator as the operator", "the terminal")
+    "control": FileKey(
+        path, "a file", "control socket of an emulator as the operator", "the terminal"
+    )
 }
 HARDWARE_LINE: Final[Schema] = {
-    "port": Key(text, "a device path or URL", "where it is"),
-    "baud": Key(_BAUD.field, _BAUD.values, _BAUD.text, "that of the wire"),
+    "port": FileKey(text, "a device path or URL", "where it is"),
+    "baud": FileKey(_BAUD.field, _BAUD.values, _BAUD.text, "that of the wire"),
 }
 HARDWARE_BUS: Final[Schema] = _BUS
 HARDWARE_DEVICE: Final[Schema] = {
-    "control": Key(path, "a file", "as above, for this device", "that of all"),
-    "power_on": Key(command, "a command line", "switches it on", "the operator does it"),
-    "power_off": Key(command, "a command line", "switches it off", "the operator does it"),
+    "control": FileKey(path, "a file", "as above, for this device", "that of all"),
+    "power_on": FileKey(command, "a command line", "switches it on", "the operator does it"),
+    "power_off": FileKey(command, "a command line", "switches it off", "the operator does it"),
 }
 TOLERANCE: Final[Schema] = {
-    "stick_pct": Key(number(0, 50), "0..50", "how far a stick held by hand may be off", "10"),
-    "time_ms": Key(number(0, 1_000), "0..1000", "how far a time may be off", "50"),
+    "stick_pct": FileKey(number(0, 50), "0..50", "how far a stick held by hand may be off", "10"),
+    "time_ms": FileKey(number(0, 1_000), "0..1000", "how far a time may be off", "50"),
 }
 
 TOP: Final[Schema] = {
-    "seed": Key(whole(0, (1 << 63) - 1), "0 or more", "of all chance", "0"),
-    "bus": Key(path, "a file", "bus.yml of ros2_canopen: each node is a device", NONE),
+    "seed": FileKey(whole(0, (1 << 63) - 1), "0 or more", "of all chance", "0"),
+    "bus": FileKey(path, "a file", "bus.yml of ros2_canopen: each node is a device", _NONE),
     **{
-        name: Key(table, "tables", meaning, NONE)
+        name: FileKey(table, "tables", meaning, _NONE)
         for name, meaning in (
             ("wire", "what connects devices and hosts"),
             ("device", "what is on the bench"),

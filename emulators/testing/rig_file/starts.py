@@ -11,23 +11,21 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
-from tickrig.emulators.testing.rig_file.fields import check_name, shown
-from tickrig.emulators.testing.rig_file.section import Section, is_broken
-from tickrig.emulators.testing.rig_file.unknown_device import UNKNOWN
+from tickrig.emulators.testing.rig_file.probe import UNKNOWN
+from tickrig.emulators.testing.rig_file.section import RigFileTable, check_name, is_broken, shown
 from tickrig.emulators.testing.signals.scope import SLASH, check_signals
-from tickrig.emulators.testing.signals.signal_spec import SignalSpec
-from tickrig.emulators.testing.signals.sources import Constant
+from tickrig.emulators.testing.signals.sources import Constant, SignalSpec
 from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec
 from tickrig.host.text.names import closest, near
-from tickrig.host.text.toml_document import TomlPath
+from tickrig.host.text.toml_reader import TomlPath
 from tickrig.host.text.values import Setting
 
-OBJECT: Final = "0x"
+_OBJECT: Final = "0x"
 """How the names of objects of a node begin."""
 
 Start = dict[str, Setting | SignalSpec]
 
-UNREAD = SignalSpec(Constant(0.0))
+_UNREAD = SignalSpec(Constant(0.0))
 """In place of a signal that cannot be read, so that formulas find its name."""
 
 
@@ -41,19 +39,21 @@ class StartReader:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._signals: dict[str, SignalSpec] = {}
-        self._places: dict[str, tuple[Section, TomlPath]] = {}
+        self._places: dict[str, tuple[RigFileTable, TomlPath]] = {}
 
-    def read_signals(self, section: Section) -> dict[str, SignalSpec]:
+    def read_signals(self, section: RigFileTable) -> dict[str, SignalSpec]:
         """Read `[signal]`."""
         for name, value in section.values.items():
             try:
                 check_name(name)
             except ValueError as error:
                 section.wrong(str(error), name)
-            self._keep(name, self._spec(section, (name,), value) or UNREAD, section, (name,), value)
+            self._keep(
+                name, self._spec(section, (name,), value) or _UNREAD, section, (name,), value
+            )
         return dict(self._signals)
 
-    def read_start(self, device: str, section: Section, physical: HasSignals) -> Start:
+    def read_start(self, device: str, section: RigFileTable, physical: HasSignals) -> Start:
         """Read the start of a device.
 
         Args:
@@ -87,7 +87,7 @@ class StartReader:
             section.wrong(mistake.reason, *keys)
 
     def _inputs(
-        self, section: Section, groups: Mapping[str, tuple[str, ...]]
+        self, section: RigFileTable, groups: Mapping[str, tuple[str, ...]]
     ) -> Iterator[tuple[TomlPath, str, Any]]:
         """Yield each input with the keys of its value; a group gives several."""
         for name, value in section.values.items():
@@ -103,7 +103,7 @@ class StartReader:
                 section.wrong(f"it takes {wanted}, not {came}", name)
 
     def _value(
-        self, section: Section, keys: TomlPath, value: Any, full: str
+        self, section: RigFileTable, keys: TomlPath, value: Any, full: str
     ) -> Setting | SignalSpec | None:
         """Return a value, or a signal, which is kept to be checked; None if it is noted."""
         if isinstance(value, bool | int | float | str):
@@ -114,13 +114,13 @@ class StartReader:
         return spec
 
     def _keep(
-        self, name: str, spec: SignalSpec, section: Section, keys: TomlPath, value: Any
+        self, name: str, spec: SignalSpec, section: RigFileTable, keys: TomlPath, value: Any
     ) -> None:
         """Keep a signal with the key that says what it is."""
         form = [key for key in FORMS if isinstance(value, dict) and key in value]
         self._signals[name], self._places[name] = spec, (section, (*keys, *form[:1]))
 
-    def _spec(self, section: Section, keys: TomlPath, value: Any) -> SignalSpec | None:
+    def _spec(self, section: RigFileTable, keys: TomlPath, value: Any) -> SignalSpec | None:
         if is_broken(value):
             return None
         spec = read_signal_spec(value, keys, self._folder)
@@ -135,7 +135,9 @@ class StartReader:
         return None
 
 
-def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, dict[str, Setting]]:
+def read_safe(
+    section: RigFileTable, devices: Mapping[str, HasSignals]
+) -> dict[str, dict[str, Setting]]:
     """Read `[safe]`: for each device outputs, and what they are when a test is over.
 
     Args:
@@ -156,7 +158,7 @@ def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, 
     return safe
 
 
-def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
+def _can_be_safe(section: RigFileTable, physical: HasSignals, name: str) -> bool:
     """Return whether an output or input can be this; else it is noted."""
     value = section.values[name]
     if is_broken(value):
@@ -177,9 +179,9 @@ def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
 
 def _alike(name: str, names: Iterable[str]) -> list[str]:
     """Leave objects out where none is meant, and else those that begin otherwise."""
-    if name.startswith(OBJECT):
+    if name.startswith(_OBJECT):
         return [each for each in names if each.startswith(name[:4])]
-    return [each for each in names if not each.startswith(OBJECT)]
+    return [each for each in names if not each.startswith(_OBJECT)]
 
 
 def _without_lists(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -188,7 +190,7 @@ def _without_lists(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check(
-    section: Section, keys: TomlPath, physical: HasSignals, name: str, value: Setting
+    section: RigFileTable, keys: TomlPath, physical: HasSignals, name: str, value: Setting
 ) -> None:
     try:
         physical.inputs.check(name, value)

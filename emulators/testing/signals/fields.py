@@ -7,16 +7,40 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import Final
+from typing import Final, NamedTuple
 
-from tickrig.emulators.testing.signals.formula import Formula
-from tickrig.emulators.testing.signals.formula_parser import parse_formula
+from tickrig.emulators.testing.signals.formula import Formula, parse_formula
 from tickrig.host.text.values import parse_time_us
 
-LEAST_US: Final = 100
+# What is wrong with a value of a file, and where it stands.
+
+Keys = tuple[str | int, ...]
+"""Keys and indices from the top of a file, as `("device", "left", "start", "supply_v")`."""
+
+
+class SignalMistake(NamedTuple):
+    """One mistake.
+
+    Attributes:
+        keys: where it is.
+        reason: what came, and what was allowed.
+
+    >>> print(Mistake(("signal", "load", "over"), "it is missing"))
+    signal.load.over: it is missing
+    """
+
+    keys: Keys
+    reason: str
+
+    def __str__(self) -> str:
+        """Write it in one line."""
+        return f"{'.'.join(map(str, self.keys))}: {self.reason}"
+
+
+_LEAST_US: Final = 100
 """No period, ramp or time constant is shorter."""
 
-FINEST: Final = 1e-12
+_FINEST: Final = 1e-12
 """No quantisation is finer."""
 
 
@@ -32,9 +56,9 @@ def number(value: object) -> float:
 
 
 def step(value: object) -> float:
-    """Take a number from `FINEST` on."""
-    if (found := number(value)) < FINEST:
-        raise ValueError(f"it takes a number from {FINEST:g} on, as 0.01, not {value!r:.60}")
+    """Take a number from `_FINEST` on."""
+    if (found := number(value)) < _FINEST:
+        raise ValueError(f"it takes a number from {_FINEST:g} on, as 0.01, not {value!r:.60}")
     return found
 
 
@@ -78,8 +102,8 @@ def time(value: object) -> int:
 
 def some_time(value: object) -> int:
     """Take a time that is not too short; return microseconds."""
-    if (found := time(value)) < LEAST_US:
-        raise ValueError(f'it takes a time from "{LEAST_US}us" on, not {value!r:.60}')
+    if (found := time(value)) < _LEAST_US:
+        raise ValueError(f'it takes a time from "{_LEAST_US}us" on, not {value!r:.60}')
     return found
 
 

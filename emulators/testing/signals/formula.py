@@ -4,22 +4,36 @@
 ...     {"t": 1.5, "load": 3.0}
 ... )
 4.5
+
+Arithmetic over other signals, as text: a syntax tree is looked at, nothing is executed.
+
+>>> parse_formula("12.6 - 0.1 * left.current_a").names
+('left.current_a',)
+>>> parse_formula("clip(2 * t, 0, 5) if load > 1 else 0").value({"t": 1.5, "load": 3})
+3.0
+>>> parse_formula("__import__('os')")
+Traceback (most recent call last):
+    ...
+ValueError: no function __import__; known: abs, sqrt, sin, cos, exp, floor, min, max, clip
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import ast
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from math import copysign, cos, exp, floor, inf, isfinite, nan, sin, sqrt
+from math import copysign, cos, exp, floor, inf, isfinite, nan, pi, sin, sqrt
 from typing import Final
 
 from tickrig.device.twin import Immutable
+from tickrig.host.text.names import near
 
 TIME: Final = "t"
 
 
 @dataclass(frozen=True, slots=True)
-class Number(Immutable):
+class FormulaNumber(Immutable):
     """A number."""
 
     number: float
@@ -37,10 +51,10 @@ class Call(Immutable):
     """A function or an operator, and what it is of."""
 
     function: str
-    terms: tuple[Term, ...]
+    terms: tuple[_Term, ...]
 
 
-Term = Number | Name | Call
+_Term = FormulaNumber | Name | Call
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +69,7 @@ class Formula(Immutable):
     """
 
     text: str
-    term: Term
+    term: _Term
     names: tuple[str, ...]
     timed: bool
 
@@ -68,15 +82,15 @@ class Formula(Immutable):
         return _value(self.term, values)
 
 
-def _value(term: Term, values: Mapping[str, float]) -> float:
+def _value(term: _Term, values: Mapping[str, float]) -> float:
     match term:
-        case Number(number):
+        case FormulaNumber(number):
             return number
         case Name(name):
             return values[name]
         case Call(function, terms):
             try:
-                return FUNCTIONS[function][0](*(_value(each, values) for each in terms))
+                return _FUNCTIONS[function][0](*(_value(each, values) for each in terms))
             except ValueError:
                 return nan
             except OverflowError:
@@ -93,17 +107,17 @@ def _clipped(x: float, low: float, high: float) -> float:
     return min(max(x, low), high)
 
 
-MANY: Final = 99
+_MANY: Final = 99
 
-FUNCTIONS: Final[dict[str, tuple[Callable[..., float], int, int]]] = {
+_FUNCTIONS: Final[dict[str, tuple[Callable[..., float], int, int]]] = {
     "abs": (abs, 1, 1),
     "sqrt": (sqrt, 1, 1),
     "sin": (sin, 1, 1),
     "cos": (cos, 1, 1),
     "exp": (exp, 1, 1),
     "floor": (lambda x: float(floor(x)) if isfinite(x) else x, 1, 1),
-    "min": (min, 2, MANY),
-    "max": (max, 2, MANY),
+    "min": (min, 2, _MANY),
+    "max": (max, 2, _MANY),
     "clip": (_clipped, 3, 3),
     "+": (lambda x, y: x + y, 2, 2),
     "-": (lambda x, y: x - y, 2, 2),
@@ -118,9 +132,149 @@ FUNCTIONS: Final[dict[str, tuple[Callable[..., float], int, int]]] = {
     ">=": (lambda x, y: float(x >= y), 2, 2),
     "==": (lambda x, y: float(x == y), 2, 2),
     "!=": (lambda x, y: float(x != y), 2, 2),
-    "and": (lambda *x: float(all(x)), 2, MANY),
-    "or": (lambda *x: float(any(x)), 2, MANY),
+    "and": (lambda *x: float(all(x)), 2, _MANY),
+    "or": (lambda *x: float(any(x)), 2, _MANY),
     "not": (lambda x: float(not x), 1, 1),
     "if": (lambda condition, x, y: x if condition else y, 3, 3),
 }
 """What can be computed; how many numbers it takes at least and at most."""
+
+
+_LONGEST: Final = 2_000
+_DEEPEST: Final = 100
+
+CALLED: Final = ("abs", "sqrt", "sin", "cos", "exp", "floor", "min", "max", "clip")
+"""What is written as NAME(...)."""
+
+_OPERATORS: Final[dict[type[ast.AST], str]] = {
+    ast.Add: "+",
+    ast.Sub: "-",
+    ast.Mult: "*",
+    ast.Div: "/",
+    ast.Mod: "%",
+    ast.USub: "negative",
+    ast.UAdd: "positive",
+    ast.Not: "not",
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+    ast.And: "and",
+    ast.Or: "or",
+}
+
+
+def parse_formula(text: str) -> Formula:
+    """Read a formula.
+
+    Raises:
+        ValueError: it is none, it is too long, or something in it is not known here.
+    """
+    if len(text) > _LONGEST:
+        raise ValueError(f"a formula of {len(text)} characters; at most {_LONGEST} are taken")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(" ".join(text.split()), mode="eval")
+        return _formula(text, _read(tree.body, _DEEPEST))
+    except SyntaxError as error:
+        raise ValueError(f"{text!r:.60} is no formula: {error.msg}") from None
+    except (MemoryError, RecursionError):
+        raise ValueError(f"the formula is nested more than {_DEEPEST} deep") from None
+
+
+def _formula(text: str, term: _Term) -> Formula:
+    names = tuple(dict.fromkeys(_names(term)))
+    return Formula(text, term, tuple(name for name in names if name != TIME), TIME in names)
+
+
+def _names(term: _Term) -> Iterator[str]:
+    if isinstance(term, Name):
+        yield term.name
+    elif isinstance(term, Call):
+        for each in term.terms:
+            yield from _names(each)
+
+
+def _read(node: ast.expr, deep: int) -> _Term:
+    if not deep:
+        raise ValueError(f"the formula is nested more than {_DEEPEST} deep")
+    if isinstance(node, ast.Constant):
+        return _constant(node)
+    if isinstance(node, ast.Name | ast.Attribute):
+        name = _dotted(node)
+        return FormulaNumber(pi) if name == "pi" else Name(name)
+    if isinstance(node, ast.Compare):
+        return _compared(node, deep)
+    function, operands = _call(node)
+    return Call(function, tuple(_read(operand, deep - 1) for operand in operands))
+
+
+def _call(node: ast.expr) -> tuple[str, list[ast.expr]]:
+    """Return a function, or the operator that stands for it, and what it is of."""
+    match node:
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)], [left, right]
+        case ast.UnaryOp(op=op, operand=operand) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)], [operand]
+        case ast.BoolOp(op=op, values=operands):
+            return _OPERATORS[type(op)], operands
+        case ast.IfExp(test=test, body=body, orelse=otherwise):
+            return "if", [test, body, otherwise]
+        case ast.Call(func=ast.Name(id=name), args=operands, keywords=[]):
+            return _function(name, len(operands)), operands
+    raise _unknown(node)
+
+
+def _compared(node: ast.Compare, deep: int) -> _Term:
+    """Return `0 < x < 5` as `0 < x and x < 5`."""
+    if not all(type(op) in _OPERATORS for op in node.ops):
+        raise _unknown(node)
+    terms = [_read(each, deep - 1) for each in (node.left, *node.comparators)]
+    calls = [
+        Call(_OPERATORS[type(op)], (left, right))
+        for op, left, right in zip(node.ops, terms, terms[1:], strict=False)
+    ]
+    return calls[0] if len(calls) == 1 else Call("and", tuple(calls))
+
+
+def _constant(node: ast.Constant) -> _Term:
+    """Return a number, or the signal whose name is in quotes."""
+    if isinstance(node.value, str):
+        return Name(node.value)
+    if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+        raise _unknown(node)
+    try:
+        if isfinite(node.value):
+            return FormulaNumber(float(node.value))
+    except OverflowError:
+        pass
+    raise ValueError("a number in the formula is too large")
+
+
+def _dotted(node: ast.expr) -> str:
+    match node:
+        case ast.Name(id=name):
+            return name
+        case ast.Attribute(value=value, attr=name):
+            return f"{_dotted(value)}.{name}"
+    raise _unknown(node)
+
+
+def _function(name: str, count: int) -> str:
+    if name not in CALLED:
+        raise ValueError(f"no function {name}; {near(name, CALLED)}")
+    _, least, most = _FUNCTIONS[name]
+    if not least <= count <= most:
+        wanted = f"{least} or more" if most == _MANY else str(least)
+        raise ValueError(f"{name} takes {wanted} values, not {count}")
+    return name
+
+
+def _unknown(node: ast.expr) -> ValueError:
+    return ValueError(
+        f"{ast.unparse(node)!r:.60} is not known in formulas; known: + - * / % < <= > >= == !="
+        f" and, or, not, x if condition else y, t, pi, {', '.join(CALLED)}"
+    )

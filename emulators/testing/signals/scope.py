@@ -9,16 +9,15 @@ from typing import Final
 
 from tickrig.device.physical import SignalType
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
+from tickrig.emulators.testing.signals.fields import SignalMistake
 from tickrig.emulators.testing.signals.formula import Formula
-from tickrig.emulators.testing.signals.mistake import Mistake
-from tickrig.emulators.testing.signals.signal_spec import Integral, Lag, SignalSpec
-from tickrig.emulators.testing.signals.sources import Constant
+from tickrig.emulators.testing.signals.sources import Constant, Integral, Lag, SignalSpec
 from tickrig.host.text.names import near
 
-LONGEST: Final = 100
+_LONGEST: Final = 100
 """So many signals may need each other in a row."""
 
-TAKEN: Final = ("t", "pi")
+_TAKEN: Final = ("t", "pi")
 """What formulas name otherwise."""
 
 SLASH: Final = "/"
@@ -44,7 +43,7 @@ class DeviceSignal:
         return nan if isinstance(value, str) else float(value)
 
 
-class Scope:
+class SignalScope:
     """The signals of a bench and its devices.
 
     Args:
@@ -100,8 +99,8 @@ class Scope:
     def _enter(self, key: str, path: tuple[str, ...], order: dict[str, None]) -> None:
         if key in order:
             return
-        if len(path) == LONGEST:
-            raise _Order(f"it needs more than {LONGEST} others in a row", path[0])
+        if len(path) == _LONGEST:
+            raise _Order(f"it needs more than {_LONGEST} others in a row", path[0])
         if key in path:
             circle = (*path[path.index(key) :], key)
             raise _Order(f"a circle: {' -> '.join(circle)}", key)
@@ -116,7 +115,7 @@ class _Order(ValueError):  # noqa: N818 - told as a mistake
 
 def check_signals(
     signals: Mapping[str, SignalSpec], devices: Mapping[str, HasSignals]
-) -> list[Mistake]:
+) -> list[SignalMistake]:
     """Find what is wrong with signals on a bench: unknown names, values out of range, circles.
 
     Args:
@@ -126,33 +125,35 @@ def check_signals(
     Returns:
         All mistakes; the first key of each is the name of its signal.
     """
-    scope = Scope(signals, devices)
+    scope = SignalScope(signals, devices)
     mistakes = [mistake for key in signals for mistake in _check(scope, key)]
     if not mistakes:
         try:
             scope.ordered()
         except _Order as error:
-            mistakes.append(Mistake((error.args[1],), str(error.args[0])))
+            mistakes.append(SignalMistake((error.args[1],), str(error.args[0])))
     return mistakes
 
 
-def _check(scope: Scope, key: str) -> Iterator[Mistake]:
+def _check(scope: SignalScope, key: str) -> Iterator[SignalMistake]:
     if SLASH in key:
         yield from _check_target(scope, key)
-    if key in TAKEN:
-        yield Mistake((key,), f"no signal can be called so: in formulas {key} is something else")
+    if key in _TAKEN:
+        yield SignalMistake(
+            (key,), f"no signal can be called so: in formulas {key} is something else"
+        )
     source = scope.signals[key].source
     if isinstance(source, Lag | Integral):
         source = source.formula
     if isinstance(source, Formula):
         for name in source.names:
             if scope.find(name, key) is None:
-                yield Mistake(
+                yield SignalMistake(
                     (key,), f"no signal, input or output {name}; {_near(scope, key, name)}"
                 )
 
 
-def _near(scope: Scope, key: str, wanted: str) -> str:
+def _near(scope: SignalScope, key: str, wanted: str) -> str:
     """Say what a formula could mean, or list what it could name, its own device first."""
     own = key.partition(SLASH)[0]
     names = [name for name in scope.signals if SLASH not in name]
@@ -162,15 +163,15 @@ def _near(scope: Scope, key: str, wanted: str) -> str:
     return near(wanted, names)
 
 
-def _check_target(scope: Scope, key: str) -> Iterator[Mistake]:
+def _check_target(scope: SignalScope, key: str) -> Iterator[SignalMistake]:
     """Yield what is wrong with an input that is driven."""
     device_name, _, name = key.partition(SLASH)
     device = scope.devices.get(device_name)
     if device is None:
-        yield Mistake((key,), f"no device {device_name}; {near(device_name, scope.devices)}")
+        yield SignalMistake((key,), f"no device {device_name}; {near(device_name, scope.devices)}")
         return
     if name not in device.inputs.table:
-        yield Mistake((key,), f"no input {name}; {near(name, device.inputs.table)}")
+        yield SignalMistake((key,), f"no input {name}; {near(name, device.inputs.table)}")
         return
     spec, item = scope.signals[key], device.inputs.table[name]
     try:
@@ -181,13 +182,13 @@ def _check_target(scope: Scope, key: str) -> Iterator[Mistake]:
             raise ValueError(f"{name} takes a text, and only a text that stays drives it")
         device.inputs.check(name, item.initial)
     except ValueError as error:
-        yield Mistake((key,), str(error))
+        yield SignalMistake((key,), str(error))
         return
     if isinstance(spec.source, Formula | Lag | Integral):
         return
     for value in map(spec.shaped, spec.source.ends):
         if not isinstance(value, str) and not item.low <= value <= item.high:
             unit = f" {item.unit}" if item.unit else ""
-            yield Mistake(
+            yield SignalMistake(
                 (key,), f"it reaches {value:g}, and {name} takes {item.low}..{item.high}{unit}"
             )

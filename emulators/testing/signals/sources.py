@@ -11,16 +11,17 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import pi, sin
+from math import expm1, inf, isfinite, pi, sin
 from typing import Final, Protocol
 
 from tickrig.device.chance import Chance
 from tickrig.device.twin import Immutable
+from tickrig.emulators.testing.signals.formula import Formula
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
 
-class Source(Protocol):
+class SignalSource(Protocol):
     """A value as a function of time in microseconds."""
 
     @property
@@ -62,7 +63,7 @@ class Constant(Immutable):
 
 
 @dataclass(frozen=True, slots=True)
-class Ramp(Immutable):
+class RampSource(Immutable):
     """A straight line from one value to another.
 
     Attributes:
@@ -191,7 +192,7 @@ class Noise(Immutable):
 
 
 @dataclass(frozen=True, slots=True)
-class Table(Immutable):
+class ValueTable(Immutable):
     """Values at times: the first holds before its time, the last behind its own.
 
     Attributes:
@@ -236,3 +237,92 @@ class Table(Immutable):
     def _at_us(self, t_us: int) -> int:
         last_us = self.times_us[-1]
         return t_us % last_us if self.repeat and last_us else t_us
+
+
+# A signal as it was asked for: where its values come from, and what is made of them.
+
+_SETTLED: Final = 1e-9
+"""A lag that is so near to its source, as a part of it, has arrived."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lag(Immutable):
+    """A value that follows another: after `tau` it has gone 63 % of the way (first order).
+
+    Attributes:
+        formula: what it follows.
+        tau_us: its time constant.
+        start: where it begins; None where the other begins.
+    """
+
+    formula: Formula
+    tau_us: int
+    start: float | None = None
+
+    def gain(self, every_us: int) -> float:
+        """Return which part of the way it goes in a time."""
+        return -expm1(-every_us / self.tau_us)
+
+    def moved(self, value: float, source: float, gain: float) -> float:
+        """Return where it is after that time."""
+        if abs(source - value) <= _SETTLED * max(abs(source), abs(value)):
+            return source
+        return value + (source - value) * gain
+
+
+@dataclass(frozen=True, slots=True)
+class Integral(Immutable):
+    """The sum of another value over time, in its unit times seconds.
+
+    Attributes:
+        formula: what is summed up.
+        start: where it begins.
+    """
+
+    formula: Formula
+    start: float | None = 0.0
+
+    def gain(self, every_us: int) -> float:
+        """Return a time in seconds."""
+        return every_us / 1e6
+
+    def moved(self, value: float, source: float, gain: float) -> float:
+        """Return the sum after that time."""
+        return value + source * gain
+
+
+@dataclass(frozen=True, slots=True)
+class SignalSpec(Immutable):
+    """A signal.
+
+    Attributes:
+        source: where its values come from.
+        from_us: when a source of time begins; it stands still until then.
+        every_us: how long a value is held; 0 takes a new one at each tick of the rig.
+        low: the least value,
+        high: and the greatest.
+        step: values are multiples of this; 0 leaves them as they are.
+    """
+
+    source: SignalSource | Formula | Lag | Integral
+    from_us: int = 0
+    every_us: int = 0
+    low: float = -inf
+    high: float = inf
+    step: float = 0.0
+
+    def shaped(self, value: Setting) -> Setting:
+        """Return what quantisation and limits leave of a value."""
+        if isinstance(value, str) or not (self.step or self.low > -inf or self.high < inf):
+            return value
+        if self.step and isfinite(value / self.step):
+            value = _rounded(value, self.step)
+        return min(max(value, self.low), self.high)
+
+
+def _rounded(value: float, step: float) -> float:
+    """Return the nearest multiple, as it is written: 0.3, not 0.30000000000000004."""
+    whole = round(1 / step)
+    if whole and 1 / whole == step:
+        return round(value * whole) / whole
+    return round(value / step) * step

@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.testing.signals.fields import (
+    Keys,
+    SignalMistake,
     flag,
     formula,
     number,
@@ -31,28 +33,35 @@ from tickrig.emulators.testing.signals.fields import (
     time,
     word,
 )
-from tickrig.emulators.testing.signals.mistake import Keys, Mistake
-from tickrig.emulators.testing.signals.signal_spec import Integral, Lag, SignalSpec
-from tickrig.emulators.testing.signals.sources import SHAPES, Constant, Noise, Ramp, Wave
+from tickrig.emulators.testing.signals.sources import (
+    SHAPES,
+    Constant,
+    Integral,
+    Lag,
+    Noise,
+    RampSource,
+    SignalSpec,
+    Wave,
+)
 from tickrig.emulators.testing.signals.table import read_table
 from tickrig.host.text.names import near
 
-EVERY_US: Final = 10_000
+_EVERY_US: Final = 10_000
 """How often noise is drawn, and lags and integrals move on, unless told otherwise."""
 
-Fields = Mapping[str, Any]
+_Fields = Mapping[str, Any]
 """The values of a table's keys, each as its reader has left it."""
 
-Reader = Callable[[object], object]
+_Reader = Callable[[object], object]
 """Takes what TOML gives, and returns a field; ValueError with what was allowed."""
 
-COMMON: Final[Mapping[str, Reader]] = {
+_COMMON: Final[Mapping[str, _Reader]] = {
     "every": some_time,
     "min": number,
     "max": number,
     "step": step,
 }
-FROM: Final[Mapping[str, Reader]] = {"from": time, **COMMON}
+_FROM: Final[Mapping[str, _Reader]] = {"from": time, **_COMMON}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,24 +75,24 @@ class Form:
         every_us: how long a value is held unless `every` says so.
     """
 
-    keys: Mapping[str, Reader]
-    build: Callable[[Path, Fields], Any]
+    keys: Mapping[str, _Reader]
+    build: Callable[[Path, _Fields], Any]
     needed: tuple[str, ...] = ()
     every_us: int = 0
 
 
-def _ramp(folder: Path, fields: Fields) -> Ramp:
+def _ramp(folder: Path, fields: _Fields) -> RampSource:
     first, last = fields["ramp"]
-    return Ramp(first, last, fields["over"], fields.get("repeat", False))
+    return RampSource(first, last, fields["over"], fields.get("repeat", False))
 
 
-def _wave(shape: str, folder: Path, fields: Fields) -> Wave:
+def _wave(shape: str, folder: Path, fields: _Fields) -> Wave:
     (first, second), period_us = fields[shape], fields["period"]
     phase_us = round(fields.get("phase_deg", 0) / 360 * period_us)
     return Wave(shape, first, second, period_us, phase_us, fields.get("duty", 0.5))
 
 
-def _noise(folder: Path, fields: Fields) -> Noise:
+def _noise(folder: Path, fields: _Fields) -> Noise:
     given, mean = fields["noise"], fields.get("mean")
     if uniform := isinstance(given, tuple):
         if mean is not None:
@@ -91,47 +100,47 @@ def _noise(folder: Path, fields: Fields) -> Noise:
         first, second = given
     else:
         first, second = mean or 0.0, given
-    return Noise(first, second, uniform, fields.get("every", EVERY_US), fields.get("seed"))
+    return Noise(first, second, uniform, fields.get("every", _EVERY_US), fields.get("seed"))
 
 
-def _formula(folder: Path, fields: Fields) -> object:
+def _formula(folder: Path, fields: _Fields) -> object:
     return fields["formula"]
 
 
-def _lag(folder: Path, fields: Fields) -> Lag:
+def _lag(folder: Path, fields: _Fields) -> Lag:
     return Lag(fields["lag"], fields["tau"], fields.get("start"))
 
 
-def _integral(folder: Path, fields: Fields) -> Integral:
+def _integral(folder: Path, fields: _Fields) -> Integral:
     return Integral(fields["integral"], fields.get("start", 0.0))
 
 
 FORMS: Final[Mapping[str, Form]] = {
-    "ramp": Form({"ramp": pair, "over": some_time, "repeat": flag, **FROM}, _ramp, ("over",)),
+    "ramp": Form({"ramp": pair, "over": some_time, "repeat": flag, **_FROM}, _ramp, ("over",)),
     **{
         shape: Form(
             {shape: pair, "period": some_time, "phase_deg": number}
             | ({"duty": part} if shape == "square" else {})
-            | dict(FROM),
+            | dict(_FROM),
             partial(_wave, shape),
             ("period",),
         )
         for shape in SHAPES
     },
     "noise": Form(
-        {"noise": spread, "mean": number, "seed": seed, **FROM}, _noise, every_us=EVERY_US
+        {"noise": spread, "mean": number, "seed": seed, **_FROM}, _noise, every_us=_EVERY_US
     ),
     "table": Form(
         {"table": lambda value: value, "column": word, "interpolation": word, "repeat": flag}
-        | dict(FROM),
+        | dict(_FROM),
         read_table,
     ),
-    "formula": Form({"formula": formula, **COMMON}, _formula),
+    "formula": Form({"formula": formula, **_COMMON}, _formula),
     "lag": Form(
-        {"lag": formula, "tau": some_time, "start": number, **COMMON}, _lag, ("tau",), EVERY_US
+        {"lag": formula, "tau": some_time, "start": number, **_COMMON}, _lag, ("tau",), _EVERY_US
     ),
     "integral": Form(
-        {"integral": formula, "start": number, **COMMON}, _integral, every_us=EVERY_US
+        {"integral": formula, "start": number, **_COMMON}, _integral, every_us=_EVERY_US
     ),
 }
 """What a signal can be, by the key that names it."""
@@ -139,7 +148,7 @@ FORMS: Final[Mapping[str, Form]] = {
 
 def read_signal_spec(
     value: object, keys: Keys = (), folder: Path | None = None
-) -> SignalSpec | list[Mistake]:
+) -> SignalSpec | list[SignalMistake]:
     """Read what TOML gives for a value that may change by itself.
 
     Whether the signals that a formula names are there is judged by `check_signals`.
@@ -156,19 +165,21 @@ def read_signal_spec(
         try:
             return SignalSpec(Constant(value if isinstance(value, str) else number(value)))
         except ValueError as error:
-            return [Mistake(keys, str(error))]
+            return [SignalMistake(keys, str(error))]
     names = [name for name in FORMS if isinstance(value, dict) and name in value]
     if not isinstance(value, dict) or len(names) != 1:
         came = " and ".join(names) if names else f"{value!r:.60}"
         wanted = f"a number, a text, or a table with one of {', '.join(FORMS)}"
-        return [Mistake(keys, f"it is {wanted}; not {came}")]
+        return [SignalMistake(keys, f"it is {wanted}; not {came}")]
     return _read(names[0], value, keys, folder or Path())
 
 
-def _read(name: str, table: Fields, keys: Keys, folder: Path) -> SignalSpec | list[Mistake]:
+def _read(name: str, table: _Fields, keys: Keys, folder: Path) -> SignalSpec | list[SignalMistake]:
     form, fields = FORMS[name], dict[str, Any]()
     mistakes = [*_read_fields(name, table, keys, fields)]
-    mistakes += [Mistake((*keys, key), "it is missing") for key in form.needed if key not in table]
+    mistakes += [
+        SignalMistake((*keys, key), "it is missing") for key in form.needed if key not in table
+    ]
     if not mistakes:
         try:
             return SignalSpec(
@@ -178,25 +189,27 @@ def _read(name: str, table: Fields, keys: Keys, folder: Path) -> SignalSpec | li
                 **_limits(fields),
             )
         except ValueError as error:
-            mistakes.append(Mistake((*keys, name), str(error)))
+            mistakes.append(SignalMistake((*keys, name), str(error)))
     return mistakes
 
 
-def _read_fields(name: str, table: Fields, keys: Keys, fields: dict[str, Any]) -> Iterator[Mistake]:
+def _read_fields(
+    name: str, table: _Fields, keys: Keys, fields: dict[str, Any]
+) -> Iterator[SignalMistake]:
     """Enter the fields; yield the mistakes in them."""
     known = FORMS[name].keys
     for key, value in table.items():
         if key not in known:
             hint = near(str(key), [other for other in known if other != name])
-            yield Mistake((*keys, key), f"not a key of {name}; {hint}")
+            yield SignalMistake((*keys, key), f"not a key of {name}; {hint}")
             continue
         try:
             fields[key] = known[key](value)
         except ValueError as error:
-            yield Mistake((*keys, key), str(error))
+            yield SignalMistake((*keys, key), str(error))
 
 
-def _limits(fields: Fields) -> dict[str, float]:
+def _limits(fields: _Fields) -> dict[str, float]:
     """Return the limits and the quantisation; ValueError if nothing is between the limits."""
     named = {"min": "low", "max": "high", "step": "step"}
     limits = {named[key]: float(fields[key]) for key in named if key in fields}

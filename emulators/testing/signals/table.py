@@ -2,29 +2,195 @@
 
 >>> read_table(Path(), {"table": [[0, 12.0], ["4s", 10.0]]}).value(1_000_000)
 11.5
+
+Files with values at times: CSV, CAN logs, traces.
+
+>>> [point for _, point in _csv_points(["t_ms,v", "0,12.5", "20,12.25"], None)]
+[(0, 12.5), (20000, 12.25)]
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
+from tickrig.emulators.record.replay import read_bench_recording
 from tickrig.emulators.testing.signals.fields import number
-from tickrig.emulators.testing.signals.sources import Table
-from tickrig.emulators.testing.signals.table_file import (
-    Points,
-    read_points,
-    seconds_us,
-    usual_interpolation,
-)
+from tickrig.emulators.testing.signals.sources import ValueTable
+from tickrig.host.text.names import near
+from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import parse_time_us
 
-INTERPOLATIONS: Final = ("linear", "hold")
+_Points = Sequence[tuple[int, float]]
+"""Times in microseconds, and values."""
+
+_MOST: Final = 1_000_000
+"""So many values may be in a file."""
+
+_UNITS: Final = {"_us": 1, "_ms": 1_000, "_s": 1_000_000}
+"""Ends of the name of a column with times, and their unit in microseconds; seconds otherwise."""
+
+_TRACE: Final = ".trace"
 
 
-def read_table(folder: Path, fields: Mapping[str, Any]) -> Table:
+def _seconds_us(value: float, unit_us: int) -> int:
+    """Return a time of 0 or later in microseconds; ValueError if it is none."""
+    if not 0 <= value * unit_us < 1e18:
+        raise ValueError(f"{value:g} is no time from 0 on")
+    return round(value * unit_us)
+
+
+def _usual_interpolation(path: Path) -> str:
+    """Return how a file is read between its points: a trace says when an input changed."""
+    return "hold" if path.suffix == _TRACE else "linear"
+
+
+def read_points(path: Path, column: str | None) -> _Points:
+    """Read a column of a file.
+
+    Args:
+        path: a CSV file, a trace, or a CAN log; its suffix tells which.
+        column: a column of the CSV file, an input of the trace, bits of a frame.
+
+    Raises:
+        ValueError: the file cannot be read, or it has no such column, or no value in it.
+    """
+    try:
+        points = _READERS.get(path.suffix.lower(), _read_log)(path, column)
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ValueError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
+    if not points:
+        raise ValueError(f"{path} has no value{f' of {column}' if column else ''}")
+    if len(points) > _MOST:
+        raise ValueError(f"{path} has {len(points)} values; at most {_MOST} are taken")
+    return points
+
+
+def _read_trace(path: Path, column: str | None) -> _Points:
+    """Return the changes of an input in a trace; it has no value before the first of them."""
+    if column is None:
+        raise ValueError("column is missing: the name of an input")
+    records = read_bench_recording(path.read_bytes()).records
+    changes = [
+        (record, *record.change)
+        for record in records
+        if record.mark is Mark.PHYSICAL and record.change
+    ]
+    found = [
+        (record.at_us, record.name, value)
+        for record, name, value in changes
+        if column in (name, f"{record.name}/{name}")
+    ]
+    if len(devices := {device for _, device, _ in found}) > 1:
+        names = ", ".join(f"{device}/{column}" for device in sorted(devices))
+        raise ValueError(f"column {column!r} is not of one device: name one of {names}")
+    return [(at_us, float(value)) for at_us, _, value in found if not isinstance(value, str)]
+
+
+def _read_log(path: Path, column: str | None) -> _Points:
+    """Return the values in frames of a CAN log, from its first frame on."""
+    from tickrig.host.canmon.model.graph.series import Collector  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.canmon.model.graph.signal_spec import CurveSpec, parse_slice  # noqa: PLC0415
+    from tickrig.host.canmon.model.logs.log_reader import read_log  # noqa: PLC0415
+
+    if column is None:
+        raise ValueError("column is missing: bits of a frame, as 181[2:6]s*0.001")
+    collector = Collector([CurveSpec("", parse_slice(column), 1, column)])
+    begin_us = None
+    for record in read_log(path):
+        begin_us = record.at_us if begin_us is None else begin_us
+        collector.take(record)
+    series = collector.series[0]
+    return [
+        (max(0, at_us - (begin_us or 0)), value)
+        for at_us, value in zip(series.at_us, series.values, strict=True)
+    ]
+
+
+def _read_csv(path: Path, column: str | None) -> _Points:
+    """Return a column of a CSV file whose first column is the time."""
+    points: list[tuple[int, float]] = []
+    for line, point in _csv_points(path.read_text("utf-8-sig").splitlines(), column):
+        if points and point[0] < points[-1][0]:
+            raise ValueError(f"line {line}: its time is before that of the line above it")
+        points.append(point)
+    return points
+
+
+def _csv_points(
+    lines: Sequence[str], column: str | None
+) -> Iterator[tuple[int, tuple[int, float]]]:
+    """Yield the points with the numbers of their lines."""
+    rows = _rows(lines)
+    line, head = next(rows, (0, []))
+    named = bool(head) and not _is_number(head[0])
+    place = _place(head, column) if head else 0
+    unit_us = next((_UNITS[end] for end in _UNITS if named and head[0].endswith(end)), 1_000_000)
+    if head and not named:
+        yield line, _point(line, head, place, unit_us)
+    for line, row in rows:
+        yield line, _point(line, row, place, unit_us)
+
+
+def _rows(lines: Sequence[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield the cells of each line, with its number; the first tells what is between them."""
+    comma = ""
+    for line, text in enumerate(lines, 1):
+        if not text.strip() or text.startswith("#"):
+            continue
+        comma = comma or next((mark for mark in ";\t" if mark in text), ",")
+        try:
+            row = next(csv.reader([text], delimiter=comma))
+        except csv.Error as error:
+            raise ValueError(f"line {line}: {error}") from None
+        yield line, [cell.strip() for cell in row]
+
+
+def _point(line: int, row: list[str], place: int, unit_us: int) -> tuple[int, float]:
+    try:
+        return _seconds_us(float(row[0]), unit_us), float(number(float(row[place])))
+    except IndexError:
+        raise ValueError(f"line {line} has {len(row)} columns") from None
+    except ValueError as error:
+        raise ValueError(f"line {line}: {error}") from None
+
+
+def _place(head: list[str], column: str | None) -> int:
+    """Return which column it is; there may be no need to name it."""
+    if column is None and len(head) == 2:
+        return 1
+    if column in head[1:]:
+        return head.index(column, 1)
+    known = ", ".join(head[1:]) or "none"
+    if column is None:
+        raise ValueError(f"column is missing: one of {known}")
+    raise ValueError(f"no column {column!r}; {near(column, head[1:])}")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+_READERS: Final[Mapping[str, Callable[[Path, str | None], _Points]]] = {
+    ".csv": _read_csv,
+    _TRACE: _read_trace,
+}
+"""What reads a file, by its suffix; CAN logs have many."""
+
+
+_INTERPOLATIONS: Final = ("linear", "hold")
+
+
+def read_table(folder: Path, fields: Mapping[str, Any]) -> ValueTable:
     """Return the table that fields of a signal describe.
 
     Args:
@@ -37,11 +203,11 @@ def read_table(folder: Path, fields: Mapping[str, Any]) -> Table:
     """
     given, column = fields["table"], fields.get("column")
     way = fields.get("interpolation")
-    if way is not None and way not in INTERPOLATIONS:
-        raise ValueError(f"interpolation is {' or '.join(INTERPOLATIONS)}, not {way!r:.60}")
+    if way is not None and way not in _INTERPOLATIONS:
+        raise ValueError(f"interpolation is {' or '.join(_INTERPOLATIONS)}, not {way!r:.60}")
     if isinstance(given, str):
         path = folder / given
-        points, usual = read_points(path, column), usual_interpolation(path)
+        points, usual = read_points(path, column), _usual_interpolation(path)
     elif column is not None:
         raise ValueError("column belongs to a table in a file")
     else:
@@ -49,15 +215,15 @@ def read_table(folder: Path, fields: Mapping[str, Any]) -> Table:
     return _table(points, (way or usual) == "linear", fields.get("repeat", False))
 
 
-def _table(points: Points, linear: bool, repeat: bool) -> Table:
+def _table(points: _Points, linear: bool, repeat: bool) -> ValueTable:
     for (before_us, _), (at_us, _) in pairwise(points):
         if at_us < before_us:
             raise ValueError(f"{at_us / 1e6:g} s comes after {before_us / 1e6:g} s")
     times_us, values = zip(*points, strict=True)
-    return Table(times_us, values, linear, repeat)
+    return ValueTable(times_us, values, linear, repeat)
 
 
-def _inline(given: object) -> Points:
+def _inline(given: object) -> _Points:
     form = 'a list of times and values, as [[0, 12.0], ["5s", 9.5]], or the name of a file'
     if not isinstance(given, list) or not given:
         raise ValueError(f"it is {form}; not {given!r:.60}")
@@ -73,4 +239,4 @@ def _point_us(value: object) -> int:
     """Return the time of a point: text, or a number of seconds."""
     if isinstance(value, str):
         return parse_time_us(value)
-    return seconds_us(number(value), 1_000_000)
+    return _seconds_us(number(value), 1_000_000)

@@ -8,8 +8,7 @@ from enum import IntEnum
 from typing import Final, Protocol
 
 from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
-from tickrig.emulators.tkernel.node.limits import NodeLimits
-from tickrig.emulators.tkernel.node.node_manager import REFUSED, NodeManager
+from tickrig.emulators.tkernel.node.node_manager import REFUSED, NodeLimits, NodeManager
 from tickrig.wire.instant import NEVER
 
 INPUTS: Final = (
@@ -17,7 +16,7 @@ INPUTS: Final = (
     InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
 )
 
-OUTPUTS: Final = (
+_OUTPUTS: Final = (
     OutputSignal("state", "0 without supply, 1 while it boots, 2 while it runs"),
     OutputSignal("boots", "how often it was up"),
     OutputSignal("components", "components on it"),
@@ -33,14 +32,14 @@ class BoardState(IntEnum):
     RUNNING = 2
 
 
-class Lines(Protocol):
+class SolderedLines(Protocol):
     """What is soldered to a board and is let go without a word when its supply goes."""
 
     def cut(self) -> None:
         """Close all that was opened since the latest time."""
 
 
-StartSystem = Callable[[NodeManager, ExitStack], None]
+_StartSystem = Callable[[NodeManager, ExitStack], None]
 """Makes the system of a board that has booted; what it enters is left when the supply goes."""
 
 
@@ -61,7 +60,7 @@ class Board:
         boots: how often it was up.
     """
 
-    def __init__(self, limits: NodeLimits, start: StartSystem, lines: Lines) -> None:
+    def __init__(self, limits: NodeLimits, start: _StartSystem, lines: SolderedLines) -> None:
         self.limits, self._start, self._lines = limits, start, lines
         self.inputs = InputBank(INPUTS, on_change=self._input_set)
         self.manager: NodeManager | None = None
@@ -84,7 +83,7 @@ class Board:
     @property
     def outputs(self) -> Mapping[str, OutputSignal]:
         """What `read` knows."""
-        return {output.name: output for output in OUTPUTS}
+        return {output.name: output for output in _OUTPUTS}
 
     def read(self, name: str, /) -> int:
         """Look at an output; KeyError if there is none of that name."""

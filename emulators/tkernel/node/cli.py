@@ -7,8 +7,8 @@ from typing import Any
 import click
 
 from tickrig.host.cli.engine_options import openrtm_options, take_engines
+from tickrig.host.cli.messages import Refused, time_us
 from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.refused import Refused, time_us
 from tickrig.host.cli.start import loading
 
 
@@ -50,7 +50,7 @@ def main(connectors: int, message_octets: int, tick: str, boot: str, **options: 
     tkernel-emu --ucode /tmp/ucode --openrtm localhost
     """  # noqa: D301 - click wants the backspace
     with loading():
-        from tickrig.emulators.tkernel.node.limits import NodeLimits  # noqa: PLC0415 - slow
+        from tickrig.emulators.tkernel.node.node_manager import NodeLimits  # noqa: PLC0415 - slow
         from tickrig.emulators.tkernel.node.run import NodeOptions, NodeRun  # noqa: PLC0415
 
     engines = take_engines(options)

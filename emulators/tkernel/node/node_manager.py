@@ -4,31 +4,72 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from collections.abc import Mapping
-from typing import Any, Final, NoReturn
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, NoReturn, Protocol
 
-from tickrig.emulators.tkernel.node.limits import NodeLimits
+from tickrig.host.links.link import Link
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.ports.connect import Properties
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager, R
+from tickrig.host.rtc.ucode.cache import OpenSource, Source
+from tickrig.host.rtc.ucode.contents_interpretation import ContentsInterpretation
+from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
+from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.cdr import encode
+
+# What a node on T-Kernel cannot do, in numbers. The report gives none; these are choices.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeLimits:
+    """The limits of a node.
+
+    Attributes:
+        connectors: how many its ports may have together, 1..1000.
+        message_octets: of a value as CDR, 16..1048576.
+        tick_us: of its cyclic handlers; periods are multiples of it, 1000..1000000.
+        boot_us: from power-up until it answers, 0..600000000.
+
+    Raises:
+        ValueError: a limit that cannot be.
+    """
+
+    connectors: int = 8
+    message_octets: int = 4_096
+    tick_us: int = 10_000
+    boot_us: int = 3_000_000
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        ranges = {
+            "connectors": (1, 1_000),
+            "message_octets": (16, 1 << 20),
+            "tick_us": (1_000, 1_000_000),
+            "boot_us": (0, 600_000_000),
+        }
+        for name, (low, high) in ranges.items():
+            if not low <= getattr(self, name) <= high:
+                raise ValueError(f"{name} {getattr(self, name)} is not in {low}..{high}")
+
 
 HOST: Final = "tkernel"
 """Its naming context."""
 
-RATE_HZ: Final = 100.0
+_RATE_HZ: Final = 100.0
 """Of components for which nobody names one: the shortest period."""
 
-INTERFACE: Final = "dataport.interface_type"
-CORBA_CDR: Final = "corba_cdr"
-NEWER: Final = frozenset({"dataport.buffer.read.policy", "dataport.buffer.read.skip_count"})
+_INTERFACE: Final = "dataport.interface_type"
+_CORBA_CDR: Final = "corba_cdr"
+_NEWER: Final = frozenset({"dataport.buffer.read.policy", "dataport.buffer.read.skip_count"})
 """Properties of connectors that OpenRTM 1.0 does not have."""
 
-MOST_LOGGED: Final = 100
+_MOST_LOGGED: Final = 100
 REFUSED: Final = ("connectors", "interfaces", "messages", "periods")
 
 _LOG: Final = log_of(__name__)
@@ -63,14 +104,14 @@ class NodeManager(Manager):
         self,
         type_name: str,
         instance_name: str = "",
-        rate_hz: float = RATE_HZ,
+        rate_hz: float = _RATE_HZ,
         context: ExecutionContext | None = None,
     ) -> RtComponent:
         """Create a component, at 100 Hz if nobody says otherwise; see `Manager.create`."""
         return super().create(type_name, instance_name, rate_hz, context)
 
     def add(
-        self, component: R, rate_hz: float = RATE_HZ, context: ExecutionContext | None = None
+        self, component: R, rate_hz: float = _RATE_HZ, context: ExecutionContext | None = None
     ) -> R:
         """Add a component, and keep it within the limits; see `Manager.add`.
 
@@ -99,7 +140,7 @@ class NodeManager(Manager):
         connector_id: str = "",
     ) -> ConnectorProfile:
         """Join two ports, by CDR if nobody says otherwise; see `Manager.connect`."""
-        stated = {INTERFACE: CORBA_CDR, **(properties or {})}
+        stated = {_INTERFACE: _CORBA_CDR, **(properties or {})}
         return super().connect(first, second, stated, name=name, connector_id=connector_id)
 
     def admit(self, connector: ConnectorBase, /) -> None:
@@ -108,7 +149,7 @@ class NodeManager(Manager):
             return  # an observer's
         way, properties = " to ".join(connector.profile.ports), connector.profile.properties
         if len(connector.ports) == 2:  # those of peers are encoded whatever they say
-            self._check_interface(way, properties.get(INTERFACE, CORBA_CDR))
+            self._check_interface(way, properties.get(_INTERFACE, _CORBA_CDR))
         self._check_level(way, properties)
         if (count := len(self._connectors())) >= self.limits.connectors:
             why = f"{count} connectors are all that this node has"
@@ -128,12 +169,12 @@ class NodeManager(Manager):
             return False
 
     def _check_interface(self, way: str, interface: str) -> None:
-        if interface != CORBA_CDR:
-            why = f"{INTERFACE} {interface} is not of OpenRTM 1.0: {CORBA_CDR} is"
+        if interface != _CORBA_CDR:
+            why = f"{_INTERFACE} {interface} is not of OpenRTM 1.0: {_CORBA_CDR} is"
             self._refuse("interfaces", way, why, ReturnCode.UNSUPPORTED)
 
     def _check_level(self, way: str, properties: Mapping[str, str]) -> None:
-        if newer := sorted(NEWER.intersection(properties)):
+        if newer := sorted(_NEWER.intersection(properties)):
             why = f"{newer[0]} is not of OpenRTM 1.0"
             self._refuse("interfaces", way, why, ReturnCode.UNSUPPORTED)
 
@@ -165,6 +206,86 @@ class NodeManager(Manager):
 
     def _note(self, what: str, who: str, why: str) -> None:
         self.refused[what] += 1
-        if (what, who) not in self._logged and len(self._logged) < MOST_LOGGED:
+        if (what, who) not in self._logged and len(self._logged) < _MOST_LOGGED:
             self._logged.add((what, who))
             _LOG.warning("refused, a limit of the node: %s: %s", who, why)
+
+
+# The applications of the report's node: range finder (Fig. 122), position detection (Fig. 123).
+
+_RANGE_FINDER: Final = "LRFCapture_URG0"
+READER: Final = "InfraredRaysReader0"
+SETTLEMENT: Final = "UcodeSettlement0"
+CONTENTS: Final = "ContentsInterpretation0"
+
+_OpenLine = Callable[[str], Link[bytes]]
+
+
+class _Closable(Protocol):
+    def close(self) -> None: ...
+
+
+class BoardLines:
+    """What the components of a board open; it can be cut.
+
+    Args:
+        open_urg: opens the line of a range finder.
+        open_reader: opens the line of a ucode reader.
+        open_source: makes what asks the resolution service.
+    """
+
+    def __init__(
+        self, open_urg: _OpenLine, open_reader: _OpenLine, open_source: OpenSource
+    ) -> None:
+        self._open_urg, self._open_reader, self._open_source = open_urg, open_reader, open_source
+        self._opened: list[_Closable] = []
+
+    def open_urg(self, name: str) -> Link[bytes]:
+        """Open the line of a range finder."""
+        self._opened.append(link := self._open_urg(name))
+        return link
+
+    def open_reader(self, name: str) -> Link[bytes]:
+        """Open the line of a ucode reader."""
+        self._opened.append(link := self._open_reader(name))
+        return link
+
+    def open_source(self, name: str, hosts: tuple[str, ...]) -> Source:
+        """Make what asks the resolution service."""
+        self._opened.append(source := self._open_source(name, hosts))
+        return source
+
+    def cut(self) -> None:
+        """Close all that was opened, without a word to any device."""
+        for opened in self._opened:
+            opened.close()
+        self._opened.clear()
+
+
+def add_range_finder(manager: NodeManager, lines: BoardLines, device: str) -> None:
+    """Add and activate the component of a range finder at a line."""
+    component = manager.add(LrfCaptureUrg(_RANGE_FINDER, lines.open_urg))
+    component.configuration.set("DeviceFileName", device)
+    manager.activate(_RANGE_FINDER)
+
+
+def add_position_detection(
+    manager: NodeManager, lines: BoardLines, device: str, service: str = ""
+) -> None:
+    """Add, join and activate reader, settlement and interpretation.
+
+    Args:
+        manager: of the node.
+        lines: open what they need.
+        device: line of the reader.
+        service: address of the resolution service; that of the component if left out.
+    """
+    reader = manager.add(InfraredRaysReader(READER, lines.open_reader))
+    reader.configuration.set("DeviceFileName", device)
+    settlement = manager.add(UcodeSettlement(SETTLEMENT, lines.open_source))
+    if service:
+        settlement.configuration.set("service", service)
+    manager.add(ContentsInterpretation(CONTENTS, lines.open_source))
+    manager.connect(f"{READER}.ucodes", f"{SETTLEMENT}.ucodes")
+    manager.connect(f"{SETTLEMENT}.addresses", f"{CONTENTS}.addresses")
+    manager.activate(READER, SETTLEMENT, CONTENTS)

@@ -10,38 +10,36 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.bench.keeping_time import keeping_time
-from tickrig.emulators.tkernel.node.applications import (
+from tickrig.emulators.bench.running_emulator import keeping_time
+from tickrig.emulators.tkernel.node.board import Board
+from tickrig.emulators.tkernel.node.node_manager import (
+    HOST,
     BoardLines,
+    NodeLimits,
+    NodeManager,
     add_position_detection,
     add_range_finder,
 )
-from tickrig.emulators.tkernel.node.board import Board
-from tickrig.emulators.tkernel.node.limits import NodeLimits
-from tickrig.emulators.tkernel.node.node_manager import HOST, NodeManager
 from tickrig.emulators.tkernel.operated import Operated
-from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.messages import say, warnings_shown
-from tickrig.host.cli.openrtm_options import FORMAT
-from tickrig.host.cli.refused import Refused, refused_at
-from tickrig.host.cli.serving import serving_control, stopped_by_signals
+from tickrig.host.cli.control import serving_control, stopped_by_signals
+from tickrig.host.cli.engine_options import FORMAT, EngineOptions
+from tickrig.host.cli.messages import Refused, refused_at, say, warnings_shown
 from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc.commands.system_control import SystemControl
-from tickrig.host.rtc.commands.system_file import read_system
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
-from tickrig.host.rtc.remote.call_queue import CallQueue
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc.system.real_time import RealTime
-from tickrig.host.rtc.system.schedule import Schedule
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.schedule import RealTime, Schedule
 from tickrig.host.rtc.system.system import System, restore
+from tickrig.host.rtc.system.system_file import read_system
 from tickrig.host.rtc.ucode.http_source import HttpSource
 from tickrig.host.rtc.ucode.infrared_rays_reader import OPEN_SERIAL
 
-JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
-NAMES: Final = f"{HOST}.host_cxt/%n.rtc"
+_JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
+_NAMES: Final = f"{HOST}.host_cxt/%n.rtc"
 """Where its components stand in a name server."""
 
 
@@ -162,9 +160,9 @@ class NodeRun:
             attach = self._open_control(path, manager, stack)
         engines = self._options.engines
         if engines.openrtm is not None and engines.openrtm.names == FORMAT:
-            engines = replace(engines, openrtm=replace(engines.openrtm, names=NAMES))
+            engines = replace(engines, openrtm=replace(engines.openrtm, names=_NAMES))
         if engines:
-            join = load(JOIN_ENGINES)
+            join = load(_JOIN_ENGINES)
             stack.enter_context(join(engines, manager, attach, self._runner.stop))
 
     def _attach_alone(self, calls: CallQueue) -> None:

@@ -30,7 +30,7 @@ from tickrig.host.cli.options import HarmlessCommand, NumberRange
     metavar="DEG",
     help="Whole angle in which it hears, around where it looks.  [90]",
 )
-@line_options("flip, drop, dup, cut", "tickrig.device.ucode_reader.terminals:INPUTS")
+@line_options("flip, drop, dup, cut", "tickrig.device.ucode_reader:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:
     """Emulate an infra-red reader of ucodes on a pseudo-terminal (38400 8N1).

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.device.ucode_reader.parameters import ReaderParameters
-from tickrig.device.ucode_reader.reader import UcodeReader
+from tickrig.device.ucode_reader import Marker, ReaderParameters, UcodeReader
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.host.cli.refused import refused_at
+from tickrig.host.cli.messages import refused_at
 from tickrig.host.text.trace import Config, Mark
-from tickrig.wire.sensors.ucode import BAUD, parse_ucode
+from tickrig.wire.ucode import BAUD, parse_ucode
 
 
-def config_to_trace(parameters: ReaderParameters, markers: Sequence[Marker]) -> Config:
+def _config_to_trace(parameters: ReaderParameters, markers: Sequence[Marker]) -> Config:
     """Return all parameters and the markers."""
     return {
         "range_m": parameters.range_m,
@@ -31,20 +29,20 @@ def build_reader(config: Config) -> UcodeReader:
     Raises:
         ValueError: a setting that a reader does not have, or a value that it cannot have.
     """
-    defaults = config_to_trace(ReaderParameters(), ())
+    defaults = _config_to_trace(ReaderParameters(), ())
     check_config(config, defaults, "a reader has no setting", typed=False)
     settings: dict[str, Any] = {**defaults, **config}
     range_m, cone_deg = settings["range_m"], settings["cone_deg"]
     if type(range_m) not in (int, float) or type(cone_deg) is not int:
         raise ValueError(f"range_m {range_m!r} and cone_deg {cone_deg!r} are not two numbers")
     parameters = ReaderParameters(range_m=range_m, cone_deg=cone_deg)
-    return UcodeReader(parameters, tuple(map(parse_marker, str(settings["markers"]).split())))
+    return UcodeReader(parameters, tuple(map(_parse_marker, str(settings["markers"]).split())))
 
 
-def parse_marker(text: str) -> Marker:
+def _parse_marker(text: str) -> Marker:
     """Read `UCODE,X,Y`; ValueError if it is no marker.
 
-    >>> parse_marker("00001c00000000000001000000000001,1,-0.5").y_m
+    >>> _parse_marker("00001c00000000000001000000000001,1,-0.5").y_m
     -0.5
     """
     ucode, *places = text.split(",")
@@ -58,8 +56,8 @@ def parse_marker(text: str) -> Marker:
 def _configure(reader: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
     parameters = ReaderParameters(range_m=options["range_m"], cone_deg=options["cone_deg"])
     with refused_at("--marker"):
-        markers = tuple(map(parse_marker, options["markers"]))
-    config = config_to_trace(parameters, markers)
+        markers = tuple(map(_parse_marker, options["markers"]))
+    config = _config_to_trace(parameters, markers)
     return ConfiguredDevice(reader, UcodeReader(parameters, markers), config)
 
 
@@ -72,7 +70,7 @@ UCODE_READER: Final = DeviceType(
     title="ucode reader",
     build=build_reader,
     configure=_configure,
-    config_of=lambda reader: config_to_trace(reader.parameters, reader.markers),
+    config_of=lambda reader: _config_to_trace(reader.parameters, reader.markers),
     line=LineSettings(baud=BAUD),
     is_event=_is_event,
 )

@@ -44,7 +44,7 @@ def main(table: Path | None, *, example: bool, **options: Any) -> None:
     tickrig ctl /tmp/resolver.ctl get requests found
     """  # noqa: D301 - click wants the backspace
     with loading():
-        from tickrig.emulators.tkernel.resolution.run import print_example, run_service  # noqa: PLC0415 - slow
+        from tickrig.emulators.tkernel.resolution.http_service import print_example, run_service  # noqa: PLC0415 - slow
 
     if example:
         print_example()

@@ -10,7 +10,7 @@ from typing import Any, Final
 from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
 from tickrig.host.text.names import near
 from tickrig.host.text.toml_reader import load_toml
-from tickrig.wire.sensors.ucode import parse_ucode
+from tickrig.wire.ucode import parse_ucode
 
 EXAMPLE: Final = """\
 [ucodes]                                # 32 hex digits = a name below, or "http://..."
@@ -31,7 +31,7 @@ floor = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class UcodeTable:
     """What a service knows.
 
     Attributes:
@@ -43,7 +43,7 @@ class Table:
     contents: Mapping[str, str] = field(default_factory=dict)
 
 
-def parse_table(text: str) -> Table:
+def parse_table(text: str) -> UcodeTable:
     """Read a table.
 
     Raises:
@@ -60,7 +60,7 @@ def parse_table(text: str) -> Table:
         parse_ucode(ucode): _target(ucode, target, contents)
         for ucode, target in _tables(found, "ucodes").items()
     }
-    return Table(ucodes, contents)
+    return UcodeTable(ucodes, contents)
 
 
 def _tables(found: Mapping[str, Any], name: str) -> Mapping[str, object]:

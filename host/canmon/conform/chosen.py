@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from tickrig.host.canopen.conform.check import Check, Level
-from tickrig.host.canopen.conform.notation.suite import OBJECTS, group_titles, suite_checks
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.suite import OBJECTS, group_titles, suite_checks
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import closest
 
 
@@ -30,7 +29,7 @@ def unknown(words: Iterable[str]) -> list[str]:
     suite = suite_checks()
 
     def is_one(word: str) -> bool:
-        plan = Plan(Level.INTRUSIVE, (word,))
+        plan = ConformancePlan(Level.INTRUSIVE, (word,))
         return word.upper().startswith(OBJECTS) or any(map(plan.chooses, suite))
 
     none = (word for word in words if not is_one(word))
@@ -48,7 +47,7 @@ def chosen(only: Sequence[str]) -> list[Check]:
     """
     for text in unknown(only):
         raise Refused(f"--only {text}; see --list")
-    return list(filter(Plan(Level.INTRUSIVE, tuple(only)).chooses, suite_checks()))
+    return list(filter(ConformancePlan(Level.INTRUSIVE, tuple(only)).chooses, suite_checks()))
 
 
 def _near(word: str, suite: list[Check]) -> str:

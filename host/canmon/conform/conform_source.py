@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.source_spec import (
+from tickrig.host.canmon.sources.source import (
     BusSpec,
     FileSpec,
     LineSpec,
     parse_source,
 )
-from tickrig.host.canopen.conform.plan import Stimulus
+from tickrig.host.canopen.conform.check import Stimulus
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused, refuse_path
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.links.link import LinkClosed
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.conform.conform_run import ConformRun
@@ -30,17 +29,17 @@ if TYPE_CHECKING:
 
 RIG_FILE: Final = ".toml"
 
-RIGS: Final = ExtensionGroup[Any](
+_RIGS: Final = ExtensionGroup[Any](
     "tickrig.conform_sources",
     "source",
-    {"rig": "tickrig.emulators.testing.conformance.rig_source:open_rig"},
+    {"rig": "tickrig.emulators.testing.conformance.bench_source:open_rig"},
     callable,
     "a function",
 )
 """What opens a rig file: hosts know no emulators, so it is loaded by its name."""
 
 
-LOCAL: Final = ("virtual", "udp_multicast")
+_LOCAL: Final = ("virtual", "udp_multicast")
 """Interfaces of python-can whose bus is between processes, most often of one machine."""
 
 
@@ -127,7 +126,7 @@ def _parse(word: str) -> FileSpec | BusSpec | LineSpec | None:
 
 def _open_rig(path: Path, node_id: int | None) -> ConformSource:
     try:
-        source: ConformSource = RIGS.load("rig")(path, node_id)
+        source: ConformSource = _RIGS.load("rig")(path, node_id)
     except OSError as error:
         refuse_path("rig", error)
     except (ExtensionError, ValueError) as error:
@@ -161,7 +160,7 @@ def _open_bus(spec: BusSpec, options: BusOptions) -> ConformSource:
 
 def _is_local(interface: str, channel: object) -> bool:
     """Return whether a bus is one between processes of this machine, as vcan."""
-    if interface in LOCAL:
+    if interface in _LOCAL:
         return True
     net = Path("/sys/class/net", str(channel))
     return interface == "socketcan" and net.exists() and not (net / "device").exists()

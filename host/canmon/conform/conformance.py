@@ -14,17 +14,19 @@ import click
 
 from tickrig.host.canmon.conform.chosen import check_chosen, patterns, unknown
 from tickrig.host.canmon.conform.conform_source import RIG_FILE, ConformSource, open_conform_source
-from tickrig.host.canmon.conform.consent import Consent, Progress
-from tickrig.host.canmon.conform.nodes_heard import list_nodes, nodes_heard
-from tickrig.host.canmon.conform.report_files import check_files, keep_inputs, write_files
+from tickrig.host.canmon.conform.consent import Consent, Progress, list_nodes, nodes_heard
+from tickrig.host.canmon.conform.report_files import (
+    check_files,
+    decoded_frames,
+    keep_inputs,
+    write_files,
+)
 from tickrig.host.canmon.conform.stimulus import CONTROL, open_stimulus
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.views.conform_frames import decoded_frames
 from tickrig.host.canmon.output.listening import until_interrupted
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
@@ -32,15 +34,14 @@ from tickrig.host.canopen.conform.verdict import BUS_FAILED, Report
 from tickrig.host.canopen.data_sheet.check import check, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import VERSION
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.text.page_text import one_line
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 
-FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
+_FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
 
 
 class Conformance:
@@ -58,7 +59,7 @@ class Conformance:
     def __init__(self, word: str | None, bus: BusOptions, options: dict[str, Any]) -> None:
         self._word, self._bus, self._options = word, bus, options
         self._files: dict[str, Path] = {
-            f"--{name.replace('_', '-')}": options[name] for name in FILES if options[name]
+            f"--{name.replace('_', '-')}": options[name] for name in _FILES if options[name]
         }
         check_files(self._files)
         keep_inputs(self._files, self._inputs())
@@ -139,11 +140,11 @@ class Conformance:
         wrong = tuple(map(str, (*eds.errors, *eds.warnings)))
         return replace(report, settings=settings, findings=(*wrong, *report.findings))
 
-    def _plan(self, source: ConformSource, node_id: int, consent: Consent) -> Plan:
+    def _plan(self, source: ConformSource, node_id: int, consent: Consent) -> ConformancePlan:
         options, stimulus = self._options, self._stimulus
         if stimulus is None and source.stimulus is not None:
             stimulus = source.stimulus(node_id)
-        return Plan(
+        return ConformancePlan(
             level=self._level,
             only=self._only,
             allow=self._allow,

@@ -10,12 +10,11 @@ import click
 
 from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.check.junit import junit
+from tickrig.host.canmon.model.check.report import junit
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
-from tickrig.host.canopen.data_sheet.rule import RuleFinding
-from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.rule import RULES, RuleFinding
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
@@ -23,11 +22,11 @@ from tickrig.host.text.whole_file import check_file, check_not_read, write_whole
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
 
-FOUND: Final = 1
+_FOUND: Final = 1
 """Exit status where a finding counts."""
 
 
-UNREAD: Final = "unread"
+_UNREAD: Final = "unread"
 """The test case of a file that cannot be read."""
 
 
@@ -67,7 +66,7 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
         everything += found
         with until_unread():
             for one in found:
-                click.echo(finding_json(one) if as_json else str(one))
+                click.echo(_finding_json(one) if as_json else str(one))
     failures = failing(everything, strict=strict)
     _write(report, documents, unread, failures)
     if documents:
@@ -75,7 +74,7 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
     if unread:
         click.get_current_context().exit(Refused.exit_code)
     if failures:
-        click.get_current_context().exit(FOUND)
+        click.get_current_context().exit(_FOUND)
 
 
 def _read(files: Sequence[Path]) -> tuple[list[Document], list[Case]]:
@@ -86,11 +85,11 @@ def _read(files: Sequence[Path]) -> tuple[list[Document], list[Case]]:
             documents.append(read_document(path))
         except Refused as error:
             error.show()
-            unread.append(Case(f"{path}: {UNREAD}", error.message))
+            unread.append(Case(f"{path}: {_UNREAD}", error.message))
     return documents, unread
 
 
-def finding_json(one: RuleFinding) -> str:
+def _finding_json(one: RuleFinding) -> str:
     """Write a finding as an object."""
     said = {
         "v": 1,

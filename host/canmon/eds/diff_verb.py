@@ -12,7 +12,7 @@ from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 
-DIFFERENT: Final = 1
+_DIFFERENT: Final = 1
 
 
 @click.command()
@@ -29,7 +29,7 @@ def command(old: Path, new: Path, as_json: bool) -> None:
     canmon eds diff old.eds new.eds
     canmon eds diff drive.eds drive.xdd --json
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.canopen.data_sheet.diff import diff  # noqa: PLC0415 - slow
+    from tickrig.host.canopen.data_sheet.show import diff  # noqa: PLC0415 - slow
 
     changes = diff(read_device_document(old), read_device_document(new))
     with until_unread():
@@ -37,4 +37,4 @@ def command(old: Path, new: Path, as_json: bool) -> None:
             said = {"v": 1, **change._asdict()}
             click.echo(json_text(said, letters=True) if as_json else str(change))
     if changes:
-        click.get_current_context().exit(DIFFERENT)
+        click.get_current_context().exit(_DIFFERENT)

@@ -12,17 +12,16 @@ import click
 
 from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canopen.data_sheet.rule import Place, RuleFinding
-from tickrig.host.cli.messages import say
+from tickrig.host.canopen.data_sheet.rule import EditPlace, RuleFinding
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused, refuse_path
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
 
-LEFT: Final = 1
+_LEFT: Final = 1
 """Exit status where something is left that needs knowledge of the device."""
 
 
@@ -75,7 +74,7 @@ def command(
         _write(output, fixed.document.data)
     say(f"{len(fixed.mended)} mended, {len(fixed.left)} left")
     if fixed.left:
-        click.get_current_context().exit(LEFT)
+        click.get_current_context().exit(_LEFT)
 
 
 def _known(encoding: str) -> str:
@@ -102,7 +101,7 @@ def _mended(one: RuleFinding) -> str:
     """Say what was mended, and what is written instead."""
     lines = [text for edit in one.edits for text in edit.lines if text]
     more = f" and {len(lines) - 1} more" if lines[1:] else ""
-    left_out = any(edit.place is Place.REPLACE for edit in one.edits)
+    left_out = any(edit.place is EditPlace.REPLACE for edit in one.edits)
     now = f"; now {shorten(lines[0].strip())}{more}" if lines else "; left out" * left_out
     where = f"[{one.section}] " if one.section else ""
     return f"{one.file}:{max(one.line, 1)}: mended: [{one.rule.name}] {where}{one.text}{now}"

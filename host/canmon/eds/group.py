@@ -6,18 +6,18 @@ from typing import Final
 
 import click
 
-from tickrig.host.cli.lazy_group import LazyGroup
+from tickrig.host.cli.options import LazyGroup
 
-HERE: Final = "tickrig.host.canmon.eds"
-VERBS: Final = {
-    "check": (f"{HERE}.check_verb:command", "Tell all that is wrong in EDS files."),
-    "fix": (f"{HERE}.fix_verb:command", "Mend an EDS."),
-    "diff": (f"{HERE}.diff_verb:command", "Compare the devices of two EDS files."),
-    "show": (f"{HERE}.show_verb:command", "Show the device of an EDS."),
+_HERE: Final = "tickrig.host.canmon.eds"
+_VERBS: Final = {
+    "check": (f"{_HERE}.check_verb:command", "Tell all that is wrong in EDS files."),
+    "fix": (f"{_HERE}.fix_verb:command", "Mend an EDS."),
+    "diff": (f"{_HERE}.diff_verb:command", "Compare the devices of two EDS files."),
+    "show": (f"{_HERE}.show_verb:command", "Show the device of an EDS."),
 }
 
 
-@click.group(cls=LazyGroup, commands=VERBS)
+@click.group(cls=LazyGroup, commands=_VERBS)
 def command() -> None:
     """Check, mend, compare and show EDS files: EDS, DCF, XDD, XDC.
 

@@ -11,15 +11,15 @@ import click
 
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import json_text
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
 
-PLACE: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?(?::(?:0x)?([0-9a-f]{1,2})h?)?", re.IGNORECASE)
-COLUMNS: Final = ("index", "sub", "type", "access", "default", "low", "high", "name")
+_PLACE: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?(?::(?:0x)?([0-9a-f]{1,2})h?)?", re.IGNORECASE)
+_COLUMNS: Final = ("index", "sub", "type", "access", "default", "low", "high", "name")
 
 
 @click.command()
@@ -39,7 +39,7 @@ def command(file: Path, place: str | None, node: int, as_json: bool) -> None:
     canmon eds show drive.eds 1018:01 --json
     """  # noqa: D301 - click wants the backspace
     index, sub = _place(place)
-    said = describe(read_device_document(file), index, sub, node)
+    said = _describe(read_device_document(file), index, sub, node)
     if index is not None and not said["entries"]:
         raise Refused(f"{file}: no {place} is there")
     with until_unread():
@@ -50,13 +50,13 @@ def command(file: Path, place: str | None, node: int, as_json: bool) -> None:
 def _place(text: str | None) -> tuple[int | None, int | None]:
     if text is None:
         return None, None
-    match = PLACE.fullmatch(text)
+    match = _PLACE.fullmatch(text)
     if match is None:
         raise Refused(f"{text!r} is not INDEX or INDEX:SUB in hexadecimal, as 6040 or 1018:01")
     return int(match[1], 16), int(match[2], 16) if match[2] else None
 
 
-def describe(
+def _describe(
     document: Document, index: int | None, sub: int | None, node_id: int
 ) -> dict[str, Any]:
     """Return what is shown; without the head and the PDOs where one object is wanted."""
@@ -79,7 +79,7 @@ def _lines(said: dict[str, Any], node_id: int) -> Iterator[str]:
             yield f"{what:<14}{value}"
     if "device" in said:
         yield ""
-    yield from table(said["entries"], COLUMNS)
+    yield from table(said["entries"], _COLUMNS)
     if said.get("pdos"):
         yield ""
         yield f"PDOs of node {node_id}"

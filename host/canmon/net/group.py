@@ -8,27 +8,26 @@ from typing import Any, Final
 import click
 
 from tickrig.host.cli.can_options import BusOptions, bus_options, spread
-from tickrig.host.cli.lazy_group import LazyGroup
-from tickrig.host.cli.options import time_option
+from tickrig.host.cli.options import LazyGroup, time_option
 
-HERE: Final = "tickrig.host.canmon.net.verbs"
+_HERE: Final = "tickrig.host.canmon.net.verbs"
 VERBS: Final = {
-    "scan": (f"{HERE}.scan_verb:command", "Say which nodes are there."),
-    "nmt": (f"{HERE}.nmt_verb:command", "Send an NMT command to NODE, or to all."),
+    "scan": (f"{_HERE}.scan_verb:command", "Say which nodes are there."),
+    "nmt": (f"{_HERE}.nmt_verb:command", "Send an NMT command to NODE, or to all."),
     "lss": (
-        f"{HERE}.lss_verb:command",
+        f"{_HERE}.lss_verb:command",
         "Configure node-ID and bit rate of nodes by LSS (CiA 305).",
     ),
-    "read": (f"{HERE}.read_verb:command", "Read objects of NODE."),
-    "write": (f"{HERE}.write_verb:command", "Write objects of NODE."),
-    "dcf": (f"{HERE}.dcf_verb:command", "Write what the DCF or XDC FILE configures into NODE."),
-    "compare": (f"{HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node."),
-    "store": (f"{HERE}.store_verb:store", "Store parameters of NODE (1010h)."),
-    "restore": (f"{HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)."),
-    "program": (f"{HERE}.program_verb:command", "Download FILE into NODE by block transfer."),
-    "boot": (f"{HERE}.boot_verb:command", "Boot NODE as an NMT master does (CiA 302-2)."),
+    "read": (f"{_HERE}.read_verb:command", "Read objects of NODE."),
+    "write": (f"{_HERE}.write_verb:command", "Write objects of NODE."),
+    "dcf": (f"{_HERE}.dcf_verb:command", "Write what the DCF or XDC FILE configures into NODE."),
+    "compare": (f"{_HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node."),
+    "store": (f"{_HERE}.store_verb:store", "Store parameters of NODE (1010h)."),
+    "restore": (f"{_HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)."),
+    "program": (f"{_HERE}.program_verb:command", "Download FILE into NODE by block transfer."),
+    "boot": (f"{_HERE}.boot_verb:command", "Boot NODE as an NMT master does (CiA 302-2)."),
 }
-ANSWER_US: Final = 500_000
+_ANSWER_US: Final = 500_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,4 +86,4 @@ def command(
                  1 a node refused, did    3 the bus or a file failed
                    not answer, or differs
     """  # noqa: D301 - click wants the backspace
-    context.obj = NetCall(source or None, BusOptions(**options), timeout_us or ANSWER_US)
+    context.obj = NetCall(source or None, BusOptions(**options), timeout_us or _ANSWER_US)

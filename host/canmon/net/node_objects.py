@@ -9,37 +9,70 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
 from tickrig.host.canmon.model.decode.object_text import (
     ObjectText,
     describe_drive,
     describe_standard,
+    slug,
 )
-from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
 from tickrig.host.canmon.net.session import NetSession, NodeFailed
-from tickrig.host.canmon.net.standard_names import standard_names
-from tickrig.host.canopen.conform.subject.other_device import TOLD, other_device
+from tickrig.host.canopen.conform.subject import TOLD, other_device
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.object_table import EntryDescription
+from tickrig.wire.canopen.eds.object_table import (
+    OFF,
+    CommunicationProfile,
+    EntryDescription,
+    ObjectCode,
+    ObjectTable,
+    Pdo,
+    add_communication,
+)
+
+# Names of CiA 301 as an EDS writes them in full, for nodes of which there is none.
+
+_PDOS: Final = 64
+"""PDOs of each direction that have names."""
+
+
+@cache
+def _standard_names() -> Mapping[str, tuple[int, int]]:
+    """Return index and sub-index of the communication objects by their names.
+
+    >>> _standard_names()["identity_object.product_code"] == (0x1018, 2)
+    True
+    """
+    table, pdos = ObjectTable(), [Pdo(OFF)] * _PDOS
+    profile = CommunicationProfile(
+        device_type=0, name="", hardware="", software="", product_code=0, rpdos=pdos, tpdos=pdos
+    )
+    add_communication(table, profile)
+    found: dict[str, tuple[int, int]] = {}
+    for row in table:
+        head = table.objects[row.index]
+        whole = "" if head.code is ObjectCode.VAR else f"{slug(head.name)}."
+        found[f"{whole}{slug(row.name)}"] = row.index, row.sub
+    return found
+
 
 Entry = tuple[int, int]
 
-ADDRESS: Final = re.compile(
+_ADDRESS: Final = re.compile(
     r"(?:0x)?([0-9a-f]{4})h?(?:(?::|sub|/)(?:0x)?([0-9a-f]{1,2})h?)?", re.IGNORECASE
 )
-COMMUNICATION: Final = range(0x1000, 0x2000)
-DRIVE: Final = range(0x6000, 0x6100)
-SUBS: Final = range(9)
+_COMMUNICATION: Final = range(0x1000, 0x2000)
+_DRIVE: Final = range(0x6000, 0x6100)
+_SUBS: Final = range(9)
 """Of the objects that CiA 301 names, to be found by name without an EDS."""
 
 
-class NodeObjects:
+class NamedObjects:
     """What is known of the objects of one node.
 
     Args:
@@ -93,7 +126,7 @@ class NodeObjects:
         """
         if (entry := self._names.get(word.casefold())) is not None:
             return entry
-        if match := ADDRESS.fullmatch(word):
+        if match := _ADDRESS.fullmatch(word):
             return int(match[1], 16), int(match[2] or "0", 16)
         raise Refused(
             f"no object {word!r} of node {self.node_id}; {near(word.casefold(), self._names)}"
@@ -114,7 +147,7 @@ class NodeObjects:
                 standard = describe_drive(*entry)
             if standard is not None:
                 found.setdefault(standard.name, entry)
-        for name, entry in standard_names().items():
+        for name, entry in _standard_names().items():
             if entry in self.rows:
                 found.setdefault(name, entry)
         return found
@@ -124,14 +157,14 @@ class NodeObjects:
 def _names_by_standard(is_drive: bool) -> Mapping[str, Entry]:
     """Return the objects that CiA 301 names, and those of CiA 402 if it is a drive."""
     found: dict[str, Entry] = {}
-    for index in COMMUNICATION:
-        for sub in SUBS:
+    for index in _COMMUNICATION:
+        for sub in _SUBS:
             if (text := describe_standard(index, sub)) is not None:
                 found.setdefault(text.name, (index, sub))
-    for index in DRIVE if is_drive else ():
+    for index in _DRIVE if is_drive else ():
         if (text := describe_drive(index, 0)) is not None:
             found.setdefault(text.name, (index, 0))
-    return {**found, **standard_names(), **found}  # in this order: a mistake lists the first
+    return {**found, **_standard_names(), **found}  # in this order: a mistake lists the first
 
 
 DEVICE_TYPE: Final = (0x1000, 0)
@@ -144,7 +177,7 @@ def known_objects(
     *,
     what: str = "--eds",
     strict: bool = False,
-) -> NodeObjects:
+) -> NamedObjects:
     """Return what is known of the objects of a node; who it is is read from it.
 
     Args:
@@ -159,11 +192,11 @@ def known_objects(
         SdoFailed: the node does not answer.
     """
     file = read_device_document(eds, what).file if eds else session.source.eds.get(node_id)
-    objects = NodeObjects(node_id, file)
+    objects = NamedObjects(node_id, file)
     data = _device_type(session, node_id)
     objects.learn(DEVICE_TYPE, data)
     if eds is not None:
-        about = {"device type": as_hex(data)}
+        about = {"device type": _as_hex(data)}
         for name, at in list(TOLD.items())[1:]:
             if (said := _number(session, node_id, at)) is not None:
                 about[name] = said
@@ -183,14 +216,14 @@ def _device_type(session: NetSession, node_id: int) -> bytes:
         raise NodeFailed(text) from None
 
 
-def as_hex(data: bytes) -> str:
+def _as_hex(data: bytes) -> str:
     """Write a number of 32 bits."""
     return f"{int.from_bytes(data, 'little'):08X}h"
 
 
 def _number(session: NetSession, node_id: int, at: Entry) -> str | None:
     try:
-        return as_hex(session.bus.read(node_id, *at, 4))
+        return _as_hex(session.bus.read(node_id, *at, 4))
     except SdoFailed:
         return None
 

@@ -11,24 +11,23 @@ import click
 
 from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.start import INTERRUPTED
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.page_text import one_line
-from tickrig.wire.canopen.sdo.abort import AbortCode, describe_abort
+from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
 
-Title = Callable[[tuple[int, int]], str]
+_Title = Callable[[tuple[int, int]], str]
 """Writes index, sub-index and name of an object."""
 
-MOST_LISTED: Final = 5
+_MOST_LISTED: Final = 5
 
-LOCAL: Final = (AbortCode.COMMAND_SPECIFIER, AbortCode.TOGGLE_BIT)
+_LOCAL: Final = (AbortCode.COMMAND_SPECIFIER, AbortCode.TOGGLE_BIT)
 
 
 class NodeFailed(click.ClickException):
@@ -70,7 +69,7 @@ class Work:
 
 def _listed(steps: list[str]) -> str:
     """List a few steps; of many the first and the last one."""
-    if len(steps) <= MOST_LISTED:
+    if len(steps) <= _MOST_LISTED:
         return ", ".join(steps)
     return f"{steps[0]}, ... {steps[-1]} ({len(steps)} in all)"
 
@@ -152,11 +151,11 @@ def _with_work(text: str, session: NetSession) -> str:
     return f"{text}; {progress}" if progress else text
 
 
-def failure_text(error: SdoFailed, title: Title = write_entry) -> str:
+def failure_text(error: SdoFailed, title: _Title = write_entry) -> str:
     """Say why a transfer failed, in words."""
     at = title((error.index, error.sub))
     match error:
-        case SdoAborted() if error.code in LOCAL:
+        case SdoAborted() if error.code in _LOCAL:
             return f"{at}: aborted: {describe_abort(error.code)}"
         case SdoAborted():
             return f"{at}: refused: {describe_abort(error.code)}"
@@ -166,7 +165,7 @@ def failure_text(error: SdoFailed, title: Title = write_entry) -> str:
 
 
 @contextmanager
-def of_node(node_id: int, title: Title = write_entry) -> Iterator[None]:
+def of_node(node_id: int, title: _Title = write_entry) -> Iterator[None]:
     """Name the node, and the object, in what goes wrong in the block; NodeFailed then."""
     try:
         yield

@@ -1,27 +1,33 @@
-"""Values of objects, as people read and write them."""
+"""Values of objects, as people read and write them, and held against others."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Collection, Iterator, Mapping
+from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.object_text import ObjectText, drive_state
-from tickrig.host.canmon.model.dictionary.node_dictionary import encode_value
-from tickrig.host.canmon.net.node_objects import TYPES, Entry, NodeObjects
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canmon.model.node_dictionary import encode_value
+from tickrig.host.canmon.net.node_objects import TYPES, Entry, NamedObjects
+from tickrig.host.canmon.net.session import NetSession, failure_text
+from tickrig.host.canopen.commissioning.configuration import Values, same
+from tickrig.host.canopen.errors import SdoAborted
+from tickrig.host.cli.messages import Refused
 from tickrig.wire.canopen.datatypes import DataType
 
-STATUSWORD: Final = (0x6041, 0)
-MOST_SHOWN: Final = 64
+# Values of objects, as people read and write them.
+
+_STATUSWORD: Final = (0x6041, 0)
+_MOST_SHOWN: Final = 64
 """Bytes of a domain; of longer ones the number is told."""
 
 
-def shown(objects: NodeObjects, entry: Entry, data: bytes) -> str:
+def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
     """Write a value with its unit; whole numbers in hex too, identifiers and bits in hex alone."""
     text = objects.text(entry)
-    if len(data) > MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
+    if len(data) > _MOST_SHOWN and (text.kind is None or text.kind is DataType.DOMAIN):
         return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
     value, said = text.read(data)
-    if entry == STATUSWORD and objects.is_drive and isinstance(value, int):
+    if entry == _STATUSWORD and objects.is_drive and isinstance(value, int):
         return f"{said} {drive_state(value)}"
     if text.in_hex or text.kind is None:
         return said
@@ -31,7 +37,7 @@ def shown(objects: NodeObjects, entry: Entry, data: bytes) -> str:
     return f"{said}{unit}"
 
 
-def encoded(objects: NodeObjects, entry: Entry, words: str) -> bytes:
+def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     """Return the bytes of a value, as `100`, `0x64`, `-1.5` in the object's unit, `u16:100`.
 
     Raises:
@@ -64,10 +70,66 @@ def _range(text: ObjectText) -> str:
     return f" ({low * factor:g} to {high * factor:g})" if factor != 1 else f" ({low} to {high})"
 
 
-def limits(objects: NodeObjects, entry: Entry) -> str:
+def limits(objects: NamedObjects, entry: Entry) -> str:
     """Say what the EDS allows of a value; empty where it says nothing."""
     row = objects.rows.get(entry)
     if row is None or (row.low is None and row.high is None):
         return ""
     low, high = ("..." if bound is None else f"{bound}" for bound in (row.low, row.high))
     return f"; the EDS allows {low} to {high}"
+
+
+# Values of a node held against others: those of a DCF, or of another node.
+
+
+class ValueDifference(NamedTuple):
+    """An object whose value is another than wanted.
+
+    Attributes:
+        entry: index and sub-index.
+        wanted: as it goes over the wire.
+        found: likewise, None if the node refuses to tell it.
+        why: it refuses.
+    """
+
+    entry: Entry
+    wanted: bytes
+    found: bytes | None
+    why: str = ""
+
+
+def differences(
+    session: NetSession, objects: NamedObjects, values: Mapping[Entry, bytes]
+) -> Iterator[ValueDifference]:
+    """Read objects of a node, and yield those that differ; SdoTimeout if it does not answer."""
+    for entry, wanted in sorted(values.items()):
+        row = objects.rows.get(entry)
+        if row is not None and not row.readable:
+            yield ValueDifference(entry, wanted, None, "it cannot be read")
+            continue
+        try:
+            found = session.bus.read(objects.node_id, *entry, objects.size(entry))
+        except SdoAborted as error:
+            why = failure_text(error, lambda at: "").removeprefix(": ")
+            yield ValueDifference(entry, wanted, None, why)
+            continue
+        if not same(row, wanted, found):
+            yield ValueDifference(entry, wanted, found)
+
+
+def line(objects: NamedObjects, one: ValueDifference, where: str) -> str:
+    """Say what is here, and what is there."""
+    there = f"{shown(objects, one.entry, one.wanted)} {where}"
+    here = one.why if one.found is None else f"{shown(objects, one.entry, one.found)} here"
+    return f"{objects.title(one.entry)}: {here}, {there}"
+
+
+def values_of(session: NetSession, node_id: int, entries: Collection[Entry]) -> Values:
+    """Read objects of a node; what it refuses to tell is left out."""
+    found: Values = {}
+    for entry in sorted(entries):
+        try:
+            found[entry] = session.bus.read(node_id, *entry)
+        except SdoAborted:
+            continue
+    return found

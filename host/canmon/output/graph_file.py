@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import BinaryIO, Final, TextIO
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.graph.chart import Chart, Curve, chart
+from tickrig.host.canmon.model.graph.chart import COLOURS, Chart, Curve, chart, html_page, svg
 from tickrig.host.canmon.model.graph.series import Series, View
-from tickrig.host.canmon.model.graph.svg import COLOURS, html_page, svg
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.whole_file import replacing, write_whole
 
 
@@ -46,10 +45,10 @@ def _samples(number: int, series: Series, view: View) -> Iterator[tuple[int, int
         yield series.at_us[index], number, index, series.values[index]
 
 
-DPI: Final = 100
-AXIS_SHARE: Final = 0.09
+_DPI: Final = 100
+_AXIS_SHARE: Final = 0.09
 """Of the width, for each axis beyond the second."""
-MARGIN: Final = 0.03
+_MARGIN: Final = 0.03
 """Of an axis, above and below its curves."""
 
 
@@ -63,16 +62,16 @@ def write_png(
     """
     from matplotlib.figure import Figure  # noqa: PLC0415 - an extra, and slow
 
-    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, layout="constrained")
     drawn = chart(series, view, width)
     first = figure.add_subplot()
     first.grid(visible=True, alpha=0.4)
     axes = {axis: first.twinx() if number else first for number, axis in enumerate(drawn.ranges)}
     for number, (axis, (low, high)) in enumerate(drawn.ranges.items()):
-        margin = (high - low) * MARGIN
+        margin = (high - low) * _MARGIN
         axes[axis].set_ylim(low - margin, high + margin)
         if number > 1:
-            axes[axis].spines["right"].set_position(("axes", 1 + AXIS_SHARE * (number - 1)))
+            axes[axis].spines["right"].set_position(("axes", 1 + _AXIS_SHARE * (number - 1)))
     lines = []
     for curve, colour in zip(drawn.curves, cycle(COLOURS), strict=False):
         label = f"{curve.label} [{curve.unit}]" if curve.unit else curve.label
@@ -98,20 +97,20 @@ def _points(curve: Curve, drawn: Chart) -> tuple[list[float], list[float]]:
     return times, values
 
 
-KINDS: Final = (".svg", ".html", ".png", ".csv")
+_KINDS: Final = (".svg", ".html", ".png", ".csv")
 
 
 def check_graph_path(path: Path) -> None:
     """Refuse a file whose name tells no kind."""
-    if path.suffix.lower() not in KINDS:
-        raise Refused(f"-o {path}: a graph is written as {', '.join(KINDS)}")
+    if path.suffix.lower() not in _KINDS:
+        raise Refused(f"-o {path}: a graph is written as {', '.join(_KINDS)}")
 
 
 def write_graph(path: Path, series: Sequence[Series], view: View, size: tuple[int, int]) -> None:
     """Write curves as the file's name says.
 
     Args:
-        path: its suffix is one of `KINDS`.
+        path: its suffix is one of `_KINDS`.
         series: the curves.
         view: what is seen.
         size: width and height of a picture in pixels.

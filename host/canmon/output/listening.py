@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,11 +13,10 @@ from typing import TYPE_CHECKING, Final, ParamSpec, TypeVar
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.traffic.bit_rates import BitRates
-from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.sources.block_log import BlockLog
-from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.traffic import BitRates
+from tickrig.host.canmon.sources.file_source import BlockLog
+from tickrig.host.canmon.sources.source import AnySource, BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.options import time_option
 from tickrig.host.cli.start import Interrupter, give_up_terminals, taking_signals
@@ -24,8 +24,71 @@ from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns.columns import Columns
-    from tickrig.host.canmon.model.frames.record import AnyRecord
-    from tickrig.host.canmon.model.traffic.traffic import Snapshot
+    from tickrig.host.canmon.model.frames import AnyRecord, LineRecord
+    from tickrig.host.canmon.model.traffic import TrafficSnapshot
+
+
+# The clocks of verbs: of a source between its frames, and of what is sent.
+
+
+class Stopwatch:
+    """Goes on from the latest frame's time by the clock of this machine.
+
+    The stamps of a driver need not be those of our clock: only their differences count.
+
+    Attributes:
+        latest_us: when the latest frame came.
+    """
+
+    def __init__(self) -> None:
+        self.latest_us, self._since_us = 0, _now_us()
+
+    def take(self, records: Sequence[Record | LineRecord]) -> None:
+        """Go on from the last of these frames."""
+        if records:
+            self.latest_us, self._since_us = records[-1].at_us, _now_us()
+
+    @property
+    def now_us(self) -> int:
+        """The time at the source."""
+        return self.latest_us + _now_us() - self._since_us
+
+
+def _now_us() -> int:
+    return time.monotonic_ns() // 1_000
+
+
+_PR_SET_TIMERSLACK: Final = 29
+_SLACK_NS: Final = 1_000
+
+
+class Pace:
+    """Time since it was made, in microseconds.
+
+    It sleeps to absolute moments, so what is paced by it does not drift.
+    """
+
+    def __init__(self) -> None:
+        self._start_ns = time.monotonic_ns()
+        _wake_on_time()
+
+    @property
+    def now_us(self) -> int:
+        """The time."""
+        return (time.monotonic_ns() - self._start_ns) // 1_000
+
+    def wait_until(self, at_us: int) -> int:
+        """Return when it is `at_us`; the answer is how late, in microseconds."""
+        early_us = at_us - self.now_us
+        if early_us > 0:
+            time.sleep(early_us / 1e6)
+        return max(0, self.now_us - at_us)
+
+
+def _wake_on_time() -> None:
+    """Ask Linux not to let this thread sleep up to 50 us longer (prctl(2), PR_SET_TIMERSLACK)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, _SLACK_NS, 0, 0, 0)
 
 
 Given = ParamSpec("Given")
@@ -102,8 +165,8 @@ def until_interrupted() -> Iterator[Interruptions]:
 
 Item = TypeVar("Item", bound="AnyRecord")
 
-POLL_US: Final = 20_000
-PATIENCE_US: Final = 5_000_000
+_POLL_US: Final = 20_000
+_PATIENCE_US: Final = 5_000_000
 """How long a bus is heard where nothing else ends it."""
 
 
@@ -131,7 +194,7 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
     words: Sequence[str],
     take: Callable[[Sequence[Item]], None],
     span_us: int | None,
-    lines: Lines | None = None,
+    lines: _Lines | None = None,
     *,
     press: Callable[[str], None] = lambda key: None,
 ) -> None:
@@ -147,7 +210,7 @@ def follow(  # noqa: PLR0913 - how, on a screen and without
     """
     with until_interrupted():
         if lines is not None and source.live and sys.stdout.isatty():
-            paint(source, take, lines, span_us, press)
+            _paint(source, take, lines, span_us, press)
         else:
             listen(source, take, span_us or patience_us(source, words))
 
@@ -157,8 +220,8 @@ def listen(
 ) -> None:
     """Take what comes until the source ends or the time is over."""
     begin_s = time.monotonic()
-    while not (source.ended or is_over(begin_s, span_us)):
-        take(source.poll(POLL_US))
+    while not (source.ended or _is_over(begin_s, span_us)):
+        take(source.poll(_POLL_US))
         say_marks(source)
 
 
@@ -181,7 +244,7 @@ def take_blocks(log: BlockLog, take: Callable[[Columns], None]) -> bool:
     return not log.no_columns
 
 
-def count_blocks(log: BlockLog | None) -> Snapshot | None:
+def count_blocks(log: BlockLog | None) -> TrafficSnapshot | None:
     """Return the statistics of a log; None where it is to be read frame by frame."""
     if log is None:
         return None
@@ -193,25 +256,25 @@ def count_blocks(log: BlockLog | None) -> Snapshot | None:
 
 def patience_us(source: AnySource[object], words: Sequence[str]) -> int | None:
     """Return how long to listen where nobody says it; a file and a pipe have an end."""
-    return None if not source.live or list(words) == ["-"] else PATIENCE_US
+    return None if not source.live or list(words) == ["-"] else _PATIENCE_US
 
 
-def is_over(begin_s: float, span_us: int | None) -> bool:
+def _is_over(begin_s: float, span_us: int | None) -> bool:
     """Say whether a time has passed by the clock of this machine."""
     return span_us is not None and time.monotonic() >= begin_s + span_us / 1e6
 
 
-PAINT_S: Final = 0.1
-QUIT: Final = "q"
+_PAINT_S: Final = 0.1
+_QUIT: Final = "q"
 
-Lines = Callable[[int, int, int], list[str]]
+_Lines = Callable[[int, int, int], list[str]]
 """Returns what is shown at a time on a screen with so many columns and lines."""
 
 
-def paint(
+def _paint(
     source: AnySource[Item],
     take: Callable[[Sequence[Item]], None],
-    lines: Lines,
+    lines: _Lines,
     span_us: int | None,
     press: Callable[[str], None] = lambda key: None,
 ) -> None:
@@ -228,15 +291,15 @@ def paint(
 
     watch, begin_s, due_s = Stopwatch(), time.monotonic(), 0.0
     with Screen() as screen:
-        while not (source.ended or screen.is_gone or is_over(begin_s, span_us)):
-            records = source.poll(POLL_US)
+        while not (source.ended or screen.is_gone or _is_over(begin_s, span_us)):
+            records = source.poll(_POLL_US)
             take(records)
             watch.take(records)
             keys = screen.keys()
-            if QUIT in keys:
+            if _QUIT in keys:
                 break
             for key in keys:
                 press(key)
             if keys or time.monotonic() >= due_s:
-                due_s = time.monotonic() + PAINT_S
+                due_s = time.monotonic() + _PAINT_S
                 screen.paint(lines(watch.now_us, *screen.size()))

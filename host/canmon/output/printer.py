@@ -1,33 +1,78 @@
-"""What `dump` prints of each frame: candump's lines, its log format, JSON or CSV."""
+"""What frames mean, which of them are wanted, and what `dump` prints of each."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
-from tickrig.host.canmon.model.frames.dump_line import DumpLines, Stamp, decoded_text
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
 from tickrig.host.canmon.model.logs.log_writer import comment, log_line
 from tickrig.host.canmon.model.logs.mark import Mark, dropped
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
-from tickrig.host.canmon.output.filtered_decoder import DecodedFrame
 from tickrig.host.cli.start import as_is
 from tickrig.host.text.page_text import json_text, one_line
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
-    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.decode.decoder import Decoder
+    from tickrig.host.canmon.model.decode.filter import Filter
+    from tickrig.host.canmon.model.decode.filter_terms import MissingSignals
+    from tickrig.host.canmon.model.frames import AnyRecord
 
-Printer = Callable[["AnyRecord", "Decoded | None"], str]
+
+# What frames mean, and which of them are wanted.
+
+DecodedFrame = tuple["AnyRecord", "Decoded | None"]
+"""A frame or a line of a serial port, and what it means where somebody asked."""
+
+
+class FilteredDecoder:
+    """Decodes frames and passes on those that are wanted.
+
+    Args:
+        decoder: tells what frames mean; None where nobody asks.
+        wanted: which frames pass; None for all. It needs a decoder.
+    """
+
+    def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
+        self._decoder, self._wanted = decoder, wanted
+        self._missing: MissingSignals | None = None
+        if wanted is not None and wanted.signals:
+            from tickrig.host.canmon.model.decode.filter_terms import (  # noqa: PLC0415 - slow
+                MissingSignals,
+            )
+
+            self._missing = MissingSignals(wanted.signals)
+
+    def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
+        """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
+        decoder, wanted, missing = self._decoder, self._wanted, self._missing
+        for record in records:
+            if decoder is None:
+                decoded = None
+            else:
+                decoded = decoder.take(record) if isinstance(record, Record) else record.decoded
+            if missing and decoded is not None:
+                missing.take(decoded)
+            if wanted is None or (decoded is not None and wanted.matches(record, decoded)):
+                yield record, decoded
+
+    def messages(self) -> list[str]:
+        """Say which signals the filter asks for that never came, one line each."""
+        return [] if self._missing is None else self._missing.messages()
+
+
+# What `dump` prints of each frame: candump's lines, its log format, JSON or CSV.
+
+_Printer = Callable[["AnyRecord", "Decoded | None"], str]
 """Writes a frame, or a line of a serial port, and what it means, where that is known."""
 
 
-class Output(StrEnum):
+class DumpFormat(StrEnum):
     """What is printed."""
 
     TEXT = ""
@@ -37,8 +82,8 @@ class Output(StrEnum):
 
 
 def printer_of(
-    output: Output, stamp: Stamp, extra: bool, raw: bool, errors: bool = False
-) -> Printer:
+    output: DumpFormat, stamp: Stamp, extra: bool, raw: bool, errors: bool = False
+) -> _Printer:
     """Return what prints a frame.
 
     Args:
@@ -56,15 +101,15 @@ def printer_of(
     return lambda record, _: write(record, None)
 
 
-def _writer(output: Output, stamp: Stamp, extra: bool) -> Printer:
+def _writer(output: DumpFormat, stamp: Stamp, extra: bool) -> _Printer:
     match output:
-        case Output.TEXT:
-            return text_printer(DumpLines(stamp, extra))
-        case Output.LOG:
-            return log_printer
-        case Output.JSONL:
-            return json_printer
-        case Output.CSV:
+        case DumpFormat.TEXT:
+            return _text_printer(DumpLines(stamp, extra))
+        case DumpFormat.LOG:
+            return _log_printer
+        case DumpFormat.JSONL:
+            return _json_printer
+        case DumpFormat.CSV:
             return csv_printer
         case _:
             assert_never(output)
@@ -80,27 +125,27 @@ def _error_meaning(record: AnyRecord) -> Decoded | None:
     return decode_error(record.frame)
 
 
-def text_printer(lines: DumpLines) -> Printer:
+def _text_printer(lines: DumpLines) -> _Printer:
     """Return what writes lines as candump shows them."""
 
     def printed(record: AnyRecord, decoded: Decoded | None) -> str:
         text = one_line(decoded_text(decoded))
         if isinstance(record, Record):
             return lines.line(record, text)
-        from tickrig.host.canmon.model.frames.dump_line import line_text  # noqa: PLC0415 - seldom wanted
+        from tickrig.host.canmon.model.frames import line_text  # noqa: PLC0415 - seldom wanted
 
         return f"{lines.stamp(record.at_us)}  {line_text(record, text)}"
 
     return printed
 
 
-def log_printer(record: AnyRecord, decoded: Decoded | None) -> str:
+def _log_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     """Write a line of a log, which holds frames alone."""
     assert isinstance(record, Record), "who opens serial ports does not ask for a log"
     return log_line(record)
 
 
-def json_printer(record: AnyRecord, decoded: Decoded | None) -> str:
+def _json_printer(record: AnyRecord, decoded: Decoded | None) -> str:
     """Write an object in JSON, with kind, node, text, signals and their source."""
     more = "" if decoded is None else _meaning_json(decoded)
     if isinstance(record, Record):
@@ -149,8 +194,11 @@ def _cell(text: str) -> str:
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
 
 
-_DROPS: Final = {Output.LOG: lambda lost: comment(dropped(0, lost)), Output.JSONL: drop_line}
-_MARKS: Final = {Output.LOG: comment, Output.JSONL: Mark.json}
+_DROPS: Final = {
+    DumpFormat.LOG: lambda lost: comment(dropped(0, lost)),
+    DumpFormat.JSONL: drop_line,
+}
+_MARKS: Final = {DumpFormat.LOG: comment, DumpFormat.JSONL: Mark.json}
 
 
 class StdoutWriter:
@@ -160,10 +208,13 @@ class StdoutWriter:
     on a terminal.
     """
 
-    def __init__(self, printer: Printer, output: Output) -> None:
+    def __init__(self, printer: _Printer, output: DumpFormat) -> None:
         self._printer, self._output, self._lost = printer, output, 0
-        self._header = output is Output.CSV
-        machine = output in (Output.LOG, Output.CSV)  # JSON has nothing that a terminal obeys
+        self._header = output is DumpFormat.CSV
+        machine = output in (
+            DumpFormat.LOG,
+            DumpFormat.CSV,
+        )  # JSON has nothing that a terminal obeys
         self._shown = not machine or sys.stdout.isatty()
 
     def take(

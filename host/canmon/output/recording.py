@@ -1,25 +1,174 @@
-"""The options of a recording, and what they make."""
+"""A log file, or a recording in parts, that a verb writes, and its options."""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.model.recorder.plan import AtLimit, Plan, read_plan
-from tickrig.host.canmon.output.log_file import LogFile
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, log_format
+from tickrig.host.canmon.model.logs.log_writer import write_log
+from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.recorder.plan import AtLimit, RecordingPlan, read_plan
+from tickrig.host.canmon.model.recorder.recorder import Recorder
+from tickrig.host.canmon.output.listening import Stopwatch
+from tickrig.host.canmon.output.printer import DecodedFrame
+from tickrig.host.canmon.sources.source import FileSpec, parse_source
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, Decorator, add_options
-from tickrig.host.cli.refused import Refused
+from tickrig.host.text.values import counted
+from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.filter import Filter
+    from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
-RULE_FILE: Final = ".toml"
+
+# A log file, or a recording in parts, that a verb writes.
+
+
+class LogFile:
+    """A recording under way.
+
+    Args:
+        plan: what it shall be; where it is one file, one that exists is replaced.
+        source: SOURCE words of what is read meanwhile.
+        live: time goes on while no frame comes.
+        triggers: what it waits for, where the plan has it wait.
+        wanted: which frames are recorded; None for all.
+        kept: what is written stays there if it cannot be written on.
+
+    Raises:
+        Refused: the name tells no format, the format needs what is not there, or the file is
+            read meanwhile.
+        SourceFailed: it cannot be written, now or later.
+    """
+
+    def __init__(  # noqa: PLR0913 - what a recording can be
+        self,
+        plan: RecordingPlan,
+        source: Sequence[str],
+        live: bool = False,
+        triggers: Sequence[Trigger] = (),
+        wanted: FilterTrigger | None = None,
+        *,
+        kept: bool = True,
+    ) -> None:
+        _check_not_read(plan.path, source)
+        self._kept = kept
+        self._watch, self._live = Stopwatch(), live
+        try:
+            log_format(plan.path)
+            self.recorder = Recorder(plan, self._now_us, triggers, wanted)
+        except (LogFormatError, LogError) as error:
+            raise Refused(str(error)) from None
+        except OSError as error:
+            raise SourceFailed(f"{error.filename or plan.path}: {error.strerror}") from error
+
+    def take(
+        self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
+    ) -> bool:
+        """Add frames; what came is with the operating system then.
+
+        Returns:
+            Whether it takes no more.
+        """
+        if decoded_frames:
+            self._watch.take((decoded_frames[-1][0],))
+        self.recorder.take(decoded_frames, lost, self._now_us, marks)
+        if self.recorder.failed:
+            raise SourceFailed(self.recorder.failed)
+        return bool(self.recorder.ended)
+
+    def trigger(self, why: str) -> None:
+        """Record what was kept and what comes, where it waits for that."""
+        self.recorder.trigger(why, self._now_us)
+
+    def close(self) -> None:
+        """End the recording, and say how it went."""
+        failed = self.recorder.failed
+        self.recorder.close()
+        for word in self.recorder.messages() if self._kept or not self.recorder.failed else ():
+            click.echo(word, err=True)
+        if self.recorder.failed != failed:
+            raise SourceFailed(self.recorder.failed)
+
+    @property
+    def _now_us(self) -> int:
+        """The time at the source: that of this machine until a frame has told it."""
+        if not self._live:
+            return self._watch.latest_us
+        return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
+
+
+@contextmanager
+def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
+    """Give where a log is written: a new file, which takes the place of `path` in the end.
+
+    Where something else than files is read, this may be long, and somebody may read on: then it is
+    `path` itself.
+
+    Raises:
+        Refused: its name tells no format, or it is read meanwhile.
+        SourceFailed: it cannot be written.
+    """
+    _check_not_read(path, source)
+    try:
+        log_format(path)
+    except LogFormatError as error:
+        raise Refused(str(error)) from None
+    if not all(isinstance(parse_source(word), FileSpec) for word in source):
+        yield path
+        return
+    beside = path
+    try:
+        with replacing(path) as beside:
+            yield beside
+    except click.ClickException as error:
+        raise type(error)(error.message.replace(str(beside), str(path))) from error
+    except OSError as error:
+        raise SourceFailed(f"{path}: {error.strerror}") from error
+
+
+def _check_not_read(path: Path, source: Sequence[str]) -> None:
+    """Refuse a file that is read meanwhile."""
+    read = (parsed.path for word in source if isinstance(parsed := parse_source(word), FileSpec))
+    if path.exists() and any(one.exists() and one.samefile(path) for one in read):
+        raise Refused(f"{path} is read, so it cannot be written")
+
+
+def write_records(path: Path, records: Sequence[AnyRecord]) -> list[str]:
+    """Write frames into a new log; say how many, and what could not be held.
+
+    Raises:
+        ValueError: it is there already, or cannot be written.
+    """
+    frames = [record for record in records if isinstance(record, Record)]
+    if path.exists():
+        raise ValueError(f"{path} is there already: choose another name")
+    try:
+        with replacing(path) as beside, closing(write_log(beside)) as writer:
+            for frame in frames:
+                writer.write(frame)
+    except OSError as error:
+        raise ValueError(f"{path}: {error.strerror}") from None
+    lines = len(records) - len(frames)
+    left_out = [f"{counted(lines, 'line')} of serial ports left out"] if lines else []
+    return [f"{counted(len(frames), 'frame')} written to {path}", *left_out, *writer.messages()]
+
+
+# The options of a recording, and what they make.
+
+_RULE_FILE: Final = ".toml"
 
 recording_options: Final[Decorator] = add_options(
     click.option(
@@ -43,14 +192,14 @@ recording_options: Final[Decorator] = add_options(
     click.option("--pre", metavar="N|TIME", help="Frames, or time, before a trigger.  [5s]"),
     click.option("--post", metavar="N|TIME", help="And behind it.  [5s]"),
 )
-"""Add what `Recording` takes."""
+"""Add what `RecordingOptions` takes."""
 
 WORDS_METAVAR: Final = "FILE [--rotate 100M] [--disk 2G] [--trigger emcy]"
 
 NAMES: Final = ("rotate", "disk", "at_limit", "trigger", "pre", "post")
 
 
-class Recording:
+class RecordingOptions:
     """What the options of a recording say.
 
     Args:
@@ -72,7 +221,7 @@ class Recording:
         self, path: Path, options: dict[str, Any], bit_rate: int | None, parts: bool = False
     ) -> None:
         words: Sequence[str] = options["trigger"]
-        self.plan = read_recording_plan(path, options, parts)
+        self.plan = _read_recording_plan(path, options, parts)
         self.triggers = [_trigger(word, bit_rate) for word in words]
         self.decodes = any(trigger.decodes for trigger in self.triggers)
 
@@ -91,7 +240,7 @@ class Recording:
         return LogFile(self.plan, source, live, self.triggers, wanted)
 
 
-def read_recording(words: str, bit_rate: int | None) -> Recording:
+def read_recording(words: str, bit_rate: int | None) -> RecordingOptions:
     """Read a recording in parts as people write it: a file and options; Refused if it is none."""
     try:
         command = click.Command("record", params=_params())
@@ -101,7 +250,7 @@ def read_recording(words: str, bit_rate: int | None) -> Recording:
         raise Refused(f"{text.rstrip('.')}: write {WORDS_METAVAR}") from None
     except ValueError as error:
         raise Refused(f"{words!r}: {error}") from None
-    return Recording(context.params.pop("file"), context.params, bit_rate, parts=True)
+    return RecordingOptions(context.params.pop("file"), context.params, bit_rate, parts=True)
 
 
 def _params() -> list[click.Parameter]:
@@ -113,7 +262,7 @@ def _params() -> list[click.Parameter]:
     return click.command(record).params
 
 
-def read_recording_plan(path: Path, options: dict[str, Any], parts: bool = False) -> Plan:
+def _read_recording_plan(path: Path, options: dict[str, Any], parts: bool = False) -> RecordingPlan:
     """Read what options say of the files; Refused if one is wrong."""
     try:
         return read_plan(
@@ -140,11 +289,14 @@ def filter_trigger(text: str, wanted: Filter) -> FilterTrigger:
 
 
 def _trigger(word: str, bit_rate: int | None) -> Trigger:
-    if word.endswith(RULE_FILE):
+    if word.endswith(_RULE_FILE):
         return _rules(word, bit_rate)
-    from tickrig.host.canmon.model.check.expression.error_resets import errors_alone  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter  # noqa: PLC0415
-    from tickrig.host.canmon.model.frames.tokens import tokens_of  # noqa: PLC0415
+    from tickrig.host.canmon.model.check.rule_parser import errors_alone  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.model.decode.filter import (  # noqa: PLC0415
+        FilterError,
+        parse_filter,
+        tokens_of,
+    )
 
     try:
         wanted = parse_filter(word)
@@ -157,8 +309,11 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
 def _rules(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
     from tickrig.host.canmon.model.check.alarms import Alarms  # noqa: PLC0415
-    from tickrig.host.canmon.model.check.rule_file import parse_rule_file  # noqa: PLC0415
-    from tickrig.host.canmon.model.check.rules import Rules, parse_rules  # noqa: PLC0415
+    from tickrig.host.canmon.model.check.rules import (  # noqa: PLC0415
+        Rules,
+        parse_rule_file,
+        parse_rules,
+    )
     from tickrig.host.canmon.model.recorder.trigger import RuleTrigger  # noqa: PLC0415
 
     try:

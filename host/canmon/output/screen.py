@@ -18,15 +18,15 @@ ENTER: Final = "\x1b[?1049h\x1b[?25l\x1b[?7l\x1b[2J"
 """Alternate screen, no cursor, no wrapping, all clear."""
 
 LEAVE: Final = "\x1b[0m\x1b[?7h\x1b[?25h\x1b[?1049l"
-CLEAR: Final = "\x1b[2J"
+_CLEAR: Final = "\x1b[2J"
 
-ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
+_ARROWS: Final = {"\x1b[A": "k", "\x1b[B": "j", "\x1b[5~": "p", "\x1b[6~": "f"}
 """Keys that are more than a character, and what is pressed instead."""
 
 _KEY: Final = re.compile(r"\x1b\[[0-9;]*[A-Za-z~]|.", re.DOTALL)
 _COLOUR: Final = re.compile(r"(\x1b\[(?:[07]|3[1-6])m)")
-TERMINAL: Final = "/dev/tty"
-PATIENCE_S: Final = 0.02
+_TERMINAL: Final = "/dev/tty"
+_PATIENCE_S: Final = 0.02
 
 
 class Screen:
@@ -40,7 +40,7 @@ class Screen:
     """
 
     def __init__(self) -> None:
-        self._terminal = os.open(TERMINAL, os.O_RDWR)
+        self._terminal = os.open(_TERMINAL, os.O_RDWR)
         self._output = TerminalOutput(self._terminal)
         self._painted: list[str] = []
         self._size = (0, 0)
@@ -81,19 +81,19 @@ class Screen:
         with suppress(OSError):
             if ready([self._terminal], wait_s=0)[0]:
                 text = os.read(self._terminal, 1_024).decode("utf-8", "replace")
-        return [ARROWS.get(key, key) for key in _KEY.findall(text)]
+        return [_ARROWS.get(key, key) for key in _KEY.findall(text)]
 
     def paint(self, lines: Sequence[str]) -> None:
         """Show lines, if the terminal has taken those of before.
 
         The only codes in them that the terminal obeys are those of colours.
         """
-        if not self._output.catches_up(PATIENCE_S):
+        if not self._output.catches_up(_PATIENCE_S):
             return
         lines, size = list(map(_painted, lines)), self.size()
         before = self._painted if size == self._size else []
-        text = difference(before, lines)
-        self._output.write(text if size == self._size else CLEAR + text)
+        text = _difference(before, lines)
+        self._output.write(text if size == self._size else _CLEAR + text)
         self._painted, self._size = lines, size
 
 
@@ -107,10 +107,10 @@ def _painted(line: str) -> str:
     return "".join(one if place % 2 else in_cells(one) for place, one in enumerate(pieces))
 
 
-def difference(before: Sequence[str], lines: Sequence[str]) -> str:
+def _difference(before: Sequence[str], lines: Sequence[str]) -> str:
     r"""Return what to write so that lines are shown where others are.
 
-    >>> difference(["a", "b", "c"], ["a", "x"])
+    >>> _difference(["a", "b", "c"], ["a", "x"])
     '\x1b[2;1Hx\x1b[K\x1b[3;1H\x1b[K'
     """
     shown = [*lines, *[""] * (len(before) - len(lines))]

@@ -9,7 +9,7 @@ from typing import Final
 import can
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.sources.bus_source import (
     BusReader,
     BusSource,
@@ -17,19 +17,17 @@ from tickrig.host.canmon.sources.bus_source import (
     open_bus,
     reader_of,
 )
-from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
+from tickrig.host.canmon.sources.source import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.refused import Refused
-from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of
-from tickrig.host.links.can_message import to_message
-from tickrig.host.links.errors import LinkClosed
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.cli.messages import Refused
+from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of, to_message
+from tickrig.host.links.link import LinkClosed
+from tickrig.wire.can import CanFrame, FdFrame
 
-FD_WITHOUT_ASKING: Final = ("socketcan", "tickrig", "udp_multicast", "virtual")
+_FD_WITHOUT_ASKING: Final = ("socketcan", "tickrig", "udp_multicast", "virtual")
 """Interfaces that take CAN FD however they were opened, or say themselves that they do not."""
 
-SEND_TIMEOUT_S: Final = 1
+_SEND_TIMEOUT_S: Final = 1
 """How long a full queue of the driver may stay full."""
 
 
@@ -55,7 +53,7 @@ class Transmitter:
             raise Refused(f"{word!r} is no bus; frames are sent on can0 or slcan:/dev/ttyACM0@500k")
         whole = merged(bus_word, options)
         self._bus, interface, self.name = open_bus(whole)
-        self._takes_fd = whole.fd or interface in FD_WITHOUT_ASKING
+        self._takes_fd = whole.fd or interface in _FD_WITHOUT_ASKING
         self._source: BusSource | None = None
         self._reads: BusReceiver | None = None
         if receives:
@@ -100,7 +98,7 @@ class Transmitter:
 def send_on(bus: can.BusABC, name: str, frame: CanFrame | FdFrame) -> None:
     """Send a frame on a bus that is called so; SourceFailed if it is gone or takes none for 1 s."""
     try:
-        bus.send(to_message(frame), SEND_TIMEOUT_S)
+        bus.send(to_message(frame), _SEND_TIMEOUT_S)
     except Exception as error:  # drivers raise what they like
         raise SourceFailed(f"cannot send on {name}: {reason_of(error)}") from error
 

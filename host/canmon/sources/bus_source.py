@@ -9,27 +9,26 @@ import can
 from can.util import load_config
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.can_log import channel_name
-from tickrig.host.canmon.model.logs.can_record import to_record
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.can_log import channel_name, to_record
+from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 from tickrig.host.canmon.sources.socket_reader import SocketReader, let_fd
-from tickrig.host.canmon.sources.source_spec import INTERFACES, BusSpec
+from tickrig.host.canmon.sources.source import INTERFACES, BusSpec
 from tickrig.host.cli.can_options import UNNAMED, BusOptions, open_raw
-from tickrig.host.cli.refused import BusUnavailable, Refused
+from tickrig.host.cli.messages import BusUnavailable, Refused
 from tickrig.host.links.can_link import BusReceiver, close_bus
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 
-BATCH: Final = 1_024
+_BATCH: Final = 1_024
 """So that a bus that never falls silent cannot keep its reader."""
 
-DEFAULT: Final = "socketcan"
+_DEFAULT: Final = "socketcan"
 """The interface where neither the command line nor a configuration names one."""
 
-UNREADABLE: Final = "frames that the driver could not read"
+_UNREADABLE: Final = "frames that the driver could not read"
 
-STEPPED: Final = ("tickrig",)
+_STEPPED: Final = ("tickrig",)
 """Interfaces whose time passes while they are read."""
 
 
@@ -47,7 +46,7 @@ def open_bus(options: BusOptions) -> tuple[can.BusABC, str, str]:
         bus, interface, channel = open_raw(_with_interface(options))
     except BusUnavailable as error:
         raise SourceFailed(error.message) from None
-    if interface == DEFAULT:
+    if interface == _DEFAULT:
         let_fd(bus)
     return bus, interface, channel_name(interface if channel is None else channel)
 
@@ -58,7 +57,7 @@ def _with_interface(options: BusOptions) -> BusOptions:
             load_config()
         except can.CanInterfaceNotImplementedError as error:
             if UNNAMED in str(error):
-                return replace(options, interface=DEFAULT)
+                return replace(options, interface=_DEFAULT)
     return options
 
 
@@ -78,8 +77,8 @@ class BusReader:
     """
 
     def __init__(self, bus: can.BusABC, interface: str, name: str) -> None:
-        self._bus, self.name, self.stepped = bus, name, interface in STEPPED
-        self.lost, self.tally = 0, Tally()
+        self._bus, self.name, self.stepped = bus, name, interface in _STEPPED
+        self.lost, self.tally = 0, LogTally()
         self.reads = BusReceiver(bus, name)
 
     def read(self, timeout_us: int, /) -> list[Record]:
@@ -90,7 +89,7 @@ class BusReader:
             while (message := self.reads.receive(wait_us / 1e6)) is not None:
                 one = to_record(message, self.name, self.tally)
                 records += (one,) if one else ()
-                if len(records) >= BATCH:
+                if len(records) >= _BATCH:
                     break
                 wait_us = 0
         except LinkClosed:
@@ -98,7 +97,7 @@ class BusReader:
                 raise
         finally:
             if self.reads.faults != faults:
-                self.tally.passed_over[UNREADABLE] += self.reads.faults - faults
+                self.tally.passed_over[_UNREADABLE] += self.reads.faults - faults
         return records
 
     def close(self) -> None:
@@ -169,12 +168,12 @@ def merged(word: BusSpec, options: BusOptions) -> BusOptions:
         interface=interface or options.interface,
         channel=channel or options.channel,
         bitrate=word.bitrate or options.bitrate,
-        bus_kwargs=(*local(interface if word.interface else None), *options.bus_kwargs),
+        bus_kwargs=(*_local(interface if word.interface else None), *options.bus_kwargs),
         fd=options.fd or word.data_bitrate is not None,
         data_bitrate=word.data_bitrate or options.data_bitrate,
     )
 
 
-def local(interface: str | None) -> tuple[str, ...]:
+def _local(interface: str | None) -> tuple[str, ...]:
     """Return what keeps frames on this machine, unless the command line says otherwise."""
     return ("hop_limit=0",) if interface == INTERFACES["udp"] else ()

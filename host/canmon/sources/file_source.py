@@ -5,22 +5,24 @@ from __future__ import annotations
 import heapq
 import os
 from collections.abc import Iterable, Iterator, Sequence
+from importlib.util import find_spec
 from itertools import islice, takewhile
 from pathlib import Path
-from typing import Final, cast
+from typing import TYPE_CHECKING, Final, cast
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.frames.ident import flagged_id
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record, flagged_id
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
-from tickrig.host.canmon.model.logs.mark import DROP, Mark
-from tickrig.host.canmon.model.logs.tally import Tally
-from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.sources.source_spec import FileSpec
+from tickrig.host.canmon.model.logs.mark import DROP, LogTally, Mark
+from tickrig.host.canmon.sources.source import AnySource, FileSpec, parse_source
 from tickrig.host.links.ready import ready
 
-BATCH: Final = 1_024
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
+
+
+_BATCH: Final = 1_024
 """Frames of one poll."""
 
 
@@ -80,13 +82,13 @@ class FileSource(LoggedSource):
         self._names = [str(file.path) for file in files]
         self._readers = [read_log(file.path) for file in files]
         for file in files:
-            check_readable(file.path)
+            _check_readable(file.path)
         streams = [
             _chosen(file, reader.items()) for file, reader in zip(files, self._readers, strict=True)
         ]
         self._stream = streams[0] if len(streams) == 1 else _merged(streams)
 
-    def tallies(self) -> Iterable[tuple[str, Tally]]:
+    def tallies(self) -> Iterable[tuple[str, LogTally]]:
         """Return the tally of each file, with its name."""
         return [
             (name, reader.tally) for name, reader in zip(self._names, self._readers, strict=True)
@@ -95,10 +97,10 @@ class FileSource(LoggedSource):
     def _read(self, timeout_us: int) -> list[Item]:
         batch: list[Item] = []
         try:
-            batch.extend(islice(self._stream, BATCH))
+            batch.extend(islice(self._stream, _BATCH))
         except (OSError, LogError) as error:
             self.failed = str(error)
-        self._no_more = len(batch) < BATCH
+        self._no_more = len(batch) < _BATCH
         return batch
 
     def close(self) -> None:
@@ -107,7 +109,7 @@ class FileSource(LoggedSource):
         self._stream = iter(())
 
 
-def check_readable(path: Path) -> None:
+def _check_readable(path: Path) -> None:
     """Raise SourceFailed where a file cannot be read."""
     try:
         path.open("rb").close()
@@ -127,7 +129,7 @@ def _merged(streams: Sequence[Iterator[Item]]) -> Iterator[Item]:
 
 
 STDIN: Final = 0
-READ_BYTES: Final = 1 << 16
+_READ_BYTES: Final = 1 << 16
 
 
 class StdinSource(LoggedSource):
@@ -139,7 +141,7 @@ class StdinSource(LoggedSource):
         super().__init__()
         self._descriptor, self._lines = descriptor, LogLines()
 
-    def tallies(self) -> Iterable[tuple[str, Tally]]:
+    def tallies(self) -> Iterable[tuple[str, LogTally]]:
         """Return the tally of what came."""
         return [("standard input", self._lines.tally)]
 
@@ -148,9 +150,74 @@ class StdinSource(LoggedSource):
         if not ready([self._descriptor], wait_s=timeout_us / 1e6)[0]:
             return []
         try:
-            data = os.read(self._descriptor, READ_BYTES)
+            data = os.read(self._descriptor, _READ_BYTES)
         except OSError as error:
             data, self.failed = b"", f"standard input: {error.strerror}"
         self._no_more = not data
         records = self._lines.push(data) if data else self._lines.finish()
         return among(records, self._lines.marks)
+
+
+# A log file that is read in blocks, where that is faster than frame by frame.
+
+SMALL_BYTES: Final = 1 << 20
+"""Below it a log is read frame by frame sooner than numpy is imported."""
+
+
+class BlockLog(AnySource["Columns"]):
+    """A log file as columns, a block at each poll; it holds no more than that.
+
+    Attributes:
+        no_columns: it ends before its time, for it is to be read frame by frame.
+
+    Raises:
+        SourceFailed: the file cannot be read.
+    """
+
+    no_columns = False
+
+    def __init__(self, path: Path) -> None:
+        from tickrig.host.canmon.model.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
+
+        _check_readable(path)
+        self._path, self._reader = path, read_columns(path)
+        self._blocks = iter(self._reader)
+
+    def tallies(self) -> Iterable[tuple[str, LogTally]]:
+        """Return the tally of the file."""
+        return [(str(self._path), self._reader.tally)]
+
+    def poll(self, timeout_us: int, /) -> list[Columns]:
+        """Return the next block; it never waits."""
+        from tickrig.host.canmon.model.columns.columns import NoColumnsError  # noqa: PLC0415 - numpy
+
+        try:
+            return [next(self._blocks)]
+        except StopIteration:
+            pass
+        except NoColumnsError:
+            self.no_columns = True
+        except LogError as error:
+            self.failed = str(error)
+        except OSError as error:
+            self.failed = f"{self._path}: {error.strerror or error}"
+        self._ended = True
+        return []
+
+
+def block_log(words: Sequence[str]) -> BlockLog | None:
+    """Open the log that SOURCE words name; None if it is better read frame by frame.
+
+    Raises:
+        Refused: words that name nothing.
+        SourceFailed: a file that cannot be read.
+    """
+    if len(words) != 1 or find_spec("numpy") is None:
+        return None
+    word = parse_source(words[0])
+    if not isinstance(word, FileSpec) or word.chosen is not None:
+        return None
+    try:
+        return BlockLog(word.path) if word.path.stat().st_size >= SMALL_BYTES else None
+    except OSError:
+        return None  # who reads it frame by frame says so

@@ -8,22 +8,115 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import fields
 from functools import partial
 from pathlib import PurePath
 from typing import Final
 
-from tickrig.host.canmon.model.decode.serial.rrc_lines import RrcLines
-from tickrig.host.canmon.model.decode.serial.rtc_lite_lines import RtcLiteLine
-from tickrig.host.canmon.model.frames.record import LineRecord
-from tickrig.host.canmon.model.logs.tally import Tally
-from tickrig.host.canmon.sources.source_spec import LineSpec
+from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
+from tickrig.host.canmon.model.decode.rtc_lite_lines import RtcLiteLine
+from tickrig.host.canmon.model.frames import LineRecord
+from tickrig.host.canmon.model.logs.mark import LogTally
+from tickrig.host.canmon.sources.source import LineSpec
 from tickrig.host.links.serial_link import SerialLink
+from tickrig.wire.errors import WireError
+from tickrig.wire.lines import LineSplitter
+from tickrig.wire.rrc import (
+    Command,
+    Event,
+    Ok,
+    Refusal,
+    StatusA,
+    Text,
+    parse_command,
+    parse_reply,
+    strip_check,
+)
 from tickrig.wire.rtc_lite.frame import Checksum
 
-Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]
+# Lines of an RRC's serial port, decoded into the trace of the buses.
+
+_KIND: Final = "rrc"
+
+
+class RrcLines:
+    """Decodes both directions of a line to an RRC; chunking makes no difference.
+
+    Args:
+        channel: name of the line.
+    """
+
+    def __init__(self, channel: str) -> None:
+        self._channel = channel
+        self._splitters = {True: LineSplitter(), False: LineSplitter()}
+
+    def take(self, at_us: int, data: bytes, *, to_device: bool) -> list[LineRecord]:
+        """Take bytes of one direction; return the lines that are whole now."""
+        decode = _decode_command if to_device else _decode_reply
+        return [
+            LineRecord(at_us, self._channel, to_device, line, decode(line))
+            for line in self._splitters[to_device].push(data)
+        ]
+
+
+def _decode_command(line: bytes) -> Decoded:
+    """Decode a line to the RRC, with CHECK at its end or without.
+
+    >>> _decode_command(b"output1eff").text, _decode_command(b"output1e007").text
+    ('output v_pct=30 w_pct=-1', 'output v_pct=30 w_pct=0')
+    """
+    try:
+        return _command(parse_command(line))
+    except WireError as error:
+        try:
+            return _command(parse_command(strip_check(line)))
+        except WireError:
+            return Decoded(_KIND, None, str(error))
+
+
+def _decode_reply(line: bytes) -> Decoded:
+    """Decode a line from the RRC.
+
+    >>> _decode_reply(b"EV:PowerOn").text, _decode_reply(b"OK:beep").text
+    ('event PowerOn', 'OK beep')
+    """
+    try:
+        reply = parse_reply(line)
+    except WireError as error:
+        return Decoded(_KIND, None, str(error))
+    match reply:
+        case StatusA():
+            signals = _signals(reply)
+            return Decoded(_KIND, None, "status " + " ".join(map(str, signals)), signals)
+        case Ok(name=text):
+            return Decoded(_KIND, None, f"OK {text}", (Signal("ok", text),))
+        case Refusal(reason=text):
+            return Decoded(_KIND, None, f"refused {text}", (Signal("refused", text),))
+        case Event(name=text):
+            return Decoded(_KIND, None, f"event {text}", (Signal("event", text),))
+        case Text(text=text):
+            return Decoded(_KIND, None, text)
+
+
+def _command(command: Command) -> Decoded:
+    signals = _signals(command)
+    text = " ".join([command.name.decode(), *map(str, signals)])
+    return Decoded(_KIND, None, text, (Signal("command", command.name.decode()), *signals))
+
+
+def _signals(message: Command | StatusA) -> tuple[Signal, ...]:
+    """Return the fields of a message; a row of numbers is one text."""
+    values = ((field.name, getattr(message, field.name)) for field in fields(message))
+    return tuple(
+        Signal(name, value if isinstance(value, int) else " ".join(map(str, value)))
+        for name, value in values
+    )
+
+
+_Decoding = tuple[Callable[[str], RrcLines | RtcLiteLine], int]
 """What decodes a line by its name, and its usual bit/s."""
 
-DECODINGS: Final[dict[str, Decoding]] = {
+_DECODINGS: Final[dict[str, _Decoding]] = {
     "rrc": (RrcLines, 115_200),
     "rtc-lite": (RtcLiteLine, 57_600),
     "rtc-lite-xor8": (partial(RtcLiteLine, checksum=Checksum.XOR8), 57_600),
@@ -47,9 +140,9 @@ class LineReader:
     """
 
     def __init__(self, word: LineSpec) -> None:
-        decoder, usual_baud = DECODINGS[word.protocol]
+        decoder, usual_baud = _DECODINGS[word.protocol]
         self.name, self._from_host = PurePath(word.port).name or word.port, word.from_host
-        self.lost, self.tally, self.stepped = 0, Tally(), False
+        self.lost, self.tally, self.stepped = 0, LogTally(), False
         self._decoder = decoder(self.name)
         self._link = SerialLink(word.port, word.baud or usual_baud)
 

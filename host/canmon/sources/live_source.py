@@ -10,22 +10,20 @@ from itertools import repeat
 from queue import Empty
 from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
-from tickrig.host.canmon.model.frames.ident import CandumpFilter, flagged_id
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.mark import Mark
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.frames import CandumpFilter, Record, flagged_id
+from tickrig.host.canmon.model.logs.mark import LogTally, Mark
 from tickrig.host.canmon.sources.reopening_reader import ReopeningReader
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.waiting_queue import WaitingQueue
+from tickrig.host.links.link import LinkClosed
+from tickrig.host.links.ready import WaitingQueue
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.frames.record import LineRecord
+    from tickrig.host.canmon.model.frames import LineRecord
 
-QUEUE_FRAMES: Final = 200_000
+_QUEUE_FRAMES: Final = 200_000
 """Ten seconds of the busiest bus of 1 Mbit/s."""
 
-WAIT_US: Final = 100_000
+_WAIT_US: Final = 100_000
 """How long a thread may take to see that it shall end."""
 
 Item = TypeVar("Item", bound="Record | LineRecord")
@@ -42,7 +40,7 @@ class Reader(Protocol[Read_co]):
     """
 
     name: str
-    tally: Tally
+    tally: LogTally
     stepped: bool
 
     @property
@@ -84,7 +82,7 @@ class LiveSource(AnySource[Item]):
         self,
         readers: Sequence[Reader[Item]],
         chosen: Iterable[CandumpFilter | None] = repeat(None),
-        queue_frames: int = QUEUE_FRAMES,
+        queue_frames: int = _QUEUE_FRAMES,
     ) -> None:
         self._readers, self._queue_frames = readers, queue_frames
         self._queue: deque[Item | Mark] = deque()
@@ -121,7 +119,7 @@ class LiveSource(AnySource[Item]):
         for one in self._reopening():
             one.wanted = True
 
-    def tallies(self) -> Iterable[tuple[str, Tally]]:
+    def tallies(self) -> Iterable[tuple[str, LogTally]]:
         """Return what was no frame, by the name of each bus or port."""
         return [(reader.name, reader.tally) for reader in self._readers]
 
@@ -182,7 +180,7 @@ class LiveSource(AnySource[Item]):
 
     def _receive(self, reader: Reader[Item], chosen: CandumpFilter | None) -> None:
         while not self._stop and not self.failed:
-            self._take(reader, chosen, WAIT_US)
+            self._take(reader, chosen, _WAIT_US)
         self._came.put(None)
 
     def _take(self, reader: Reader[Item], chosen: CandumpFilter | None, timeout_us: int) -> None:

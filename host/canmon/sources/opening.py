@@ -9,14 +9,20 @@ from typing import TYPE_CHECKING, cast
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.file_source import FileSource, StdinSource
-from tickrig.host.canmon.sources.source import AnySource, Source
-from tickrig.host.canmon.sources.source_spec import BusSpec, FileSpec, LineSpec, parse_source
+from tickrig.host.canmon.sources.source import (
+    AnySource,
+    BusSpec,
+    FileSpec,
+    LineSpec,
+    Source,
+    parse_source,
+)
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.refused import Refused
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.cli.messages import Refused
+from tickrig.host.links.link import LinkClosed
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.sources.bus_source import OpenBus
     from tickrig.host.canmon.sources.live_source import LiveSource, Reader
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.logs.mark import Mark, back, gone
-from tickrig.host.cli.refused import Refused
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.cli.messages import Refused
+from tickrig.host.links.link import LinkClosed
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.frames.record import LineRecord, Record
+    from tickrig.host.canmon.model.frames import LineRecord, Record
     from tickrig.host.canmon.sources.live_source import Reader
 
 REOPEN_US: Final = 500_000

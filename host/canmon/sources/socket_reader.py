@@ -13,22 +13,20 @@ import struct
 from contextlib import suppress
 from typing import Any, Final
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.tally import CAN_XL, Tally
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.mark import CAN_XL, LogTally
 from tickrig.host.links.can_link import close_bus
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.ready import ready
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ERROR_CLASS_MASK, ERROR_FLAG, ErrorFrame
-from tickrig.wire.can_fd import BRS, ESI, FdFrame
+from tickrig.wire.can import BRS, ERROR_CLASS_MASK, ERROR_FLAG, ESI, CanFrame, ErrorFrame, FdFrame
 
-SO_RXQ_OVFL: Final = 40
+_SO_RXQ_OVFL: Final = 40
 SO_TIMESTAMPNS: Final = 35
-SOL_CAN_RAW: Final = 101
-CAN_RAW_FD_FRAMES: Final = 5
-CAN_RAW_XL_FRAMES: Final = 7
+_SOL_CAN_RAW: Final = 101
+_CAN_RAW_FD_FRAMES: Final = 5
+_CAN_RAW_XL_FRAMES: Final = 7
 
-BATCH: Final = 1_024
+_BATCH: Final = 1_024
 
 _EXTENDED: Final = 0x8000_0000
 _REMOTE: Final = 0x4000_0000
@@ -43,7 +41,7 @@ _COUNT: Final = struct.Struct("@I")
 _ANCILLARY_BYTES: Final = 128
 """Room for time and count with their heads; CMSG_SPACE would say 56, where there is one."""
 
-MSG_CONFIRM: Final = 0x800
+_MSG_CONFIRM: Final = 0x800
 
 
 class SocketReader:
@@ -64,11 +62,11 @@ class SocketReader:
     def __init__(self, bus: Any, name: str) -> None:
         self._bus, self.name = bus, name
         self._socket: Any = bus.socket  # on Windows a socket has no recvmsg, and no such bus
-        self.lost, self.tally = 0, Tally()
-        self._socket.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+        self.lost, self.tally = 0, LogTally()
+        self._socket.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
         let_fd(bus)
         with suppress(OSError):  # older kernels have no such frames
-            self._socket.setsockopt(SOL_CAN_RAW, CAN_RAW_XL_FRAMES, 1)
+            self._socket.setsockopt(_SOL_CAN_RAW, _CAN_RAW_XL_FRAMES, 1)
         self._socket.setblocking(False)
 
     def read(self, timeout_us: int, /) -> list[Record]:
@@ -76,7 +74,7 @@ class SocketReader:
         records: list[Record] = []
         ready([self._socket], wait_s=timeout_us / 1e6)
         try:
-            while len(records) < BATCH:
+            while len(records) < _BATCH:
                 records += self._records(*self._socket.recvmsg(_FD_BYTES, _ANCILLARY_BYTES))
         except BlockingIOError:
             pass
@@ -97,9 +95,9 @@ class SocketReader:
             if kind == SO_TIMESTAMPNS:
                 seconds, nanos = _STAMP.unpack(said)
                 at_us = seconds * 1_000_000 + nanos // 1_000
-            elif kind == SO_RXQ_OVFL:
+            elif kind == _SO_RXQ_OVFL:
                 self.lost = _COUNT.unpack(said)[0]
-        sent = bool(flags & MSG_CONFIRM)  # by this very socket (linux, networking/can)
+        sent = bool(flags & _MSG_CONFIRM)  # by this very socket (linux, networking/can)
         if len(data) == _FRAME.size:
             return (Record(at_us, self.name, _frame(*_FRAME.unpack(data)), sent),)
         if data[_FLAGS_AT] & _XL_FLAG or len(data) != _FD_BYTES:
@@ -111,7 +109,7 @@ class SocketReader:
 def let_fd(bus: Any) -> None:
     """Have a bus of SocketCAN send and hear CAN FD frames, where the kernel has them."""
     with suppress(OSError):
-        bus.socket.setsockopt(SOL_CAN_RAW, CAN_RAW_FD_FRAMES, 1)
+        bus.socket.setsockopt(_SOL_CAN_RAW, _CAN_RAW_FD_FRAMES, 1)
 
 
 def _fd_frame(flagged: int, length: int, flags: int, data: bytes) -> FdFrame:

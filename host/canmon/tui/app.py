@@ -3,27 +3,229 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import click
+from rich.segment import Segment
+from rich.style import Style
 from textual.app import ComposeResult, SystemCommand
 from textual.binding import Binding, BindingType
+from textual.events import Click
 from textual.screen import ModalScreen, Screen
+from textual.strip import Strip
+from textual.widget import Widget
 from textual.widgets import Input, TabbedContent, TabPane
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
-from tickrig.host.canmon.output.recording import WORDS_METAVAR
+from tickrig.host.canmon.model.frames import load_text
+from tickrig.host.canmon.model.recorder.recorder import Recorder, RecorderState
+from tickrig.host.canmon.output.recording import WORDS_METAVAR, read_recording
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask
-from tickrig.host.canmon.tui.tasks.session import Session
-from tickrig.host.canmon.workspace import Workspace, WorkspaceError
-from tickrig.host.tui.framed_app import FramedApp
-from tickrig.host.tui.key_footer import KeyFooter
+from tickrig.host.canmon.tui.session import DecodedFrame, Session, Task
+from tickrig.host.canmon.workspace import (
+    MonitorSetup,
+    PanelSettings,
+    Workspace,
+    WorkspaceError,
+    text_of,
+)
+from tickrig.host.cli.messages import Refused
+from tickrig.host.text.values import counted
+from tickrig.host.tui import FramedApp, KeyFooter, Line
+from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
+
+# A task that records what the session hears, while somebody wants it.
+
+_LOOK_US: Final = 100_000
+"""How often it is called while no frame comes."""
+
+_WORDS: Final = "run.log"
+
+_Light = tuple[str, str]
+"""A text and its style."""
+
+
+class RecorderTask(Task):
+    """Records in parts, so that no file of before is overwritten.
+
+    Args:
+        session: what is heard.
+
+    Attributes:
+        section: its table in the workspace.
+        words: what is recorded, as behind `canmon dump -l`.
+        recorder: what records, or did last; None before the first.
+    """
+
+    section: Final = "record"
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self.words = _WORDS
+        self.recorder: Recorder | None = None
+        self._due_us = NEVER
+        session.tasks.append(self)
+
+    @property
+    def due_us(self) -> int:
+        """When it is next called without a frame."""
+        return self._due_us
+
+    @property
+    def running(self) -> bool:
+        """Whether it records, or waits for a trigger."""
+        recorder = self.recorder
+        return recorder is not None and recorder.state in (
+            RecorderState.WAITING,
+            RecorderState.RECORDING,
+        )
+
+    @property
+    def failed(self) -> str:
+        """Why the latest recording ended before its time; empty if it did not."""
+        return "" if self.recorder is None else self.recorder.failed
+
+    def start(self, words: str) -> None:
+        """Begin a recording; buses that go away are opened again from now on.
+
+        Raises:
+            ValueError: words that name none, or it cannot be written there.
+        """
+        session = self._session
+        self.end()
+        try:
+            recording = read_recording(words, session.model.top.view.bit_rate)
+            with session.lock:
+                model = session.model
+                self.recorder = Recorder(
+                    recording.plan, model.now_us, recording.triggers, lost=session.source.lost
+                )
+                self._due_us = session.now_us
+                session.marks.clear()
+        except Refused as error:
+            raise ValueError(error.message) from None
+        except OSError as error:
+            raise ValueError(f"{error.filename}: {error.strerror}") from None
+        self.words = words
+        session.source.reopen()
+
+    def end(self) -> list[str]:
+        """End the recording; say how it went."""
+        with self._session.lock:
+            self._due_us = NEVER
+            if self.recorder is None:
+                return []
+            self.recorder.close()
+            return self.recorder.messages()
+
+    def trigger(self) -> None:
+        """Record what was kept and what comes."""
+        with self._session.lock:
+            if self.recorder is not None:
+                self.recorder.trigger("key", self._session.model.now_us)
+
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
+        """Record; it sends nothing."""
+        session, recorder = self._session, self.recorder
+        if recorder is not None and self._due_us != NEVER:
+            self._due_us = now_us + _LOOK_US
+            marks = [session.marks.popleft() for _ in range(len(session.marks))]
+            recorder.take(records, session.source.lost, session.model.now_us, marks)
+        return ()
+
+    def light(self) -> list[_Light]:
+        """Return what the line at the bottom says of it."""
+        recorder = self.recorder
+        if recorder is None or (self._due_us == NEVER and not recorder.failed):
+            return []
+        said = counted(recorder.frames, "frame")
+        match recorder.state:
+            case RecorderState.RECORDING:
+                return [(" REC ", "bold white on red"), (f" {said} ", "")]
+            case RecorderState.WAITING:
+                return [(" REC WAITS ", "bold black on yellow"), (f" {said} ", "")]
+            case RecorderState.FAILED:
+                text = f" REC FAILED: {recorder.failed}; {recorder.missing} frames missing "
+                return [(text, "bold red")]
+            case RecorderState.ENDED:
+                return [(f" REC ENDED: {recorder.ended} ", "bold yellow")]
+
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Take what was recorded last; SettingError if it is none."""
+        self.words = text_of(settings, "words", self.words)
+
+    def save(self) -> dict[str, Any]:
+        """Return what was recorded last."""
+        return {"words": self.words}
+
+
+# The line at the bottom: how the bus is, what got lost, and whether frames may be sent.
+
+ARMED: Final = (" ARMED ", "bold white on red")
+_LISTENING: Final = (" LISTEN-ONLY ", "bold black on green")
+_WARNING: Final = "bold yellow"
+_ALARM: Final = "bold red"
+
+
+class StatusLine(Widget):
+    """Shows a status; a click on its first word arms or disarms.
+
+    Args:
+        session: what it is about.
+        recorder: what records.
+    """
+
+    DEFAULT_CSS = "StatusLine { height: 1; background: $boost; }"
+
+    def __init__(self, session: Session, recorder: RecorderTask) -> None:
+        super().__init__(id="status")
+        self._session, self._recorder = session, recorder
+        self._counts = [0]
+        self.line: Line = ()
+
+    def refresh_view(self) -> None:
+        """Show how things are now; called ten times a second."""
+        with self._session.lock:
+            line = self._status()
+        if line != self.line:
+            self.line = line
+            self.refresh()
+
+    def _status(self) -> Line:
+        """Return the line: who may send, the buses, counts, what is wrong."""
+        session, model = self._session, self._session.model
+        self._counts = [*self._counts[-10:], model.frames]
+        line = [ARMED if session.armed else _LISTENING, *self._recorder.light()]
+        for bus in model.top.traffic.buses(model.now_us):
+            load = load_text(bus.load.latest.bits, model.top.view.bit_rate)
+            line.append((f" {bus.channel} {load}", ""))
+            if bus.errors.state is not None:
+                state = bus.errors.state.name.lower().replace("_", "-")
+                line.append((f" {state}", "" if state == "active" else _ALARM))
+            line += [(f" {bus.errors.frames} error frames", _WARNING)] if bus.errors.frames else []
+        line.append((f"  {model.frames} frames  {model.frames - self._counts[0]}/s", ""))
+        line.append((f"  lost {model.lost}", _ALARM if model.lost else ""))
+        line += [(f"  passed over {model.unread}", _ALARM)] if model.unread else []
+        line += [(f"  sent {session.sent}", "")] if session.sent else []
+        line += [(f"  {', '.join(model.away)} is gone", _ALARM)] if model.away else []
+        trouble = session.trouble or model.failed
+        line += [(f"  {trouble}", _ALARM)] if trouble else []
+        line += [("  end of the log", "")] if model.ended and not trouble else []
+        return tuple(line)
+
+    def render_line(self, y: int) -> Strip:
+        """Return the line for the screen."""
+        strip = Strip([Segment(text, Style.parse(style)) for text, style in self.line])
+        return strip.crop_extend(0, self.size.width, None).apply_style(self.rich_style)
+
+    async def on_click(self, event: Click) -> None:
+        """Arm or disarm."""
+        if self.line and event.x < len(self.line[0][0]):
+            await self.app.run_action("arm")
 
 
 class ExportScreen(ModalScreen[str]):
@@ -62,13 +264,13 @@ class ExportScreen(ModalScreen[str]):
         self.dismiss("")
 
 
-PAINT_S: Final = 0.1
-SAVE_S: Final = 2.0
-SWITCH_S: Final = 0.002
+_PAINT_S: Final = 0.1
+_SAVE_S: Final = 2.0
+_SWITCH_S: Final = 0.002
 """How long the screen may keep the session from running."""
 
 
-class Monitor(FramedApp):
+class MonitorApp(FramedApp):
     """Tabs, keys, help and the status line.
 
     Args:
@@ -121,15 +323,15 @@ class Monitor(FramedApp):
 
     def on_mount(self) -> None:
         """Begin to paint."""
-        self.set_interval(PAINT_S, self.refresh_view)
-        self.set_interval(SAVE_S, self.save)
+        self.set_interval(_PAINT_S, self.refresh_view)
+        self.set_interval(_SAVE_S, self.save)
         if unknown := self.panel_settings.unknown():
             self.notify(f"not known here, and kept: {', '.join(unknown)}", severity="warning")
 
     def run_session(self) -> None:
         """Read the source in a thread and show the panels until they are left."""
         before_s, said = sys.getswitchinterval(), []
-        sys.setswitchinterval(SWITCH_S)
+        sys.setswitchinterval(_SWITCH_S)
         with self.ended_by_signals():
             self.session.start()
             try:

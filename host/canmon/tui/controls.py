@@ -13,7 +13,7 @@ from textual.message import Message
 from textual.widget import Widget
 from textual.widgets import Input, Static
 
-from tickrig.host.tui.line_view import Line, LineView
+from tickrig.host.tui import Line, LineView
 
 
 class TitleLine(Static):
@@ -34,7 +34,7 @@ class TitleLine(Static):
             self.update(text, layout=False)
 
 
-CHOSEN: Final = "reverse"
+_CHOSEN: Final = "reverse"
 
 
 class ChoiceView(LineView):
@@ -66,7 +66,7 @@ class ChoiceView(LineView):
         self._rows = list(lines)
         self.chosen = min(self.chosen, max(0, len(lines) - 1))
         marked = [
-            tuple((text, f"{style} {CHOSEN}".strip()) for text, style in line)
+            tuple((text, f"{style} {_CHOSEN}".strip()) for text, style in line)
             if number == self.chosen
             else line
             for number, line in enumerate(lines)
@@ -99,7 +99,7 @@ class ChoiceView(LineView):
         self.choose(self.top + event.y)
 
 
-Take = Callable[[str], None]
+_Take = Callable[[str], None]
 """Takes an answer; ValueError says what is wrong with it."""
 
 
@@ -118,7 +118,7 @@ class PromptLine(Vertical):
 
     def __init__(self) -> None:
         super().__init__(id="ask")
-        self._take: Take | None = None
+        self._take: _Take | None = None
         self._back: Widget | None = None
 
     def compose(self) -> ComposeResult:
@@ -127,7 +127,7 @@ class PromptLine(Vertical):
         yield Input(id="answer", compact=True)
         yield Static(id="wrong", markup=False)
 
-    def prompt(self, question: str, answer: str, take: Take) -> None:
+    def prompt(self, question: str, answer: str, take: _Take) -> None:
         """Ask something.
 
         Args:

@@ -1,6 +1,6 @@
 """Rows of the trace as lines with styles.
 
->>> from tickrig.host.canmon.model.frames.record import Record
+>>> from tickrig.host.canmon.model.frames import Record
 >>> from tickrig.wire.can import CanFrame
 >>> row = TraceRow(7, Record(1_250_000, "can0", CanFrame.parse("185#3702")), 50_000, 100_000, 0xFF)
 >>> line = TraceLines(origin_us=1_000_000).line(row)
@@ -18,24 +18,30 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Final
 
-from tickrig.host.canmon.model.frames.dump_line import Stamp, bytes_text, date_text, seconds_text
-from tickrig.host.canmon.model.frames.ident import any_ident, ident_text
-from tickrig.host.canmon.model.frames.quantity import ms_text
-from tickrig.host.canmon.model.frames.record import ARROWS, Record
-from tickrig.host.canmon.model.views.top_model import meaning_text
-from tickrig.host.canmon.model.views.trace import TraceRow
-from tickrig.host.tui.line_view import Line, line_text
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.frames import (
+    ARROWS,
+    Record,
+    Stamp,
+    any_ident,
+    bytes_text,
+    date_text,
+    ident_text,
+    ms_text,
+    seconds_text,
+)
+from tickrig.host.canmon.model.top_model import meaning_text
+from tickrig.host.canmon.model.trace import TraceRow
+from tickrig.host.tui import Line, line_text
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 __all__ = ["CHANGED", "TraceLines", "line_text"]
 
 CHANGED: Final = "bold yellow"
-SENT: Final = "bold cyan"
-ERROR: Final = "bold red"
-DIM: Final = "dim"
-HEAD: Final = "bold"
-KIND_STYLES: Final = {
+_SENT: Final = "bold cyan"
+_ERROR: Final = "bold red"
+_DIM: Final = "dim"
+_HEAD: Final = "bold"
+_KIND_STYLES: Final = {
     "emcy": "red",
     "error": "red",
     "nmt": "magenta",
@@ -45,10 +51,10 @@ KIND_STYLES: Final = {
     "raw": "dim",
     "fd": "dim",
 }
-BYTES_WIDTH: Final = len("[8] 00 11 22 33 44 55 66 77")
-BITS_WIDTH: Final = len("[8]") + 8 * len(" 00000000")
-STAMP_WIDTHS: Final = {Stamp.ABSOLUTE: 17, Stamp.DATE: 26}
-STAMP_WIDTH: Final = 13
+_BYTES_WIDTH: Final = len("[8] 00 11 22 33 44 55 66 77")
+_BITS_WIDTH: Final = len("[8]") + 8 * len(" 00000000")
+_STAMP_WIDTHS: Final = {Stamp.ABSOLUTE: 17, Stamp.DATE: 26}
+_STAMP_WIDTH: Final = 13
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +86,7 @@ class TraceLines:
         parts += [f"{'bus':<{self.channel_width}}"] * bool(self.channel_width)
         parts += [f"{'CAN-ID':<9}", f"{'data':<{self._data_width}}"]
         parts += ["meaning"] * self.meaning
-        return ((" ".join(parts).rstrip(), HEAD),)
+        return ((" ".join(parts).rstrip(), _HEAD),)
 
     def line(self, row: TraceRow, count: int = 0) -> Line:
         """Return the line of a row."""
@@ -89,20 +95,20 @@ class TraceLines:
         counted = f"{count:>8} " * self.counts
         gap = f"{ms_text(row.gap_us):>8} " * self.gaps
         begin = f"{self._stamp(row):>{self._stamp_width}} {gap}"
-        pieces = [(begin, DIM), (counted + channel, ""), _ident(row), *self._data(row)]
+        pieces = [(begin, _DIM), (counted + channel, ""), _ident(row), *self._data(row)]
         if self.meaning and row.decoded is not None:
             missing = self._data_width - sum(len(text) for text, _ in pieces[3:])
-            style = KIND_STYLES.get(row.decoded.kind, "")
+            style = _KIND_STYLES.get(row.decoded.kind, "")
             pieces.append((" " * (max(0, missing) + 1) + meaning_text(row.decoded), style))
         return tuple(piece for piece in pieces if piece[0])
 
     @property
     def _stamp_width(self) -> int:
-        return STAMP_WIDTHS.get(self.stamp, STAMP_WIDTH)
+        return _STAMP_WIDTHS.get(self.stamp, _STAMP_WIDTH)
 
     @property
     def _data_width(self) -> int:
-        return BITS_WIDTH if self.bits else BYTES_WIDTH
+        return _BITS_WIDTH if self.bits else _BYTES_WIDTH
 
     def _stamp(self, row: TraceRow) -> str:
         at_us = row.record.at_us
@@ -143,10 +149,10 @@ def _cells(data: bytes, changed: int, bits: bool) -> Iterator[tuple[str, bool]]:
 
 def _ident(row: TraceRow) -> tuple[str, str]:
     record = row.record
-    style = SENT if record.sent else HEAD
+    style = _SENT if record.sent else _HEAD
     if not isinstance(record, Record):
         return f"{ARROWS[record.sent]:<9} ", style
     frame = record.frame
     if isinstance(frame, ErrorFrame):
-        return f"{'error':<9} ", ERROR
+        return f"{'error':<9} ", _ERROR
     return f"{ident_text(any_ident(frame)):<9} ", style

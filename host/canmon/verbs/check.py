@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -9,11 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import load_rule
+from tickrig.host.canmon.model.check.checker import Unjudged
 from tickrig.host.canmon.model.check.decoded_check import DecodedCheck
-from tickrig.host.canmon.model.check.junit import junit
-from tickrig.host.canmon.model.check.rule import Finding
-from tickrig.host.canmon.model.check.rule_file import parse_rule_file
+from tickrig.host.canmon.model.check.report import junit
+from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import (
     SWITCHES,
     VALUES,
@@ -21,12 +23,12 @@ from tickrig.host.canmon.model.check.rules import (
     Rules,
     RuleValues,
     joined,
+    parse_rule_file,
     parse_rules,
 )
-from tickrig.host.canmon.model.frames.dump_line import Stamp
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.output.clocks import Stopwatch
+from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
 from tickrig.host.canmon.output.listening import (
+    Stopwatch,
     bit_rate_of,
     bit_rates_of,
     listen,
@@ -36,20 +38,137 @@ from tickrig.host.canmon.output.listening import (
     take_blocks,
     until_interrupted,
 )
-from tickrig.host.canmon.output.verdict import Verdict
-from tickrig.host.canmon.sources.block_log import BlockLog, block_log
+from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import AnySource, Source
-from tickrig.host.canmon.verbs.decode_options import decode_options, decoder_of, read_eds_files
-from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
+from tickrig.host.canmon.verbs.decode_options import (
+    decode_options,
+    decoder_of,
+    read_eds_files,
+    reopen_option,
+    source_command,
+)
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import PATH, Decorator, add_options
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.text.page_text import json_text
+from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.check.column_check import ColumnChecker
     from tickrig.host.canmon.model.columns.columns import Columns
+
+
+# What `check` finds, shown as it comes: as text, or as objects in JSON.
+
+
+class FindingPrinter:
+    """Findings, shown as they come.
+
+    Args:
+        jsonl: show them as JSON.
+        stamp: how times are shown as text; None for seconds of the epoch.
+        kept: a report will want them.
+        rules: the names of all rules.
+
+    Attributes:
+        counts: how many there are, by rule.
+        findings: all of them, where they are kept.
+        frames: how many were held against the rules.
+        unjudged: what the rules could not judge, once all is over.
+    """
+
+    unjudged = Unjudged({})
+
+    def __init__(
+        self, jsonl: bool, stamp: Stamp | None = None, *, kept: bool, rules: Sequence[str] = ()
+    ) -> None:
+        self._rules = rules
+        self.counts: Counter[str] = Counter()
+        self.findings: list[TrafficFinding] = []
+        self.frames = self._shown = 0
+        self._lines = None if stamp is None else DumpLines(stamp)
+        self._text = finding_json if jsonl else partial(TrafficFinding.shown, lines=self._lines)
+        self._kept = kept
+
+    def count(self, frames: int, first_us: int) -> None:
+        """Count frames; the first of all is where times may begin.
+
+        Args:
+            frames: at least one.
+            first_us: when the first of them was.
+        """
+        if self._lines is not None and not self.frames:
+            self._lines.stamp(first_us)
+        self.frames += frames
+
+    def begin_again(self) -> None:
+        """Forget all but how many findings were shown: those come first again, and are not."""
+        self._shown = self.counts.total()
+        self.counts.clear()
+        self.findings.clear()
+        self.frames = 0
+
+    def take(self, findings: Sequence[TrafficFinding]) -> None:
+        """Show findings."""
+        self.counts.update(finding.rule for finding in findings)
+        self.findings += findings if self._kept else ()
+        new = findings[self._shown :]
+        self._shown -= len(findings) - len(new)
+        if new:
+            with until_unread():
+                click.echo("\n".join(map(self._text, new)))
+
+    def nothing_judged(self) -> str:
+        """Say why no rule judged anything; empty if one did."""
+        none = self.none_judged
+        if any(name not in none for name in self._rules):
+            return ""
+        return f"nothing was judged: {'; '.join(f'{name}: {why}' for name, why in none.items())}"
+
+    @property
+    def none_judged(self) -> dict[str, str]:
+        """Why rules judged nothing, by their names; one that found something did."""
+        return {name: why for name, why in self.unjudged.rules.items() if name not in self.counts}
+
+    def doubts(self) -> list[str]:
+        """Say what was not judged, one line each."""
+        none = [f"{name} judged nothing: {why}" for name, why in self.none_judged.items()]
+        return none + [f"not judged: {text}" for text in self.unjudged.notes]
+
+    def summary(self) -> str:
+        """Say how it ended."""
+        if self.counts:
+            counts = ", ".join(f"{rule}: {count}" for rule, count in sorted(self.counts.items()))
+            return f"{counted(self.counts.total(), 'finding')}: {counts}"
+        none = len(self.none_judged)
+        if not none:
+            return "all rules hold"
+        return f"{counted(len(self._rules) - none, 'rule')} held, {none} judged nothing"
+
+
+def finding_json(finding: TrafficFinding) -> str:
+    """Write a finding as an object; frames as candump does."""
+    said: dict[str, object] = {
+        "v": 1,
+        "t": finding.at_us / 1e6,
+        "rule": finding.rule,
+        "text": finding.text,
+    }
+    if finding.record is not None:
+        said |= _frame(finding.record)
+    if finding.around:
+        said["around"] = [
+            {"t": record.at_us / 1e6, **_frame(record), "text": decoded_text(decoded)}
+            for record, decoded in finding.around
+        ]
+    return json_text(said, letters=True)
+
+
+def _frame(record: Record) -> dict[str, str]:
+    return {"ch": record.channel, "frame": str(record.frame)}
+
 
 _TEXTS: Final = {
     "no_emcy": "No EMCY but error reset.",
@@ -60,7 +179,7 @@ _TEXTS: Final = {
     "no_loss": "No frame lost, no line of a log that is none.",
 }
 
-rule_options: Final[Decorator] = add_options(
+_rule_options: Final[Decorator] = add_options(
     click.option("--max-load", type=float, metavar="PERCENT", help="Of any second; needs -b."),
     *(
         click.option(f"--{name.replace('_', '-')}", name, is_flag=True, help=text)
@@ -87,7 +206,7 @@ rule_options: Final[Decorator] = add_options(
 """Add a rule each as an option."""
 
 
-def read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
+def _read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
     """Return the rules of files and options together.
 
     Raises:
@@ -118,22 +237,22 @@ def _file(path: Path) -> RuleValues:
         raise Refused(f"rules {path}: {error}") from None
 
 
-BROKEN: Final = 1
+_BROKEN: Final = 1
 """Exit status where a rule does not hold."""
 
-RULE_FILE: Final = ".toml"
-STDIN: Final = "-"
-NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
-MOST_AROUND: Final = 1_000
+_RULE_FILE: Final = ".toml"
+_STDIN: Final = "-"
+_NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
+_MOST_AROUND: Final = 1_000
 
 
 @source_command(
-    rule_options,
+    _rule_options,
     decode_options,
     span_option,
     click.option(
         "--around",
-        type=click.IntRange(0, MOST_AROUND),
+        type=click.IntRange(0, _MOST_AROUND),
         default=2,
         show_default=True,
         help="Frames before and after what a RULE finds.",
@@ -177,16 +296,16 @@ def command(  # noqa: PLR0913 - options
 
     {source}
     """  # noqa: D301 - click wants the backspace
-    words = [word for word in source if not word.endswith(RULE_FILE)]
-    rules = read_rules([Path(word) for word in source if word.endswith(RULE_FILE)], options)
-    bus = BusOptions(**{name: options[name] for name in NAMES})
+    words = [word for word in source if not word.endswith(_RULE_FILE)]
+    rules = _read_rules([Path(word) for word in source if word.endswith(_RULE_FILE)], options)
+    bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
     objects = read_eds_files(eds)
     decoder = decoder_of(objects, dbc) if rules.expressions else None
     heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
     kept = bool(report_path or sarif_path)
     shown = Stamp(stamp) if stamp else None
-    verdict = Verdict(jsonl, shown, kept=kept, rules=rules.names())
+    verdict = FindingPrinter(jsonl, shown, kept=kept, rules=rules.names())
     log = None if decoder else block_log(words)
     made = partial(_column_checker, rules, bit_rate, heartbeats)
     log = _in_blocks(log, made, verdict) if log else None
@@ -208,7 +327,7 @@ def command(  # noqa: PLR0913 - options
     said = verdict.doubts() if verdict.counts or not unjudged else []
     report(frames, strict, [*said, verdict.summary()] if verdict.counts or not why else said)
     if verdict.counts:
-        click.get_current_context().exit(BROKEN)
+        click.get_current_context().exit(_BROKEN)
     if unjudged:
         raise NothingJudged(unjudged)
 
@@ -236,7 +355,7 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
 
 
 def _in_blocks(
-    log: BlockLog, make: Callable[[], ColumnChecker], verdict: Verdict
+    log: BlockLog, make: Callable[[], ColumnChecker], verdict: FindingPrinter
 ) -> BlockLog | None:
     """Judge a log; return None where it is to be read again, frame by frame."""
     checker = make()
@@ -255,9 +374,13 @@ def _in_blocks(
 
 
 def _one_by_one(
-    source: Source, words: Sequence[str], held: DecodedCheck, verdict: Verdict, span_us: int | None
+    source: Source,
+    words: Sequence[str],
+    held: DecodedCheck,
+    verdict: FindingPrinter,
+    span_us: int | None,
 ) -> None:
-    watch, has_clock = Stopwatch(), source.live and list(words) != [STDIN]
+    watch, has_clock = Stopwatch(), source.live and list(words) != [_STDIN]
 
     def take(records: Sequence[Record]) -> None:
         watch.take(records)
@@ -284,10 +407,10 @@ def _column_checker(
     return ColumnChecker(rules, bit_rate, eds_heartbeats)
 
 
-Judged = tuple[str, list[str], list[Finding], str, Mapping[str, str]]
+_Judged = tuple[str, list[str], list[TrafficFinding], str, Mapping[str, str]]
 
 
-def _write(option: str, path: Path | None, text: Callable[..., str], judged: Judged) -> None:
+def _write(option: str, path: Path | None, text: Callable[..., str], judged: _Judged) -> None:
     """Write a report where one is wanted."""
     if path is None:
         return
@@ -298,6 +421,6 @@ def _write(option: str, path: Path | None, text: Callable[..., str], judged: Jud
 
 
 def _sarif(*judged: Any) -> str:
-    from tickrig.host.canmon.model.check.sarif import sarif  # noqa: PLC0415 - seldom wanted
+    from tickrig.host.canmon.model.check.report import sarif  # noqa: PLC0415 - seldom wanted
 
     return sarif(*judged)

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig.host.canmon.conform.chosen import chosen
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.object_checks import object_checks
+from tickrig.host.canopen.conform.suite import OBJECTS, group_titles
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.start import loading
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-LEVELS: Final = ("read-only", "communication", "intrusive")
+
+_LEVELS: Final = ("read-only", "communication", "intrusive")
 """In the order of `Level`."""
 
 
-LEAST_LOAD: Final = 1
+_LEAST_LOAD: Final = 1
 """In percent: with less an answer takes longer than a check may."""
 
 
@@ -44,7 +50,7 @@ def _complete_only(
     from click.shell_completion import CompletionItem  # noqa: PLC0415 - only at a TAB
 
     with loading():
-        from tickrig.host.canopen.conform.notation.suite import read_suite  # noqa: PLC0415
+        from tickrig.host.canopen.conform.suite import read_suite  # noqa: PLC0415
 
     names = [
         (name, title)
@@ -55,9 +61,9 @@ def _complete_only(
 
 
 _levels: Final[Decorator] = add_options(
-    click.option(f"--{LEVELS[0]}", is_flag=True, help="Default."),
-    click.option(f"--{LEVELS[1]}", is_flag=True, help="NMT, SYNC, PDO, writes."),
-    click.option(f"--{LEVELS[2]}", is_flag=True, help="Reset, LSS, store, restore."),
+    click.option(f"--{_LEVELS[0]}", is_flag=True, help="Default."),
+    click.option(f"--{_LEVELS[1]}", is_flag=True, help="NMT, SYNC, PDO, writes."),
+    click.option(f"--{_LEVELS[2]}", is_flag=True, help="Reset, LSS, store, restore."),
 )
 _choice: Final[Decorator] = add_options(
     click.option("--node", type=click.IntRange(1, 127), metavar="N", help="Node-ID, 1 to 127."),
@@ -68,7 +74,7 @@ _choice: Final[Decorator] = add_options(
     click.option("--never", multiple=True, metavar="INDEX", help="Is never written, as 2000h."),
     click.option(
         "--max-load",
-        type=Percent(LEAST_LOAD, 100),
+        type=Percent(_LEAST_LOAD, 100),
         default=30,
         metavar="PERCENT",
         help="Of the bus, by this tester; 30.",
@@ -150,20 +156,55 @@ def command(context: click.Context, /, source: str | None, **options: Any) -> No
 
 def _level(options: dict[str, Any]) -> str:
     """Return the level that was chosen; two are refused: who only reads would write."""
-    given = [level for level in LEVELS if options.pop(level.replace("-", "_"))]
+    given = [level for level in _LEVELS if options.pop(level.replace("-", "_"))]
     if len(given) > 1:
         words = " and ".join(f"--{level}" for level in given)
         raise click.UsageError(f"{words}: which level? give one")
-    return given[0] if given else LEVELS[0]
+    return given[0] if given else _LEVELS[0]
 
 
 def _list(only: Sequence[str], eds: Path | None) -> None:
     from tickrig.host.canmon.conform.chosen import patterns  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.conform.listing import listed_checks  # noqa: PLC0415 - slow
     from tickrig.host.canmon.eds_document import read_device_document  # noqa: PLC0415 - slow
 
     device = None if eds is None else read_device_document(eds, "--eds").device
-    lines = list(listed_checks(patterns(only), device))
+    lines = list(_listed_checks(patterns(only), device))
     with until_unread():
         for line in lines:
             click.echo(line)
+
+
+# The list of checks: names, levels, titles, and what their groups are about.
+
+_ANY_NODE_ID: Final = 1
+_NAMED: Final = ", which --eds FILE names"
+
+
+def _listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str]:
+    """Yield a line a check, whatever its level, and then a line a group.
+
+    Args:
+        only: groups or ids, with * and ?, in any case; all if empty.
+        device: what an EDS says, for the checks of its objects.
+
+    Raises:
+        Refused: a word that names none.
+    """
+    checks = [*chosen(only), *_of_objects(only, device)]
+    wide = max((len(check.id) for check in checks), default=0) + 2
+    yield from (f"{check.id:<{wide}}{check.level.word:<15}{check.title}" for check in checks)
+    yield ""
+    groups = {check.group for check in checks}
+    unnamed = device is None and (not only or any(map(_is_of_objects, only)))
+    for name, title in group_titles().items():
+        if name in groups or (name == OBJECTS and unnamed):
+            yield f"{name:<5}{title}{_NAMED if name == OBJECTS and unnamed else ''}"
+
+
+def _of_objects(only: Sequence[str], device: EdsDevice | None) -> list[Check]:
+    made = object_checks(device, _ANY_NODE_ID) if device else ()
+    return list(filter(ConformancePlan(Level.INTRUSIVE, tuple(only)).chooses, made))
+
+
+def _is_of_objects(word: str) -> bool:
+    return word.upper().startswith(OBJECTS)

@@ -8,19 +8,20 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.canmon.model.recorder.plan import Plan
-from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
+from tickrig.host.canmon.model.recorder.plan import RecordingPlan
 from tickrig.host.canmon.output.listening import report, until_interrupted
-from tickrig.host.canmon.output.log_file import LogFile, whole_log
+from tickrig.host.canmon.output.printer import FilteredDecoder
+from tickrig.host.canmon.output.recording import LogFile, whole_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
+    explained,
     filter_option,
     make_decoder,
     read_filter,
+    strict_option,
 )
 from tickrig.host.canmon.verbs.dump import pass_on
-from tickrig.host.canmon.verbs.source_command import explained, strict_option
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import INTERRUPTED
 
@@ -58,7 +59,7 @@ def command(  # noqa: PLR0913 - options
     meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
     with closing(frames), whole_log(log, source) as place:
         with (
-            closing(LogFile(Plan(path=place), source, kept=place == log)) as out,
+            closing(LogFile(RecordingPlan(path=place), source, kept=place == log)) as out,
             until_interrupted() as signals,
         ):
             pass_on(frames, meaning, signals.behind(out.take))

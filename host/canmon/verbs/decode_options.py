@@ -6,21 +6,23 @@ The decoder is imported when it is wanted: a verb that does without starts faste
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.cli.messages import show_findings
-from tickrig.host.cli.options import PATH, add_options
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
+from tickrig.host.cli.messages import Refused, refuse_path, show_findings
+from tickrig.host.cli.options import PATH, Decorator, add_options
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoder import Decoder
     from tickrig.host.canmon.model.decode.filter import Filter
     from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+
 
 _EDS: Final = re.compile(r"(0[xX][0-9A-Fa-f]{1,2}|[0-9]{1,3})=(.+)")
 
@@ -30,10 +32,10 @@ eds_option: Final = click.option(
     metavar="NODE=FILE",
     help="An EDS, DCF or XDD of a node, as 3=drive.eds; once for each node.",
 )
-dbc_option: Final = click.option(
+_dbc_option: Final = click.option(
     "--dbc", multiple=True, type=PATH, metavar="FILE", help="A DBC file (extra tickrig[dbc])."
 )
-decode_options: Final = add_options(eds_option, dbc_option)
+decode_options: Final = add_options(eds_option, _dbc_option)
 """Add `--eds` and `--dbc`; `make_decoder` takes what they give."""
 
 filter_option: Final = click.option(
@@ -123,3 +125,44 @@ def _read(node: int, path: Path) -> EdsObjects:
         refuse_path("--eds", error)
     except EdsError as error:
         raise Refused(f"--eds {error}") from None
+
+
+# What verbs that take SOURCE words share.
+
+_SOURCE_HELP = """\b
+SOURCE   can0                      a bus of SocketCAN, or of the interface that -i or ~/.canrc names
+         can0,123:7FF,400~700,#FF  candump's filters: these, not these, error frames
+         slcan:/dev/ttyACM0@500k   interface:channel@bitrate; can0@500k/2M is CAN FD; udp
+         serial:/dev/ttyUSB0,rrc   a port (dump, top, tui): PORT[@BAUD],rrc or ,rtc-lite
+         run.log run.blf run.asc.gz  logs: candump, jsonl, asc, blf, trc, csv, mf4, pcapng, trace
+         -                         standard input: what candump or canmon dump prints"""
+"""For the help text of a verb that takes SOURCE words."""
+
+strict_option: Final[Decorator] = click.option(
+    "--strict", is_flag=True, help="Exit status 4 if frames were lost or bad."
+)
+
+reopen_option: Final[Decorator] = click.option(
+    "--reopen", is_flag=True, help="Wait for a bus that goes away until it is back."
+)
+
+
+def source_command(*options: Decorator) -> Callable[[Callable[..., Any]], click.Command]:
+    """Return a decorator that makes a verb with SOURCE words, `--strict`, and those of a bus.
+
+    Args:
+        options: what else the verb has, in the order of its help.
+    """
+    source = click.argument("source", nargs=-1)
+    add = add_options(source, *options, strict_option, bus_options, fd_options)
+
+    def decorate(function: Callable[..., Any]) -> click.Command:
+        return explained(click.command(cls=BusCommand)(add(function)))
+
+    return decorate
+
+
+def explained(command: click.Command) -> click.Command:
+    """Put what a SOURCE may be in the place of `{source}` in a command's help."""
+    command.help = cleandoc(command.help or "").replace("{source}", _SOURCE_HELP)
+    return command

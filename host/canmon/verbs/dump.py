@@ -2,54 +2,109 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
 from itertools import islice
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.frames.dump_line import Stamp
-from tickrig.host.canmon.output.filtered_decoder import DecodedFrame, FilteredDecoder
-from tickrig.host.canmon.output.listening import (
-    bit_rate_of,
-    report,
-    say_marks,
-    until_interrupted,
+from tickrig.host.canmon.model.frames import Stamp
+from tickrig.host.canmon.output.listening import bit_rate_of, report, say_marks, until_interrupted
+from tickrig.host.canmon.output.printer import (
+    DecodedFrame,
+    DumpFormat,
+    FilteredDecoder,
+    StdoutWriter,
+    printer_of,
 )
-from tickrig.host.canmon.output.printer import Output, StdoutWriter, printer_of
 from tickrig.host.canmon.output.recording import (
     NAMES,
-    Recording,
+    RecordingOptions,
     filter_trigger,
     recording_options,
 )
-from tickrig.host.canmon.output.trigger_keys import TriggerKeys
 from tickrig.host.canmon.sources.opening import open_any
-from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.sources.source_spec import LineSpec, parse_source
+from tickrig.host.canmon.sources.source import AnySource, LineSpec, parse_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,
     make_decoder,
     read_filter,
+    reopen_option,
+    source_command,
 )
-from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, add_options
-from tickrig.host.cli.refused import Refused
+from tickrig.host.links.ready import ready
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.logs.mark import Mark
-    from tickrig.host.canmon.output.log_file import LogFile
+    from tickrig.host.canmon.output.recording import LogFile
 
-POLL_US: Final = 100_000
 
-Take = Callable[[list[DecodedFrame], int, "Sequence[Mark]"], bool]
+# Triggers by hand: Enter in the terminal, or a signal.
+
+_KEY: Final = "key"
+_STDIN: Final = 0
+
+
+class TriggerKeys:
+    """Waits for Enter on standard input, where that is a terminal, and for SIGUSR1.
+
+    Args:
+        typed: somebody may type; not where standard input is what is recorded.
+    """
+
+    def __init__(self, typed: bool) -> None:
+        self._typed = typed and sys.platform != "win32" and os.isatty(_STDIN)
+        self._signals = 0
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Take signals while the block runs."""
+        if sys.platform == "win32":
+            yield
+        else:  # mypy leaves out the branch of the other system
+            before = signal.signal(signal.SIGUSR1, self._signalled)
+            # a job in the background that reads its terminal would be stopped
+            ignored = signal.signal(signal.SIGTTIN, signal.SIG_IGN)
+            try:
+                yield
+            finally:
+                signal.signal(signal.SIGUSR1, before)
+                signal.signal(signal.SIGTTIN, ignored)
+
+    def pressed(self) -> str:
+        """Return what was pressed since the last time; empty if nothing was."""
+        if self._signals:
+            self._signals = 0
+            return "SIGUSR1"
+        if not self._typed or not ready([_STDIN], wait_s=0)[0]:
+            return ""
+        try:
+            typed = os.read(_STDIN, 1_024)
+        except OSError:
+            typed = b""
+        self._typed = bool(typed)  # at its end nobody types any more
+        return _KEY if b"\n" in typed else ""
+
+    def _signalled(self, number: int, frame: FrameType | None) -> None:
+        self._signals += 1
+
+
+_POLL_US: Final = 100_000
+
+_Take = Callable[[list[DecodedFrame], int, "Sequence[Mark]"], bool]
 """Takes frames, how many were lost so far, and what happened behind them; says when to end."""
 
 _shown: Final = add_options(
@@ -130,20 +185,22 @@ def command(  # noqa: PLR0913 - options
     given = {name: options.pop(name) for name in NAMES}
     if file is None and (named := next((name for name in NAMES if given[name]), "")):
         raise Refused(f"--{named.replace('_', '-')} goes with -l FILE")
-    if (file is not None or output == Output.LOG) and any(map(_is_line, source)):
+    if (file is not None or output == DumpFormat.LOG) and any(map(_is_line, source)):
         raise Refused(
             "a log holds frames alone: a serial port is shown, or goes into --jsonl, --csv"
         )
-    chosen, form, bus = read_filter(wanted), Output(output or ""), BusOptions(**options)
-    recording = None if file is None else Recording(file, given, bit_rate_of(source, bus))
+    chosen, form, bus = read_filter(wanted), DumpFormat(output or ""), BusOptions(**options)
+    recording = None if file is None else RecordingOptions(file, given, bit_rate_of(source, bus))
     decodes = recording is not None and recording.decodes
-    plain = (raw or form is Output.LOG or file is not None) and not decodes
+    plain = (raw or form is DumpFormat.LOG or file is not None) and not decodes
     decoder = None if plain and chosen is None else make_decoder(eds, dbc)
     kept = None
     if recording is not None and recording.triggers and chosen is not None:
         kept, chosen = filter_trigger(wanted or "", chosen), None  # triggers see all frames
     meaning = FilteredDecoder(decoder, chosen)
-    take: Take = StdoutWriter(printer_of(form, Stamp(stamp or ""), extra, plain, errors), form).take
+    take: _Take = StdoutWriter(
+        printer_of(form, Stamp(stamp or ""), extra, plain, errors), form
+    ).take
     with ExitStack() as held:
         frames = held.enter_context(closing(open_any(source, bus)))
         if reopen or (recording is not None and recording.plan.numbered):
@@ -162,7 +219,7 @@ def command(  # noqa: PLR0913 - options
     report(frames, strict, meaning.messages())
 
 
-def _with_keys(log: LogFile, keys: TriggerKeys) -> Take:
+def _with_keys(log: LogFile, keys: TriggerKeys) -> _Take:
     """Return what takes frames and looks for keys."""
 
     def take(decoded_frames: list[DecodedFrame], lost: int, marks: Sequence[Mark]) -> bool:
@@ -181,7 +238,7 @@ def _is_line(word: str) -> bool:
 def pass_on(
     source: AnySource[AnyRecord],
     meaning: FilteredDecoder,
-    take: Take,
+    take: _Take,
     count: int | None = None,
     quiet_ms: int | None = None,
 ) -> None:
@@ -189,7 +246,7 @@ def pass_on(
     quiet_s = quiet_ms / 1e3 if quiet_ms else float("inf")
     latest_s, left = time.monotonic(), count
     while not source.ended and left != 0:
-        records = source.poll(min(POLL_US, (quiet_ms or POLL_US) * 1_000))
+        records = source.poll(min(_POLL_US, (quiet_ms or _POLL_US) * 1_000))
         decoded_frames = list(islice(meaning.take(records), left))
         say_marks(source)
         if take(decoded_frames, source.lost, source.marks):

@@ -14,19 +14,22 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.model.graph.collector import Collector
 from tickrig.host.canmon.model.graph.plot import render
-from tickrig.host.canmon.model.graph.series import Series, View
+from tickrig.host.canmon.model.graph.series import Collector, Series, View
 from tickrig.host.canmon.model.graph.signal_spec import ObjectName, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
-from tickrig.host.canmon.sources.block_log import BlockLog, block_log
+from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.verbs.decode_options import decode_options, make_decoder
-from tickrig.host.canmon.verbs.source_command import explained, strict_option
+from tickrig.host.canmon.verbs.decode_options import (
+    decode_options,
+    explained,
+    make_decoder,
+    strict_option,
+)
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, time_option
-from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import paint
 
 _SIZE: Final = re.compile(r"([0-9]{2,4})x([0-9]{2,4})")
@@ -101,7 +104,7 @@ def _range(text: str) -> tuple[int, tuple[float, float]]:
     return int(match[1]), (low, high)
 
 
-MOST: Final = 2_000_000
+_MOST: Final = 2_000_000
 """Samples of a signal that are kept of a bus."""
 
 SIZE: Final = (100, 28)
@@ -170,7 +173,7 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     frames = (log if whole else None) or open_source([source], BusOptions(**options))
     try:
         if not isinstance(frames, BlockLog):
-            collector = Collector(words, decoder, MOST if frames.live else 0)
+            collector = Collector(words, decoder, _MOST if frames.live else 0)
             lines = partial(_live, collector.series, request)
             follow(frames, [source], collector.take_all, request.span_us, lines)
         _show(collector.series, request)

@@ -22,14 +22,14 @@ from tickrig.host.canmon.model.logs.log_file import (
     log_format,
 )
 from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.logs.mark import LogTally
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import json_text
 
-HEAD_FRAMES: Final = 1_000
-TAIL_BYTES: Final = 1 << 14
-UNREAD: Final = "not read, nor whether the log was ended: canmon stats does"
+_HEAD_FRAMES: Final = 1_000
+_TAIL_BYTES: Final = 1 << 14
+_UNREAD: Final = "not read, nor whether the log was ended: canmon stats does"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +56,12 @@ class LogHead:
     channels: tuple[str, ...]
     first_us: int | None
     last_us: int | None
-    tally: Tally
+    tally: LogTally
 
     @property
     def whole(self) -> bool:
         """All of the log was read."""
-        return self.head_frames < HEAD_FRAMES
+        return self.head_frames < _HEAD_FRAMES
 
     @property
     def end_read(self) -> bool:
@@ -79,8 +79,8 @@ def read_head(path: Path) -> LogHead:
     """
     kind, compressed = log_format(path), path.suffix.lower() == COMPRESSED
     reader = read_log(path)
-    head = list(islice(reader, HEAD_FRAMES))
-    whole = len(head) < HEAD_FRAMES
+    head = list(islice(reader, _HEAD_FRAMES))
+    whole = len(head) < _HEAD_FRAMES
     last_us = head[-1].at_us if whole and head else None
     if not whole and kind in TEXT and not compressed:
         last_us = None if reader.tally.shifted_us else _last_us(path)
@@ -102,7 +102,7 @@ def read_head(path: Path) -> LogHead:
 def _last_us(path: Path) -> int | None:
     """Return the time of the last frame of a log in text, if it is near its end."""
     with path.open("rb") as file:
-        file.seek(-min(TAIL_BYTES, path.stat().st_size), os.SEEK_END)
+        file.seek(-min(_TAIL_BYTES, path.stat().st_size), os.SEEK_END)
         lines = LogLines()
         tail = lines.push(file.read()) + lines.finish()
     known = tail and not (lines.deltas or lines.tally.shifted_us)
@@ -149,7 +149,7 @@ def _lines(path: Path, head: LogHead) -> list[str]:
         f"  frames   {head.head_frames:,}{more}",
         f"  buses    {' '.join(head.channels) or '-'}",
         f"  first    {_time(head.first_us)}",
-        f"  last     {_time(head.last_us) if head.end_read else UNREAD}",
+        f"  last     {_time(head.last_us) if head.end_read else _UNREAD}",
     ]
     if head.first_us is not None and head.last_us is not None:
         lines.append(f"  span     {(head.last_us - head.first_us) / 1e6:.6f} s")

@@ -10,23 +10,20 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
-from tickrig.host.canmon.model.decode.board_text import board_json, render_board
-from tickrig.host.canmon.model.decode.node_board import NodeBoard
+from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.output.clocks import Stopwatch
-from tickrig.host.canmon.output.listening import follow, report, span_option, take_blocks
-from tickrig.host.canmon.sources.block_log import BlockLog, block_log
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.output.listening import Stopwatch, follow, report, span_option, take_blocks
+from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
-from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files, source_command
 from tickrig.host.cli.can_options import BusOptions
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes
+    from tickrig.host.canmon.model.columns.column_traffic import ColumnNodes
     from tickrig.host.canmon.model.columns.columns import Columns
 
-MANY: Final = 1_000
+_MANY: Final = 1_000
 """Lines, and columns where nobody's terminal sets them."""
 
 
@@ -94,7 +91,7 @@ class NodesView:
     def take_block(self, columns: Columns) -> None:
         """Take a block of a log."""
         if self._columns is None:
-            from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes  # noqa: PLC0415 - numpy
+            from tickrig.host.canmon.model.columns.column_traffic import ColumnNodes  # noqa: PLC0415 - numpy
 
             self._columns = ColumnNodes(self.decoder, self._board)
         self._columns.take(columns)
@@ -107,8 +104,8 @@ class NodesView:
 
     def lines(self, *, live: bool) -> list[str]:
         """Return the board for paper, or as wide as the terminal is."""
-        columns = _columns() if sys.stdout.isatty() else MANY
-        return render_board(self._board, self._now_us(live), columns, MANY)
+        columns = _columns() if sys.stdout.isatty() else _MANY
+        return render_board(self._board, self._now_us(live), columns, _MANY)
 
     def json(self, *, live: bool) -> list[str]:
         """Return the board as JSON, an object a node."""

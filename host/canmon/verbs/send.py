@@ -9,22 +9,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.transmit.frame_fields import (
+from tickrig.host.canmon.model.transmit import (
     FrameFields,
+    PdoFrames,
+    TransmitRow,
     parse_checksum,
     parse_counter,
 )
-from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
-from tickrig.host.canmon.model.transmit.transmit_list import TransmitRow
-from tickrig.host.canmon.output.clocks import Pace
-from tickrig.host.canmon.output.listening import until_interrupted
+from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.text.values import parse_time_with_unit_us
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame, parse_sent
-from tickrig.wire.candump import LogLine
+from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 

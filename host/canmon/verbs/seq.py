@@ -12,24 +12,24 @@ import click
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.canmon.model.sequence.sequence_run import (
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.sequence import (
     DecodedCondition,
     EventType,
     FrameCondition,
     SequenceRun,
+    TomlSequence,
     event_line,
     outline,
+    parse_lines,
 )
-from tickrig.host.canmon.model.sequence.sequence_run import Sequence as Steps
-from tickrig.host.canmon.model.sequence.variables import parse_variable
-from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
-from tickrig.host.canmon.output.clocks import Pace
-from tickrig.host.canmon.output.listening import until_interrupted
+from tickrig.host.canmon.model.sequence import Sequence as Steps
+from tickrig.host.canmon.model.sequence_variables import parse_variable
+from tickrig.host.canmon.model.transmit import PdoFrames
+from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_and_rest, bus_options
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.output.transmitter import Transmitter
 
 
-class Watch:
+class ConditionDecoder:
     """Decodes all that is heard, for conditions on it.
 
     Attributes:
@@ -57,8 +57,8 @@ class Watch:
         return self._latest.condition(text)
 
 
-POLL_US: Final = 100_000
-FAILED: Final = 1
+_POLL_US: Final = 100_000
+_FAILED: Final = 1
 
 
 @click.command(cls=BusCommand)
@@ -94,7 +94,7 @@ def command(context: click.Context, /, words: Sequence[str], **options: Any) -> 
     dry_run, quiet = options.pop("dry_run"), options.pop("quiet")
     bus, files = bus_and_rest(words, options["channel"], "FILE", most=1)
     file = Path(files[0])
-    watch = Watch(read_eds_files(eds))
+    watch = ConditionDecoder(read_eds_files(eds))
     sequence = _read(file, variables, watch)
     if dry_run:
         click.echo("\n".join(outline(sequence.steps)))
@@ -104,10 +104,10 @@ def command(context: click.Context, /, words: Sequence[str], **options: Any) -> 
     if not run.done:
         click.echo("interrupted before its end", err=True)
     if run.missed or not run.done:
-        context.exit(FAILED)
+        context.exit(_FAILED)
 
 
-def _read(file: Path, words: Sequence[str], watch: Watch) -> Steps:
+def _read(file: Path, words: Sequence[str], watch: ConditionDecoder) -> Steps:
     try:
         variables = dict(map(parse_variable, words))
         text = file.read_text("utf-8")
@@ -129,7 +129,7 @@ def _read(file: Path, words: Sequence[str], watch: Watch) -> Steps:
 
 
 def _carry_out(
-    run: SequenceRun, bus: str | None, options: BusOptions, watch: Watch, quiet: bool
+    run: SequenceRun, bus: str | None, options: BusOptions, watch: ConditionDecoder, quiet: bool
 ) -> None:
     from tickrig.host.canmon.output.transmitter import transmitters  # noqa: PLC0415 - python-can is slow
 
@@ -138,7 +138,7 @@ def _carry_out(
         _send(out, watch, run.tick(pace.now_us))
         while not run.done:
             _show(run, quiet)
-            for record in out.poll(max(0, min(POLL_US, run.due_us - pace.now_us))):
+            for record in out.poll(max(0, min(_POLL_US, run.due_us - pace.now_us))):
                 watch.take(record)
                 _send(out, watch, run.tick(pace.now_us, (record,)))
             _send(out, watch, run.tick(pace.now_us))
@@ -148,7 +148,7 @@ def _carry_out(
     _show(run, quiet)
 
 
-def _send(out: Transmitter, watch: Watch, frames: Frames) -> None:
+def _send(out: Transmitter, watch: ConditionDecoder, frames: Frames) -> None:
     for frame in frames:
         out.send(frame)
         watch.take(Record(time.time_ns() // 1_000, out.name, frame, sent=True))

@@ -8,10 +8,8 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.bit_rates import BitRates
-from tickrig.host.canmon.model.traffic.traffic import Snapshot, Traffic
-from tickrig.host.canmon.model.views.statistics import (
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.statistics import (
     bus_json,
     bus_lines,
     by_id,
@@ -20,6 +18,7 @@ from tickrig.host.canmon.model.views.statistics import (
     node_json,
     node_rows,
 )
+from tickrig.host.canmon.model.traffic import BitRates, Traffic, TrafficSnapshot
 from tickrig.host.canmon.output.listening import (
     bit_rates_of,
     count_blocks,
@@ -27,10 +26,10 @@ from tickrig.host.canmon.output.listening import (
     report,
     span_option,
 )
-from tickrig.host.canmon.sources.block_log import BlockLog, block_log
+from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
-from tickrig.host.canmon.verbs.source_command import source_command
+from tickrig.host.canmon.verbs.decode_options import source_command
 from tickrig.host.cli.can_options import BusOptions
 
 
@@ -83,7 +82,7 @@ def command(
 
 def _one_by_one(
     source: Source, words: Sequence[str], span_us: int | None, rates: BitRates
-) -> Snapshot:
+) -> TrafficSnapshot:
     traffic = Traffic(rates)
 
     def take(records: Sequence[Record]) -> None:
@@ -94,12 +93,12 @@ def _one_by_one(
     return traffic.snapshot()
 
 
-def _tables(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:
+def _tables(snapshot: TrafficSnapshot, by: str, bit_rate: int | None) -> list[str]:
     lines = [line for bus in snapshot.buses for line in bus_lines(bus, bit_rate)]
     return [*lines, "", *(by_id if by == "id" else by_node)(snapshot)]
 
 
-def _jsonl(snapshot: Snapshot, by: str, bit_rate: int | None) -> list[str]:
+def _jsonl(snapshot: TrafficSnapshot, by: str, bit_rate: int | None) -> list[str]:
     lines = [bus_json(bus, bit_rate) for bus in snapshot.buses]
     if by == "id":
         return lines + [id_json(row) for row in snapshot.rows]

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.views.top_model import TopModel
-from tickrig.host.canmon.output.filtered_decoder import FilteredDecoder
+from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.output.listening import (
     bit_rates_of,
     count_blocks,
@@ -18,21 +17,23 @@ from tickrig.host.canmon.output.listening import (
     report,
     span_option,
 )
-from tickrig.host.canmon.sources.block_log import BlockLog, block_log
+from tickrig.host.canmon.output.printer import FilteredDecoder
+from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_any
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     filter_option,
     make_decoder,
     read_filter,
+    reopen_option,
+    source_command,
 )
-from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
 from tickrig.host.cli.can_options import BusOptions
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.frames import AnyRecord
 
-Take = Callable[["Sequence[AnyRecord]"], None]
+_Take = Callable[["Sequence[AnyRecord]"], None]
 
 
 @source_command(
@@ -76,7 +77,7 @@ def command(  # noqa: PLR0913 - options
     chosen, model = read_filter(wanted), TopModel(bit_rates_of(source, bus))
     plain = not (decode or chosen or eds or dbc)
     meaning = FilteredDecoder(None if plain else make_decoder(eds, dbc), chosen)
-    take: Take = model.take
+    take: _Take = model.take
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
     log = block_log(source) if plain else None

@@ -9,24 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.canmon.monitor_setup import MonitorSetup
 from tickrig.host.canmon.output.listening import bit_rates_of, report
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
     eds_paths,
     read_eds_paths,
     refusing_dbc,
+    reopen_option,
+    source_command,
 )
-from tickrig.host.canmon.verbs.source_command import reopen_option, source_command
-from tickrig.host.canmon.workspace import Workspace, WorkspaceError
+from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.cli.start import loading
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.tui.app import Monitor
+    from tickrig.host.canmon.tui.app import MonitorApp
 
 
 @source_command(
@@ -80,17 +79,17 @@ def command(  # noqa: PLR0913 - options
     report(monitor.session.source, strict)
 
 
-def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
+def _monitor(path: Path | None, said: MonitorSetup) -> MonitorApp:
     """Make the program, its panels with the settings of the workspace."""
     try:
         with loading():
-            from tickrig.host.canmon.tui.app import Monitor  # noqa: PLC0415 - an extra
-            from tickrig.host.canmon.tui.panels.tabs import make_panels  # noqa: PLC0415
+            from tickrig.host.canmon.tui.app import MonitorApp  # noqa: PLC0415 - an extra
+            from tickrig.host.canmon.tui.panels.panel import make_panels  # noqa: PLC0415
     except ImportError as error:
         raise Refused(f"canmon tui needs Textual: pip install 'tickrig[tui]' ({error})") from None
-    from tickrig.host.canmon.monitor_setup import PanelSettings  # noqa: PLC0415 - an extra
-    from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.tui.tasks.session import Model, open_session  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.tui.app import RecorderTask  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.tui.session import Model, open_session  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.workspace import PanelSettings  # noqa: PLC0415 - an extra
 
     try:
         workspace = Workspace() if path is None else Workspace.read(path)
@@ -109,4 +108,4 @@ def _monitor(path: Path | None, said: MonitorSetup) -> Monitor:
             raise
     except WorkspaceError as error:
         raise Refused(str(error)) from None
-    return Monitor(session, panels, panel_settings, recorder)
+    return MonitorApp(session, panels, panel_settings, recorder)

@@ -5,33 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, Channel
-from tickrig.host.canopen.bus_file.item import Place
+from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, DriveChannel
 from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
-from tickrig.host.canopen.bus_file.notes import Notes, Section
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO
-from tickrig.host.canopen.bus_file.writes import final_places
+from tickrig.host.canopen.bus_file.sheet import final_places
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.eds import read_eds_bytes
 from tickrig.host.text.names import near
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID, is_restricted
 from tickrig.wire.canopen.eds.eds_file import shorten
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, INVALID, is_restricted
 
 SYNC: Final = 0x080
-DRIVER_KEYS: Final = ("driver", "package")
-NAMESPACE: Final = "ros2_canopen::"
-CLASSES: Final = {
+_DRIVER_KEYS: Final = ("driver", "package")
+_NAMESPACE: Final = "ros2_canopen::"
+_CLASSES: Final = {
     "MasterDriver": "canopen_master_driver",
     "ProxyDriver": "canopen_proxy_driver",
     "Cia402Driver": "canopen_402_driver",
     "BaseDriver": "canopen_base_driver",
 }
 """The packages of its classes, of which each has one for life cycles, too."""
-MISSING: Final = ("object-missing", "pdo-missing")
-MOST_OFF: Final = 0.01
+_MISSING: Final = ("object-missing", "pdo-missing")
+_MOST_OFF: Final = 0.01
 """How far a scale and its inverse may be from each other: they are rounded."""
 
 
@@ -50,7 +49,7 @@ def check_node_ids(
     layout: Layout, master: BusMaster | None, slaves: Mapping[str, BusSlave]
 ) -> None:
     """Note node-IDs that two nodes have."""
-    taken: dict[int, tuple[str, Place]] = {}
+    taken: dict[int, tuple[str, FilePlace]] = {}
     if master is not None and layout.master is not None:
         taken[master.node_id] = MASTER, layout.master.place_of("node_id")
     for name, slave in slaves.items():
@@ -63,12 +62,14 @@ def check_node_ids(
         taken.setdefault(slave.node_id, (section.name, place))
 
 
-def check_cob_ids(notes: Notes, master: BusMaster | None, slaves: Mapping[str, BusSlave]) -> None:
+def check_cob_ids(
+    notes: BusFileNotes, master: BusMaster | None, slaves: Mapping[str, BusSlave]
+) -> None:
     """Note CAN-IDs that two nodes send with, and those that belong to other services.
 
     The master sends what slaves receive; two slaves may receive one message.
     """
-    senders: dict[int, tuple[str, Place, BusSlave | None]] = {}
+    senders: dict[int, tuple[str, FilePlace, BusSlave | None]] = {}
     if master is not None and master.sync_period_us:
         senders[SYNC] = "SYNC", master.place, None
     for slave in slaves.values():
@@ -95,7 +96,7 @@ def _is_double(one: BusSlave | None, other: BusSlave) -> bool:
 
 def _pdos(
     slaves: Mapping[str, BusSlave],
-) -> Iterator[tuple[str, int, Place, BusSlave, bool]]:
+) -> Iterator[tuple[str, int, FilePlace, BusSlave, bool]]:
     """Give the PDOs that are on with 11 bits, TPDOs first: what they are, CAN-ID, place, slave."""
     for transmit in (True, False):
         for slave in slaves.values():
@@ -109,22 +110,22 @@ def _pdos(
                 yield f"{kind} {pdo.number}", pdo.cob_id & CAN_ID_MASK, place, slave, transmit
 
 
-def _sections(layout: Layout) -> list[Section]:
+def _sections(layout: Layout) -> list[BusFileSection]:
     return [*layout.slaves.values(), *([] if layout.master is None else [layout.master])]
 
 
 def has_drivers(layout: Layout) -> bool:
     """Return whether a file is for the container of ros2_canopen, too."""
-    return any(key in section for section in _sections(layout) for key in DRIVER_KEYS)
+    return any(key in section for section in _sections(layout) for key in _DRIVER_KEYS)
 
 
-def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
+def check_container(notes: BusFileNotes, layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
     """Note what the container of ros2_canopen refuses, in a file that is for it."""
     if not has_drivers(layout):
         return
     unmade = layout.slaves.keys() - slaves.keys()
     for section in _sections(layout):
-        missing = [key for key in DRIVER_KEYS if key not in section]
+        missing = [key for key in _DRIVER_KEYS if key not in section]
         if missing:
             section.note("no-driver", missing[0], f"no {' and no '.join(missing)}")
         if "node_id" not in section and section.name not in unmade:
@@ -137,9 +138,9 @@ def check_container(notes: Notes, layout: Layout, slaves: Mapping[str, BusSlave]
         notes.note("hidden", place, name, text)
 
 
-def check_defaults(layout: Layout, node: Section, found: Iterable[RuleFinding]) -> None:
+def check_defaults(layout: Layout, node: BusFileSection, found: Iterable[RuleFinding]) -> None:
     """Note that writes of `defaults` are those of other nodes, if the EDS of one has not them."""
-    if layout.defaults is None or all(one.rule.name not in MISSING for one in found):
+    if layout.defaults is None or all(one.rule.name not in _MISSING for one in found):
         return
     shared = [key for key in ("rpdo", "sdo", "tpdo") if key in layout.defaults]
     if shared:
@@ -162,35 +163,35 @@ def check_settings(layout: Layout, slaves: Mapping[str, BusSlave]) -> None:
             _check_scale(layout.slaves[name], channel, "vel")
 
 
-def _check_class(section: Section) -> None:
+def _check_class(section: BusFileSection) -> None:
     """Note a class that ros2_canopen has not, or not in this package."""
-    if not (set(DRIVER_KEYS) <= section.fields.keys()):
+    if not (set(_DRIVER_KEYS) <= section.fields.keys()):
         return
-    named, package = (section.text(key) for key in DRIVER_KEYS)
-    short = named.removeprefix(NAMESPACE)
+    named, package = (section.text(key) for key in _DRIVER_KEYS)
+    short = named.removeprefix(_NAMESPACE)
     if short == named:
         return
-    own = CLASSES.get(short.removeprefix("Lifecycle"))
+    own = _CLASSES.get(short.removeprefix("Lifecycle"))
     if own is None:
-        known = [each for name in CLASSES for each in (name, f"Lifecycle{name}")]
+        known = [each for name in _CLASSES for each in (name, f"Lifecycle{name}")]
         text = f"driver: ros2_canopen has no class {shorten(short)!r}; {near(short, known)}"
         section.note("driver-class", "driver", text)
-    elif package != own and package in CLASSES.values():
+    elif package != own and package in _CLASSES.values():
         text = f"package: {package} has no {short}: that is in {own}"
         section.note("driver-class", "package", text)
 
 
-def _check_scale(section: Section, channel: Channel, what: str) -> None:
+def _check_scale(section: BusFileSection, channel: DriveChannel, what: str) -> None:
     """Note scales to and from the device that do not cancel out."""
     keys = f"scale_{what}_to_dev", f"scale_{what}_from_dev"
     to_dev, from_dev = (getattr(channel, key) for key in keys)
-    if abs(to_dev * from_dev - 1) > MOST_OFF:
+    if abs(to_dev * from_dev - 1) > _MOST_OFF:
         key = next((key for key in keys if key in section), "channels")
         text = f"{keys[0]}: {to_dev:g} times {keys[1]}: {from_dev:g} is not 1"
         section.note("scale", key, text)
 
 
-def _check_name(section: Section) -> None:
+def _check_name(section: BusFileSection) -> None:
     for word in (MASTER, OPTIONS):
         if word in section.name:
             text = f"{word!r} is in its name: the container takes it for one"
@@ -199,7 +200,7 @@ def _check_name(section: Section) -> None:
 
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
     """Return how much `canmon eds check` finds in each EDS, and what of it stops dcfgen."""
-    notes = Notes()
+    notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):
         document = Document(str(sheet), read_eds_bytes(sheet))
         found = check(document)
@@ -210,6 +211,6 @@ def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
         counted = [*stops, *failing(found)]
         if names or counted:
             stopped = f"; dcfgen stops at {', '.join(dict.fromkeys(names))}" if names else ""
-            place = Place(str(sheet), min((one.line for one in counted), default=0))
+            place = FilePlace(str(sheet), min((one.line for one in counted), default=0))
             notes.note("eds-check", place, "", f"it finds {severities(found)}{stopped}")
     return notes.all

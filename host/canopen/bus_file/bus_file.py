@@ -15,17 +15,146 @@ from tickrig.host.canopen.bus_file.bus_checks import (
     check_settings,
     has_drivers,
 )
-from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusOptions, BusSlave
-from tickrig.host.canopen.bus_file.item import Place
+from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusMaster, BusSlave, Identity
+from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, check_keys
 from tickrig.host.canopen.bus_file.layout import Layout, read_layout
-from tickrig.host.canopen.bus_file.master_reader import read_master, read_options, watch_master
-from tickrig.host.canopen.bus_file.notes import Notes, Section
+from tickrig.host.canopen.bus_file.notes import (
+    UNSIGNED8,
+    UNSIGNED16,
+    BusFileNotes,
+    BusFileSection,
+    FilePlace,
+)
 from tickrig.host.canopen.bus_file.pdo_reader import CobIds, pdos_after
-from tickrig.host.canopen.bus_file.sheet import Sheets
-from tickrig.host.canopen.bus_file.slave_reader import SlaveReader
+from tickrig.host.canopen.bus_file.sheet import UNSET, Sheet, Sheets, Writes
+from tickrig.host.canopen.bus_file.slave_reader import SlaveReader, read_extra
 from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
+from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
+from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
-MOST_BYTES: Final = 1 << 20
+# The section of the master, and what it makes of the heartbeats of its slaves.
+
+_CONSUMER: Final = 0x1016
+_TIME: Final = 0x100
+_SHORTEST_SYNC_US: Final = 1_000
+_FLAGS: Final = {
+    "start": True,
+    "start_nodes": True,
+    "start_all_nodes": False,
+    "reset_all_nodes": False,
+    "stop_all_nodes": False,
+}
+"""Those that dcfgen takes for numbers, with what they are if they are left out."""
+
+
+def _read_options(section: BusFileSection | None) -> BusDefaults:
+    """Read what holds for all nodes."""
+    if section is None:
+        return BusDefaults()
+    check_keys(section, OPTIONS, open_to_others=True)
+    return BusDefaults(
+        dcf_path=section.text("dcf_path"),
+        heartbeat_multiplier=section.real("heartbeat_multiplier", 3.0),
+        retry_factor=section.whole("retry_factor", 3, 0, UNSIGNED8),
+        extra=read_extra(section),
+    )
+
+
+def _read_master(section: BusFileSection, options: BusDefaults) -> BusMaster:
+    """Read the section of the master."""
+    check_keys(section, MASTER, open_to_others=True)
+    whole = section.whole
+    numbers = ("vendor_id", "product_code", "revision_number", "serial_number")
+    node_id = whole("node_id", UNSET, 1, UNSET)
+    if HIGHEST_NODE_ID < node_id < UNSET:
+        section.note("node-id", "node_id", f"node_id: {node_id} is not in 1..127")
+        node_id = UNSET
+    return BusMaster(
+        node_id,
+        section.place,
+        baudrate=_bit_rate(section),
+        identity=Identity(0, *(whole(key) for key in numbers)),
+        sync_period_us=_sync_period(section),
+        sync_window_us=whole("sync_window"),
+        sync_overflow=whole("sync_overflow", 0, 0, 240),
+        heartbeat_producer_ms=whole("heartbeat_producer", 0, 0, UNSIGNED16),
+        heartbeat_multiplier=section.real("heartbeat_multiplier", options.heartbeat_multiplier),
+        emcy_inhibit_time_100us=whole("emcy_inhibit_time", 0, 0, UNSIGNED16),
+        nmt_inhibit_time_100us=whole("nmt_inhibit_time", 0, 0, UNSIGNED16),
+        error_behavior=_error_behavior(section),
+        heartbeat_consumer=section.flag("heartbeat_consumer", default=True),
+        time_cob_id=whole("time_cob_id", _TIME),
+        **{key: bool(whole(key, default, -UNSIGNED16)) for key, default in _FLAGS.items()},
+        boot_time_ms=whole("boot_time"),
+        boot_timeout_ms=whole("boot_timeout") if "boot_timeout" in section else None,
+        driver=section.text("driver"),
+        package=section.text("package"),
+        extra=read_extra(section),
+    )
+
+
+def _bit_rate(section: BusFileSection) -> int:
+    rate = section.whole("baudrate", 1000, 1, 1000)
+    if rate not in BIT_RATES_KBIT:
+        allowed = ", ".join(map(str, BIT_RATES_KBIT))
+        section.note("bit-rate", "baudrate", f"baudrate: {rate} kbit/s is none of {allowed}")
+    return rate
+
+
+def _sync_period(section: BusFileSection) -> int:
+    period_us = section.whole("sync_period")
+    if 0 < period_us < _SHORTEST_SYNC_US:
+        text = f"sync_period: a SYNC each {period_us} µs; {_SHORTEST_SYNC_US} µs is short already"
+        section.note("sync-period", "sync_period", text)
+    return period_us
+
+
+def _error_behavior(section: BusFileSection) -> dict[int, int]:
+    behavior = {1: 0}
+    if "error_behavior" in section:
+        given = section.section("error_behavior")
+        for sub in given.fields:
+            if isinstance(sub, int):
+                behavior[sub] = given.whole(sub, 0, 0, UNSIGNED8)
+            else:
+                given.note("kind", sub, f"{sub!r:.40}: a sub-index of 1029h is a number")
+    return behavior
+
+
+def _watch_master(node: BusFileSection, sheet: Sheet, writes: Writes, master: BusMaster) -> None:
+    """Write the time of the master's heartbeat that a slave shall watch, before all else."""
+    time_ms = int(master.heartbeat_producer_ms * master.heartbeat_multiplier)
+    entries = {sub: sheet.value(_CONSUMER, sub) for sub in sheet.subs(_CONSUMER) if sub}
+    watched = node.flag("heartbeat_consumer", default=False) and time_ms > 0
+    place = node.place_of("heartbeat_consumer")
+    if not watched:
+        for sub, value in entries.items():
+            if value & UNSIGNED16 and _node_id(value) == master.node_id:
+                writes.insert(_CONSUMER, sub, master.node_id << 16, place)
+        return
+    if _CONSUMER not in sheet:
+        text = f"heartbeat_consumer: {sheet.path.name} has no 1016h"
+        node.note("no-object", "heartbeat_consumer", text)
+        return
+    own = [sub for sub, value in entries.items() if _node_id(value) == master.node_id]
+    free = [sub for sub, value in entries.items() if not value & UNSIGNED16 or _is_unused(value)]
+    if sub := next(iter(own + free), 0):
+        value = (master.node_id & UNSIGNED8) << 16 | time_ms & UNSIGNED16
+        writes.insert(_CONSUMER, sub, value, place)
+    else:
+        text = f"heartbeat_consumer: no entry of 1016h is free: {sheet.place(_CONSUMER)}"
+        node.note("no-entry", "heartbeat_consumer", text)
+
+
+def _node_id(value: int) -> int:
+    return value >> 16 & UNSIGNED8
+
+
+def _is_unused(value: int) -> bool:
+    return not 1 <= _node_id(value) <= HIGHEST_NODE_ID
+
+
+_MOST_BYTES: Final = 1 << 20
 """A larger file is no bus.yml."""
 _SECTION: Final = re.compile(
     r"^(master|nodes|defaults)[ \t]*:|^[ \t]+(dcf|node_id)[ \t]*:", re.MULTILINE
@@ -34,7 +163,7 @@ _TOML: Final = re.compile(r"^[ \t]*\[\[?[\w.\"-]+\]|^[\w.-]+[ \t]*=", re.MULTILI
 _LIST_OF_NODES: Final = re.compile(
     r"^nodes[ \t]*:[ \t]*(?:\[|(?:#[^\n]*)?\n(?:[ \t]*(?:#[^\n]*)?\n)*+[ \t]*-[ \t])", re.MULTILINE
 )
-NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[bus]'"
+_NEEDS_YAML: Final = "a bus.yml needs PyYAML: pip install 'tickrig[bus]'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +180,7 @@ class BusFile:
     """
 
     path: Path
-    options: BusOptions
+    options: BusDefaults
     master: BusMaster | None
     slaves: dict[str, BusSlave]
     findings: tuple[RuleFinding, ...] = ()
@@ -116,7 +245,7 @@ def read_bus_file(path: Path) -> BusFile:
         ImportError: PyYAML is not installed; the text says how.
     """
     with path.open("rb") as file:
-        return decode_bus_file(file.read(MOST_BYTES + 1), path)
+        return decode_bus_file(file.read(_MOST_BYTES + 1), path)
 
 
 def decode_bus_file(data: bytes, path: Path) -> BusFile:
@@ -124,16 +253,16 @@ def decode_bus_file(data: bytes, path: Path) -> BusFile:
     try:
         from tickrig.host.canopen.bus_file.yaml_tree import read_yaml  # noqa: PLC0415 - an extra
     except ModuleNotFoundError as error:
-        raise ImportError(NEEDS_YAML) from error
-    notes = Notes()
-    empty = BusFile(path, BusOptions(), None, {})
-    if len(data) > MOST_BYTES:
-        notes.note("yaml", Place(str(path), 1), "", "more than 1 MB: this is no bus.yml")
+        raise ImportError(_NEEDS_YAML) from error
+    notes = BusFileNotes()
+    empty = BusFile(path, BusDefaults(), None, {})
+    if len(data) > _MOST_BYTES:
+        notes.note("yaml", FilePlace(str(path), 1), "", "more than 1 MB: this is no bus.yml")
         return replace(empty, findings=notes.all)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        place = Place(str(path), data.count(b"\n", 0, error.start) + 1)
+        place = FilePlace(str(path), data.count(b"\n", 0, error.start) + 1)
         notes.note("yaml", place, "", f"the byte 0x{data[error.start]:02x} is no UTF-8")
         return replace(empty, findings=notes.all)
     tree, wrong = read_yaml(text, str(path))
@@ -141,15 +270,15 @@ def decode_bus_file(data: bytes, path: Path) -> BusFile:
         notes.note(rule, place, "", reason)
     if tree is None:
         return replace(empty, findings=notes.all)
-    return _Reader(path, read_layout(tree, notes), notes, Place(str(path), 0)).read()
+    return _Reader(path, read_layout(tree, notes), notes, FilePlace(str(path), 0)).read()
 
 
 class _Reader:
     """Reads the sections of one file."""
 
-    def __init__(self, path: Path, layout: Layout, notes: Notes, top: Place) -> None:
+    def __init__(self, path: Path, layout: Layout, notes: BusFileNotes, top: FilePlace) -> None:
         self._path, self._layout, self._notes, self._top = path, layout, notes, top
-        self._options = read_options(layout.options)
+        self._options = _read_options(layout.options)
         self._cob_ids, self._sheets = CobIds(), Sheets(path.parent, self._options.dcf_path)
 
     def read(self) -> BusFile:
@@ -159,7 +288,7 @@ class _Reader:
             rule = "no-master" if has_drivers(self._layout) else "slaves-only"
             self._notes.note(rule, self._top, "", "it has no section master")
         else:
-            master = read_master(self._layout.master, self._options)
+            master = _read_master(self._layout.master, self._options)
         slaves: dict[str, BusSlave] = {}
         for name, node in self._layout.slaves.items():
             if (slave := self._slave(name, node, master)) is not None:
@@ -170,7 +299,7 @@ class _Reader:
         check_settings(self._layout, slaves)
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
-    def _slave(self, name: str, node: Section, master: BusMaster | None) -> BusSlave | None:
+    def _slave(self, name: str, node: BusFileSection, master: BusMaster | None) -> BusSlave | None:
         sheet = self._sheets.find(node)
         if sheet is None:
             return None
@@ -184,6 +313,6 @@ class _Reader:
         slave = reader.read()
         check_defaults(self._layout, node, self._notes.since(count))
         if master is not None:
-            watch_master(node, sheet, reader.writes, master)
+            _watch_master(node, sheet, reader.writes, master)
         pdos = pdos_after(sheet, reader.writes)
         return replace(slave, writes=reader.writes.all, pdos=pdos)

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tickrig.host.canopen.bus_file.item import Item, Place
-from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.host.canopen.bus_file.notes import FilePlace, Item
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.nmt import INVALID
 from tickrig.wire.canopen.pdo import MappedObject
 
-Extra = Mapping[str, Item]
+_Extra = Mapping[str, Item]
 """A mapping `tickrig:` of the file, as it stands there."""
 
 
@@ -48,7 +48,7 @@ class BusWrite:
     index: int
     sub_index: int
     data: bytes
-    place: Place
+    place: FilePlace
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +82,7 @@ class BusPdo:
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class DriveChannel:
     """An axis of a drive as ros2_canopen's 402 driver has it; lengths are its user's units.
 
     Attributes:
@@ -145,7 +145,7 @@ class BusSlave:
 
     name: str
     node_id: int
-    place: Place
+    place: FilePlace
     sheet: Path
     device: EdsDevice
     identity: Identity
@@ -168,9 +168,9 @@ class BusSlave:
     boot_timeout_ms: int | None = None
     driver: str = ""
     package: str = ""
-    channels: tuple[Channel, ...] = ()
+    channels: tuple[DriveChannel, ...] = ()
     settings: Mapping[str, Item] = field(default_factory=dict)
-    extra: Extra = field(default_factory=dict)
+    extra: _Extra = field(default_factory=dict)
 
     @property
     def num_channels(self) -> int:
@@ -215,7 +215,7 @@ class BusMaster:
     """
 
     node_id: int
-    place: Place
+    place: FilePlace
     baudrate: int = 1000
     identity: Identity = Identity()
     sync_period_us: int = 0
@@ -237,11 +237,11 @@ class BusMaster:
     boot_timeout_ms: int | None = None
     driver: str = ""
     package: str = ""
-    extra: Extra = field(default_factory=dict)
+    extra: _Extra = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
-class BusOptions:
+class BusDefaults:
     """What holds for all nodes that say nothing else.
 
     Attributes:
@@ -254,4 +254,4 @@ class BusOptions:
     dcf_path: str = ""
     heartbeat_multiplier: float = 3.0
     retry_factor: int = 3
-    extra: Extra = field(default_factory=dict)
+    extra: _Extra = field(default_factory=dict)

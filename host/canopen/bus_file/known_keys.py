@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.canopen.bus_file.item import Item
-from tickrig.host.canopen.bus_file.notes import Section
+from tickrig.host.canopen.bus_file.notes import BusFileSection, Item
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.eds.eds_file import shorten
 
@@ -16,13 +15,13 @@ EXTRA: Final = "tickrig"
 OPTIONS: Final = ("dcf_path", "heartbeat_multiplier", "retry_factor", EXTRA)
 ROS: Final = ("driver", "package", "namespace", "remappings", "diagnostics", "non_transmit_timeout")
 """What ros2_canopen reads of the master and of nodes."""
-BOTH: Final = (
+_BOTH: Final = (
     *("node_id", "dcf_path", "vendor_id", "product_code", "revision_number", "serial_number"),
     *("heartbeat_producer", "heartbeat_consumer", "heartbeat_multiplier", "error_behavior"),
     *("time_cob_id", EXTRA, *ROS),
 )
 MASTER: Final = (
-    *(*BOTH, "baudrate", "sync_period", "sync_window", "sync_overflow", "emcy_inhibit_time"),
+    *(*_BOTH, "baudrate", "sync_period", "sync_window", "sync_overflow", "emcy_inhibit_time"),
     *("nmt_inhibit_time", "start", "start_nodes", "start_all_nodes", "reset_all_nodes"),
     *("stop_all_nodes", "boot_time", "boot_timeout"),
 )
@@ -37,7 +36,7 @@ DRIVER: Final = (
 )
 """What the drivers of ros2_canopen read of a node, and its hardware interfaces."""
 SLAVE: Final = (
-    *(*BOTH, "dcf", "guard_time", "life_time_factor", "retry_factor", "rpdo", "tpdo", "sdo"),
+    *(*_BOTH, "dcf", "guard_time", "life_time_factor", "retry_factor", "rpdo", "tpdo", "sdo"),
     *("boot", "mandatory", "reset_communication", "software_file", "software_version"),
     *("configuration_file", "restore_configuration", *DRIVER),
 )
@@ -47,7 +46,7 @@ PDO: Final = (
 )
 MAPPED: Final = ("index", "sub_index", "bits")
 WRITE: Final = ("index", "sub_index", "value")
-FLAGS: Final = {
+_FLAGS: Final = {
     **dict.fromkeys(("true", "yes", "on", "y"), 1),
     **dict.fromkeys(("false", "no", "off", "n"), 0),
 }
@@ -66,7 +65,7 @@ class Allowed(NamedTuple):
         Quotes do not matter to it. A flag is 1 or 0.
         """
         if not self.numbers:
-            return FLAGS.get(item.text.lower())
+            return _FLAGS.get(item.text.lower())
         try:
             number = None if isinstance(item.value, bool) else int(item.text, 0)
         except ValueError:
@@ -89,7 +88,9 @@ SETTINGS: Final = {
 """By key of a node."""
 
 
-def check_keys(section: Section, known: Iterable[str], *, open_to_others: bool = False) -> None:
+def check_keys(
+    section: BusFileSection, known: Iterable[str], *, open_to_others: bool = False
+) -> None:
     """Note the keys that nobody knows.
 
     Args:

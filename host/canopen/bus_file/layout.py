@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final, NamedTuple, cast
 
-from tickrig.host.canopen.bus_file.item import Item, Key, Place
-from tickrig.host.canopen.bus_file.notes import Notes, Section
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace, Item, Key
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 OPTIONS: Final = "options"
 MASTER: Final = "master"
-DEFAULTS: Final = "defaults"
-NODES: Final = "nodes"
-COGEN: Final = (OPTIONS, MASTER, DEFAULTS, NODES)
+_DEFAULTS: Final = "defaults"
+_NODES: Final = "nodes"
+_COGEN: Final = (OPTIONS, MASTER, _DEFAULTS, _NODES)
 
 
 class Layout(NamedTuple):
@@ -27,55 +26,56 @@ class Layout(NamedTuple):
         defaults: what cogen gives to all nodes; None where there is nothing.
     """
 
-    options: Section | None
-    master: Section | None
-    slaves: dict[str, Section]
-    hidden: dict[str, Place]
-    defaults: Section | None = None
+    options: BusFileSection | None
+    master: BusFileSection | None
+    slaves: dict[str, BusFileSection]
+    hidden: dict[str, FilePlace]
+    defaults: BusFileSection | None = None
 
 
-def read_layout(tree: Item, notes: Notes) -> Layout:
+def read_layout(tree: Item, notes: BusFileNotes) -> Layout:
     """Find the sections of a file.
 
     What begins with a dot is no node: anchors stand there. As cogen does it, `defaults` count more
     than what a node says, and all keys are sorted.
     """
-    top = Section(notes, "", tree, tree.place)
+    top = BusFileSection(notes, "", tree, tree.place)
     ends = _optional(top, OPTIONS), _optional(top, MASTER)
-    if NODES in top or DEFAULTS in top:
-        return Layout(*ends, _cogen_nodes(top), {}, _optional(top, DEFAULTS))
+    if _NODES in top or _DEFAULTS in top:
+        return Layout(*ends, _cogen_nodes(top), {}, _optional(top, _DEFAULTS))
     names = list(_named(top))
     hidden = {key: top.place_of(key) for key in names if key.startswith(".")}
     nodes = (key for key in names if key not in {OPTIONS, MASTER, *hidden})
     slaves = {
-        key: Section(notes, shorten(key), top.fields[key], top.place_of(key)) for key in nodes
+        key: BusFileSection(notes, shorten(key), top.fields[key], top.place_of(key))
+        for key in nodes
     }
     return Layout(*ends, slaves, hidden)
 
 
-def _optional(top: Section, key: str) -> Section | None:
+def _optional(top: BusFileSection, key: str) -> BusFileSection | None:
     item = top.fields.get(key)
-    return None if item is None else Section(top.notes, key, item, top.place_of(key))
+    return None if item is None else BusFileSection(top.notes, key, item, top.place_of(key))
 
 
-def _cogen_nodes(top: Section) -> dict[str, Section]:
+def _cogen_nodes(top: BusFileSection) -> dict[str, BusFileSection]:
     for key in top.fields:
-        if key not in COGEN and not str(key).startswith("."):
+        if key not in _COGEN and not str(key).startswith("."):
             text = f"{shorten(str(key))!r} stands beside nodes: it is dropped"
             top.note("section-lost", key, text)
-    if NODES not in top:
-        top.note("no-nodes", DEFAULTS, "defaults, but no nodes: that they are for")
+    if _NODES not in top:
+        top.note("no-nodes", _DEFAULTS, "defaults, but no nodes: that they are for")
         return {}
-    nodes = Section(top.notes, NODES, top.fields[NODES], top.place_of(NODES))
-    defaults = _optional(top, DEFAULTS)
+    nodes = BusFileSection(top.notes, _NODES, top.fields[_NODES], top.place_of(_NODES))
+    defaults = _optional(top, _DEFAULTS)
     found = {}
     for name in sorted(_named(nodes)):
         item = _sorted(_with_defaults(top.notes, name, nodes.fields[name], defaults), {})
-        found[name] = Section(top.notes, shorten(name), item, nodes.place_of(name))
+        found[name] = BusFileSection(top.notes, shorten(name), item, nodes.place_of(name))
     return found
 
 
-def _named(section: Section) -> Iterator[str]:
+def _named(section: BusFileSection) -> Iterator[str]:
     """Give the names of nodes; one that is no text is noted."""
     for key in section.fields:
         if isinstance(key, str):
@@ -84,7 +84,9 @@ def _named(section: Section) -> Iterator[str]:
             section.note("kind", key, f"{shorten(str(key))}: the name of a node is a text")
 
 
-def _with_defaults(notes: Notes, name: str, item: Item, defaults: Section | None) -> Item:
+def _with_defaults(
+    notes: BusFileNotes, name: str, item: Item, defaults: BusFileSection | None
+) -> Item:
     """Return a node with all that defaults say."""
     if defaults is None or not item.is_mapping:
         return item
@@ -93,7 +95,7 @@ def _with_defaults(notes: Notes, name: str, item: Item, defaults: Section | None
         if usual is not own:
             text = f"{shorten(str(key))} is that of defaults: {usual.place}"
             notes.note("defaults-win", item.keys[key], shorten(name), text)
-    keys: dict[Key, Place] = {
+    keys: dict[Key, FilePlace] = {
         **item.keys,
         **{key: defaults.place_of(key) for key in defaults.fields},
     }

@@ -8,38 +8,37 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusPdo
 from tickrig.host.canopen.bus_file.known_keys import MAPPED, PDO, check_keys
-from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
-from tickrig.host.canopen.bus_file.sheet import Sheet
-from tickrig.host.canopen.bus_file.writes import Writes
-from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
+from tickrig.host.canopen.bus_file.sheet import Sheet, Writes
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.nmt import INVALID
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 
 RPDO: Final = 0x1400
 TPDO: Final = 0x1800
-MAPPING: Final = 0x200
-MOST_PDOS: Final = 0x200
-PREDEFINED: Final = 4
-AUTO: Final = "auto"
-OTHER_WAY: Final = {
+_MAPPING: Final = 0x200
+_MOST_PDOS: Final = 0x200
+_PREDEFINED: Final = 4
+_AUTO: Final = "auto"
+_OTHER_WAY: Final = {
     True: ("event_deadline",),
     False: ("event_timer", "inhibit_time", "sync_start"),
 }
 """Keys that dcfgen reads of PDOs of the other direction alone, by whether it is a TPDO."""
-FIRST_FREE: Final = 0x680
-END_OF_FREE: Final = 0x6E0
+_FIRST_FREE: Final = 0x680
+_END_OF_FREE: Final = 0x6E0
 
 
 class CobIds:
     """The COB-IDs that `auto` gives to PDOs beyond the fourth, one after the other."""
 
     def __init__(self) -> None:
-        self._next = FIRST_FREE
+        self._next = _FIRST_FREE
 
     def take(self) -> int | None:
         """Return the next one, None if all are taken."""
-        if self._next >= END_OF_FREE:
+        if self._next >= _END_OF_FREE:
             return None
         self._next += 1
         return self._next - 1
@@ -55,7 +54,7 @@ class PdoReader:
         cob_ids: of the whole bus.
     """
 
-    def __init__(self, node: Section, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:
+    def __init__(self, node: BusFileSection, sheet: Sheet, writes: Writes, cob_ids: CobIds) -> None:
         self._node, self._sheet, self._writes, self._cob_ids = node, sheet, writes, cob_ids
 
     def read(self, key: str, first: int) -> tuple[BusPdo, ...]:
@@ -70,7 +69,7 @@ class PdoReader:
         """
         pdos = {
             index - first + 1: _of_sheet(self._sheet, index)
-            for index in range(first, first + MOST_PDOS)
+            for index in range(first, first + _MOST_PDOS)
             if index in self._sheet
         }
         if key in self._node:
@@ -86,10 +85,10 @@ class PdoReader:
                     pdos[pdo.number] = self._configured(pdo, first + pdo.number - 1, one)
         return tuple(pdo for pdo in pdos.values() if pdo.enabled and pdo.mapping)
 
-    def _configured(self, pdo: BusPdo, index: int, section: Section) -> BusPdo:
+    def _configured(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
         """Write what differs from the EDS, in the order of dcfgen: off, parameters, mapping, on."""
         check_keys(section, PDO)
-        for key in OTHER_WAY[pdo.transmit]:
+        for key in _OTHER_WAY[pdo.transmit]:
             if key in section:
                 kind = "a TPDO" if pdo.transmit else "an RPDO"
                 section.note("pdo-key", key, f"{key} of {kind}: dcfgen writes nothing of it")
@@ -105,7 +104,7 @@ class PdoReader:
             return pdo
         pdo = self._with_parameters(pdo, index, section)
         if "mapping" in section:
-            pdo = self._with_mapping(pdo, index + MAPPING, section)
+            pdo = self._with_mapping(pdo, index + _MAPPING, section)
         if section.flag("enabled", default=True):
             self._writes.add(index, 1, pdo.cob_id, place)
         elif pdo.mapping and pdo.transmit:
@@ -113,23 +112,23 @@ class PdoReader:
             section.note("not-disabled", "enabled", text)
         return pdo
 
-    def _cob_id(self, pdo: BusPdo, section: Section) -> int:
+    def _cob_id(self, pdo: BusPdo, section: BusFileSection) -> int:
         item = section.fields.get("cob_id")
         if item is None:
             return pdo.cob_id
-        if item.value != AUTO:
+        if item.value != _AUTO:
             return section.whole("cob_id", pdo.cob_id)
-        if pdo.number <= PREDEFINED:
+        if pdo.number <= _PREDEFINED:
             base = 0x80 if pdo.transmit else 0x100
             return pdo.number * 0x100 + base + self._sheet.node_id
         taken = self._cob_ids.take()
         if taken is None:
-            text = f"auto: none is left, 0x{FIRST_FREE:X}..0x{END_OF_FREE - 1:X} are taken"
+            text = f"auto: none is left, 0x{_FIRST_FREE:X}..0x{_END_OF_FREE - 1:X} are taken"
             section.note("cob-id-none", "cob_id", text)
             return pdo.cob_id
         return taken
 
-    def _with_parameters(self, pdo: BusPdo, index: int, section: Section) -> BusPdo:
+    def _with_parameters(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
         """Take the parameters that the file gives; those of the other direction are not written."""
         kind = section.whole("transmission", pdo.transmission, 0, UNSIGNED8)
         inhibit = section.whole("inhibit_time", pdo.inhibit_time_100us, 0, UNSIGNED16)
@@ -157,7 +156,7 @@ class PdoReader:
             sync_start=sync,
         )
 
-    def _with_mapping(self, pdo: BusPdo, index: int, section: Section) -> BusPdo:
+    def _with_mapping(self, pdo: BusPdo, index: int, section: BusFileSection) -> BusPdo:
         place = section.place_of("mapping")
         entries = section.sections("mapping")
         if entries or self._sheet.value(index, 0):
@@ -176,7 +175,7 @@ class PdoReader:
             self._writes.add(index, 0, len(mapping), place)
         return replace(pdo, mapping=tuple(mapping))
 
-    def _mapped(self, entry: Section, pdo: BusPdo) -> MappedObject | None:
+    def _mapped(self, entry: BusFileSection, pdo: BusPdo) -> MappedObject | None:
         """Return what an entry maps, None if it is not there."""
         if "index" not in entry:
             entry.note("kind", "index", "an entry of mapping has an index")
@@ -205,7 +204,7 @@ class PdoReader:
         return MappedObject(index, sub, row.data_type.bits)
 
     def _check_mappable(
-        self, entry: Section, row: EntryDescription, what: str, pdo: BusPdo
+        self, entry: BusFileSection, row: EntryDescription, what: str, pdo: BusPdo
     ) -> None:
         place = self._sheet.place(row.index, row.sub)
         if not row.access & (Access.TPDO | Access.RPDO):
@@ -232,7 +231,7 @@ def _of_sheet(sheet: Sheet, index: int) -> BusPdo:
         inhibit_time_100us=value(index, 3) if count >= 3 and transmit else 0,
         event_timer_ms=value(index, 5) if count >= 5 else 0,
         sync_start=value(index, 6) if count >= 6 and transmit else 0,
-        mapping=tuple(_mapping(sheet, index + MAPPING)),
+        mapping=tuple(_mapping(sheet, index + _MAPPING)),
     )
 
 
@@ -252,9 +251,9 @@ def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
         return sheet.value(index, sub, default) if data is None else int.from_bytes(data, "little")
 
     def pdo(index: int, number: int, transmit: bool) -> BusPdo:
-        count = value(index + MAPPING, 0)
-        subs = (sub for sub in sheet.subs(index + MAPPING) if 1 <= sub <= count)
-        mapping = (MappedObject.parse(value(index + MAPPING, sub)) for sub in subs)
+        count = value(index + _MAPPING, 0)
+        subs = (sub for sub in sheet.subs(index + _MAPPING) if 1 <= sub <= count)
+        mapping = (MappedObject.parse(value(index + _MAPPING, sub)) for sub in subs)
         return BusPdo(
             *(number, transmit, value(index, 1, INVALID), value(index, 2)),
             inhibit_time_100us=value(index, 3) if transmit else 0,
@@ -266,6 +265,6 @@ def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
     return tuple(
         pdo(first + at, at + 1, first == TPDO)
         for first in (RPDO, TPDO)
-        for at in range(MOST_PDOS)
+        for at in range(_MOST_PDOS)
         if first + at in sheet
     )

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canopen.bus_file.item import Place
-from tickrig.host.canopen.bus_file.notes import Section
+from tickrig.host.canopen.bus_file.bus_values import BusWrite
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace
 from tickrig.host.canopen.eds import open_eds
 from tickrig.host.text.names import closest
+from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import (
     COMMISSIONING,
     HIGHEST_NODE_ID,
@@ -21,14 +22,14 @@ from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
+_FOLDER_WORD: Final = "@BUS_CONFIG_PATH@"
 """What the build of ros2_canopen replaces by the folder of the installed bus.yml."""
 IDENTITY: Final = 0x1018
 UNSET: Final = 255
 """The node-ID of who has none."""
-WRONG: Final = -(1 << 31) - 1
+_WRONG: Final = -(1 << 31) - 1
 """Stands for a node-ID that is no number; what is wrong with it is noted."""
-SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
+_SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
 
 class Sheet:
@@ -72,13 +73,13 @@ class Sheet:
         """Say where an object is described that lacks an entry, or that there is no object."""
         return str(self.place(index)) if index in self else f"{self.path} has no {index:04X}h"
 
-    def place(self, index: int, sub: int | None = None) -> Place:
+    def place(self, index: int, sub: int | None = None) -> FilePlace:
         """Return the line where an object, or an entry of it, is described."""
         names = [] if sub is None else [f"{index:04X}sub{sub:X}"]
         for section in (*names, f"{index:04X}"):
             if line := self.file.line(section):
-                return Place(str(self.path), line)
-        return Place(str(self.path), 0)
+                return FilePlace(str(self.path), line)
+        return FilePlace(str(self.path), 0)
 
     def head_number(self, section: str, key: str) -> int:
         """Return a number of the head, 0 if there is none."""
@@ -107,7 +108,7 @@ class Sheets:
         self._folder, self._dcf_path = folder, dcf_path
         self._read: dict[Path, tuple[EdsFile, EdsDevice]] = {}
 
-    def find(self, node: Section) -> Sheet | None:
+    def find(self, node: BusFileSection) -> Sheet | None:
         """Return the sheet of a node; None, and a finding, without one.
 
         It is looked for beside the file, as dcfgen does; then in `dcf_path`; then by its name alone
@@ -140,17 +141,17 @@ class Sheets:
         yield folder.parent / given.name
 
     def _expanded(self, text: str) -> str:
-        return os.path.expandvars(text.replace(FOLDER_WORD, str(self._folder)))
+        return os.path.expandvars(text.replace(_FOLDER_WORD, str(self._folder)))
 
     def _not_found(self, name: str, looked: list[Path]) -> str:
         """Say where a file is not, and which one could be meant."""
         where = ", ".join(dict.fromkeys(str(path.parent) for path in looked))
-        beside = [path.name for path in self._folder.iterdir() if path.suffix.lower() in SUFFIXES]
+        beside = [path.name for path in self._folder.iterdir() if path.suffix.lower() in _SUFFIXES]
         meant = closest(Path(name).name, sorted(beside))
         hint = f"; did you mean {shorten(meant[0])!r}?" if meant else ""
         return f"no file {shorten(name)!r}; looked in {_printable(where)}{hint}"
 
-    def _sheet(self, node: Section, path: Path, *, is_first: bool) -> Sheet | None:
+    def _sheet(self, node: BusFileSection, path: Path, *, is_first: bool) -> Sheet | None:
         if path not in self._read:
             file = open_eds(path)
             self._read[path] = file, read_device(file)
@@ -160,15 +161,15 @@ class Sheets:
             node.note("file-elsewhere", "dcf", text)
         for one in file.errors:
             where = f"[{shorten(one.section)}] " if one.section else ""
-            place = Place(str(path), one.line)
+            place = FilePlace(str(path), one.line)
             node.notes.note("eds", place, node.name, f"{where}{one.reason}")
         return Sheet(path, file, device, _node_id(node)) if device.entries else None
 
 
-def _node_id(node: Section) -> int:
+def _node_id(node: BusFileSection) -> int:
     """Return the node-ID that the section gives, 0 for none or a wrong one."""
-    number = node.whole("node_id", WRONG if "node_id" in node else UNSET, WRONG + 1)
-    if number == WRONG:
+    number = node.whole("node_id", _WRONG if "node_id" in node else UNSET, _WRONG + 1)
+    if number == _WRONG:
         return 0
     if number != UNSET and not 1 <= number <= HIGHEST_NODE_ID:
         node.note("node-id", "node_id", f"node_id: {number} is not in 1..127")
@@ -188,3 +189,105 @@ def _said(name: str, error: OSError | EdsError) -> str:
 def _printable(text: str) -> str:
     """Return a path that can be printed in a line."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+# The writes of a concise DCF, as dcfgen makes them, held against the EDS.
+
+_FLOATS: Final = (DataType.REAL32, DataType.REAL64)
+_ODD_SIZES: Final = (3, 5, 6, 7)
+
+
+class Writes:
+    """Collects the writes for one slave.
+
+    Args:
+        sheet: of the slave.
+        name: of its section.
+        notes: take what the EDS contradicts.
+    """
+
+    def __init__(self, sheet: Sheet, name: str, notes: BusFileNotes) -> None:
+        self._sheet, self._name, self._notes = sheet, name, notes
+        self._all: list[BusWrite] = []
+
+    @property
+    def all(self) -> tuple[BusWrite, ...]:
+        """All of them in their order."""
+        return tuple(self._all)
+
+    def add(self, index: int, sub: int, value: int, place: FilePlace, said: str = "") -> None:
+        """Add a write; what dcfgen refuses is noted and left out.
+
+        Args:
+            index: of the object.
+            sub: sub-index.
+            value: as the file gives it.
+            place: what asks for it.
+            said: the value as it is written there.
+        """
+        if (write := self._made(index, sub, value, place, said)) is not None:
+            self._all.append(write)
+
+    def insert(self, index: int, sub: int, value: int, place: FilePlace) -> None:
+        """Put a write before all others."""
+        if (write := self._made(index, sub, value, place, "")) is not None:
+            self._all.insert(0, write)
+
+    def values(self) -> dict[int, bytes]:
+        """Return what is written last, by index << 8 | sub-index."""
+        return {write.index << 8 | write.sub_index: write.data for write in self._all}
+
+    def _made(
+        self, index: int, sub: int, value: int, place: FilePlace, said: str
+    ) -> BusWrite | None:
+        what, row = f"{index:04X}h:{sub:02X}", self._sheet.row(index, sub)
+        kind = DataType.UNSIGNED8
+        if row is not None:
+            kind = row.data_type
+            self._check_access(row, what, place)
+        elif sub or index not in self._sheet:
+            text = f"{what} is not there: {self._sheet.beside(index)}"
+            self._notes.note("object-missing", place, self._name, text)
+            return None
+        data = self._data(kind, what, value, place, said or str(value))
+        if data is None:
+            return None
+        if row is not None:
+            self._check_limits(row, what, value, place)
+        return BusWrite(index, sub, data, place)
+
+    def _data(
+        self, kind: DataType, what: str, value: int, place: FilePlace, said: str
+    ) -> bytes | None:
+        if kind not in _FLOATS and not kind.is_integer:
+            text = f"{what} is a {kind.name}, of which dcfgen writes none"
+            self._notes.note("value-type", place, self._name, text)
+            return None
+        if kind.size in _ODD_SIZES:
+            text = f"{what} is a {kind.name}: dcfgen writes more bytes than it says"
+            self._notes.note("odd-size", place, self._name, text)
+        if kind is DataType.BOOLEAN:  # a byte for dcfgen, whatever is in it
+            kind = DataType.UNSIGNED8
+        try:
+            return kind.encode(float(value) if kind in _FLOATS else value)
+        except (ValueError, OverflowError):
+            text = f"{what}: {said} is no {kind.name}"
+            self._notes.note("value-range", place, self._name, text)
+            return None
+
+    def _check_access(self, row: EntryDescription, what: str, place: FilePlace) -> None:
+        if not row.writable:
+            text = f"{what} cannot be written: {self._sheet.place(row.index, row.sub)}"
+            self._notes.note("read-only", place, self._name, text)
+
+    def _check_limits(self, row: EntryDescription, what: str, value: int, place: FilePlace) -> None:
+        low, high = row.low, row.high
+        if (low is not None and value < low) or (high is not None and value > high):
+            limits = f"{'' if low is None else low}..{'' if high is None else high}"
+            text = f"{what}: {value} is not in {limits}: {self._sheet.place(row.index, row.sub)}"
+            self._notes.note("value-limits", place, self._name, text)
+
+
+def final_places(writes: Iterable[BusWrite]) -> dict[int, FilePlace]:
+    """Return what asks for the last write to an entry, by index << 8 | sub-index."""
+    return {write.index << 8 | write.sub_index: write.place for write in writes}

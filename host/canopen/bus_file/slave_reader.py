@@ -6,12 +6,11 @@ from dataclasses import replace
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import (
-    BusOptions,
+    BusDefaults,
     BusSlave,
-    Channel,
+    DriveChannel,
     Identity,
 )
-from tickrig.host.canopen.bus_file.item import Item, Place
 from tickrig.host.canopen.bus_file.known_keys import (
     DRIVER,
     EXTRA,
@@ -20,14 +19,19 @@ from tickrig.host.canopen.bus_file.known_keys import (
     WRITE,
     check_keys,
 )
-from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, Section
+from tickrig.host.canopen.bus_file.notes import (
+    UNSIGNED8,
+    UNSIGNED16,
+    BusFileSection,
+    FilePlace,
+    Item,
+)
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
-from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet
-from tickrig.host.canopen.bus_file.writes import Writes
-from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet, Writes
 from tickrig.wire.canopen.eds.eds_file import shorten
+from tickrig.wire.canopen.nmt import INVALID
 
-MOST_CHANNELS: Final = 8
+_MOST_CHANNELS: Final = 8
 TIME, EMCY, HEARTBEAT, GUARD_TIME, LIFE_TIME = 0x1012, 0x1014, 0x1017, 0x100C, 0x100D
 ERROR_BEHAVIOR, RESTORE, SOFTWARE = 0x1029, 0x1011, 0x1F56
 
@@ -44,7 +48,7 @@ class SlaveReader:
     """
 
     def __init__(
-        self, name: str, node: Section, sheet: Sheet, options: BusOptions, cob_ids: CobIds
+        self, name: str, node: BusFileSection, sheet: Sheet, options: BusDefaults, cob_ids: CobIds
     ) -> None:
         self._name, self._node, self._sheet, self._options = name, node, sheet, options
         self._cob_ids = cob_ids
@@ -67,7 +71,7 @@ class SlaveReader:
             slave,
             driver=node.text("driver"),
             package=node.text("package"),
-            channels=read_channels(node, self._name),
+            channels=_read_channels(node, self._name),
             settings=self._settings(),
             extra=read_extra(node),
         )
@@ -133,7 +137,7 @@ class SlaveReader:
         for sub, key in ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber")):
             head, number = sheet.head_number("DeviceInfo", key), sheet.value(IDENTITY, sub)
             if head and number and head != number:
-                place = Place(str(sheet.path), sheet.file.line("DeviceInfo", key))
+                place = FilePlace(str(sheet.path), sheet.file.line("DeviceInfo", key))
                 where = sheet.place(IDENTITY, sub)
                 text = f"{key}=0x{head:08X} is expected, but 1018h has 0x{number:08X}: {where}"
                 self._node.notes.note("identity", place, self._node.name, text)
@@ -231,20 +235,20 @@ class SlaveReader:
         return {key: fields[key] for key in DRIVER if key in fields}
 
 
-def read_extra(section: Section) -> dict[str, Item]:
+def read_extra(section: BusFileSection) -> dict[str, Item]:
     """Return what is for us alone, by key."""
     if EXTRA not in section:
         return {}
     return {str(key): item for key, item in section.section(EXTRA).fields.items()}
 
 
-def read_channels(node: Section, name: str) -> tuple[Channel, ...]:
+def _read_channels(node: BusFileSection, name: str) -> tuple[DriveChannel, ...]:
     """Read the axes of a node: their names and scales; without a number there is one."""
-    count = node.whole("num_channels", 1, 1, MOST_CHANNELS)
+    count = node.whole("num_channels", 1, 1, _MOST_CHANNELS)
     names = node.fields.get("channel_names")
     own = node.sections("channels")
     given = [item.text for item in names.items] if names else []
-    usual = {key: node.real(key, getattr(Channel(""), key)) for key in SCALES if key in node}
+    usual = {key: node.real(key, getattr(DriveChannel(""), key)) for key in SCALES if key in node}
     channels = []
     for at in range(count):
         default = name if count == 1 else f"{name}/{at}"
@@ -253,5 +257,5 @@ def read_channels(node: Section, name: str) -> tuple[Channel, ...]:
         if at < len(own):
             check_keys(own[at], SCALES)
             scales |= {key: own[at].real(key, 0.0) for key in SCALES if key in own[at]}
-        channels.append(Channel(joint, **scales))
+        channels.append(DriveChannel(joint, **scales))
     return tuple(channels)

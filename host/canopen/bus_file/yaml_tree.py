@@ -13,16 +13,16 @@ from typing import Final, NamedTuple
 
 import yaml
 
-from tickrig.host.canopen.bus_file.item import Item, Key, Place, Scalar
+from tickrig.host.canopen.bus_file.notes import FilePlace, Item, Key, Scalar
 from tickrig.wire.canopen.eds.eds_file import shorten
 
-WIDEST: Final = 1_000
+_WIDEST: Final = 1_000
 """Bits of a number; a longer one stays a text."""
-DIGITS: Final = frozenset("0123456789.")
-MERGE: Final = "tag:yaml.org,2002:merge"
+_DIGITS: Final = frozenset("0123456789.")
+_MERGE: Final = "tag:yaml.org,2002:merge"
 
 
-READ_APART: Final = (
+_READ_APART: Final = (
     (
         "[-+]?0[0-7_]+",
         "{!r} is octal for PyYAML, and for yaml-cpp in whole numbers; decimal in others",
@@ -42,8 +42,8 @@ READ_APART: Final = (
 )
 """Numbers that dcfgen (PyYAML, YAML 1.1) and ros2_canopen (yaml-cpp) read apart."""
 
-LONGEST: Final = 120
-MEANT: Final = {
+_LONGEST: Final = 120
+_MEANT: Final = {
     "found character '\\t'": "a tab; indent with spaces",
     "expected <block end>": "it is indented otherwise than the lines before",
     "mapping values are not allowed": "a colon too many, or none in the line before",
@@ -53,15 +53,15 @@ MEANT: Final = {
 """What is meant by the words of PyYAML, by how they begin."""
 
 
-class Wrong(NamedTuple):
+class YamlFault(NamedTuple):
     """What is wrong with the YAML: rule, place, reason."""
 
     rule: str
-    place: Place
+    place: FilePlace
     text: str
 
 
-def read_yaml(text: str, name: str) -> tuple[Item | None, list[Wrong]]:
+def read_yaml(text: str, name: str) -> tuple[Item | None, list[YamlFault]]:
     """Read a text.
 
     Args:
@@ -74,7 +74,7 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, list[Wrong]]:
     try:
         root = yaml.compose(text, yaml.SafeLoader)
         if root is None:
-            return None, [Wrong("yaml", Place(name, 1), "the file is empty")]
+            return None, [YamlFault("yaml", FilePlace(name, 1), "the file is empty")]
         tree = _Tree(name)
         return tree.item(root), tree.wrong
     except yaml.reader.ReaderError as error:
@@ -86,12 +86,12 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, list[Wrong]]:
         line, reason = 1, str(error)
     except RecursionError:
         line, reason = 1, "lists or mappings nest too deep"
-    return None, [Wrong("yaml", Place(name, line), f"not YAML: {_in_a_line(reason)}")]
+    return None, [YamlFault("yaml", FilePlace(name, line), f"not YAML: {_in_a_line(reason)}")]
 
 
 def _said(problem: str) -> str:
     """Return what PyYAML says in words that help."""
-    for words, meant in MEANT.items():
+    for words, meant in _MEANT.items():
         if words in problem:
             return meant.format(problem)
     return problem
@@ -100,14 +100,14 @@ def _said(problem: str) -> str:
 def _in_a_line(reason: str) -> str:
     """Return what can be printed of a reason."""
     text = "".join(letter if letter.isprintable() else "?" for letter in " ".join(reason.split()))
-    return text[:LONGEST]
+    return text[:_LONGEST]
 
 
 class _Tree:
     """Makes items of nodes; what an anchor names is made once, so that no file can grow."""
 
     def __init__(self, name: str) -> None:
-        self.wrong: list[Wrong] = []
+        self.wrong: list[YamlFault] = []
         self._name = name
         self._plain = yaml.constructor.SafeConstructor()
         self._done: dict[int, Item] = {}
@@ -128,7 +128,7 @@ class _Tree:
         self._done[key] = item
         return item
 
-    def _make(self, node: yaml.Node, place: Place) -> Item:
+    def _make(self, node: yaml.Node, place: FilePlace) -> Item:
         if isinstance(node, yaml.SequenceNode):
             return Item(tuple(map(self.item, node.value)), place)
         if isinstance(node, yaml.MappingNode):
@@ -136,20 +136,20 @@ class _Tree:
         self._check_number(node)
         return Item(self._scalar(node), place, shorten(str(node.value)))
 
-    def _mapping(self, node: yaml.MappingNode, place: Place) -> Item:
+    def _mapping(self, node: yaml.MappingNode, place: FilePlace) -> Item:
         """Make a mapping: what `<<` brings first, then its own; of a key twice the last counts."""
         fields: dict[Key, Item] = {}
-        keys: dict[Key, Place] = {}
+        keys: dict[Key, FilePlace] = {}
         own: list[tuple[yaml.Node, yaml.Node]] = []
         for key_node, value in node.value:
-            if key_node.tag != MERGE:
+            if key_node.tag != _MERGE:
                 own.append((key_node, value))
                 continue
             for merged in self._merged(value):
                 for key, each in merged.fields.items():
                     fields.setdefault(key, each)
                     keys.setdefault(key, merged.keys[key])
-        seen: dict[Key, Place] = {}
+        seen: dict[Key, FilePlace] = {}
         for key_node, value in own:
             if not isinstance(key_node, yaml.ScalarNode):
                 self._wrong("yaml-key", key_node, "a key is a text or a number, this is not")
@@ -176,8 +176,8 @@ class _Tree:
         text = str(node.value)
         if not isinstance(node, yaml.ScalarNode) or node.style is not None:
             return
-        if len(text) <= LONGEST and text.strip("-+")[:1] in DIGITS:
-            for form, said in READ_APART:
+        if len(text) <= _LONGEST and text.strip("-+")[:1] in _DIGITS:
+            for form, said in _READ_APART:
                 if re.fullmatch(form, text):
                     self._wrong("yaml-number", node, said.format(shorten(text)))
                     return
@@ -189,14 +189,14 @@ class _Tree:
         except (yaml.YAMLError, ValueError, LookupError, AttributeError, TypeError, OverflowError):
             self._wrong("yaml-value", node, f"{shorten(str(node.value))!r} is no {node.tag}")
             return str(node.value)
-        if isinstance(value, int) and value.bit_length() > WIDEST:  # Python prints none so long
+        if isinstance(value, int) and value.bit_length() > _WIDEST:  # Python prints none so long
             return str(node.value)
         if isinstance(value, datetime.date | bytes):
             return str(node.value)
         return value if value is None or isinstance(value, str | int | float) else str(node.value)
 
     def _wrong(self, rule: str, node: yaml.Node, text: str) -> None:
-        self.wrong.append(Wrong(rule, self._place(node), text))
+        self.wrong.append(YamlFault(rule, self._place(node), text))
 
-    def _place(self, node: yaml.Node) -> Place:
-        return Place(self._name, node.start_mark.line + 1)
+    def _place(self, node: yaml.Node) -> FilePlace:
+        return FilePlace(self._name, node.start_mark.line + 1)

@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from typing import Final
 
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.lss import (
     BIT_RATES,
@@ -24,22 +24,22 @@ from tickrig.wire.canopen.lss import (
     number_of,
 )
 
-ANSWER_US: Final = 500_000
+_ANSWER_US: Final = 500_000
 """How long an answer to a command is waited for."""
 SCAN_US: Final = 20_000
 """How long answers to a question of a fastscan are waited for: several slaves may answer."""
-SILENCE_US: Final = 200_000
+_SILENCE_US: Final = 200_000
 """Answers to a fastscan that failed have come by then."""
-PATIENCE: Final = (1, 2, 4)
+_PATIENCE: Final = (1, 2, 4)
 """A fastscan is tried with so many times its wait."""
-SETTLE_US: Final = 5_000
+_SETTLE_US: Final = 5_000
 """After what nobody answers, so that slow slaves take it."""
 MOST_FOUND: Final = 127
-BITS: Final = range(31, -1, -1)
+_BITS: Final = range(31, -1, -1)
 
 INDICES: Final = {rate: index for index, rate in BIT_RATES.items()}
 """Index of the standard table by bit rate in bit/s."""
-SPECIFIC: Final = 0xFF
+_SPECIFIC: Final = 0xFF
 """Error code whose reason is the manufacturer's."""
 
 _ERRORS: Final = {
@@ -75,7 +75,7 @@ class LssMaster:
         waiting: all slaves were sent back to waiting, at the end of `at_work`.
     """
 
-    def __init__(self, bus: NodeBus, answer_us: int = ANSWER_US, scan_us: int = SCAN_US) -> None:
+    def __init__(self, bus: NodeBus, answer_us: int = _ANSWER_US, scan_us: int = SCAN_US) -> None:
         self.waiting = False
         self._bus, self._answer_us, self._scan_us = bus, answer_us, scan_us
 
@@ -93,14 +93,14 @@ class LssMaster:
     def switch_all(self, mode: LssMode) -> None:
         """Switch all slaves; nobody answers. A new node-ID counts when they wait again."""
         self._bus.send(LSS_MASTER_COB_ID, message(LssCommand.SWITCH_GLOBAL, mode))
-        self._bus.gather(SETTLE_US)
+        self._bus.gather(_SETTLE_US)
 
     def select(self, address: LssAddress) -> bool:
         """Switch the slave with this address to configuration; False if none answers."""
         for number, part in enumerate(address[:3]):
             command = LssCommand(LssCommand.SWITCH_VENDOR + number)
             self._bus.send(LSS_MASTER_COB_ID, message(command, part))
-            self._bus.gather(SETTLE_US)
+            self._bus.gather(_SETTLE_US)
         answers = self._request(message(LssCommand.SWITCH_SERIAL, address.serial))
         return LssCommand.SWITCHED in (answer[0] for answer in answers)
 
@@ -113,12 +113,12 @@ class LssMaster:
             LssFailed: slaves answered in a way that fits no address, each time.
         """
         failed: LssFailed | None = None
-        for factor in PATIENCE:
+        for factor in _PATIENCE:
             try:
                 found = self._fastscan(factor * self._scan_us)
             except LssFailed as error:
                 failed = error
-                self._bus.gather(SILENCE_US)
+                self._bus.gather(_SILENCE_US)
             else:
                 if found is None and failed is not None:
                     break  # who had answered is gone
@@ -127,12 +127,12 @@ class LssMaster:
         raise failed
 
     def _fastscan(self, wait_us: int) -> LssAddress | None:
-        if not self._scan(FastScan(0, FASTSCAN_RESET, 0, 0), max(wait_us, SILENCE_US)):
+        if not self._scan(FastScan(0, FASTSCAN_RESET, 0, 0), max(wait_us, _SILENCE_US)):
             return None
         found: list[int] = []
         for sub in range(4):
             number = 0
-            for bit in BITS:
+            for bit in _BITS:
                 if not self._scan(FastScan(number, bit, sub, sub), wait_us):
                     number |= 1 << bit
             if not self._scan(FastScan(number, 0, sub, (sub + 1) % 4), wait_us):
@@ -199,7 +199,7 @@ class LssMaster:
         if code := answer[1]:
             command = LssCommand(request[0])
             text = _ERRORS.get((command, code), f"error {code}")
-            if code == SPECIFIC:
+            if code == _SPECIFIC:
                 text = f"error {answer[2]} of its maker"
             raise LssFailed(f"LSS {_name(command)}: {text}", command, code)
 
@@ -215,7 +215,7 @@ class LssMaster:
 
     def _answers_to(self, request: bytes) -> list[bytes]:
         """Return all answers to a command."""
-        answers = [*self._request(request), *self._gather(SETTLE_US)]
+        answers = [*self._request(request), *self._gather(_SETTLE_US)]
         return [answer for answer in answers if answer[0] == request[0]]
 
     def _request(self, request: bytes) -> list[bytes]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NoReturn, TypeVar
 
-from tickrig.host.canopen.block_download import OnProgress, download_blocks
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
+from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
-from tickrig.host.canopen.master.program_update import (
+from tickrig.host.canopen.master.boot_slave import (
     BUSY,
     CONTROL,
     DATA,
@@ -19,22 +19,109 @@ from tickrig.host.canopen.master.program_update import (
     STOP,
 )
 from tickrig.host.canopen.sdo_transfer import download
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo import Abort
+from tickrig.wire.canopen.sdo_frame import (
+    MAX_BLOCK_SIZE,
+    SEGMENT_BYTES,
+    AbortCode,
+    BlockAcknowledge,
+    BlockDownloadInitiateRequest,
+    BlockDownloadInitiateResponse,
+    BlockEnd,
+    BlockEnded,
+    BlockSegment,
+    crc16,
+)
+
+# SDO block download as a script (CiA 301, SDO block download).
+
+_MOST_IDLE: Final = 20
+"""So many blocks in a row of which nothing came through end the transfer."""
+
+Answer = TypeVar("Answer")
+
+_OnProgress = Callable[[int], object]
+"""Called with the number of bytes that the server has acknowledged."""
+
+
+def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress) -> Script[None]:
+    """Write an object in blocks, with CRC if the server can.
+
+    What is lost within a block is sent again from there on. If the last segment of a block or
+    its acknowledgement is lost, CiA 301 has no way to go on: the transfer times out.
+
+    Args:
+        index: of the object.
+        sub: its sub-index.
+        data: what is written.
+        on_progress: is told how far it is.
+
+    Raises:
+        SdoAborted: the server refuses, or answers something else; `COMMAND_SPECIFIER` from
+            one that does no block transfer.
+        SdoTimeout: it does not answer.
+    """
+    request = BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
+    first = SdoRequest(request, index, sub)
+    begun = yield from _request(first, BlockDownloadInitiateResponse)
+    block_size, total, taken, idle = begun.block_size, max(1, -(-len(data) // SEGMENT_BYTES)), 0, 0
+    while taken < total:
+        if not 1 <= block_size <= MAX_BLOCK_SIZE:
+            yield from _abort(index, sub, AbortCode.BLOCK_SIZE)
+        count = min(block_size, total - taken)
+        receipt = yield from _send_block(index, sub, data, taken, count)
+        idle = 0 if receipt.ackseq else idle + 1
+        if receipt.ackseq > count or idle == _MOST_IDLE:
+            yield from _abort(index, sub, AbortCode.SEQUENCE_NUMBER)
+        taken, block_size = taken + receipt.ackseq, receipt.block_size
+        on_progress(min(taken * SEGMENT_BYTES, len(data)))
+    end = BlockEnd(total * SEGMENT_BYTES - len(data), crc16(data) if begun.crc else 0)
+    yield from _request(SdoRequest(end.encode(), index, sub, goes_on=True), BlockEnded)
+
+
+def _send_block(
+    index: int, sub: int, data: bytes, first: int, count: int
+) -> Script[BlockAcknowledge]:
+    """Send segments; return the receipt of the last of them."""
+    at = first * SEGMENT_BYTES
+    for seqno in range(1, count):
+        yield SdoFrame(bytes((seqno,)) + data[at : at + SEGMENT_BYTES])
+        at += SEGMENT_BYTES
+    last = BlockSegment(count, data[at : at + SEGMENT_BYTES], at + SEGMENT_BYTES >= len(data))
+    request = SdoRequest(last.encode(), index, sub, goes_on=True)
+    return (yield from _request(request, BlockAcknowledge))
+
+
+def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
+    """Send, and return the answer; what is no such answer ends the transfer."""
+    answer = yield request
+    if isinstance(answer, kind):
+        return answer
+    if isinstance(answer, Abort):
+        raise SdoAborted(request.index, request.sub, answer.code)
+    return (yield from _abort(request.index, request.sub, AbortCode.COMMAND_SPECIFIER))
+
+
+def _abort(index: int, sub: int, code: AbortCode) -> Script[NoReturn]:
+    """End the transfer: the server has said what it may not."""
+    yield SdoFrame(Abort(index, sub, code).encode())
+    raise SdoAborted(index, sub, code)
+
 
 COMMANDS: Final = {"stop": 0, "start": 1, "reset": 2, "clear": 3}
 """Program control, 1F51h."""
-STATES: Final = {0: "stopped", 1: "running"}
+_STATES: Final = {0: "stopped", 1: "running"}
 
-PATIENCE_US: Final = 60_000_000
+_PATIENCE_US: Final = 60_000_000
 """How long flash may be busy, and a program may take to stop or start."""
-ANSWER_US: Final = 10_000_000
+_ANSWER_US: Final = 10_000_000
 """How long a node that clears its flash may take to answer."""
 
-LOOKS: Final = 3
-SILENCE_US: Final = 500_000
+_LOOKS: Final = 3
+_SILENCE_US: Final = 500_000
 """What a node answers to segments behind an abort has come by then."""
 
-ERRORS: Final = {
+_ERRORS: Final = {
     0: "no error",
     1: "no valid program",
     2: "data format unknown",
@@ -47,10 +134,10 @@ ERRORS: Final = {
 }
 """Of 1F57h, bits 1 to 7."""
 
-AGAIN: Final = (AbortCode.CRC, AbortCode.SEQUENCE_NUMBER, AbortCode.TIMEOUT)
+_AGAIN: Final = (AbortCode.CRC, AbortCode.SEQUENCE_NUMBER, AbortCode.TIMEOUT)
 """Aborts by which a transfer was disturbed, and not refused."""
 
-Say = Callable[[str], object]
+_Say = Callable[[str], object]
 
 
 class ProgramFailed(Exception):  # noqa: N818 - what the node did
@@ -73,9 +160,9 @@ class ProgramStatus:
 
     def __str__(self) -> str:
         """Return it in words."""
-        state = STATES.get(self.control, f"state {self.control}")
+        state = _STATES.get(self.control, f"state {self.control}")
         known = "none" if self.identification is None else f"{self.identification:08X}h"
-        flash = "not told" if self.flash is None else flash_text(self.flash)
+        flash = "not told" if self.flash is None else _flash_text(self.flash)
         return f"{state}; identification {known}; flash: {flash}"
 
 
@@ -89,7 +176,7 @@ class Program:
         say: is told what is done.
     """
 
-    def __init__(self, bus: NodeBus, node_id: int, number: int, say: Say) -> None:
+    def __init__(self, bus: NodeBus, node_id: int, number: int, say: _Say) -> None:
         self._bus, self._node_id, self._number, self._say = bus, node_id, number, say
 
     def status(self) -> ProgramStatus:
@@ -130,7 +217,7 @@ class Program:
         self.await_control(COMMANDS["start"])
         self._say("started")
 
-    def download(self, data: bytes, on_progress: OnProgress, tries: int = 3) -> int:
+    def download(self, data: bytes, on_progress: _OnProgress, tries: int = 3) -> int:
         """Write it, and wait until the flash is written.
 
         Args:
@@ -151,10 +238,10 @@ class Program:
                 self._transfer(data, on_progress)
                 break
             except SdoFailed as error:
-                disturbed = isinstance(error, SdoTimeout) or getattr(error, "code", 0) in AGAIN
+                disturbed = isinstance(error, SdoTimeout) or getattr(error, "code", 0) in _AGAIN
                 if not disturbed or number == tries:
                     raise
-                self._bus.gather(SILENCE_US)
+                self._bus.gather(_SILENCE_US)
                 if not self._is_there():
                     raise
                 self._say(f"the transfer broke off ({error}); begun anew, {number + 1} of {tries}")
@@ -164,7 +251,7 @@ class Program:
 
     def _is_there(self) -> bool:
         """Say whether the node answers at all; a frame or two may be lost."""
-        for _ in range(LOOKS):
+        for _ in range(_LOOKS):
             try:
                 self._read(CONTROL)
             except SdoTimeout:
@@ -174,38 +261,38 @@ class Program:
             return True
         return False
 
-    def _transfer(self, data: bytes, on_progress: OnProgress) -> None:
+    def _transfer(self, data: bytes, on_progress: _OnProgress) -> None:
         at = (DATA, self._number)
         try:
-            self._bus.run(self._node_id, download_blocks(*at, data, on_progress), ANSWER_US)
+            self._bus.run(self._node_id, download_blocks(*at, data, on_progress), _ANSWER_US)
         except SdoAborted as error:
             if error.code != AbortCode.COMMAND_SPECIFIER:
                 raise
             self._say("the node does no block transfer: in segments")
-            self._bus.run(self._node_id, download(*at, data), ANSWER_US)
+            self._bus.run(self._node_id, download(*at, data), _ANSWER_US)
             on_progress(len(data))
 
     def await_control(self, wanted: int) -> None:
         """Wait until program control reads so; a node that resets does not answer meanwhile."""
-        until_us = self._bus.now_us + PATIENCE_US
+        until_us = self._bus.now_us + _PATIENCE_US
         while (control := self._optional(CONTROL)) != wanted:
             if self._bus.now_us >= until_us:
-                found = "not told" if control is None else STATES.get(control, f"{control}")
+                found = "not told" if control is None else _STATES.get(control, f"{control}")
                 raise ProgramFailed(
-                    f"the program is not {STATES[wanted]} after {PATIENCE_US // 1_000_000} s:"
+                    f"the program is not {_STATES[wanted]} after {_PATIENCE_US // 1_000_000} s:"
                     f" 1F51h:{self._number:02X} is {found}"
                 )
             self._bus.gather(LOOK_US)
 
     def _await_flash(self, allowed: tuple[int, ...]) -> None:
         """Wait until the flash is ready; an error that is not allowed is raised."""
-        until_us = self._bus.now_us + PATIENCE_US
+        until_us = self._bus.now_us + _PATIENCE_US
         while (status := self._optional(FLASH_STATUS)) is not None and status & BUSY:
             if self._bus.now_us >= until_us:
-                raise ProgramFailed(f"the flash is busy after {PATIENCE_US // 1_000_000} s")
+                raise ProgramFailed(f"the flash is busy after {_PATIENCE_US // 1_000_000} s")
             self._bus.gather(LOOK_US)
         if status is not None and status >> 1 & 0x7F not in allowed:
-            raise ProgramFailed(f"1F57h:{self._number:02X} flash status: {flash_text(status)}")
+            raise ProgramFailed(f"1F57h:{self._number:02X} flash status: {_flash_text(status)}")
 
     def _read(self, index: int) -> int:
         return int.from_bytes(self._bus.read(self._node_id, index, self._number), "little")
@@ -217,16 +304,16 @@ class Program:
             return None
 
     def _write(self, index: int, data: bytes) -> None:
-        self._bus.write(self._node_id, index, self._number, data, ANSWER_US)
+        self._bus.write(self._node_id, index, self._number, data, _ANSWER_US)
 
 
-def flash_text(status: int) -> str:
+def _flash_text(status: int) -> str:
     """Say what 1F57h means.
 
-    >>> flash_text(0), flash_text(1), flash_text(0x0A)
+    >>> _flash_text(0), _flash_text(1), _flash_text(0x0A)
     ('no error', 'busy', 'flash write error')
     """
     if status & BUSY:
         return "busy"
     error = status >> 1 & 0x7F
-    return ERRORS.get(error, f"error {error}")
+    return _ERRORS.get(error, f"error {error}")

@@ -2,47 +2,141 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
 from functools import partial
 from random import Random
 from typing import Final
 
-from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.conform.bus.presence import Presence
-from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
-from tickrig.host.canopen.conform.bus.steps import Player
-from tickrig.host.canopen.conform.bus.traffic import ASSUMED_BIT_RATE
-from tickrig.host.canopen.conform.check import Check, Level
+from tickrig.host.canopen.conform.bus.exchange import (
+    ASSUMED_BIT_RATE,
+    HOST_GAP_US,
+    MS_US,
+    PERIOD_TOLERANCE,
+    BusExchange,
+    Disturbed,
+    Presence,
+    StepFailed,
+)
+from tickrig.host.canopen.conform.bus.frame_pattern import matches
+from tickrig.host.canopen.conform.bus.sdo import SdoClient
+from tickrig.host.canopen.conform.bus.steps import StepPlayer
+from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
 from tickrig.host.canopen.conform.judge import Judge
-from tickrig.host.canopen.conform.notation.suite import suite_checks
-from tickrig.host.canopen.conform.objects.object_checks import object_checks
-from tickrig.host.canopen.conform.objects.object_steps import play_object_step
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.safety.node_care import HEARTBEAT, NodeCare
-from tickrig.host.canopen.conform.safety.permission import Permission
-from tickrig.host.canopen.conform.safety.stray_heartbeat import StrayHeartbeat
-from tickrig.host.canopen.conform.settings import describe_settings
-from tickrig.host.canopen.conform.subject.other_device import other_device
-from tickrig.host.canopen.conform.subject.subject import Subject, examine
-from tickrig.host.canopen.conform.verdict import INTERRUPTED, Outcome, Report, Result, Verdict
+from tickrig.host.canopen.conform.node_care import HEARTBEAT, NodeCare
+from tickrig.host.canopen.conform.notation import ANSWER_MS
+from tickrig.host.canopen.conform.object_checks import object_checks, play_object_step
+from tickrig.host.canopen.conform.permission import Permission
+from tickrig.host.canopen.conform.subject import Subject, examine, other_device
+from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import (
+    INTERRUPTED,
+    CheckOutcome,
+    CheckVerdict,
+    Report,
+    Result,
+)
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import StampedLink
+from tickrig.host.links.link import LinkClosed, StampedLink
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 
-LISTEN_MS: Final = 1_000
+# What a report says of how the run judged: for people, by name.
+
+
+def _describe_settings(plan: ConformancePlan, others: Collection[int]) -> dict[str, str]:
+    """Return bit rate, limits and tolerances of a run.
+
+    Args:
+        plan: what was chosen.
+        others: node-IDs that were on the bus.
+    """
+    rate = f"{plan.bit_rate} bit/s" if plan.bit_rate else f"{ASSUMED_BIT_RATE} bit/s, assumed"
+    nodes = ", ".join(str(node) for node in sorted(set(others) - {0})) or "none"
+    return {
+        "bit rate": rate,
+        "load by the tester": f"at most {plan.max_load:.0%}",
+        "other nodes": nodes,
+        "resolution of time stamps": f"{plan.resolution_us / MS_US:g} ms",
+        "answers": f"within {ANSWER_MS} ms, where the check says nothing else",
+        "periods": f"mean within {PERIOD_TOLERANCE:.0%}",
+        "late host": f"{HOST_GAP_US / MS_US:g} ms make a failure inconclusive",
+        "longest run": f"{plan.longest_s / 60:g} min, then all is blocked; 2 min more to restore",
+        "seed": str(plan.seed),
+    }
+
+
+# A heartbeat that runs though 1017h does not say so: told, and told again when it is gone.
+
+_SPARE_MS: Final = 1_000
+_MISSED: Final = 3
+"""So many periods without a heartbeat, and it is gone."""
+
+
+class StrayHeartbeat:
+    """What was heard of the heartbeat of a node before the run.
+
+    Args:
+        exchange: the bus.
+        node_id: of the node, 1..127.
+
+    Attributes:
+        stamps: when heartbeats came before the run, in bus time.
+        finding: that 1017h does not say so, for people; empty if it does.
+        unrestored: that it is gone after the run, for people; empty if it is not.
+    """
+
+    def __init__(self, exchange: BusExchange, node_id: int) -> None:
+        self._exchange, self._can_id = exchange, f"{ERROR_CONTROL_COB_ID + node_id:03X}"
+        self._pattern = f"{self._can_id}#[0-7][45F]"
+        self.stamps: list[int] = []
+        self._period_ms: int | None = 0
+        self.finding = self.unrestored = ""
+
+    def hear(self) -> None:
+        """Take what has come so far; answers to node guarding are no heartbeat."""
+        heard = self._exchange.unread(self._can_id)
+        if not any(text.startswith(f"{self._can_id}#R") for _, text in heard):
+            self.stamps = [at_us for at_us, text in heard if matches(self._pattern, text)]
+
+    def compare(self, period_ms: int | None) -> None:
+        """Hold what was heard against 1017h, None if the node has none."""
+        self._period_ms = period_ms
+        if not period_ms:
+            self.finding = f"{self._text()}, but {self._said()}"
+
+    def look_again(self) -> None:
+        """Listen after the run: what 1017h does not say, nobody can switch on again."""
+        each_ms = self._each_ms()
+        if not self.finding or not each_ms:
+            return
+        self._exchange.begin((_MISSED * each_ms + _SPARE_MS) * MS_US)
+        if not self._exchange.collect(self._pattern, _MISSED * each_ms):
+            self.unrestored = f"{self._text()}: gone, and {self._said()} as before"
+
+    def _each_ms(self) -> int:
+        stamps = self.stamps
+        return round((stamps[-1] - stamps[0]) / max(1, len(stamps) - 1) / MS_US) if stamps else 0
+
+    def _text(self) -> str:
+        each_ms = self._each_ms()
+        return f"heartbeat each {each_ms} ms" if each_ms else "a heartbeat was heard"
+
+    def _said(self) -> str:
+        return "the node has no 1017h" if self._period_ms is None else "1017h = 0"
+
+
+_LISTEN_MS: Final = 1_000
 """So long is only listened at first: who else is on the bus?"""
 
-EXAMINE_US: Final = 120_000_000
+_EXAMINE_US: Final = 120_000_000
 """So long may it take to read the node before the first check."""
 
-INTEGERS: Final = {1: "u8", 2: "u16", 3: "u24", 4: "u32", 5: "u40", 6: "u48", 7: "u56", 8: "u64"}
+_INTEGERS: Final = {1: "u8", 2: "u16", 3: "u24", 4: "u32", 5: "u40", 6: "u48", 7: "u56", 8: "u64"}
 """Types by the size of a value in bytes."""
 
-MOST_CRASHES: Final = 20
+_MOST_CRASHES: Final = 20
 """So many ways in which the program of the node crashed are told."""
 
 Crash = Callable[[str, list[str]], object]
@@ -66,7 +160,7 @@ class ConformRun:
         self,
         link: StampedLink,
         node_id: int,
-        plan: Plan,
+        plan: ConformancePlan,
         *,
         device: EdsDevice | None = None,
         eds: EdsFile | None = None,
@@ -76,7 +170,7 @@ class ConformRun:
         self._node_id, self._plan, self._source = node_id, plan, source
         self._device, self._eds, self._on_result = device, eds, on_result
         self._permission = Permission(plan.level, plan.allow, node_id, plan.confirm, plan.never)
-        self._exchange = Exchange(
+        self._exchange = BusExchange(
             link,
             node_id,
             bit_rate=plan.bit_rate or ASSUMED_BIT_RATE,
@@ -89,7 +183,7 @@ class ConformRun:
         self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
         self._stray = StrayHeartbeat(self._exchange, node_id)
         more = partial(play_object_step, self._client)
-        player = Player(self._exchange, node_id, plan.stimulus, more)
+        player = StepPlayer(self._exchange, node_id, plan.stimulus, more)
         self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
         self._longest_us = round(plan.longest_s * 1e6)
         self._results: list[Result] = []
@@ -108,7 +202,7 @@ class ConformRun:
             reason: what it raised, in a line.
             where: the lines of the program at which it did.
         """
-        if len(self._crashes) < MOST_CRASHES:
+        if len(self._crashes) < _MOST_CRASHES:
             self._crashes[reason] = None
         self._exchange.crash(reason, where)
 
@@ -131,8 +225,8 @@ class ConformRun:
 
     def _run(self) -> str:
         """Judge; return why nothing could be, empty if it could."""
-        self._exchange.begin(min(EXAMINE_US, self._longest_us))
-        self._exchange.wait(LISTEN_MS)
+        self._exchange.begin(min(_EXAMINE_US, self._longest_us))
+        self._exchange.wait(_LISTEN_MS)
         self._stray.hear()
         self._permission.others = frozenset(self._exchange.others)
         self._exchange.end_listening()
@@ -154,10 +248,10 @@ class ConformRun:
             return ""
         self._absent = True
         if presence is Presence.NONE:
-            verdict, reason = Verdict.BLOCKED, self._nobody()
+            verdict, reason = CheckVerdict.BLOCKED, self._nobody()
         else:
             reason = f"each request is answered twice: two nodes have ID {self._node_id}?"
-            verdict = Verdict.INCONCLUSIVE
+            verdict = CheckVerdict.INCONCLUSIVE
         self._block(suite_checks(), reason, verdict)
         return reason
 
@@ -199,10 +293,12 @@ class ConformRun:
                 return
             self._keep(self._judge.result(check, self._subject))
 
-    def _block(self, checks: list[Check], reason: str, verdict: Verdict = Verdict.BLOCKED) -> None:
+    def _block(
+        self, checks: list[Check], reason: str, verdict: CheckVerdict = CheckVerdict.BLOCKED
+    ) -> None:
         for check in checks:
             if self._plan.chooses(check):
-                self._keep(Result(check, Outcome(verdict, reason)))
+                self._keep(Result(check, CheckOutcome(verdict, reason)))
 
     def _keep(self, result: Result) -> None:
         self._results.append(result)
@@ -239,7 +335,7 @@ class ConformRun:
             self._plan.level,
             tuple(self._results),
             node=subject.about if subject else {},
-            settings=describe_settings(self._plan, self._exchange.others),
+            settings=_describe_settings(self._plan, self._exchange.others),
             findings=findings,
             unrestored=(*self._care.unrestored, *gone),
             repairs=repairs,
@@ -252,6 +348,6 @@ class ConformRun:
 
 def _typed(data: bytes) -> str:
     """Write a value as `canmon net write` takes it."""
-    if kind := INTEGERS.get(len(data)):
+    if kind := _INTEGERS.get(len(data)):
         return f"{kind}:0x{int.from_bytes(data, 'little'):X}"
     return f"hex:{data.hex().upper()}"

@@ -7,36 +7,32 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
-from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
-from tickrig.host.canopen.conform.bus.steps import Player
-from tickrig.host.canopen.conform.bus.unlike import abort_of
-from tickrig.host.canopen.conform.check import STIMULUS, Check, Level
-from tickrig.host.canopen.conform.notation.bound_check import BoundCheck, bind_check
-from tickrig.host.canopen.conform.notation.names import Unbound
-from tickrig.host.canopen.conform.notation.step_words import step_head
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.safety.node_care import NodeCare
-from tickrig.host.canopen.conform.safety.permission import Permission
-from tickrig.host.canopen.conform.subject.subject import Subject
-from tickrig.host.canopen.conform.verdict import Line, Outcome, Result, Verdict
+from tickrig.host.canopen.conform.bus.exchange import BusExchange, Disturbed, NotAllowed, StepFailed
+from tickrig.host.canopen.conform.bus.frame_pattern import abort_of
+from tickrig.host.canopen.conform.bus.steps import StepPlayer
+from tickrig.host.canopen.conform.check import STIMULUS, Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.node_care import NodeCare
+from tickrig.host.canopen.conform.notation import BoundCheck, Unbound, bind_check, step_head
+from tickrig.host.canopen.conform.permission import Permission
+from tickrig.host.canopen.conform.subject import Subject
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, FrameLine, Result
 
-LSS_ANSWER: Final = "7E4#"
+_LSS_ANSWER: Final = "7E4#"
 """Begins what LSS slaves say: it does not tell which one."""
-HISTORY: Final = (0x1003, 0)
-PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
-EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
-START: Final = "000#01"
-UPLOADS: Final = ("UE", "US", "BU", "OD")
+_HISTORY: Final = (0x1003, 0)
+_PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+_EMPTIED: Final = "empty the error history 1003h, which cannot be written back"
+_START: Final = "000#01"
+_UPLOADS: Final = ("UE", "US", "BU", "OD")
 """Groups whose checks fail where an upload goes wrong; others only look at values by it."""
-UNSEEN: Final = "could not be read back, see the checks of group US"
-UNPREPARED: Final = "could not be prepared"
-MAY_BE_CONSTANT: Final = frozenset(
-    (0x1003, 0x1005, 0x1014, 0x1015, 0x1016, 0x1017, *PDO_PARAMETERS)
+_UNSEEN: Final = "could not be read back, see the checks of group US"
+_UNPREPARED: Final = "could not be prepared"
+_MAY_BE_CONSTANT: Final = frozenset(
+    (0x1003, 0x1005, 0x1014, 0x1015, 0x1016, 0x1017, *_PDO_PARAMETERS)
 )
 """Objects that are "rw; const, if not changeable" (CiA 301 v4.2.0, 7.5.2)."""
-READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
-NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
+_READ_ONLY: Final = frozenset((0x0601_0000, 0x0601_0001, 0x0601_0002))
+_NOT_SUPPORTED: Final = frozenset((0x0609_0030, 0x0609_0031, 0x0609_0032, 0x0609_0036))
 
 
 def _is_misread(error: StepFailed) -> bool:
@@ -53,13 +49,13 @@ def _is_segment(command: str) -> bool:
 def _enables(step: Mapping[str, Any]) -> bool:
     """Return whether a step gives a PDO its COB-ID: every device takes its own."""
     at = step.get("write", (0, 0))
-    return "macro" in step or (at[0] in PDO_PARAMETERS and at[1] == 1)
+    return "macro" in step or (at[0] in _PDO_PARAMETERS and at[1] == 1)
 
 
 def _is_constant(step: Mapping[str, Any], error: StepFailed) -> bool:
     """Return whether the node keeps an object constant that CiA 301 lets be so."""
     index, _ = step.get("write", (0, 0))
-    return index in MAY_BE_CONSTANT and abort_of(error.got) in READ_ONLY
+    return index in _MAY_BE_CONSTANT and abort_of(error.got) in _READ_ONLY
 
 
 class Judge:
@@ -75,9 +71,9 @@ class Judge:
 
     def __init__(
         self,
-        plan: Plan,
-        exchange: Exchange,
-        player: Player,
+        plan: ConformancePlan,
+        exchange: BusExchange,
+        player: StepPlayer,
         care: NodeCare,
         permission: Permission,
     ) -> None:
@@ -88,19 +84,19 @@ class Judge:
         """Judge a check; one that failed is done again, and both are told."""
         bound = self._bind(check, subject)
         if isinstance(bound, str):
-            return Result(check, Outcome(Verdict.NOT_APPLICABLE, bound))
+            return Result(check, CheckOutcome(CheckVerdict.NOT_APPLICABLE, bound))
         bound = replace(bound, steps=tuple(map(self._as_found, bound.steps)))
         if unread := self._unread(bound, subject):
-            return Result(check, Outcome(Verdict.INCONCLUSIVE, unread))
+            return Result(check, CheckOutcome(CheckVerdict.INCONCLUSIVE, unread))
         first = self._go(bound)
-        if first.verdict is not Verdict.FAIL or self._care.lost:
+        if first.verdict is not CheckVerdict.FAIL or self._care.lost:
             return Result(check, first)
         again = self._go(bound)
-        if again.reason.startswith(UNPREPARED) and not self._exchange.disturbances:
+        if again.reason.startswith(_UNPREPARED) and not self._exchange.disturbances:
             return Result(check, first)  # the first go has left the node in another state
-        if again.verdict is Verdict.PASS:
+        if again.verdict is CheckVerdict.PASS:
             reason = f"passed when it was done again; before: {first.reason}"
-            again = replace(again, verdict=Verdict.INCONCLUSIVE, reason=reason)
+            again = replace(again, verdict=CheckVerdict.INCONCLUSIVE, reason=reason)
         return Result(check, again, first)
 
     def _bind(self, check: Check, subject: Subject) -> BoundCheck | str:
@@ -118,8 +114,8 @@ class Judge:
                 self._permission.check_write(index)
             for index, _ in sorted(bound.written - bound.changed):
                 self._permission.check_write(index, refused=True)
-            if HISTORY in bound.changed and any(self._care.held(HISTORY)):
-                self._permission.check_confirmed(EMPTIED)
+            if _HISTORY in bound.changed and any(self._care.held(_HISTORY)):
+                self._permission.check_confirmed(_EMPTIED)
             for question in sorted(bound.questions):
                 self._permission.check_confirmed(question)
         except Unbound as error:
@@ -145,11 +141,11 @@ class Judge:
         places = ", ".join(f"{index:04X}h:{sub:02X}" for index, sub in unread)
         return f"{places} cannot be read, so that what it holds could not be written back"
 
-    def _go(self, bound: BoundCheck) -> Outcome:
+    def _go(self, bound: BoundCheck) -> CheckOutcome:
         """Do a check once, and bring the node back."""
         self._care.begin(bound)
         if self._care.lost:
-            return Outcome(Verdict.BLOCKED, "the node does not answer any more")
+            return CheckOutcome(CheckVerdict.BLOCKED, "the node does not answer any more")
         boots = self._exchange.boots
         self._exchange.begin(bound.within_us, bound.can_ids)
         start_us, begun_us = self._exchange.now_us, self._exchange.start_us
@@ -157,16 +153,16 @@ class Judge:
         verdict, reason = self._play(bound)
         self._end(bound)
         crashed = bool(self._exchange.crashes)
-        if crashed and verdict is not Verdict.FAIL:
-            verdict, reason = Verdict.FAIL, self._crash()
+        if crashed and verdict is not CheckVerdict.FAIL:
+            verdict, reason = CheckVerdict.FAIL, self._crash()
         lines, end_us = self._lines(), self._exchange.now_us
-        unwell = verdict in {Verdict.FAIL, Verdict.INCONCLUSIVE} and not crashed
+        unwell = verdict in {CheckVerdict.FAIL, CheckVerdict.INCONCLUSIVE} and not crashed
         if not self._care.tidy(bound, boots) and unwell:
-            verdict, reason = Verdict.BLOCKED, f"{reason}; the node did not come back"
+            verdict, reason = CheckVerdict.BLOCKED, f"{reason}; the node did not come back"
         times = start_us - begun_us, end_us - begun_us
-        return Outcome(verdict, reason, lines, *times, self._wanted)
+        return CheckOutcome(verdict, reason, lines, *times, self._wanted)
 
-    def _play(self, bound: BoundCheck) -> tuple[Verdict, str]:
+    def _play(self, bound: BoundCheck) -> tuple[CheckVerdict, str]:
         where = ""
         try:
             for number, step in enumerate(bound.steps, 1):
@@ -176,22 +172,22 @@ class Judge:
                 if self._exchange.crashes:
                     raise StepFailed(self._crash())
         except NotAllowed as error:
-            return Verdict.NOT_APPLICABLE, str(error)
+            return CheckVerdict.NOT_APPLICABLE, str(error)
         except Disturbed as error:
-            return Verdict.INCONCLUSIVE, str(error)
+            return CheckVerdict.INCONCLUSIVE, str(error)
         except StepFailed as error:
             self._wanted = error.wanted
             if self._exchange.crashes:
-                return Verdict.FAIL, f"{where}: {self._crash()}"
+                return CheckVerdict.FAIL, f"{where}: {self._crash()}"
             if "given" in step or _is_constant(step, error):
                 return self._unprepared(step, error, f"{where}: {error}")
-            misread = "read" in step and bound.check.group not in UPLOADS and _is_misread(error)
+            misread = "read" in step and bound.check.group not in _UPLOADS and _is_misread(error)
             return self._failed(bound, f"{where}: {error}", misread=misread)
-        return Verdict.PASS, ""
+        return CheckVerdict.PASS, ""
 
     def _unprepared(
         self, step: Mapping[str, Any], error: StepFailed, reason: str
-    ) -> tuple[Verdict, str]:
+    ) -> tuple[CheckVerdict, str]:
         """Return the verdict of a check that the node did not let come to its question.
 
         The clause of the check says nothing of what only prepares it.
@@ -200,11 +196,11 @@ class Judge:
         """
         if self._exchange.disturbances:
             reason = f"{reason}; {', '.join(self._exchange.disturbances)}"
-            return Verdict.INCONCLUSIVE, f"{UNPREPARED}: {reason}"
+            return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
         code = abort_of(error.got)
-        if code in READ_ONLY or (code in NOT_SUPPORTED and not _enables(step)):
-            return Verdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
-        return Verdict.INCONCLUSIVE, f"{UNPREPARED}: {reason}"
+        if code in _READ_ONLY or (code in _NOT_SUPPORTED and not _enables(step)):
+            return CheckVerdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
+        return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
 
     def _end(self, bound: BoundCheck) -> None:
         """Do what is done at the end, however the check went."""
@@ -217,24 +213,24 @@ class Judge:
         """Return what the program of the node has raised first."""
         return next(iter(self._exchange.crashes))
 
-    def _lines(self) -> tuple[Line, ...]:
+    def _lines(self) -> tuple[FrameLine, ...]:
         return self._exchange.evidence.lines()
 
     def _failed(
         self, bound: BoundCheck, reason: str, *, misread: bool = False
-    ) -> tuple[Verdict, str]:
+    ) -> tuple[CheckVerdict, str]:
         if misread:
-            return Verdict.INCONCLUSIVE, f"{UNSEEN}: {reason}"
+            return CheckVerdict.INCONCLUSIVE, f"{_UNSEEN}: {reason}"
         if self._exchange.disturbances:
-            return Verdict.INCONCLUSIVE, f"{reason}; {', '.join(self._exchange.disturbances)}"
+            return CheckVerdict.INCONCLUSIVE, f"{reason}; {', '.join(self._exchange.disturbances)}"
         others = self._permission.others
-        if others and any(line.text.startswith(LSS_ANSWER) for line in self._lines()):
+        if others and any(line.text.startswith(_LSS_ANSWER) for line in self._lines()):
             known = ", ".join(map(str, sorted(others)))
-            return Verdict.INCONCLUSIVE, f"{reason}; other nodes may have answered: {known}"
+            return CheckVerdict.INCONCLUSIVE, f"{reason}; other nodes may have answered: {known}"
         errors = self._care.errors
-        if errors and any(str(step.get("send", "")).startswith(START) for step in bound.steps):
+        if errors and any(str(step.get("send", "")).startswith(_START) for step in bound.steps):
             why = f"1001h was {errors:02X}h before: with an error a node may leave Operational"
-            return Verdict.INCONCLUSIVE, f"{reason}; {why}"
+            return CheckVerdict.INCONCLUSIVE, f"{reason}; {why}"
         if bound.check.choice:
-            return Verdict.IMPLEMENTATION_DEFINED, f"{bound.check.choice}; {reason}"
-        return Verdict.FAIL, reason
+            return CheckVerdict.IMPLEMENTATION_DEFINED, f"{bound.check.choice}; {reason}"
+        return CheckVerdict.FAIL, reason

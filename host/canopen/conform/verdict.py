@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from tickrig.host.canopen.conform.check import Check, Level
 
 
-class Verdict(StrEnum):
+class CheckVerdict(StrEnum):
     """What a check gave."""
 
     PASS = "pass"
@@ -31,7 +31,7 @@ class Direction(StrEnum):
     REMARK = "#"
 
 
-class Line(NamedTuple):
+class FrameLine(NamedTuple):
     """A line of the evidence.
 
     Attributes:
@@ -46,7 +46,7 @@ class Line(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CheckOutcome:
     """One go at a check.
 
     Attributes:
@@ -58,9 +58,9 @@ class Outcome:
         wanted: patterns of the frame that should have come, one of them, where it failed by that.
     """
 
-    verdict: Verdict
+    verdict: CheckVerdict
     reason: str = ""
-    evidence: tuple[Line, ...] = ()
+    evidence: tuple[FrameLine, ...] = ()
     start_us: int = 0
     end_us: int = 0
     wanted: tuple[str, ...] = ()
@@ -77,8 +77,8 @@ class Result:
     """
 
     check: Check
-    outcome: Outcome
-    first: Outcome | None = None
+    outcome: CheckOutcome
+    first: CheckOutcome | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,18 +115,22 @@ class Report:
     doubt: str = ""
     absent: bool = False
 
-    def count(self, verdict: Verdict) -> int:
+    def count(self, verdict: CheckVerdict) -> int:
         """Return how many checks gave this verdict."""
         return sum(result.outcome.verdict is verdict for result in self.results)
 
     @property
     def exit_status(self) -> int:
         """0 all pass, 1 a failure, 4 inconclusive or blocked, 5 nothing judged (conform.md 5)."""
-        if self.count(Verdict.FAIL):
+        if self.count(CheckVerdict.FAIL):
             return FAILED
-        if self.count(Verdict.INCONCLUSIVE) or self.count(Verdict.BLOCKED) or self.aborted:
+        if (
+            self.count(CheckVerdict.INCONCLUSIVE)
+            or self.count(CheckVerdict.BLOCKED)
+            or self.aborted
+        ):
             return UNDECIDED
-        return 0 if self.count(Verdict.PASS) else NOTHING_JUDGED
+        return 0 if self.count(CheckVerdict.PASS) else NOTHING_JUDGED
 
 
 FAILED: Final = 1

@@ -20,7 +20,7 @@ from tickrig.host.canopen.data_sheet.rules import (
 )
 from tickrig.host.text.values import counted
 
-CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
+_CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     value_rules.of_reader,
     value_rules.stray_lines,
     *(text_rules.encoding, text_rules.line_ends, text_rules.titles, text_rules.keywords),
@@ -41,7 +41,7 @@ CHECKS: Final[tuple[Callable[[Document], Iterator[RuleFinding]], ...]] = (
     ),
     *(profile_rules.mandatory, profile_rules.communication, profile_rules.profile),
 )
-UNREADABLE: Final = frozenset({"xml", "no-objects"})
+_UNREADABLE: Final = frozenset({"xml", "no-objects"})
 """Where one of these is found, what else is missing goes without saying."""
 
 
@@ -53,9 +53,9 @@ def check(document: Document) -> list[RuleFinding]:
 
 
 def _check(document: Document) -> list[RuleFinding]:
-    found = list(dict.fromkeys(one for rule in CHECKS for one in rule(document)))
-    if document.file.is_xml and any(one.rule.name in UNREADABLE for one in found):
-        found = [one for one in found if one.rule.name in UNREADABLE]
+    found = list(dict.fromkeys(one for rule in _CHECKS for one in rule(document)))
+    if document.file.is_xml and any(one.rule.name in _UNREADABLE for one in found):
+        found = [one for one in found if one.rule.name in _UNREADABLE]
     return sorted(found, key=lambda one: one.line)
 
 

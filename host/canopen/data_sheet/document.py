@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Final
 
-from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
-from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.rule import RULES, Edit, EditPlace, RuleFinding
 from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import (
     CODE_PAGES,
@@ -18,10 +17,10 @@ from tickrig.wire.canopen.eds.eds_file import (
     encoding_of,
     shorten,
 )
-from tickrig.wire.canopen.eds.eds_lines import EdsLine
+from tickrig.wire.canopen.eds.eds_value import EdsLine
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-BOM: Final = "\ufeff"
+_BOM: Final = "\ufeff"
 _END: Final = re.compile(r"(\r\n|\r|\n)")
 
 
@@ -51,8 +50,8 @@ class Document:
         self.name, self.data = name, data
         self.encoding = encoding or encoding_of(coded)
         text = coded.decode(self.encoding, self._lossless)
-        self.has_bom = coded != data or text.startswith(BOM)
-        parts = _END.split(text.removeprefix(BOM))
+        self.has_bom = coded != data or text.startswith(_BOM)
+        parts = _END.split(text.removeprefix(_BOM))
         self.texts, self.ends = parts[::2], [*parts[1::2], ""]
         self.file = EdsFile(name, decode_text(data, self.encoding))
         self.device = read_device(self.file)
@@ -121,7 +120,7 @@ class Document:
         """Return whether edits would leave another file, in letters that its encoding has."""
         added = "".join(text for edit in edits for text in edit.lines)
         return self._can_hold(added) and any(
-            place is not Place.REPLACE or lines != (self.texts[line - 1],)
+            place is not EditPlace.REPLACE or lines != (self.texts[line - 1],)
             for line, place, lines in edits
         )
 
@@ -149,7 +148,7 @@ class Document:
     def add_to(self, section: str, texts: Iterable[str]) -> Edit:
         """Return the edit that puts lines at the end of a section."""
         numbers = [line.number for line in self._blocks.get(section, ()) if line.content]
-        return Edit(max(numbers, default=0), Place.AFTER, tuple(texts))
+        return Edit(max(numbers, default=0), EditPlace.AFTER, tuple(texts))
 
     def is_again(self, line: EdsLine) -> bool:
         """Return whether a line stands in a section whose title was there before."""

@@ -10,11 +10,11 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.check import check, failing
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.wire.canopen.eds.eds_file import UTF_8_MARK, shorten
 
-MOST_PASSES: Final = 50
-WRITTEN_AS: Final = {
+_MOST_PASSES: Final = 50
+_WRITTEN_AS: Final = {
     **{"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss"},
     **{"°": "deg", "µ": "u", "μ": "u", "Ω": "Ohm", "\N{OHM SIGN}": "Ohm", "±": "+-", "€": "EUR"},
     **{"©": "(c)", "®": "(R)", "•": "*", "·": "*", "„": '"', "“": '"', "”": '"'},
@@ -22,7 +22,7 @@ WRITTEN_AS: Final = {
     **dict.fromkeys("\u2018\u2019", "'"),
 }
 """Letters in ASCII that taking their accents away does not give."""
-CUT: Final = "truncated"
+_CUT: Final = "truncated"
 _NO_LETTER: Final = re.compile("[\udc80-\udcff]")
 """Bytes that their encoding has no letter for."""
 
@@ -61,9 +61,9 @@ def fix(document: Document, *, ascii_only: bool = False) -> Fixed:
     mended: list[RuleFinding] = []
     origins = list(range(1, len(document.texts) + 1))
     left = failing(check(document), strict=True)
-    if any(one.rule.name == CUT for one in left):
+    if any(one.rule.name == _CUT for one in left):
         return Fixed(document, (), tuple(left), tuple(origins))
-    for _ in range(MOST_PASSES):
+    for _ in range(_MOST_PASSES):
         plan = _Plan()
         wanted = [*left, *_beyond_ascii(document)] if ascii_only else left
         taken = [one for one in wanted if document.changes(one.edits) and plan.take(one.edits)]
@@ -81,23 +81,23 @@ def _beyond_ascii(document: Document) -> Iterator[RuleFinding]:
         if text.isascii():
             continue
         letters = dict.fromkeys(letter for letter in text if not letter.isascii())
-        said = ", ".join(f"{shorten(letter)!r} as {in_ascii(letter)!r}" for letter in letters)
-        edit = Edit(number, lines=("".join(map(in_ascii, text)),))
+        said = ", ".join(f"{shorten(letter)!r} as {_in_ascii(letter)!r}" for letter in letters)
+        edit = Edit(number, lines=("".join(map(_in_ascii, text)),))
         yield document.found(
             "non-ascii", f"letters beyond ASCII are written: {said}", "", number, edit
         )
 
 
-def in_ascii(letter: str) -> str:
+def _in_ascii(letter: str) -> str:
     """Return a letter in ASCII, `?` if there is nothing like it.
 
-    >>> [in_ascii(letter) for letter in "öéß°Ω²✓"]
+    >>> [_in_ascii(letter) for letter in "öéß°Ω²✓"]
     ['oe', 'e', 'ss', 'deg', 'Ohm', '2', '?']
     """
     if letter.isascii():
         return letter
-    if letter in WRITTEN_AS:
-        return WRITTEN_AS[letter]
+    if letter in _WRITTEN_AS:
+        return _WRITTEN_AS[letter]
     plain = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
     return plain if plain.isprintable() and plain else "?"
 
@@ -112,17 +112,17 @@ class _Plan:
     def __init__(self) -> None:
         self._lines: dict[int, tuple[str, ...]] = {}
         self._added: dict[int, dict[tuple[str, ...], None]] = {}
-        self._places: set[Place] = set()
+        self._places: set[EditPlace] = set()
 
     def take(self, edits: tuple[Edit, ...]) -> bool:
         """Add edits; False, and none of them, where they contradict others."""
         for line, place, lines in edits:
-            if place is Place.REPLACE and self._lines.get(line, lines) != lines:
+            if place is EditPlace.REPLACE and self._lines.get(line, lines) != lines:
                 return False
         for line, place, lines in edits:
-            if place is Place.REPLACE:
+            if place is EditPlace.REPLACE:
                 self._lines[line] = lines
-            elif place is Place.AFTER:
+            elif place is EditPlace.AFTER:
                 self._added.setdefault(line, {})[lines] = None
             else:
                 self._places.add(place)
@@ -135,7 +135,7 @@ class _Plan:
         self._add(lines, 0, usual, 1)
         for number, (text, end) in enumerate(zip(document.texts, document.ends, strict=True), 1):
             origin = origins[number - 1]
-            if end == "\r" and Place.LINE_ENDS in self._places:
+            if end == "\r" and EditPlace.LINE_ENDS in self._places:
                 end = usual  # noqa: PLW2901 - what it is from here on
             kept = self._lines.get(number, (text,))
             last = number == len(document.texts)
@@ -155,12 +155,12 @@ class _Plan:
             lines += ((text, end, origin) for text in texts)
 
     def _encoded(self, document: Document, text: str) -> bytes:
-        if not document.is_unicode and Place.ENCODING in self._places:
+        if not document.is_unicode and EditPlace.ENCODING in self._places:
             plain = _NO_LETTER.sub("\ufffd", text)
             return plain.encode("utf-8")
         if document.encoding.startswith("utf-16"):
             return text.encode("utf-8", "replace")
-        keeps = document.has_bom and Place.ENCODING not in self._places
+        keeps = document.has_bom and EditPlace.ENCODING not in self._places
         coded = text.encode(document.encoding, "surrogateescape")
         return (UTF_8_MARK if keeps else b"") + coded
 

@@ -3,27 +3,60 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.notation import (
-    access_text,
-    default_text,
-    limit_text,
-    rates_text,
-)
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
-from tickrig.wire.canopen.eds.object_table import EntryDescription
+from tickrig.host.canopen.data_sheet.rules.known_keys import FLAGS, NUMBERS
+from tickrig.wire.canopen.eds.eds_value import format_value, parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_writer import access_type
+from tickrig.wire.canopen.eds.object_table import Access, DeviceInfo, EntryDescription
 
-IDENTITY: Final = (
+# How values of an EDS are shown to people.
+
+
+def _access_text(row: EntryDescription) -> str:
+    """Return the access of an entry, and which PDOs may carry it.
+
+    >>> from tickrig.wire.canopen.eds.object_table import ROT, RW, DataType
+    >>> [_access_text(EntryDescription(1, 0, "", DataType.UNSIGNED8, each)) for each in (ROT, RW)]
+    ['ro T', 'rw']
+    """
+    try:
+        word = access_type(row)
+    except ValueError:
+        word = "?"
+    ways = ("T" * (Access.TPDO in row.access)) + ("R" * (Access.RPDO in row.access))
+    return f"{word} {ways}".strip()
+
+
+def _default_text(row: EntryDescription) -> str:
+    """Return the default of an entry as an EDS has it; empty without one."""
+    if not row.has_default:
+        return ""
+    text = format_value(row.data_type, row.default, relative=row.relative)
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+def _limit_text(limit: int | float | None) -> str:
+    """Return a limit, empty without one."""
+    return "" if limit is None else str(limit)
+
+
+def _rates_text(info: DeviceInfo) -> str:
+    """Return bit rates in kbit/s, the slowest first."""
+    return " ".join(str(rate // 1_000) for rate in sorted(info.bit_rates))
+
+
+_IDENTITY: Final = (
     *(("vendor-ID", 1, "VendorNumber"), ("product code", 2, "ProductNumber")),
     *(("revision", 3, "RevisionNumber"), ("serial number", 4, "")),
 )
-PDO_KINDS: Final = (("RPDO", 0x1400), ("TPDO", 0x1800))
-MOST_PDOS: Final = 0x200
-MAPPING: Final = 0x200
-INVALID: Final = 1 << 31
-CAN_ID: Final = 0x1FFF_FFFF
+_PDO_KINDS: Final = (("RPDO", 0x1400), ("TPDO", 0x1800))
+_MOST_PDOS: Final = 0x200
+_MAPPING: Final = 0x200
+_INVALID: Final = 1 << 31
+_CAN_ID: Final = 0x1FFF_FFFF
 
 
 def head(document: Document) -> dict[str, Any]:
@@ -33,9 +66,9 @@ def head(document: Document) -> dict[str, Any]:
         "vendor": info.vendor_name,
         "product": info.product_name,
         "order code": info.order_code,
-        **{what: _identity(document, sub, key) for what, sub, key in IDENTITY},
+        **{what: _identity(document, sub, key) for what, sub, key in _IDENTITY},
         "device type": _hex(document, 0x1000, 0),
-        "bit rates": rates_text(info),
+        "bit rates": _rates_text(info),
         "node-ID": document.device.node_id or "",
         "LSS": "yes" if number(document, "DeviceInfo", "LSS_Supported") else "no",
         "objects": len(document.device.objects),
@@ -77,10 +110,10 @@ def _entry(document: Document, row: EntryDescription) -> dict[str, Any]:
         "object": described.name,
         "kind": described.code.name,
         "type": row.data_type.name,
-        "access": access_text(row),
-        "default": default_text(row),
-        "low": limit_text(row.low),
-        "high": limit_text(row.high),
+        "access": _access_text(row),
+        "default": _default_text(row),
+        "low": _limit_text(row.low),
+        "high": _limit_text(row.high),
         "unit": row.unit,
     }
 
@@ -94,8 +127,8 @@ def pdos(document: Document, node_id: int) -> list[dict[str, Any]]:
     """
     return [
         _pdo(document, f"{kind}{at + 1}", first + at, node_id)
-        for kind, first in PDO_KINDS
-        for at in range(MOST_PDOS)
+        for kind, first in _PDO_KINDS
+        for at in range(_MOST_PDOS)
         if (first + at, 1) in document.rows
     ]
 
@@ -106,10 +139,10 @@ def _pdo(document: Document, name: str, index: int, node_id: int) -> dict[str, A
     return {
         "pdo": name,
         "index": f"{index:04X}h",
-        "can_id": f"{cob_id & CAN_ID:03X}",
-        "valid": not cob_id & INVALID,
+        "can_id": f"{cob_id & _CAN_ID:03X}",
+        "valid": not cob_id & _INVALID,
         "transmission": int.from_bytes(transmission.default, "little") if transmission else "",
-        "mapping": list(_mapped(document, index + MAPPING)),
+        "mapping": list(_mapped(document, index + _MAPPING)),
     }
 
 
@@ -141,4 +174,115 @@ def table(rows: list[dict[str, Any]], columns: tuple[str, ...]) -> list[str]:
     return [
         "  ".join(f"{text:<{width}}" for text, width in zip(line, widths, strict=True)).rstrip()
         for line in all_lines
+    ]
+
+
+# What is another device in one file than in another.
+
+
+class Change(NamedTuple):
+    """One difference.
+
+    Attributes:
+        place: `DeviceInfo`, `2000h` or `2000h:01`.
+        what: the field, or `object` or `entry` of what is in one file only.
+        old: of the first file, empty if it has none.
+        new: of the second file, likewise.
+    """
+
+    place: str
+    what: str
+    old: str
+    new: str
+
+    def __str__(self) -> str:
+        """Say it in one line."""
+        if self.what in _WHOLE:
+            sign, name = ("-", self.old) if self.old else ("+", self.new)
+            return f"{sign} {self.place} {name}"
+        return f"~ {self.place} {self.what}: {self.old or '-'} -> {self.new or '-'}"
+
+
+_WHOLE: Final = ("object", "entry")
+
+
+def diff(one: Document, other: Document) -> list[Change]:
+    """Return all differences: device, identity, bit rates, then objects by index.
+
+    The order of sections, the notation of numbers and what no device has (dates, file names,
+    comments) make none.
+    """
+    return [*_device(one, other), *_objects(one, other)]
+
+
+def _device(one: Document, other: Document) -> Iterator[Change]:
+    pairs = [
+        ("vendor", one.device.info.vendor_name, other.device.info.vendor_name),
+        ("product", one.device.info.product_name, other.device.info.product_name),
+        ("order code", one.device.info.order_code, other.device.info.order_code),
+        ("bit rates", _rates_text(one.device.info), _rates_text(other.device.info)),
+        ("node-ID", str(one.device.node_id or ""), str(other.device.node_id or "")),
+    ]
+    for key in (*NUMBERS, *FLAGS):
+        if not key.startswith("BaudRate"):
+            pairs.append((key, _number(one, key), _number(other, key)))
+    for what, old, new in pairs:
+        if old != new:
+            yield Change("DeviceInfo", what, old, new)
+
+
+def _number(document: Document, key: str) -> str:
+    """Return a number of [DeviceInfo] in one notation; 0 is what is not there."""
+    text = plain_numbers(document.file.value("DeviceInfo", key))
+    try:
+        number = parse_number(text or "0")
+    except ValueError:
+        return text
+    return f"0x{number:X}"
+
+
+def _objects(one: Document, other: Document) -> Iterator[Change]:
+    old, new = one.device.objects, other.device.objects
+    all_subs: dict[int, set[int]] = {}
+    for at, sub in (*one.rows, *other.rows):
+        all_subs.setdefault(at, set()).add(sub)
+    for index in sorted({*old, *new}):
+        place = f"{index:04X}h"
+        before, after = old.get(index), new.get(index)
+        if before is None or after is None:
+            name = "" if before is None else before.name or "-"
+            yield Change(place, "object", name, "" if after is None else after.name or "-")
+            continue
+        if before.name != after.name:
+            yield Change(place, "name", before.name, after.name)
+        if before.code is not after.code:
+            yield Change(place, "kind", before.code.name, after.code.name)
+        yield from _entries(one, other, index, all_subs.get(index, set()))
+
+
+def _entries(one: Document, other: Document, index: int, subs: set[int]) -> Iterator[Change]:
+    for sub in sorted(subs):
+        before, after = one.rows.get((index, sub)), other.rows.get((index, sub))
+        place = f"{index:04X}h:{sub:02X}"
+        if before is None or after is None:
+            old, new = (row.name or "-" if row else "" for row in (before, after))
+            yield Change(place, "entry", old, new)
+            continue
+        fields = zip(_fields(before), _fields(after), strict=True)
+        for (what, old), (_, new) in fields:
+            named = what == "name" and len(subs) == 1
+            if old != new and not named:
+                yield Change(place, what, old, new)
+
+
+def _fields(row: EntryDescription) -> list[tuple[str, str]]:
+    return [
+        ("name", row.name),
+        ("type", row.data_type.name),
+        ("access", _access_text(row)),
+        ("default", _default_text(row)),
+        ("low limit", _limit_text(row.low)),
+        ("high limit", _limit_text(row.high)),
+        ("unit", row.unit),
+        ("factor", f"{row.factor:g}"),
     ]

@@ -2,36 +2,333 @@
 
 Device type, identity, node state if it is to be kept alive, software, configuration,
 error control. It knows no time: a `Dialogue` says it to the slave.
+
+How the boot-up of a slave ended (CiA 302-2, error status of the boot slave process).
+
+>>> BootStatus("D").text
+'1018h:01 vendor-ID is another than expected, or cannot be read'
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
-from tickrig.host.canopen.dialogue import Command, Guard, Script
-from tickrig.host.canopen.errors import SdoFailed
+from tickrig.host.canopen.dialogue import AwaitReport, Guard, NmtRequest, Pause, Script
+from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
-from tickrig.host.canopen.master.boot_status import BootStatus
-from tickrig.host.canopen.master.boot_talk import (
-    TRIES,
-    BootEnded,
-    BootTalk,
-    OnStep,
-    as_hex,
-    is_value,
-)
-from tickrig.host.canopen.master.program_update import update_program
+from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
-GUARD_ANSWER_US: Final = 100_000
-BOOT_UP_US: Final = 1_000_000
+
+class BootStatus(Enum):
+    """The error status by its letter; `BOOTED` has none."""
+
+    BOOTED = ""
+    NOT_LISTED = "A"
+    NO_ANSWER = "B"
+    DEVICE_TYPE = "C"
+    VENDOR = "D"
+    NO_HEARTBEAT = "E"
+    NO_GUARD_ANSWER = "F"
+    NO_PROGRAM_OBJECTS = "G"
+    UPDATE_NOT_ALLOWED = "H"
+    UPDATE_FAILED = "I"
+    CONFIGURATION = "J"
+    NO_FIRST_HEARTBEAT = "K"
+    WAS_OPERATIONAL = "L"
+    PRODUCT = "M"
+    REVISION = "N"
+    SERIAL = "O"
+
+    @property
+    def text(self) -> str:
+        """What it means, in words."""
+        return _TEXTS[self]
+
+    @property
+    def good(self) -> bool:
+        """Whether the slave is at work: it has booted, or had been Operational all along."""
+        return self in (BootStatus.BOOTED, BootStatus.WAS_OPERATIONAL)
+
+
+_TEXTS: Final = {
+    BootStatus.BOOTED: "booted",
+    BootStatus.NOT_LISTED: "no slave of this master (1F81h)",
+    BootStatus.NO_ANSWER: "1000h device type cannot be read",
+    BootStatus.DEVICE_TYPE: "1000h device type is another than expected",
+    BootStatus.VENDOR: "1018h:01 vendor-ID is another than expected, or cannot be read",
+    BootStatus.NO_HEARTBEAT: "to be kept alive, but no heartbeat came, or no boot-up after a reset",
+    BootStatus.NO_GUARD_ANSWER: "to be kept alive, but node guarding was not answered",
+    BootStatus.NO_PROGRAM_OBJECTS: "1F56h:01 software identification cannot be read",
+    BootStatus.UPDATE_NOT_ALLOWED: "other software than expected, and no leave to update it",
+    BootStatus.UPDATE_FAILED: "other software than expected, and its update failed",
+    BootStatus.CONFIGURATION: "the configuration was not taken",
+    BootStatus.NO_FIRST_HEARTBEAT: "no heartbeat within the consumer heartbeat time",
+    BootStatus.WAS_OPERATIONAL: "had been Operational and was left so",
+    BootStatus.PRODUCT: "1018h:02 product code is another than expected, or cannot be read",
+    BootStatus.REVISION: "1018h:03 revision number is another than expected, or cannot be read",
+    BootStatus.SERIAL: "1018h:04 serial number is another than expected, or cannot be read",
+}
+
+
+# What is said to a slave during its boot-up, and told of it step by step.
+
+_TRIES: Final = 4
+"""A slave that may just have been reset is asked so often."""
+
+_U32: Final = 4
+
+
+@dataclass(frozen=True, slots=True)
+class BootStep:
+    """One step of a boot-up, for people.
+
+    Attributes:
+        request: what was said to the slave, or waited for.
+        answer: what came.
+        meaning: what follows.
+    """
+
+    request: str
+    answer: str
+    meaning: str
+
+    def __str__(self) -> str:
+        """Return it in a line."""
+        return f"{self.request}: {self.answer}; {self.meaning}"
+
+
+_OnStep = Callable[[BootStep], None]
+
+
+class BootEnded(Exception):  # noqa: N818 - how a boot-up ends, in the middle of it
+    """The slave cannot be booted.
+
+    Attributes:
+        status: why.
+    """
+
+    def __init__(self, status: BootStatus) -> None:
+        super().__init__(status.text)
+        self.status = status
+
+
+class BootTalk:
+    """Reads, writes and waits; each step is told.
+
+    Args:
+        on_step: called with each step.
+    """
+
+    def __init__(self, on_step: _OnStep) -> None:
+        self._on_step = on_step
+
+    def report(
+        self, what: str, wait_us: int, status: BootStatus, *, boot_up: bool = True
+    ) -> Script[NmtState]:
+        """Wait for a boot-up or a state; end the boot-up without one."""
+        state: NmtState | None = yield AwaitReport(wait_us, boot_up)
+        if state is None:
+            self.record(what, f"none within {wait_us // 1_000} ms", status.text)
+            raise BootEnded(status)
+        self.record(what, state_text(state), "goes on")
+        return state
+
+    def read(
+        self, index: int, sub: int, name: str, status: BootStatus, tries: int = 1
+    ) -> Script[bytes]:
+        """Read an object; end the boot-up if it cannot be read."""
+        what = f"{index:04X}h:{sub:02X} {name}"
+        data = yield from self.attempt(index, sub, what, tries)
+        if isinstance(data, SdoFailed):
+            self.record(what, str(data), status.text)
+            raise BootEnded(status)
+        return data
+
+    def attempt(self, index: int, sub: int, what: str, tries: int) -> Script[bytes | SdoFailed]:
+        """Read an object, once more after a time-out; return what was raised at last."""
+        for _ in range(tries - 1):
+            try:
+                return (yield from upload(index, sub))
+            except SdoTimeout:
+                self.record(what, "no answer", "asked again")
+            except SdoFailed as error:
+                return error
+        try:
+            return (yield from upload(index, sub))
+        except SdoFailed as error:
+            return error
+
+    def write(
+        self,
+        write: ObjectWrite,
+        status: BootStatus,
+        *,
+        what: str = "",
+        tries: int = 1,
+        answered: bool = True,
+    ) -> Script[None]:
+        """Write an object; end the boot-up if it is refused, or not answered.
+
+        Args:
+            write: what to write.
+            status: of the end.
+            what: for the step; object and value unless given.
+            tries: so often, as long as there is no answer.
+            answered: an answer is needed.
+        """
+        what = what or f"{write.index:04X}h:{write.sub:02X} := {_as_hex(write.data)}"
+        try:
+            yield from self._download(write, what, tries)
+        except SdoFailed as error:
+            if isinstance(error, SdoTimeout) and not answered:
+                self.record(what, "no answer", "which need not be; goes on")
+                return
+            self.record(what, str(error), status.text)
+            raise BootEnded(status) from error
+        self.record(what, "taken", "goes on")
+
+    def _download(self, write: ObjectWrite, what: str, tries: int) -> Script[None]:
+        for left in range(tries - 1, 0, -1):
+            try:
+                return (yield from download(write.index, write.sub, write.data))
+            except SdoTimeout:
+                self.record(what, "no answer", f"said again, {left} more")
+        return (yield from download(write.index, write.sub, write.data))
+
+    def compare(self, what: str, data: bytes, expected: int, status: BootStatus) -> None:
+        """End the boot-up if a number is another than expected; 0 expects nothing."""
+        if expected and not _is_value(data, expected):
+            self.record(what, _as_hex(data), f"not {expected:08X}h: {status.text}")
+            raise BootEnded(status)
+        self.record(what, _as_hex(data), "as expected" if expected else "not looked at")
+
+    def record(self, request: str, answer: str, meaning: str) -> None:
+        """Tell a step."""
+        self._on_step(BootStep(request, answer, meaning))
+
+
+_STATES: Final = {
+    NmtState.INITIALISING: "boot-up",
+    NmtState.STOPPED: "Stopped",
+    NmtState.OPERATIONAL: "Operational",
+    NmtState.PRE_OPERATIONAL: "Pre-operational",
+}
+
+
+def state_text(state: NmtState) -> str:
+    """Return a state as people write it."""
+    return _STATES[state]
+
+
+def _is_value(data: bytes, expected: int) -> bool:
+    """Say whether data is a number of 32 bits."""
+    return len(data) == _U32 and int.from_bytes(data, "little") == expected
+
+
+def _as_hex(data: bytes) -> str:
+    """Return a value as a number; what is longer than eight bytes as their count."""
+    return f"{data[::-1].hex().upper()}h" if 0 < len(data) <= 8 else f"{len(data)} bytes"
+
+
+# The download of software at boot-up, as a script (CiA 302-3, program download).
+
+DATA: Final = 0x1F50
+CONTROL: Final = 0x1F51
+IDENTIFICATION: Final = 0x1F56
+FLASH_STATUS: Final = 0x1F57
+
+STOP: Final = 0
+_START: Final = 1
+_CLEAR: Final = 3
+"""Program control, 1F51h:01."""
+
+LOOK_US: Final = 100_000
+_LOOKS: Final = 600
+"""Flash status and program control are looked at so often, for a minute."""
+
+BUSY: Final = 0x01
+"""Bit of the flash status; bits 1 to 7 are an error code."""
+
+_FAILED: Final = BootStatus.UPDATE_FAILED
+
+
+def _update_program(talk: BootTalk, program: bytes, expected: int) -> Script[None]:
+    """Stop and clear the program, download another, see that it is the right one, start it.
+
+    Args:
+        talk: with the slave.
+        program: what is downloaded, segmented.
+        expected: its identification.
+
+    Raises:
+        BootEnded: it failed.
+    """
+    yield from _stop(talk)
+    yield from talk.write(_control(_CLEAR), _FAILED, what="1F51h:01 := clear", tries=_TRIES)
+    what = f"1F50h:01 := {len(program)} bytes"
+    yield from talk.write(ObjectWrite(DATA, 1, program), _FAILED, what=what, tries=_TRIES)
+    yield from _await_flash(talk)
+    data = yield from talk.read(IDENTIFICATION, 1, "software identification", _FAILED)
+    talk.compare("1F56h:01 software identification", data, expected, _FAILED)
+    yield from talk.write(_control(_START), _FAILED, what="1F51h:01 := start", answered=False)
+    yield from _await_start(talk)
+
+
+def _control(command: int) -> ObjectWrite:
+    return ObjectWrite(CONTROL, 1, bytes((command,)))
+
+
+def _stop(talk: BootTalk) -> Script[None]:
+    """Stop the program, unless it says that it is."""
+    what = "1F51h:01 program control"
+    data = yield from talk.attempt(CONTROL, 1, what, 1)
+    if data == bytes((STOP,)):
+        talk.record(what, "stopped", "goes on")
+        return
+    yield from talk.write(_control(STOP), _FAILED, what="1F51h:01 := stop", answered=False)
+
+
+def _await_flash(talk: BootTalk) -> Script[None]:
+    """Wait until the flash is written."""
+    what = "1F57h:01 flash status"
+    for _ in range(_LOOKS):
+        yield Pause(LOOK_US)
+        data = yield from talk.attempt(FLASH_STATUS, 1, what, 1)
+        if isinstance(data, SdoFailed) or len(data) != _U32 or data[0] & BUSY:
+            continue
+        if error := data[0] >> 1:
+            talk.record(what, f"error {error}", _FAILED.text)
+            raise BootEnded(_FAILED)
+        talk.record(what, "written", "goes on")
+        return
+    talk.record(what, f"not written after {_LOOKS} looks", _FAILED.text)
+    raise BootEnded(_FAILED)
+
+
+def _await_start(talk: BootTalk) -> Script[None]:
+    """Wait until the program runs."""
+    for _ in range(_LOOKS):
+        yield Pause(LOOK_US)
+        data = yield from talk.read(CONTROL, 1, "program control", _FAILED, _TRIES)
+        if data == bytes((_START,)):
+            talk.record("1F51h:01 program control", "started", "booted from the beginning")
+            return
+    talk.record("1F51h:01 program control", f"not started after {_LOOKS} looks", _FAILED.text)
+    raise BootEnded(_FAILED)
+
+
+_GUARD_ANSWER_US: Final = 100_000
+_BOOT_UP_US: Final = 1_000_000
 """How long an answer to guarding, and a boot-up after a reset, are waited for."""
 
-LOAD: Final = b"load"
+_LOAD: Final = b"load"
 """The signature of 1011h."""
 
-COMMUNICATION: Final = 2
+_COMMUNICATION: Final = 2
 """Sub-index of 1011h for communication parameters alone; a reset communication loads them."""
 
 
@@ -59,7 +356,7 @@ class SlaveBoot:
         on_step: called with each step.
     """
 
-    def __init__(self, slave: SlaveAssignment, on_step: OnStep) -> None:
+    def __init__(self, slave: SlaveAssignment, on_step: _OnStep) -> None:
         self._slave, self._talk = slave, BootTalk(on_step)
         self._state: NmtState | None = None
 
@@ -89,7 +386,7 @@ class SlaveBoot:
 
     def _check_identity(self) -> Script[None]:
         slave = self._slave
-        data = yield from self._talk.read(0x1000, 0, "device type", BootStatus.NO_ANSWER, TRIES)
+        data = yield from self._talk.read(0x1000, 0, "device type", BootStatus.NO_ANSWER, _TRIES)
         self._talk.compare("1000h:00 device type", data, slave.device_type, BootStatus.DEVICE_TYPE)
         for sub, name, expected, status in (
             (1, "vendor-ID", slave.vendor_id, BootStatus.VENDOR),
@@ -106,7 +403,7 @@ class SlaveBoot:
         slave, status = self._slave, BootStatus.NO_HEARTBEAT
         wait_us, what = slave.heartbeat_us, "heartbeat"
         if not wait_us:
-            wait_us, status, what = GUARD_ANSWER_US, BootStatus.NO_GUARD_ANSWER, "guarding"
+            wait_us, status, what = _GUARD_ANSWER_US, BootStatus.NO_GUARD_ANSWER, "guarding"
             yield Guard()
         state = yield from self._talk.report(f"state by {what}", wait_us, status)
         if state is NmtState.OPERATIONAL:
@@ -119,16 +416,16 @@ class SlaveBoot:
         """Compare the software; return True if it was updated."""
         expected = self._slave.software_version
         data = yield from self._talk.read(
-            0x1F56, 1, "software identification", BootStatus.NO_PROGRAM_OBJECTS, TRIES
+            0x1F56, 1, "software identification", BootStatus.NO_PROGRAM_OBJECTS, _TRIES
         )
         what = "1F56h:01 software identification"
         if not self._slave.program or not self._slave.reset_communication:
             self._talk.compare(what, data, expected, BootStatus.UPDATE_NOT_ALLOWED)
-        elif is_value(data, expected):
-            self._talk.record(what, as_hex(data), "as expected")
+        elif _is_value(data, expected):
+            self._talk.record(what, _as_hex(data), "as expected")
         else:
-            self._talk.record(what, as_hex(data), f"not {expected:08X}h: to be updated")
-            yield from update_program(self._talk, self._slave.program, expected)
+            self._talk.record(what, _as_hex(data), f"not {expected:08X}h: to be updated")
+            yield from _update_program(self._talk, self._slave.program, expected)
             return True
         return False
 
@@ -137,23 +434,23 @@ class SlaveBoot:
         date, time = self._slave.configuration_date, self._slave.configuration_time
         if not (date and time):
             return False
-        for sub, name, expected, tries in ((1, "date", date, TRIES), (2, "time", time, 1)):
+        for sub, name, expected, tries in ((1, "date", date, _TRIES), (2, "time", time, 1)):
             what = f"1020h:{sub:02X} configuration {name}"
             data = yield from self._talk.attempt(0x1020, sub, what, tries)
-            if isinstance(data, SdoFailed) or not is_value(data, expected):
-                found = str(data) if isinstance(data, SdoFailed) else as_hex(data)
+            if isinstance(data, SdoFailed) or not _is_value(data, expected):
+                found = str(data) if isinstance(data, SdoFailed) else _as_hex(data)
                 self._talk.record(what, found, f"not {expected:08X}h: configured anew")
                 return False
-            self._talk.record(what, as_hex(data), "as expected")
+            self._talk.record(what, _as_hex(data), "as expected")
         return True
 
     def _configure(self) -> Script[None]:
         slave = self._slave
         if slave.restore_sub:
-            load = ObjectWrite(0x1011, slave.restore_sub, LOAD)
+            load = ObjectWrite(0x1011, slave.restore_sub, _LOAD)
             what = f"1011h:{slave.restore_sub:02X} := load"
             yield from self._talk.write(load, BootStatus.CONFIGURATION, what=what)
-            communication = slave.restore_sub == COMMUNICATION
+            communication = slave.restore_sub == _COMMUNICATION
             yield from self._reset(
                 NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE,
                 BootStatus.CONFIGURATION,
@@ -171,6 +468,6 @@ class SlaveBoot:
             yield Guard()
 
     def _reset(self, command: NmtCommand, status: BootStatus) -> Script[None]:
-        yield Command(command)
+        yield NmtRequest(command)
         name = command.name.lower().replace("_", " ")
-        yield from self._talk.report(f"boot-up after {name}", BOOT_UP_US, status)
+        yield from self._talk.report(f"boot-up after {name}", _BOOT_UP_US, status)

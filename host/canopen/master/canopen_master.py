@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
+from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.master.assignment import MasterPlan
-from tickrig.host.canopen.master.boot_talk import BootStep, state_text
-from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
+from tickrig.host.canopen.master.boot_slave import BootStep, state_text
+from tickrig.host.canopen.master.cia402.drive_driver import (
+    DriveDriver,
+    DriveNode,
+    axes_of,
+    is_drive,
+    period_us_of,
+)
+from tickrig.host.canopen.master.from_bus_file import plan_of
 from tickrig.host.canopen.master.network_slave import NetworkSlave
-from tickrig.host.canopen.master.nmt_master import NmtMaster
-from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.nmt_master import NmtMaster, ProcessData
+from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.master.waiting import Operation, perform
-from tickrig.host.links.closing import Closing
-from tickrig.host.links.link import Link, StampedLink
+from tickrig.host.links.link import Closing, Link, StampedLink
 from tickrig.host.text.names import known, near
 from tickrig.host.text.values import us_of
 
-Duration = int | str
+_Duration = int | str
 """Microseconds, or a text as `"100ms"`."""
 
-STARTED_US: Final = 2_000
+_STARTED_US: Final = 2_000
 """By then a command to start has been heard."""
 
 
@@ -91,7 +100,7 @@ class CanopenMaster(Closing):
         drivers = [driver for node in process_data.drives for driver in node.drivers]
         self.joints = Named("joint", {driver.name: driver for driver in drivers})
 
-    def boot(self, within: Duration = "10s") -> None:
+    def boot(self, within: _Duration = "10s") -> None:
         """Start the network: let time pass until each slave has booted.
 
         Args:
@@ -103,13 +112,13 @@ class CanopenMaster(Closing):
         self.wait_until(self._all_booted, within)
         if failed := [slave for slave in self.nmt.slaves.values() if not slave.good]:
             raise BootFailed(failed)
-        self.run_for(STARTED_US)
+        self.run_for(_STARTED_US)
 
-    def run_for(self, duration: Duration) -> None:
+    def run_for(self, duration: _Duration) -> None:
         """Let time pass: microseconds, or a text as `"100ms"`."""
         self.wait_until(_never, duration)
 
-    def wait_until(self, done: Callable[[], bool], within: Duration) -> bool:
+    def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
         """Let time pass until something is so.
 
         Args:
@@ -217,3 +226,55 @@ def _failure(slave: NetworkSlave) -> str:
 
 def _never() -> bool:
     return False
+
+
+# The master that a bus.yml describes, on a bus.
+
+SDO_TIMEOUT_US: Final = 100_000
+"""As Lely's master has it, unless told otherwise."""
+
+
+def open_master(
+    link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
+) -> CanopenMaster:
+    """Return the master of a bus.yml; it has sent nothing yet.
+
+    Args:
+        link: the bus, as `bench.link`, or `CanLink.open("can0", "socketcan")`.
+        path: the bus.yml.
+        sdo_timeout_us: how long to wait for an SDO response; a loaded machine wants more.
+
+    Returns:
+        A master; close it, or use it in a `with` block.
+
+    Raises:
+        OSError: the file cannot be read, or software that it names.
+        ImportError: PyYAML is not installed.
+        ValueError: all that is wrong with the file, each with its line.
+        TypeError: a link to a serial line.
+    """
+    bus = read_bus_file(Path(path))
+    if bus.errors:
+        raise ValueError("\n".join(str(one) for one in bus.errors))
+    return _master_of(link, bus, sdo_timeout_us)
+
+
+def _master_of(
+    link: Link[Any], bus: BusFile, sdo_timeout_us: int = SDO_TIMEOUT_US
+) -> CanopenMaster:
+    """Return the master of a bus.yml that was read."""
+    master = CanopenMaster(link, replace(plan_of(bus), sdo_timeout_us=sdo_timeout_us))
+    slaves = bus.slaves.values()
+    images = {slave.node_id: ProcessImage(slave.pdos, master.nmt.send) for slave in slaves}
+    drives = tuple(
+        DriveNode(
+            master.nmt.slaves[slave.node_id],
+            images[slave.node_id],
+            axes_of(slave),
+            period_us_of(slave),
+        )
+        for slave in slaves
+        if is_drive(slave)
+    )
+    master.attach(ProcessData(images, drives))
+    return master

@@ -7,17 +7,21 @@ from typing import Final
 
 from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Send
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.boot_slave import BootOutcome, SlaveBoot
-from tickrig.host.canopen.master.boot_status import BootStatus
-from tickrig.host.canopen.master.boot_talk import BootStep, state_text
+from tickrig.host.canopen.master.boot_slave import (
+    BootOutcome,
+    BootStatus,
+    BootStep,
+    SlaveBoot,
+    state_text,
+)
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
-AGAIN_US: Final = 1_000_000
+_AGAIN_US: Final = 1_000_000
 """A slave that does not answer is booted again after so long."""
 
-STATE_BITS: Final = 0x7F
-TOGGLE: Final = 0x80
+_STATE_BITS: Final = 0x7F
+_TOGGLE: Final = 0x80
 
 
 class NetworkSlave:
@@ -106,7 +110,7 @@ class NetworkSlave:
         """
         self._now_us = now_us
         try:
-            state = NmtState(number & STATE_BITS)
+            state = NmtState(number & _STATE_BITS)
         except ValueError:
             return
         if self.events and self.state is None and not self.booting:
@@ -117,7 +121,7 @@ class NetworkSlave:
             self.state = NmtState.PRE_OPERATIONAL
             self.boot(now_us)
         elif not self.booting:
-            self._watch(number & TOGGLE)
+            self._watch(number & _TOGGLE)
 
     def _watch(self, toggle: int) -> None:
         """Go on with error control: by heartbeat of all that were heard, booted or not."""
@@ -178,7 +182,7 @@ class NetworkSlave:
 
     def _end(self, outcome: BootOutcome) -> None:
         if outcome.status is BootStatus.NO_ANSWER and self._may_try_again():
-            self._again_us = self._now_us + AGAIN_US
+            self._again_us = self._now_us + _AGAIN_US
             return
         self.booting, self.outcome = False, outcome
         if outcome.status.good:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final
 
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.boot_status import BootStatus
+from tickrig.host.canopen.master.boot_slave import BootStatus
+from tickrig.host.canopen.master.cia402.drive_driver import DriveNode
 from tickrig.host.canopen.master.network_slave import NetworkSlave
-from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, data_frame
@@ -18,18 +20,64 @@ from tickrig.wire.canopen.nmt import (
     NmtCommand,
     NmtState,
 )
-from tickrig.wire.canopen.sdo.sdo_command import RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo_frame import RESPONSE_COB_ID
 from tickrig.wire.instant import NEVER
 
-SYNC_COB_ID: Final = 0x080
-EMCY_COB_ID: Final = 0x080
+# The PDOs of all slaves, and who works on them in periods.
+
+
+class ProcessData:
+    """Hands frames and SYNCs on to the images and drives of the nodes.
+
+    Args:
+        images: by node-ID.
+        drives: nodes with axes.
+    """
+
+    def __init__(
+        self, images: Mapping[int, ProcessImage], drives: tuple[DriveNode, ...] = ()
+    ) -> None:
+        self.images, self.drives = images, drives
+        self._began = False
+        self._by_cob_id = {cob_id: image for image in images.values() for cob_id in image.cob_ids}
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do."""
+        return min((drive.due_us for drive in self.drives), default=NEVER)
+
+    def receive(self, frame: CanFrame) -> None:
+        """Take a data frame; one that is no TPDO of a slave is passed over."""
+        if (image := self._by_cob_id.get(frame.can_id)) is not None:
+            image.receive(frame.can_id, frame.data)
+
+    def sync(self) -> None:
+        """Send what goes with a SYNC."""
+        for image in self.images.values():
+            image.sync()
+
+    def tick(self, now_us: int, *, sync: bool) -> None:
+        """Begin the periods that are due; `sync` says that a SYNC was sent just now.
+
+        None begins while slaves boot at the start: ros2_canopen has its drivers wait for them.
+        """
+        if not self._began:
+            if any(drive.is_awaited(now_us) for drive in self.drives):
+                return
+            self._began = any(drive.is_booted for drive in self.drives)
+        for drive in self.drives:
+            drive.tick(now_us, sync=sync)
+
+
+_SYNC_COB_ID: Final = 0x080
+_EMCY_COB_ID: Final = 0x080
 """EMCY of node n is on this plus n."""
 
-NODE_IDS: Final = range(1, 128)
-FUNCTION: Final = 0x780
+_NODE_IDS: Final = range(1, 128)
+_FUNCTION: Final = 0x780
 """The bits of a CAN-ID that are no node-ID."""
 
-COMMANDED: Final = {
+_COMMANDED: Final = {
     NmtCommand.START: NmtState.OPERATIONAL,
     NmtCommand.STOP: NmtState.STOPPED,
     NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
@@ -97,8 +145,8 @@ class NmtMaster:
         """Send an NMT command, and expect of the slaves what it commands."""
         self.send(NMT_COB_ID, bytes((command, node_id)))
         for slave in self.slaves.values():
-            if node_id in (ALL_NODES, slave.assignment.node_id) and command in COMMANDED:
-                slave.expect(COMMANDED[command])
+            if node_id in (ALL_NODES, slave.assignment.node_id) and command in _COMMANDED:
+                slave.expect(_COMMANDED[command])
 
     def _guard(self, can_id: int) -> None:
         self._out.append(CanFrame(can_id, remote=True, remote_length=1))
@@ -123,14 +171,14 @@ class NmtMaster:
         if not kept:
             self.command(NmtCommand.RESET_COMMUNICATION)
             return
-        for node_id in NODE_IDS:
+        for node_id in _NODE_IDS:
             if node_id not in kept and node_id != self.plan.node_id:
                 self.command(NmtCommand.RESET_COMMUNICATION, node_id)
 
     def _hear(self, at_us: int, frame: CanFrame) -> None:
         if frame.extended or frame.remote:
             return
-        function, node_id = frame.can_id & FUNCTION, frame.can_id & ~FUNCTION
+        function, node_id = frame.can_id & _FUNCTION, frame.can_id & ~_FUNCTION
         slave = self.slaves.get(node_id)
         if function == ERROR_CONTROL_COB_ID and frame.data:
             if slave is not None:
@@ -139,7 +187,7 @@ class NmtMaster:
                 self.strangers.append(node_id)
         elif function == RESPONSE_COB_ID and slave is not None:
             slave.dialogue.receive_sdo(at_us, frame.data)
-        elif function == EMCY_COB_ID and slave is not None:
+        elif function == _EMCY_COB_ID and slave is not None:
             slave.emergencies.append(int.from_bytes(frame.data[:2], "little"))
         else:
             self.process_data.receive(frame)
@@ -194,7 +242,7 @@ class NmtMaster:
         if self._heartbeat.advance(self.now_us):
             self.send(ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
         if self._sync.advance(self.now_us):
-            self.send(SYNC_COB_ID, self._count())
+            self.send(_SYNC_COB_ID, self._count())
             if self.state is NmtState.OPERATIONAL:
                 self.process_data.sync()
             return True

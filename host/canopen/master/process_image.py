@@ -8,7 +8,7 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusPdo
 from tickrig.host.canopen.dialogue import Send
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK
+from tickrig.wire.canopen.nmt import CAN_ID_MASK
 from tickrig.wire.canopen.pdo import pack_bits, unpack_bits
 
 Key = tuple[int, int]
@@ -17,7 +17,7 @@ Key = tuple[int, int]
 EVENT_DRIVEN: Final = 0xFE
 """Transmission types from here on: a PDO is sent when an object is written."""
 
-SYNC_ACYCLIC: Final = 0
+_SYNC_ACYCLIC: Final = 0
 """Sent with the SYNC after an object was written."""
 
 
@@ -106,7 +106,7 @@ class ProcessImage:
         """Send what is due with this SYNC."""
         self._syncs += 1
         for pdo in self._sent:
-            if pdo.transmission == SYNC_ACYCLIC:
+            if pdo.transmission == _SYNC_ACYCLIC:
                 due = pdo.number in self._written
             else:
                 due = pdo.transmission < EVENT_DRIVEN and self._syncs % pdo.transmission == 0

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from tickrig.host.canopen.dialogue import Failure, QueuedScript
-from tickrig.host.rtc.canopen.definition.definition import PdoEntry, PdoLink, PdoName, RtConnection
-from tickrig.host.rtc.canopen.errors import ServerRefused
+from tickrig.host.rtc.canopen.boot import set_pdo
+from tickrig.host.rtc.canopen.definition import (
+    PdoEntry,
+    PdoLink,
+    PdoName,
+    RtConnection,
+    ServerRefused,
+)
 from tickrig.host.rtc.canopen.events import Notify, ServerEventType
-from tickrig.host.rtc.canopen.node.boot import set_pdo
-from tickrig.host.rtc.canopen.node.served_node import NodePhase, ServedNode
-from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout
+from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
+from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.port import ConnectorProfile
 from tickrig.host.rtc.states import RtcRefused

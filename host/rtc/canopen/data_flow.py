@@ -8,18 +8,16 @@ from functools import partial
 from tickrig.host.canopen.dialogue import Failure, QueuedScript, Script
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.rtc.canopen.events import Notify, ServerEventType
-from tickrig.host.rtc.canopen.node.operations import kind_of
-from tickrig.host.rtc.canopen.node.served_node import NodePhase, ServedNode
-from tickrig.host.rtc.canopen.proxy.pdo_ports import PdoSink, PdoSource
-from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
-from tickrig.host.rtc.canopen.proxy.sdo_ports import SdoSink, SdoSource
+from tickrig.host.rtc.canopen.operations import kind_of
+from tickrig.host.rtc.canopen.proxy import PdoSink, PdoSource, ProxyRtc, SdoSink, SdoSource
+from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.idl import Struct
 
-Send = Callable[[int, bytes], None]
+_Send = Callable[[int, bytes], None]
 
 
 class PdoDataFlow:
@@ -33,7 +31,7 @@ class PdoDataFlow:
         notify: takes events.
     """
 
-    def __init__(self, nodes: Mapping[int, ServedNode], send: Send, notify: Notify) -> None:
+    def __init__(self, nodes: Mapping[int, ServedNode], send: _Send, notify: Notify) -> None:
         self._nodes, self._send, self._notify = nodes, send, notify
         self._sources: dict[int, tuple[tuple[ServedNode, PdoSource], ...]] = {}
         self._connected: tuple[tuple[ServedNode, PdoSink], ...] = ()

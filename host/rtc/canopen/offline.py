@@ -7,22 +7,25 @@ from collections.abc import Iterable, Iterator
 
 from tickrig.host.canopen.dialogue import SdoRequest, Step
 from tickrig.host.canopen.errors import SdoAborted
+from tickrig.host.rtc.canopen.boot import boot
 from tickrig.host.rtc.canopen.connections import are_there, check_lengths, find_layout
-from tickrig.host.rtc.canopen.definition.definition import NodeEntry, PdoLink, PdoName, SdoEntry
-from tickrig.host.rtc.canopen.definition.device_file import DeviceFile
-from tickrig.host.rtc.canopen.errors import ServerRefused
-from tickrig.host.rtc.canopen.node.boot import boot
-from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout
-from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
-from tickrig.host.rtc.canopen.proxy.sdo_ports import lay_out_sdo_ports
+from tickrig.host.rtc.canopen.definition import (
+    DeviceFile,
+    NodeEntry,
+    PdoLink,
+    PdoName,
+    SdoEntry,
+    ServerRefused,
+)
+from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
+from tickrig.host.rtc.canopen.proxy import ProxyRtc, lay_out_sdo_ports
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.dot import Box, Edge, write_dot
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.canopen.nmt import CAN_ID_MASK
+from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -33,11 +36,12 @@ from tickrig.wire.canopen.sdo.sdo import (
     UploadInitiateResponse,
     parse_request,
 )
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
-Layouts = tuple[PdoLayout, ...]
+_Layouts = tuple[PdoLayout, ...]
 
 
-def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> Layouts | None:
+def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> _Layouts | None:
     """Return the PDOs that will be on, None where the EDS does not give the values."""
     values = dict(file.defaults)
     script = boot(entry, file, writes)
@@ -46,7 +50,7 @@ def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry])
         while True:
             step = script.send(_answer(step, values))
     except StopIteration as end:
-        layouts: Layouts = end.value
+        layouts: _Layouts = end.value
         return layouts
     except SdoAborted:
         return None
@@ -76,7 +80,7 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     Args:
         server: it gets proxies of devices that are none, and is of no other use any more.
     """
-    layouts = dict[int, Layouts]()
+    layouts = dict[int, _Layouts]()
     for node_id, node in server.nodes.items():
         if (on := boot_offline(node.entry, node.file, node.writes)) is not None:
             layouts[node_id] = on
@@ -88,7 +92,7 @@ def check_offline(server: RtcCanopenServer) -> tuple[str, ...]:
     )
 
 
-def _proxies(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
+def _proxies(server: RtcCanopenServer, layouts: dict[int, _Layouts]) -> Iterator[str]:
     for node_id, on in layouts.items():
         try:
             node = server.nodes[node_id]
@@ -99,7 +103,7 @@ def _proxies(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[
             yield f"nodes: {error}"
 
 
-def _sent_twice(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterator[str]:
+def _sent_twice(server: RtcCanopenServer, layouts: dict[int, _Layouts]) -> Iterator[str]:
     senders = defaultdict[int, list[str]](list)
     for node_id, on in layouts.items():
         file = server.nodes[node_id].file
@@ -114,7 +118,7 @@ def _sent_twice(server: RtcCanopenServer, layouts: dict[int, Layouts]) -> Iterat
             yield f"pdos: {which} sent as {cob_id:03X}h; give each a cob_id of its own"
 
 
-def _link(link: PdoLink, layouts: dict[int, Layouts]) -> Iterator[str]:
+def _link(link: PdoLink, layouts: dict[int, _Layouts]) -> Iterator[str]:
     ends = [
         (name, layouts[name.node]) for name in (link.source, link.target) if name.node in layouts
     ]

@@ -6,12 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tickrig.host.links.link import StampedLink
-from tickrig.host.rtc.canopen.definition.definition import SystemDefinition
-from tickrig.host.rtc.canopen.definition.definition_reader import read_definition
-from tickrig.host.rtc.canopen.definition.device_file import DeviceFile, read_device_file
-from tickrig.host.rtc.canopen.errors import DefinitionError
+from tickrig.host.rtc.canopen.definition import (
+    DefinitionError,
+    DeviceFile,
+    SystemDefinition,
+    read_device_file,
+)
+from tickrig.host.rtc.canopen.definition_reader import read_definition
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
-from tickrig.host.rtc.system.real_time import LATE_US, PAUSE_US
+from tickrig.host.rtc.system.schedule import LATE_US, PAUSE_US
 from tickrig.wire.instant import NEVER
 
 

@@ -2,35 +2,221 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.links.link import StampedFrames
 from tickrig.host.rtc.canopen.connections import PdoLinks, PortConnections
 from tickrig.host.rtc.canopen.data_flow import PdoDataFlow, SdoDataFlow
-from tickrig.host.rtc.canopen.definition.definition import NodeEntry, SystemDefinition
-from tickrig.host.rtc.canopen.definition.device_file import DeviceFile
+from tickrig.host.rtc.canopen.definition import DeviceFile, NodeEntry, SystemDefinition
 from tickrig.host.rtc.canopen.events import EventLog, ServerEventType
-from tickrig.host.rtc.canopen.node.receiver import QUIET_US, SYNC_COB_ID, FrameDispatcher
-from tickrig.host.rtc.canopen.node.served_node import NodePhase, ServedNode
-from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
-from tickrig.host.rtc.canopen.proxy.sdo_ports import lay_out_sdo_ports
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.canopen.proxy import ProxyRtc, lay_out_sdo_ports
+from tickrig.host.rtc.canopen.served_node import NodePhase, NodeServer, ServedNode
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import CanFrame, ErrorState, Frames
+from tickrig.wire.canopen.emcy import Emcy, EmcyCode, describe
 from tickrig.wire.canopen.nmt import (
+    ALL_NODES,
     ERROR_CONTROL_COB_ID,
+    FLAG_30,
     NMT_COB_ID,
     NmtCommand,
     NmtState,
 )
+from tickrig.wire.canopen.sdo import (
+    Abort,
+    DownloadInitiateRequest,
+    Request,
+    UploadInitiateRequest,
+    UploadInitiateResponse,
+    parse_request,
+)
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID, AbortCode
+from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.idl import Struct
 
-LATE_US: Final = 100_000
+# What the server hears on the bus beside PDOs, and who is told.
+
+_DEVICE_TYPE: Final = 460
+"""A marker of ours: the number of the profile whose text is not public."""
+
+_CONSUMERS: Final = 3
+"""A heartbeat may be so many producer times late."""
+
+_SYNC_COB_ID: Final = 0x080
+"""The default of 1005h (CiA 301, SYNC)."""
+
+_MOST_MS: Final = 0xFFFF
+
+Table = Mapping[tuple[int, int], bytes]
+
+
+class ServerObjects:
+    """Answers who reads the server's objects by SDO.
+
+    | object | what |
+    |---|---|
+    | 1000h | device type, 000001CCh |
+    | 1001h | error register, 0 |
+    | 1005h, 1006h | COB-ID SYNC, with bit 30 if it sends it; communication cycle period, us |
+    | 1016h | consumer heartbeat time of each node |
+    | 1017h | producer heartbeat time |
+    | 1018h | identity: vendor-ID 0, which is nobody's |
+
+    Not emulated: writing, segments and blocks; every object has at most four bytes.
+
+    Args:
+        definition: what the server was told.
+    """
+
+    def __init__(self, definition: SystemDefinition) -> None:
+        consumed = [
+            node.id << 16 | min(_CONSUMERS * node.heartbeat_ms, _MOST_MS)
+            for node in definition.nodes
+        ]
+        sync_ms = definition.master.sync_ms
+        self._table: Table = {
+            (0x1000, 0): _u32(_DEVICE_TYPE),
+            (0x1001, 0): bytes(1),
+            (0x1005, 0): _u32(_SYNC_COB_ID | bool(sync_ms) * FLAG_30),
+            (0x1006, 0): _u32(1_000 * sync_ms),
+            **_array(0x1016, map(_u32, consumed)),
+            (0x1017, 0): definition.master.heartbeat_ms.to_bytes(2, "little"),
+            **_array(0x1018, [_u32(0)]),
+        }
+        self._indices = frozenset(index for index, _ in self._table)
+
+    def answer(self, data: bytes) -> bytes | None:
+        """Return the answer to a request; None to an abort, and to what is no request."""
+        try:
+            request = parse_request(data)
+        except WireError:
+            return None
+        return None if isinstance(request, Abort) else self._answer(request)
+
+    def _answer(self, request: Request) -> bytes:
+        match request:
+            case UploadInitiateRequest(index=index, sub=sub):
+                return self._upload(index, sub)
+            case DownloadInitiateRequest(index=index, sub=sub):
+                code = self._missing(index, sub) or AbortCode.READ_ONLY
+                return Abort(index, sub, code).encode()
+        return Abort(0, 0, AbortCode.COMMAND_SPECIFIER).encode()
+
+    def _upload(self, index: int, sub: int) -> bytes:
+        if (code := self._missing(index, sub)) is not None:
+            return Abort(index, sub, code).encode()
+        value = self._table[index, sub]
+        return UploadInitiateResponse(index, sub, value, len(value)).encode()
+
+    def _missing(self, index: int, sub: int) -> AbortCode | None:
+        if index not in self._indices:
+            return AbortCode.NO_OBJECT
+        return None if (index, sub) in self._table else AbortCode.NO_SUBINDEX
+
+
+def _array(index: int, values: Iterable[bytes]) -> Table:
+    """Return an array or record with its number of entries."""
+    entries = list(values)
+    numbered = {(index, sub): value for sub, value in enumerate(entries, 1)}
+    return {(index, 0): bytes((len(entries),)), **numbered}
+
+
+def _u32(value: int) -> bytes:
+    return value.to_bytes(4, "little")
+
+
+_EMERGENCY: Final = range(0x080, 0x100)
+_SDO_RESPONSES: Final = range(0x580, 0x600)
+_ERROR_CONTROL: Final = range(0x700, 0x780)
+"""What nodes send, by node-ID; node 0 is none."""
+
+_QUIET_US: Final = 1_000_000
+"""Another master that was not heard for so long is told of anew."""
+
+
+class FrameDispatcher:
+    """Tells nodes what they sent, and the log what others did.
+
+    Args:
+        nodes: by node-ID.
+        definition: what the server was told.
+        server: the server.
+    """
+
+    def __init__(
+        self, nodes: Mapping[int, ServedNode], definition: SystemDefinition, server: NodeServer
+    ) -> None:
+        self._nodes, self._master_id = nodes, definition.master.node
+        self._notify, self._send = server.notify, server.send
+        self._objects = ServerObjects(definition)
+        self._foreign_us: int | None = None
+        of_master = {ERROR_CONTROL_COB_ID + self._master_id, REQUEST_COB_ID + self._master_id}
+        of_nodes = {ids[n] for ids in (_EMERGENCY, _SDO_RESPONSES, _ERROR_CONTROL) for n in nodes}
+        self._accepted = frozenset({NMT_COB_ID} | of_master | of_nodes)
+
+    def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
+        """Take a data frame that was on the bus at a time."""
+        can_id = frame.can_id
+        if can_id not in self._accepted:
+            return
+        if can_id == NMT_COB_ID:
+            self._on_nmt_command(at_us, frame.data)
+        elif can_id == ERROR_CONTROL_COB_ID + self._master_id:
+            self._on_master_heartbeat(at_us)
+        elif can_id == REQUEST_COB_ID + self._master_id:
+            self._on_sdo_request(frame.data)
+        else:
+            self._on_frame_of(self._nodes[can_id & 0x7F], now_us, at_us, frame)
+
+    def _on_frame_of(self, node: ServedNode, now_us: int, at_us: int, frame: CanFrame) -> None:
+        if frame.can_id in _ERROR_CONTROL:
+            node.on_error_control(now_us, at_us, frame.data)
+        elif frame.can_id in _SDO_RESPONSES:
+            node.receive_sdo(now_us, frame.data)
+        else:
+            self._on_emergency(node, frame.data)
+
+    def _on_nmt_command(self, at_us: int, data: bytes) -> None:
+        if len(data) != 2:
+            return
+        command, node_id = data
+        known = command in tuple(NmtCommand)
+        text = NmtCommand(command).name if known else f"{command:02X}h"
+        self._notify(
+            ServerEventType.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all"
+        )
+        for node in self._nodes.values():
+            if node_id in (ALL_NODES, node.entry.id):
+                node.on_foreign_command(at_us, command)
+
+    def _on_master_heartbeat(self, at_us: int) -> None:
+        if self._foreign_us is None or at_us - self._foreign_us >= _QUIET_US:
+            text = "another node has the node-ID of the server"
+            self._notify(ServerEventType.FOREIGN_MASTER, self._master_id, text)
+        self._foreign_us = at_us
+
+    def _on_sdo_request(self, data: bytes) -> None:
+        if (answer := self._objects.answer(data)) is not None:
+            self._send(RESPONSE_COB_ID + self._master_id, answer)
+
+    def _on_emergency(self, node: ServedNode, data: bytes) -> None:
+        try:
+            emcy = Emcy.parse(data)
+        except WireError:
+            return
+        text = f"{emcy.code:04X}h {describe(emcy.code)}, error register {emcy.register:02X}h"
+        back = emcy.code == EmcyCode.BUS_OFF_RECOVERED
+        self._notify(
+            ServerEventType.BUS_OFF if back else ServerEventType.EMERGENCY, node.entry.id, text
+        )
+
+
+_LATE_US: Final = 100_000
 """A server that looks so much later than it wanted to knows nothing of the nodes meanwhile."""
 
 
@@ -88,7 +274,7 @@ class RtcCanopenServer:
         late_us, self.now_us = now_us - self.due_us, now_us
         if not self._started:
             self._start()
-        elif late_us >= LATE_US:
+        elif late_us >= _LATE_US:
             self._be_late(late_us)
         if self._bus_states:
             self._on_bus_states()
@@ -108,7 +294,7 @@ class RtcCanopenServer:
         if begins:
             self._by_sdo.exchange(now_us)
         if self._sync.advance(now_us):
-            self.send(SYNC_COB_ID, b"")
+            self.send(_SYNC_COB_ID, b"")
         if self._heartbeat.advance(now_us):
             self._error_control(NmtState.OPERATIONAL)
         timers_us = min(self._heartbeat.due_us, self._sync.due_us)
@@ -210,7 +396,7 @@ class RtcCanopenServer:
             node.pause(self.now_us, late_us)
         if self.now_us >= self._quiet_us:
             self.notify(ServerEventType.SERVER_LATE, 0, f"looked {self._late_us // 1_000} ms late")
-            self._quiet_us, self._late_us = self.now_us + QUIET_US, 0
+            self._quiet_us, self._late_us = self.now_us + _QUIET_US, 0
 
     def _make_proxy(self, node: ServedNode) -> None:
         if node.proxy is not None:

@@ -8,18 +8,18 @@ from typing import Any, Final
 
 from tickrig.host.canopen.dialogue import Failure, QueuedScript, Script
 from tickrig.host.canopen.sdo_transfer import download, upload
-from tickrig.host.rtc.canopen.definition.definition import (
+from tickrig.host.rtc.canopen.definition import (
     PdoLink,
     PdoName,
     Role,
     RtConnection,
+    ServerRefused,
     SystemDefinition,
 )
-from tickrig.host.rtc.canopen.errors import ServerRefused
 from tickrig.host.rtc.canopen.events import ServerEvent
-from tickrig.host.rtc.canopen.node.served_node import NodePhase, ServedNode
-from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout, proxy_index
-from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc.canopen.pdo_layout import PdoLayout, proxy_index
+from tickrig.host.rtc.canopen.proxy import ProxyRtc
+from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import DataPort, OutPort

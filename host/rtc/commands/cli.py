@@ -7,13 +7,11 @@ from typing import Any
 import click
 
 from tickrig.host.cli.engine_options import openrtm_options, ros2_options, take_engines
+from tickrig.host.cli.messages import time_us
 from tickrig.host.cli.options import PATH, NumberRange
-from tickrig.host.cli.refused import time_us
 from tickrig.host.cli.start import loading
-from tickrig.host.rtc.commands.conf import conf
 from tickrig.host.rtc.commands.request import VARIABLE, default_path
-from tickrig.host.rtc.commands.system_verbs import SYSTEM_VERBS
-from tickrig.host.rtc.commands.verbs import VERBS
+from tickrig.host.rtc.commands.verbs import SYSTEM_VERBS, VERBS, conf
 
 
 @click.group()

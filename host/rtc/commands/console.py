@@ -12,10 +12,10 @@ from typing import Final, Protocol, TypeGuard
 from tickrig.host.links.ready import ready
 from tickrig.host.rtc.components import ConsoleOut
 from tickrig.host.rtc.system.manager import Manager
+from tickrig.wire.lines import LineSplitter
 from tickrig.wire.rtc_types.basic import TimedLong
-from tickrig.wire.serial.lines import LineSplitter
 
-READ_BYTES: Final = 4_096
+_READ_BYTES: Final = 4_096
 
 
 class TypedTo(Protocol):
@@ -25,7 +25,7 @@ class TypedTo(Protocol):
         """Take a line; ValueError if it is none for this component, which is not changed."""
 
 
-def is_typed_to(component: object) -> TypeGuard[TypedTo]:
+def _is_typed_to(component: object) -> TypeGuard[TypedTo]:
     """Return whether lines are typed to a component."""
     return hasattr(component, "typed")
 
@@ -62,7 +62,7 @@ class Console:
     def read(self, descriptor: int) -> None:
         """Take lines that were typed; never wait."""
         if self.is_open and ready([descriptor], wait_s=0)[0] and _in_foreground(descriptor):
-            data = os.read(descriptor, READ_BYTES)
+            data = os.read(descriptor, _READ_BYTES)
             self.is_open = bool(data)
             for line in self._typed.push(data or b"\n"):
                 if data or line:
@@ -71,7 +71,7 @@ class Console:
     def _enter(self, line: str) -> None:
         refusals, taken = dict[str, None](), False
         for component in self._manager.components:
-            if is_typed_to(component):
+            if _is_typed_to(component):
                 try:
                     component.typed(line)
                     taken = True

@@ -12,13 +12,13 @@ from typing import Any, Final
 import click
 
 from tickrig.host.cli.control import request
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, Decorator
-from tickrig.host.cli.refused import Refused
 from tickrig.host.control.requests import Object
 
 SYSTEM: Final = "system"
 VARIABLE: Final = "TICKRIG_RTC"
-POLL_S: Final = 0.01
+_POLL_S: Final = 0.01
 ERROR: Final = "ERROR"
 
 
@@ -58,10 +58,10 @@ def components(socket: Path, *names: str) -> list[Any]:
     return described
 
 
-Complete = Callable[[click.Context, click.Parameter, str], list[str]]
+_Complete = Callable[[click.Context, click.Parameter, str], list[str]]
 
 
-def _completer(names: Callable[[Any], list[str]]) -> Complete:
+def _completer(names: Callable[[Any], list[str]]) -> _Complete:
     """Return what completes a word by names out of the description of a running system."""
 
     def complete(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
@@ -103,7 +103,7 @@ def settle(socket: Path, name: str, wanted: str, wait_us: int) -> None:
         waited_us = (time.monotonic() - start_s) * 1e6
         if waited_us > wait_us or (state == ERROR and waited_us > _periods_us(component)):
             raise click.ClickException(f"{name} is {state}, not {wanted}")
-        time.sleep(POLL_S)
+        time.sleep(_POLL_S)
 
 
 def _periods_us(component: Any) -> float:

@@ -10,30 +10,29 @@ from typing import Final
 
 import click
 
+from tickrig.host.cli.control import serving_control, stopped_by_signals
 from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.messages import say, warnings_shown
-from tickrig.host.cli.refused import Refused
-from tickrig.host.cli.serving import serving_control, stopped_by_signals
+from tickrig.host.cli.messages import Refused, say, warnings_shown
 from tickrig.host.cli.start import load
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc.commands.console import Console
 from tickrig.host.rtc.commands.system_control import SystemControl
-from tickrig.host.rtc.commands.system_file import (
+from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.components import EXAMPLES
+from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.schedule import RealTime
+from tickrig.host.rtc.system.system import System, restore, with_remotes
+from tickrig.host.rtc.system.system_file import (
     check_system,
     file_format,
     read_system,
     write_system,
 )
-from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.components import EXAMPLES
-from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc.system.real_time import RealTime
-from tickrig.host.rtc.system.system import System, restore, with_remotes
 from tickrig.host.text.user_file import explain_error, find_class
 
-ATTACH_LITE: Final = "tickrig.host.rtc.lite.lite_option:attach_lite"
+_ATTACH_LITE: Final = "tickrig.host.rtc.lite.attachment:attach_lite"
 """Named by its path, as a command is: that room is made of this one's components."""
-JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
+_JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
 """The same."""
 
 
@@ -62,17 +61,17 @@ def run_system(options: SystemOptions) -> None:
     if options.save is not None:
         check_system(options.save)
     manager = Manager()
-    for kind in (*EXAMPLES, *map(find_rt_component, options.components)):
+    for kind in (*EXAMPLES, *map(_find_rt_component, options.components)):
         manager.register(kind)
     with warnings_shown(), ExitStack() as stack:
         for word in options.lites:
-            load(ATTACH_LITE)(manager, word, stack, options.lite_boot_us, options.rate_hz)
+            load(_ATTACH_LITE)(manager, word, stack, options.lite_boot_us, options.rate_hz)
         _restore(manager, system, options)
         stack.callback(_close, manager)
         _serve(stack, manager, options)
 
 
-def find_rt_component(spec: str) -> type[RtComponent]:
+def _find_rt_component(spec: str) -> type[RtComponent]:
     """Return the class that `FILE.py:Class` stands for; Refused if no component can be of it."""
     try:
         kind: type[RtComponent] = find_class(spec, RtComponent)
@@ -111,7 +110,7 @@ def _serve(stack: ExitStack, manager: Manager, options: SystemOptions) -> None:
     stack.enter_context(stopped_by_signals(runner.stop))
     server = stack.enter_context(serving_control(options.control, control, clock))
     if options.engines:
-        join = load(JOIN_ENGINES)
+        join = load(_JOIN_ENGINES)
         stack.enter_context(
             join(
                 options.engines,

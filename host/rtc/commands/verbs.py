@@ -11,8 +11,9 @@ from typing import Any, Final
 import click
 
 from tickrig.host.cli.control import refused_by
-from tickrig.host.cli.options import NumberRange
-from tickrig.host.cli.refused import Refused, time_us
+from tickrig.host.cli.messages import Refused, time_us
+from tickrig.host.cli.options import PATH, NumberRange
+from tickrig.host.cli.start import loading
 from tickrig.host.control.client import ControlClient
 from tickrig.host.rtc.commands.request import (
     SYSTEM,
@@ -24,19 +25,173 @@ from tickrig.host.rtc.commands.request import (
     request_system,
     settle,
 )
-from tickrig.host.rtc.commands.texts import component_lines, component_row, port_line, value_line
 from tickrig.host.text.page_text import json_text
+from tickrig.host.text.values import format_time
 
-DATAPORT: Final = "dataport."
-POLL_S: Final = 0.02
+# Descriptions of components as people read them.
+
+
+def _component_row(component: Any) -> str:
+    """Write a line of `ls -l`: state, ports with those that are connected, rate, type, name."""
+    ports = component["ports"]
+    connected = sum(1 for port in ports if port["connectors"])
+    rate = "".join(f"{context['rate_hz']:g}Hz" for context in component["contexts"][:1])
+    state = component["state"].capitalize()
+    return (
+        f"{state:<9} {len(ports):>3}/{connected:<3} {rate:>9}  "
+        f"{component['type']:<16} {component['name']}"
+    )
+
+
+def component_lines(component: Any, *, long: bool) -> Iterator[str]:
+    """Write what `cat` shows.
+
+    Args:
+        component: its description.
+        long: connectors with their properties, and all configuration sets.
+    """
+    yield f"{component['name']}  {component['state'].capitalize()}"
+    yield f"  {'Path':<14}{component['path']}"
+    for key in ("type", "description", "version", "vendor", "category"):
+        yield f"  {key.capitalize():<14}{component[key]}".rstrip()
+    for name, text in component["properties"].items():
+        yield f"  {'Property':<14}{name} = {text}"
+    for context in component["contexts"]:
+        runs = "" if context["running"] else ", stopped"
+        yield f"  {'Runs at':<14}{context['rate_hz']:g} Hz{runs}"
+    for port in component["ports"]:
+        yield from _port_lines(port, long=long)
+    yield from _configuration_lines(component["configuration"], long=long)
+
+
+def _port_line(port: Any) -> str:
+    """Write what a port is: its kind, name and data type."""
+    return f"  {port['kind']:<14}{port['name']}  {_short_type(port['data_type'])}".rstrip()
+
+
+def _port_lines(port: Any, *, long: bool) -> Iterator[str]:
+    yield _port_line(port)
+    for interface in port["interfaces"]:
+        yield f"    {interface['polarity'].lower()} {interface['name']} ({interface['type']})"
+    for connector in port["connectors"]:
+        others = [name for name in connector["ports"] if name != port["name"]]
+        lost = " (lost)" if connector.get("state") == "lost" else ""
+        yield f"    connected to {(others or connector['ports'])[0]}{lost}"
+        if long:
+            properties = {"name": connector["name"], **connector["properties"]}
+            yield from (f"      {key} = {value}" for key, value in properties.items())
+
+
+def _configuration_lines(configuration: Any, *, long: bool) -> Iterator[str]:
+    """Write the parameters with the values that hold, and with `long` those of each set."""
+    for parameter in configuration["parameters"]:
+        value = f"{parameter['name']} = {parameter['value']} {parameter['unit']}".rstrip()
+        allowed = f"  [{parameter['constraint']}]" if parameter["constraint"] else ""
+        yield f"  {'Parameter':<14}{value}{allowed}"
+    if not configuration["parameters"]:
+        return
+    for set_id, values in configuration["sets"].items():
+        star = " *" if set_id == configuration["active"] else ""
+        yield f"  {'Set':<14}{set_id}{star}"
+        if long:
+            yield from (f"    {name} = {value}" for name, value in values.items())
+
+
+def _value_line(value: Any) -> str:
+    """Write a value of a port: its time in seconds if it has one, and its data.
+
+    >>> _value_line({"tm": {"sec": 1, "nsec": 500000000}, "data": -5})
+    '1.500000 -5'
+    >>> _value_line({"x": 1.0})
+    '{"x": 1.0}'
+    """
+    if set(value) == {"tm", "data"}:
+        time_us = value["tm"]["sec"] * 1_000_000 + value["tm"]["nsec"] // 1_000
+        return f"{format_time(time_us)} {json_text(value['data'])}"
+    return json_text(value)
+
+
+def _short_type(idl_id: str) -> str:
+    """Write `IDL:RTC/TimedLong:1.0` as `TimedLong`."""
+    return idl_id.removeprefix("IDL:").removesuffix(":1.0").removeprefix("RTC/")
+
+
+# `tickrig rtc conf`: the configuration sets of a component.
+
+_component_name = click.argument("name", shell_complete=complete_component)
+
+
+@click.group()
+def conf() -> None:
+    """Show and change the configuration sets of a component.
+
+    A change takes effect before the component's next period.
+
+    \b
+    tickrig rtc conf list ConfigSample0
+    tickrig rtc conf get ConfigSample0 int_param0
+    tickrig rtc conf set ConfigSample0 int_param0 5
+    tickrig rtc conf act ConfigSample0 fast
+    """  # noqa: D301 - click wants the backspace
+
+
+@conf.command("list")
+@_component_name
+@click.option("-l", "--long", is_flag=True, help="Show the values of each set.")
+@at
+def list_(at: Path, name: str, long: bool) -> None:
+    """List the parameters of the component NAME with the values that hold, and its sets."""
+    for line in _configuration_lines(_configuration(at, name), long=long):
+        click.echo(line.removeprefix("  "))
+
+
+@conf.command()
+@_component_name
+@click.argument("parameter")
+@at
+def get(at: Path, name: str, parameter: str) -> None:
+    """Print the value of PARAMETER that holds."""
+    values = {one["name"]: one["value"] for one in _configuration(at, name)["parameters"]}
+    if parameter not in values:
+        raise Refused(f"no parameter {parameter!r}; known: {', '.join(values) or 'none'}")
+    click.echo(values[parameter])
+
+
+@conf.command("set", context_settings={"ignore_unknown_options": True})
+@_component_name
+@click.argument("parameter")
+@click.argument("value")
+@click.option("--set", "set_id", default="", help="The set to change.  [the active one]")
+@at
+def set_(at: Path, name: str, parameter: str, value: str, set_id: str) -> None:
+    """Change PARAMETER to VALUE; elements of a list have commas between."""
+    request_system(at, "set_parameter", name=name, parameter=parameter, value=value, set=set_id)
+
+
+@conf.command()
+@_component_name
+@click.argument("set_id", metavar="SET")
+@at
+def act(at: Path, name: str, set_id: str) -> None:
+    """Let the values of SET hold."""
+    request_system(at, "activate_set", name=name, set=set_id)
+
+
+def _configuration(socket: Path, name: str) -> Any:
+    (component,) = components(socket, name)
+    return component["configuration"]
+
+
+_DATAPORT: Final = "dataport."
+_POLL_S: Final = 0.02
 
 as_json = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
-some_names = click.argument("names", nargs=-1, shell_complete=complete_component)
-names_needed = click.argument("names", nargs=-1, required=True, shell_complete=complete_component)
+_some_names = click.argument("names", nargs=-1, shell_complete=complete_component)
+_names_needed = click.argument("names", nargs=-1, required=True, shell_complete=complete_component)
 
 
 @click.command()
-@some_names
+@_some_names
 @click.option("-l", "--long", is_flag=True, help="Show state, ports, rate and type, too.")
 @click.option("-R", "--recursive", is_flag=True, help="Show the ports of each component, too.")
 @as_json
@@ -51,13 +206,13 @@ def ls(at: Path, names: tuple[str, ...], long: bool, recursive: bool, as_json: b
         click.echo(json_text(described))
         return
     for component in described:
-        click.echo(component_row(component) if long else component["name"])
+        click.echo(_component_row(component) if long else component["name"])
         for port in component["ports"] if recursive else ():
-            click.echo(port_line(port))
+            click.echo(_port_line(port))
 
 
 @click.command()
-@names_needed
+@_names_needed
 @click.option("-l", "--long", is_flag=True, help="Show properties of connectors, and all sets.")
 @as_json
 @at
@@ -111,7 +266,7 @@ def dis(at: Path, ports: tuple[str, ...]) -> None:
 
 
 @click.command("exit")
-@names_needed
+@_names_needed
 @at
 def exit_(at: Path, names: tuple[str, ...]) -> None:
     """End the components NAMES, and their connectors."""
@@ -160,7 +315,7 @@ def print_(at: Path, port: str, count: int | None, duration: str | None, as_json
     until_s = time.monotonic() + time_us("--for", duration) / 1e6 if duration else None
     try:
         for value in _values(at, port, count, until_s):
-            click.echo(json_text(value) if as_json else value_line(value))
+            click.echo(json_text(value) if as_json else _value_line(value))
     except KeyboardInterrupt:
         return
 
@@ -169,7 +324,7 @@ def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
     """Return a command that asks components for a state, and waits until they are there."""
 
     @click.command(name, help=f"{text}, and wait until they are {wanted.capitalize()}.")
-    @names_needed
+    @_names_needed
     @click.option("--wait", default="2s", help="How long to wait for it; 0 asks only.  [2s]")
     @at
     def move(at: Path, names: tuple[str, ...], wait: str) -> None:
@@ -182,7 +337,7 @@ def _moving(name: str, verb: str, wanted: str, text: str) -> click.Command:
     return move
 
 
-MOVES: Final = (
+_MOVES: Final = (
     _moving("act", "activate", "ACTIVE", "Activate the components NAMES"),
     _moving("deact", "deactivate", "INACTIVE", "Deactivate the components NAMES"),
     _moving("reset", "reset", "INACTIVE", "Reset the components NAMES from Error"),
@@ -193,7 +348,7 @@ def _property(word: str) -> tuple[str, str]:
     key, equals, value = word.partition("=")
     if not key or not equals:
         raise Refused(f"-p {word!r} is not KEY=VALUE")
-    return (key if key.startswith(DATAPORT) else DATAPORT + key), value
+    return (key if key.startswith(_DATAPORT) else _DATAPORT + key), value
 
 
 def _values(socket: Path, port: str, count: int | None, until_s: float | None) -> Iterator[Any]:
@@ -210,7 +365,7 @@ def _values(socket: Path, port: str, count: int | None, until_s: float | None) -
                 given += 1
                 if given == count:
                     return
-            time.sleep(POLL_S)
+            time.sleep(_POLL_S)
 
 
 def _report_lost(answer: Any, latest: Any) -> None:
@@ -218,4 +373,104 @@ def _report_lost(answer: Any, latest: Any) -> None:
         click.echo(f"{lost} values lost: they came faster than they were taken", err=True)
 
 
-VERBS: Final = (ls, cat, create, con, dis, *MOVES, exit_, inject, print_)
+VERBS: Final = (ls, cat, create, con, dis, *_MOVES, exit_, inject, print_)
+
+
+# The verbs of `tickrig rtc` about a system as a whole.
+
+
+@click.command()
+@click.argument("file", type=PATH, required=False)
+@at
+def save(at: Path, file: Path | None) -> None:
+    """Write the system as it is to FILE, .toml or .xml; without FILE print it as TOML."""
+    with loading():
+        from tickrig.host.rtc.system.system_file import file_format, write_system  # noqa: PLC0415
+
+    text = request_system(at, "save", format="toml" if file is None else file_format(file))["text"]
+    if file is None:
+        click.echo(text)
+    else:
+        write_system(text, file)
+
+
+@click.command()
+@as_json
+@at
+def status(at: Path, as_json: bool) -> None:
+    """Show how the run is going: time, late ticks."""
+    answer = {key: value for key, value in request_system(at, "status").items() if key != "ok"}
+    if as_json:
+        click.echo(json_text(answer))
+        return
+    for key in ("components", "now_us", "late_ticks", "late_us"):
+        click.echo(f"{key} {answer[key]}")
+
+
+@click.command()
+@at
+def stop(at: Path) -> None:
+    """End the system."""
+    request_system(at, "stop")
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@at
+def check(at: Path, file: Path) -> None:
+    """Compare the system with FILE, .toml or .xml: exit status 1 and a line for all it lacks.
+
+    States are compared with a .toml file; RTSProfile has none. What is there
+    beside it does not matter.
+    """
+    with loading():
+        from tickrig.host.rtc.system.rts_profile import parse_rts_profile  # noqa: PLC0415
+        from tickrig.host.rtc.system.system import differences  # noqa: PLC0415
+        from tickrig.host.rtc.system.system_file import (  # noqa: PLC0415
+            file_format,
+            parse_toml,
+            read_system,
+        )
+
+    parse = parse_rts_profile if file_format(file) == "xml" else parse_toml
+    wanted = read_system(file)
+    found = parse(request_system(at, "save", format=file_format(file))["text"])
+    lines = tuple(differences(wanted, found))
+    for line in lines:
+        click.echo(line)
+    if lines:
+        click.get_current_context().exit(1)
+
+
+@click.command()
+@at
+def dot(at: Path) -> None:
+    """Print the system as a graph in the language of Graphviz.
+
+    \b
+    tickrig rtc dot | dot -Tsvg -o system.svg
+    """  # noqa: D301 - click wants the backspace
+    from tickrig.host.rtc.system.dot import Edge, write_dot  # noqa: PLC0415
+
+    described = components(at)
+    ends = dict.fromkeys(
+        tuple(connector["ports"])
+        for component in described
+        for port in component["ports"]
+        for connector in port["connectors"]
+    )
+    click.echo(write_dot(map(_box, described), (Edge(*pair) for pair in ends)))
+
+
+def _box(component: Any) -> Any:
+    from tickrig.host.rtc.system.dot import Box  # noqa: PLC0415
+
+    ins, outs = list[str](), list[str]()
+    for port in component["ports"]:
+        side = ins if port["kind"] == "DataInPort" else outs
+        side.append(port["name"].rpartition(".")[2])
+    state = component["state"].capitalize()
+    return Box(component["name"], f"{component['type']} {state}", tuple(ins), tuple(outs))
+
+
+SYSTEM_VERBS: Final = (save, status, stop, check, dot)

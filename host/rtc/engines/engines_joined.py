@@ -7,16 +7,16 @@ from contextlib import ExitStack, contextmanager
 from typing import Final
 
 from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.ros2_options import Ros2Options
 from tickrig.host.cli.start import load
-from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
 
-OPENRTM: Final = "tickrig.host.rtc.engines.openrtm.engine:openrtm_joined"
-NEEDS_OMNIORB: Final = "--openrtm needs omniORB: pip install 'tickrig[openrtm]'"
-ROS2: Final = "tickrig.host.rtc.engines.ros2.engine:ros2_joined"
-NEEDS_CYCLONE: Final = "--ros2 needs Cyclone DDS: pip install 'tickrig[ros2]'"
+_OPENRTM: Final = "tickrig.host.rtc.engines.openrtm.engine:openrtm_joined"
+_NEEDS_OMNIORB: Final = "--openrtm needs omniORB: pip install 'tickrig[openrtm]'"
+_ROS2: Final = "tickrig.host.rtc.engines.ros2.engine:ros2_joined"
+_NEEDS_CYCLONE: Final = "--ros2 needs Cyclone DDS: pip install 'tickrig[ros2]'"
 
 
 @contextmanager
@@ -46,14 +46,14 @@ def engines_joined(
         attach(calls)
         if options.openrtm is not None:
             try:
-                openrtm_joined = load(OPENRTM)
+                openrtm_joined = load(_OPENRTM)
                 stack.enter_context(
                     openrtm_joined(options.openrtm, manager, calls, stop, fixed=fixed)
                 )
             except ImportError as error:
                 if (error.name or "").partition(".")[0] not in ("omniORB", "CosNaming"):
                     raise
-                raise Refused(NEEDS_OMNIORB) from None
+                raise Refused(_NEEDS_OMNIORB) from None
             except (ValueError, RuntimeError) as error:
                 raise Refused(f"--openrtm: {error}") from None
         if options.ros2 is not None:
@@ -65,11 +65,11 @@ def engines_joined(
 def _ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Iterator[None]:
     with ExitStack() as stack:
         try:
-            stack.enter_context(load(ROS2)(options, manager, calls))
+            stack.enter_context(load(_ROS2)(options, manager, calls))
         except ImportError as error:
             if (error.name or "").partition(".")[0] != "cyclonedds":
                 raise
-            raise Refused(NEEDS_CYCLONE) from None
+            raise Refused(_NEEDS_CYCLONE) from None
         except OSError as error:
             refuse_path("ros2-table", error)
         except UnicodeDecodeError as error:

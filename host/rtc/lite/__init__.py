@@ -3,7 +3,7 @@
 from tickrig.host.rtc.lite.attachment import Attachment, attach
 from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
-from tickrig.host.rtc.lite.settings import ProxySettings
+from tickrig.host.rtc.lite.request_channel import ProxySettings
 
 __all__ = [
     "Attachment",

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from tickrig.host.links.link import Link
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.cli.messages import Refused, say
+from tickrig.host.links.link import Link, LinkClosed, ReopeningLink
+from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
-from tickrig.host.rtc.lite.request_channel import POLL_US, RequestChannel
-from tickrig.host.rtc.lite.settings import ProxySettings
+from tickrig.host.rtc.lite.request_channel import POLL_US, ProxySettings, RequestChannel
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.text.log import log_of
@@ -46,7 +49,7 @@ class DeviceWatcher:
         return self._channel.state is not None
 
 
-RATE_HZ: Final = 10.0
+_RATE_HZ: Final = 10.0
 """A period that two round trips at 57600 bit/s do not fill."""
 
 _LOG: Final = log_of(__name__)
@@ -79,7 +82,7 @@ class Attachment:
     settings: ProxySettings
     listener: ProxyListener | None = None
     context: ExecutionContext | None = None
-    rate_hz: float = RATE_HZ
+    rate_hz: float = _RATE_HZ
     proxy: RtcLiteProxy = field(init=False)
     _watcher: DeviceWatcher | None = field(default=None, init=False)  # for a device that is away
 
@@ -157,7 +160,7 @@ def attach(  # noqa: PLR0913 - options, by keyword
     *,
     listener: ProxyListener | None = None,
     context: ExecutionContext | None = None,
-    rate_hz: float = RATE_HZ,
+    rate_hz: float = _RATE_HZ,
 ) -> RtcLiteProxy:
     """Add a proxy to a system, named with the lowest number that is free: `LiteA0`.
 
@@ -178,3 +181,50 @@ def attach(  # noqa: PLR0913 - options, by keyword
         manager, link, base_name, settings or ProxySettings(), listener, context, rate_hz
     )
     return attachment.proxy
+
+
+# `--lite NAME=URL[@BAUD]`: devices of RTC-Lite as the command line of `tickrig rtc` names them.
+
+_BAUD: Final = 57_600
+
+_WORD: Final = re.compile(r"([A-Za-z]\w*)=(.+?)(?:@(\d{1,8}))?", re.ASCII)
+
+
+def attach_lite(
+    manager: Manager, word: str, stack: ExitStack, boot_us: int, rate_hz: float | None
+) -> None:
+    """Open a device's line and add its proxy, which comes back when the device does.
+
+    Args:
+        manager: of the system.
+        word: `NAME=URL[@BAUD]`; the proxy is `NAME0`.
+        stack: closes the line.
+        boot_us: silence after the line was opened.
+        rate_hz: of the proxy; 10 Hz if None.
+
+    Raises:
+        Refused: no such word, no such line, or nobody answers there.
+    """
+    name, url, baud = _parse_lite(word)
+    settings = ProxySettings(boot_us=boot_us, rediscover=True)
+    try:
+        link = stack.enter_context(closing(ReopeningLink(lambda: SerialLink(url, baud))))
+        attach(manager, link, name, settings, listener=_report, rate_hz=rate_hz or _RATE_HZ)
+    except (LinkClosed, ValueError) as error:
+        raise Refused(f"--lite {word}: {error}") from None
+
+
+def _parse_lite(word: str) -> tuple[str, str, int]:
+    """Read name, URL and bit rate; Refused if it is not so written.
+
+    >>> _parse_lite("LiteA=/dev/ttyUSB0"), _parse_lite("B=socket://localhost:7000@9600")
+    (('LiteA', '/dev/ttyUSB0', 57600), ('B', 'socket://localhost:7000', 9600))
+    """
+    match = _WORD.fullmatch(word)
+    if match is None:
+        raise Refused(f"--lite {word!r} is not NAME=URL[@BAUD], as LiteA=/dev/ttyUSB0@57600")
+    return match[1], match[2], int(match[3] or _BAUD)
+
+
+def _report(event: ProxyEvent) -> None:
+    say(str(event))

@@ -2,29 +2,261 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import ClassVar, Final
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import chain
+from typing import Any, ClassVar, Final
 
-from tickrig.host.links.errors import DeviceRefused, LinkError
-from tickrig.host.links.link import Link
+from tickrig.host.links.link import DeviceRefused, Link, LinkError, LinkTimeout
 from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
-from tickrig.host.rtc.lite.ping_monitor import PingStatistics
-from tickrig.host.rtc.lite.port_bridges import PortBridges
-from tickrig.host.rtc.lite.request_channel import RETRIES, RequestChannel
-from tickrig.host.rtc.lite.settings import ProxySettings
-from tickrig.host.rtc.lite.start_up import DeviceProfile, start_up
+from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.lite.events import (
+    PingStatistics,
+    ProxyEvent,
+    ProxyEventType,
+    ProxyListener,
+    notify,
+)
+from tickrig.host.rtc.lite.request_channel import RETRIES, ProxySettings, RequestChannel
+from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc.ports.port import AnyPort
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.text.log import log_of
-from tickrig.wire.errors import WireError
+from tickrig.wire.errors import FieldError, WireError
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
-from tickrig.wire.rtc_lite.messages import LiteReply
+from tickrig.wire.rtc_lite.messages import (
+    LitePortData,
+    LitePortProfile,
+    LiteReply,
+    parse_component_profile,
+)
+from tickrig.wire.rtc_lite.values import PORT_TYPES, LitePortType
+from tickrig.wire.rtc_types import basic
+from tickrig.wire.rtc_types.basic import Time
 
-MIRROR_US: Final = 100_000
+# What is said before a proxy is an RT component: state, profile, execution context, initialize.
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceProfile:
+    """What a device says of itself.
+
+    Attributes:
+        type_name: type of its component.
+        in_ports: its in-ports.
+        out_ports: its out-ports.
+        context: who makes it execute.
+    """
+
+    type_name: str
+    in_ports: tuple[LitePortProfile, ...]
+    out_ports: tuple[LitePortProfile, ...]
+    context: LiteContextType
+
+    @property
+    def properties(self) -> dict[str, str]:
+        """What the profile of its proxy says of it."""
+        return {
+            "rtc_lite.type_name": self.type_name,
+            "rtc_lite.context": f"0x{self.context:02X}",
+        }
+
+
+def _start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:
+    """Bring a device to Inactive, and ask what it is.
+
+    Raises:
+        LinkTimeout: no reply.
+        DeviceRefused: a reply that does not lead to Inactive.
+        WireError: a profile that cannot be read.
+    """
+    channel.listen(boot_us)
+    _demand(LiteCommand.STATE, channel.request_again(LiteCommand.STATE))
+    if channel.state is LiteState.ACTIVE:
+        _demand(LiteCommand.DEACTIVATE, channel.request(LiteCommand.DEACTIVATE))
+    elif channel.state is LiteState.ERROR:
+        _demand(LiteCommand.RESET, channel.request(LiteCommand.RESET))
+    profile = _request_profile(channel)
+    if channel.state is LiteState.CREATED:
+        _demand(LiteCommand.INITIALIZE, channel.request(LiteCommand.INITIALIZE))
+    if channel.state is not LiteState.INACTIVE:
+        state = "unknown" if channel.state is None else channel.state.name
+        raise DeviceRefused(f"the state of the device is {state}, not INACTIVE", state)
+    channel.pushed.clear()
+    return profile
+
+
+def _request_profile(channel: RequestChannel) -> DeviceProfile:
+    reply = _demand(LiteCommand.PROFILE, channel.request_again(LiteCommand.PROFILE))
+    announced = parse_component_profile(reply.fields)
+    ins, outs = tuple(channel.in_ports), tuple(channel.out_ports)
+    if (len(ins), len(outs)) != (announced.in_ports, announced.out_ports):
+        counts = f"{announced.in_ports} in-ports and {announced.out_ports} out-ports"
+        raise DeviceRefused(f"{counts} announced, {len(ins)} and {len(outs)} described", "CZ")
+    return DeviceProfile(
+        announced.type_name.decode("latin-1"), ins, outs, _request_context(channel)
+    )
+
+
+def _request_context(channel: RequestChannel) -> LiteContextType:
+    code = _demand(LiteCommand.CONTEXT, channel.request_again(LiteCommand.CONTEXT)).fields[0]
+    try:
+        return LiteContextType(code)
+    except ValueError:
+        text = f"execution context 0x{code:02X}, 0x21 and 0x22 are known"
+        raise DeviceRefused(text, "BB") from None
+
+
+def _demand(command: LiteCommand, reply: LiteReply | None) -> LiteReply:
+    """Return a reply that is there and OK."""
+    name = command.value.decode()
+    if reply is None:
+        raise LinkTimeout(f"no reply to {name}")
+    if not reply.ok:
+        raise DeviceRefused(f"{name} was refused with {reply.status:#04x}", chr(reply.status))
+    return reply
+
+
+# Ports of a proxy, made from the profile of its device, and what passes through (DECISION L10).
+#
+# The time of a value is not on the wire: it is stamped when it arrives.
+
+_KINDS: Final[dict[str, type[Any]]] = {
+    kind.__name__: kind
+    for kind in (
+        *(basic.TimedBoolean, basic.TimedChar, basic.TimedOctet, basic.TimedShort),
+        *(basic.TimedLong, basic.TimedFloat, basic.TimedDouble),
+        *(basic.TimedBooleanSeq, basic.TimedCharSeq, basic.TimedOctetSeq, basic.TimedShortSeq),
+        *(basic.TimedLongSeq, basic.TimedFloatSeq, basic.TimedDoubleSeq),
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class InPortBridge:
+    """An InPort of the proxy, and the in-port of the device behind it."""
+
+    port: InPort[Any]
+    name: bytes
+    port_type: LitePortType[Any]
+
+    @classmethod
+    def of(cls, profile: LitePortProfile) -> InPortBridge:
+        """Make the InPort of an in-port; DeviceRefused if its type is not known."""
+        name, port_type = _read(profile)
+        return cls(InPort(name, _KINDS[port_type.name]), profile.name, port_type)
+
+    def take(self) -> LitePortData | None:
+        """Return the oldest value that was not read, if there is one.
+
+        Raises:
+            FieldError: its type does not have it, or it does not fit into a frame.
+        """
+        value = self.port.read() if self.port.is_new else None
+        if value is None:
+            return None
+        bare = value.data
+        if self.port.data_type is basic.TimedOctetSeq:
+            bare = tuple(bare)
+        elif self.port.data_type is basic.TimedCharSeq:
+            bare = "".join(bare)
+        return LitePortData(self.name, self.port_type.encode(bare))
+
+
+@dataclass(frozen=True, slots=True)
+class OutPortBridge:
+    """An OutPort of the proxy, and the out-port of the device behind it."""
+
+    port: OutPort[Any]
+    port_type: LitePortType[Any]
+
+    @classmethod
+    def of(cls, profile: LitePortProfile) -> OutPortBridge:
+        """Make the OutPort of an out-port; DeviceRefused if its type is not known."""
+        name, port_type = _read(profile)
+        return cls(OutPort(name, _KINDS[port_type.name]), port_type)
+
+    def give(self, data: bytes, now_us: int) -> None:
+        """Write a value that arrived; FieldError if it is not of the port's type."""
+        kind = self.port.data_type
+        value = self.port_type.decode(data)
+        if kind is basic.TimedOctetSeq:
+            value = bytes(value)
+        elif kind is basic.TimedCharSeq:
+            value = tuple(value)
+        self.port.write(kind(Time.from_us(now_us), value))
+
+
+def _read(profile: LitePortProfile) -> tuple[str, LitePortType[Any]]:
+    name = profile.name.decode("latin-1")
+    if (port_type := PORT_TYPES.get(profile.code)) is None:
+        known = " ".join(PORT_TYPES)
+        raise DeviceRefused(f"port {name!r} has type {profile.code!r}; known: {known}", "CZ")
+    return name, port_type
+
+
+_PORTS_LOG: Final = log_of(__name__)
+
+
+class PortBridges:
+    """The ports of a proxy, made from the profile of its device.
+
+    A value that does not fit the device, and data that fit no port, are logged
+    and dropped: they are no reason to stop.
+
+    Args:
+        ins: the in-ports of the device.
+        outs: its out-ports.
+
+    Attributes:
+        dropped: how many values were dropped.
+
+    Raises:
+        DeviceRefused: a port of a type that nobody knows.
+    """
+
+    def __init__(
+        self, ins: Iterable[LitePortProfile] = (), outs: Iterable[LitePortProfile] = ()
+    ) -> None:
+        self._ins = [InPortBridge.of(profile) for profile in ins]
+        self._outs = {profile.name: OutPortBridge.of(profile) for profile in outs}
+        self.dropped = 0
+
+    @property
+    def ports(self) -> Iterator[AnyPort]:
+        """The InPorts, then the OutPorts."""
+        return chain((relay.port for relay in self._ins), (r.port for r in self._outs.values()))
+
+    def fresh(self) -> Iterator[LitePortData]:
+        """Take one new value from each InPort that has one."""
+        for relay in self._ins:
+            try:
+                data = relay.take()
+            except FieldError as error:
+                self._drop(relay.port.full_name, error)
+            else:
+                if data is not None:
+                    yield data
+
+    def give(self, at_us: int, data: LitePortData) -> None:
+        """Write to an OutPort what arrived from the device."""
+        if (relay := self._outs.get(data.name)) is None:
+            self._drop("an out-port that was not described", repr(data.name))
+            return
+        try:
+            relay.give(data.data, at_us)
+        except FieldError as error:
+            self._drop(relay.port.full_name, error)
+
+    def _drop(self, where: str, why: FieldError | str) -> None:
+        self.dropped += 1
+        _PORTS_LOG.warning("dropped at %s: %s", where, why)
+
+
+_MIRROR_US: Final = 100_000
 """How often the state of a device is asked that executes by its own timer: each 10th tick."""
 
-MAX_RATE_HZ: Final = 0xFFFF
+_MAX_RATE_HZ: Final = 0xFFFF
 
 _OK: Final = ReturnCode.RTC_OK
 _CODES: Final[dict[int, ReturnCode]] = {
@@ -131,7 +363,7 @@ class RtcLiteProxy(RtComponent):
             self.remove_port(port)
         self._channel = RequestChannel(self._link, self._settings)
         try:
-            self.device = start_up(self._channel, self._settings.boot_us)
+            self.device = _start_up(self._channel, self._settings.boot_us)
             self.relays = PortBridges(self.device.in_ports, self.device.out_ports)
             for port in self.relays.ports:
                 self.add_port(port)
@@ -157,7 +389,7 @@ class RtcLiteProxy(RtComponent):
         """Give the nearest whole rate to a device that executes by its own timer."""
         if not self._by_timer:
             return _OK
-        rate_hz = min(max(1, round(ec.rate_hz)), MAX_RATE_HZ)
+        rate_hz = min(max(1, round(ec.rate_hz)), _MAX_RATE_HZ)
         return self._command(LiteCommand.RATE, rate_hz.to_bytes(2, "little"))
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -237,10 +469,10 @@ class RtcLiteProxy(RtComponent):
 
     def _mirror(self, now_us: int) -> ReturnCode:
         """Ask once in 10 ticks whether the device is still Active; up to 3 times in vain."""
-        if self._mute or now_us // MIRROR_US == self._mirrored:
+        if self._mute or now_us // _MIRROR_US == self._mirrored:
             self._channel.poll()
             return _OK
-        self._mirrored = now_us // MIRROR_US
+        self._mirrored = now_us // _MIRROR_US
         reply = self._channel.request(LiteCommand.STATE)
         self._unanswered = 0 if reply else self._unanswered + 1
         if reply is None and self._unanswered <= RETRIES:

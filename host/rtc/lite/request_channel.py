@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Final
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, Protocol
 
-from tickrig.host.links.link import Link
-from tickrig.host.rtc.lite.frame_link import SILENCE_US, FrameLink, RtnoLink
-from tickrig.host.rtc.lite.ping_monitor import PingMonitor
-from tickrig.host.rtc.lite.settings import ProxySettings
+from tickrig.host.links.link import Link, LinkError
+from tickrig.host.rtc.lite.events import PingMonitor
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_lite.codes import (
     FAULT_COMMANDS,
@@ -17,9 +17,14 @@ from tickrig.wire.rtc_lite.codes import (
     LiteState,
     LiteStatus,
 )
-from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import Framing, LiteFrame
-from tickrig.wire.rtc_lite.layout import REPLIES, WITH_STATE
+from tickrig.wire.rtc_lite.frame import (
+    REPLIES,
+    WITH_STATE,
+    Checksum,
+    Framing,
+    LiteDecoder,
+    LiteFrame,
+)
 from tickrig.wire.rtc_lite.messages import (
     LitePortData,
     LitePortProfile,
@@ -28,14 +33,203 @@ from tickrig.wire.rtc_lite.messages import (
     parse_port_profile,
     parse_reply,
 )
+from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
+
+# What differs from one proxy to another, and what the paper leaves open.
+
+
+@dataclass(frozen=True, slots=True)
+class ProxySettings:
+    """How a proxy talks to its device, and what becomes of it when the device is lost.
+
+    Attributes:
+        framing: frames of RTC-Lite, or packets of RTno (bridge mode).
+        checksum: how frames are summed up (DECISION L5); packets of RTno always by `sum8`.
+        boot_us: silence after the link was opened; 3 s for boards that an open port resets.
+        reply_us: how long a reply may take, 1 us or more (DECISION L13).
+        ping_period_us: from one PING to the next, whatever else is on the line, 1 us or more
+            (DECISION L14).
+        pings: how many are unanswered when a device is lost, 1 or more.
+        linger_us: how long a proxy stays in Error after that (DECISION L15).
+        rediscover: whether the device is looked for afterwards.
+        search_period_us: how often, 1 us or more.
+
+    Raises:
+        ValueError: a number that is too small, or another sum for packets of RTno.
+    """
+
+    framing: Framing = Framing.LITE
+    checksum: Checksum = Checksum.SUM8
+    boot_us: int = 0
+    reply_us: int = 100_000
+    ping_period_us: int = 1_000_000
+    pings: int = 4
+    linger_us: int = 1_000_000
+    rediscover: bool = False
+    search_period_us: int = 1_000_000
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if self.framing is Framing.RTNO and self.checksum is not Checksum.SUM8:
+            raise ValueError(f"checksum is {self.checksum}, packets of RTno have sum8")
+        at_least = {"boot_us": 0, "linger_us": 0}
+        for name in (
+            "boot_us",
+            "reply_us",
+            "ping_period_us",
+            "pings",
+            "linger_us",
+            "search_period_us",
+        ):
+            value, low = getattr(self, name), at_least.get(name, 1)
+            if value < low:
+                raise ValueError(f"{name} is {value}, at least {low} is needed")
+
+
+# Frames over a byte link: those of RTC-Lite, or packets of RTno in their place.
+
+_SILENCE_US: Final = 20_000
+"""Silence after which the rest of a broken frame is not waited for."""
+
+_KEPT: Final = 8
+"""Frames that are kept, for who wants to know what was said last."""
+
+_FRAMES_LOG: Final = log_of(__name__)
+
+
+class ReplyDecoder(Protocol):
+    """`Decoder` or `RtnoReplies`."""
+
+    @property
+    def lost(self) -> bool:
+        """Whether all is thrown away until `clear`."""
+        ...
+
+    def clear(self) -> None:
+        """Look for a header again."""
+
+    def push(self, data: bytes, /) -> list[LiteFrame | LiteLinkFault]:
+        """Take bytes in; give frames and faults out."""
+        ...
+
+
+class FrameLink:
+    """A `Link[LiteFrame]`, one way requests, the other way replies.
+
+    A line that is gone is as silent as a device without power. What is no
+    frame is left out; after an unknown command the next header is looked for
+    at once, as the checksum tells what is a frame.
+
+    Args:
+        link: the line.
+        encode: writes a request.
+        decoder: reads the replies.
+
+    Attributes:
+        latest: the last frames with their times, as `1.234 > CX`, `1.238 < CX@I`.
+    """
+
+    def __init__(
+        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: ReplyDecoder
+    ) -> None:
+        self._link, self._encode, self._decoder = link, encode, decoder
+        self._byte_us = link.now_us
+        self.latest: deque[str] = deque(maxlen=_KEPT)
+
+    @property
+    def now_us(self) -> int:
+        """Time on the clock of the link."""
+        return self._link.now_us
+
+    def send(self, frame: LiteFrame) -> None:
+        """Send a frame; a broken one that came long before is not waited for any more."""
+        if self.now_us - self._byte_us >= _SILENCE_US:
+            self._decoder.clear()
+        self._note(">", frame)
+        try:
+            self._link.send(self._encode(frame))
+        except LinkError as error:
+            _FRAMES_LOG.debug("not sent: %s", error)
+
+    def receive(self, timeout_us: int) -> list[LiteFrame] | None:
+        """Wait for bytes, and return the frames that they complete; None if the line is gone."""
+        try:
+            data = self._link.receive(timeout_us)
+        except LinkError as error:
+            _FRAMES_LOG.debug("not heard: %s", error)
+            return None
+        if data:
+            self._byte_us = self.now_us
+        if self._decoder.lost:
+            self._decoder.clear()
+        frames = [found for found in self._decoder.push(data) if isinstance(found, LiteFrame)]
+        for frame in frames:
+            self._note("<", frame)
+        return frames
+
+    def _note(self, arrow: str, frame: LiteFrame) -> None:
+        _FRAMES_LOG.debug("%s %s", arrow, frame.body)
+        self.latest.append(f"{self.now_us / 1e6:.3f} {arrow} {str(frame.body)[2:-1]}")
+
+
+class RtnoLink(FrameLink):
+    """Says what RTno has a letter for, and makes up for the rest.
+
+    | asked for | said instead |
+    |---|---|
+    | PING | `X`, the state; its answer is that to the PING, too |
+    | abort | `D`, deactivate: the device is Inactive then, and only its proxy in Error |
+    | initialize, finalize, on_startup, on_shutdown, rate, poll | nothing; the reply is `!` |
+
+    Args:
+        link: the line.
+    """
+
+    def __init__(self, link: Link[bytes]) -> None:
+        super().__init__(link, encode_request, RtnoReplies())
+        self._ping = b""  # number of the PING that waits for its answer
+        self._aborts = False
+        self._made_up: list[LiteFrame] = []
+
+    def send(self, frame: LiteFrame) -> None:
+        """Send a request, or what stands for it."""
+        self._aborts = frame.command is LiteCommand.ABORT
+        if frame.command is LiteCommand.PING:
+            self._ping = frame.data
+            super().send(LiteFrame(LiteCommand.STATE))
+        elif self._aborts:
+            super().send(LiteFrame(LiteCommand.DEACTIVATE))
+        elif frame.command in LETTERS:
+            super().send(frame)
+        else:
+            self._made_up.append(LiteFrame(frame.command, bytes([LiteStatus.UNSUPPORTED])))
+
+    def receive(self, timeout_us: int) -> list[LiteFrame] | None:
+        """Wait for bytes, and return the frames that they complete; None if the line is gone."""
+        made_up, self._made_up = self._made_up, []
+        frames = super().receive(0 if made_up else timeout_us)
+        if frames is None:
+            return None
+        for frame in frames:
+            made_up += self._translate(frame)
+        return made_up
+
+    def _translate(self, frame: LiteFrame) -> list[LiteFrame]:
+        if frame.command is LiteCommand.STATE and self._ping:
+            number, self._ping = self._ping, b""
+            return [frame, LiteFrame(LiteCommand.PING, bytes([LiteStatus.OK]) + number)]
+        if frame.command is LiteCommand.DEACTIVATE and self._aborts:
+            return [LiteFrame(LiteCommand.ABORT, frame.data)]
+        return [frame]
+
 
 POLL_US: Final = 1_000
 """How often the answer to a PING is looked for."""
 
-PROFILE_US: Final = 10_000_000
+_PROFILE_US: Final = 10_000_000
 """How long all frames of a profile may take (RTnoProxy)."""
 
-FAULTS: Final = frozenset(FAULT_COMMANDS)
+_FAULTS: Final = frozenset(FAULT_COMMANDS)
 """What stands in the place of a status when a device could not read a request."""
 
 RETRIES: Final = 3
@@ -140,10 +334,10 @@ class RequestChannel:
         """
         reply = self._exchange(command)
         for _ in range(RETRIES):
-            if reply is not None and reply.status not in FAULTS:
+            if reply is not None and reply.status not in _FAULTS:
                 break
             if reply is not None:
-                self.listen(SILENCE_US)
+                self.listen(_SILENCE_US)
             reply = self._exchange(command)
         return reply
 
@@ -186,7 +380,7 @@ class RequestChannel:
         return reply
 
     def _await_reply(self) -> LiteReply | None:
-        limit_us = self.now_us + PROFILE_US
+        limit_us = self.now_us + _PROFILE_US
         self._deadline_us = self.now_us + self._settings.reply_us
         while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
             if not self._receive(self._deadline_us - self.now_us):

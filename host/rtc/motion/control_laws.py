@@ -12,13 +12,13 @@ from typing import Final
 
 from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, wrap
 
-MOST_ANGULAR_ACCELERATION: Final = 5.0
+_MOST_ANGULAR_ACCELERATION: Final = 5.0
 """rad/s2: cap of what max_acc_w and acc_cycle give (rh3-control, units)."""
 
-FLOOR: Final = pi / 90
+_FLOOR: Final = pi / 90
 """rad/s: the reference spin is never slower than 2 degrees a second."""
 
-ETA: Final = 0.1
+_ETA: Final = 0.1
 """Share of the angular acceleration that the reference spin uses."""
 
 
@@ -49,7 +49,7 @@ def steps(
 ) -> tuple[float, float]:
     """Return the steps that `max_acc_*` allow in a tick; they are given for each `acc_cycle_s`."""
     share = tick_s / acc_cycle_s
-    return max_acc_v * share, min(max_acc_w * share, MOST_ANGULAR_ACCELERATION * tick_s)
+    return max_acc_v * share, min(max_acc_w * share, _MOST_ANGULAR_ACCELERATION * tick_s)
 
 
 class ControlLaw(StrEnum):
@@ -120,7 +120,7 @@ class ReferenceSpin:
     def turn(self, heading: float, present: float, most: float, before: Twist) -> Twist:
         """Return the command towards a heading, at most so fast."""
         q = wrap(heading - present)
-        wanted = max(sqrt(2 * ETA * self.alpha * abs(q)), FLOOR)
+        wanted = max(sqrt(2 * _ETA * self.alpha * abs(q)), _FLOOR)
         return Twist(0.0, copysign(min(most, wanted), q))
 
 

@@ -7,22 +7,23 @@ from typing import Final, Protocol
 
 from tickrig.host.rtc.motion.chain import MotionChain
 from tickrig.host.rtc.motion.components.omni_to_2wd import plan
+from tickrig.host.rtc.motion.control_laws import VelocityLimits, steps
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.motion_run import MotionRun, Sample, least_time_s
+from tickrig.host.rtc.motion.motion_run import MotionRun, TrackSample, least_time_s
 from tickrig.wire.rtc_types.rh2 import RunMode
 
 PERIOD_US: Final = 20_000
 SETTLE_US: Final = 500_000
 """Time for the components to come up, and for a cart to roll on after its goal is reached."""
 
-ERROR_CHECK_PERIODS: Final = 5
+_ERROR_CHECK_PERIODS: Final = 5
 """Samples from one look for a component in Error to the next."""
 
-TIMEOUT_FACTOR: Final = 3
+_TIMEOUT_FACTOR: Final = 3
 """Times the least time that a way may take, and half a minute."""
-TIMEOUT_EXTRA_S: Final = 30
+_TIMEOUT_EXTRA_S: Final = 30
 
-OnSample = Callable[[Sample], None]
+OnSample = Callable[[TrackSample], None]
 
 
 class BaseConnection(Protocol):
@@ -87,9 +88,9 @@ def drive(
     until_us = start_us + (timeout_us or _timeout_us(connection, points))
     while connection.now_us < until_us:
         connection.run_to(min(connection.now_us + PERIOD_US, until_us))
-        run.samples.append(sample(connection, (connection.now_us - start_us) / 1e6))
+        run.samples.append(_sample(connection, (connection.now_us - start_us) / 1e6))
         watch(run.samples[-1])
-        if len(run.samples) % ERROR_CHECK_PERIODS == 0 and connection.chain.in_error:
+        if len(run.samples) % _ERROR_CHECK_PERIODS == 0 and connection.chain.in_error:
             break
         if entered.finished > finished and run.reached_s is None:
             run.reached_s = run.duration_s
@@ -99,15 +100,15 @@ def drive(
 
 def _timeout_us(connection: BaseConnection, points: Sequence[Pose]) -> int:
     least_s = least_time_s(plan(connection.chain.odometry.pose, points))
-    return round((TIMEOUT_FACTOR * least_s + TIMEOUT_EXTRA_S) * 1e6)
+    return round((_TIMEOUT_FACTOR * least_s + _TIMEOUT_EXTRA_S) * 1e6)
 
 
-def sample(connection: BaseConnection, time_s: float) -> Sample:
+def _sample(connection: BaseConnection, time_s: float) -> TrackSample:
     """Return what a cart does now."""
     follower = connection.chain.path_follower
     path = follower.path
     line = Pose(path.x, path.y, path.theta) if path.type == RunMode.LINEFOLLOW else None
-    return Sample(time_s, connection.pose, follower.twist, line)
+    return TrackSample(time_s, connection.pose, follower.twist, line)
 
 
 def set_latency(chain: MotionChain, response_s: float) -> None:
@@ -115,3 +116,34 @@ def set_latency(chain: MotionChain, response_s: float) -> None:
     latency = f"{1.5 * PERIOD_US / 1e6 + response_s:g}"
     for component in (chain.navigation, chain.path_follower):
         component.configuration.set("latency", latency, "tuned")
+
+
+# How well a cart drove, as lines of text.
+
+
+def table(run: MotionRun, start: Pose, points: Sequence[Pose], limits: VelocityLimits) -> list[str]:
+    """Return a line for each measure."""
+    least_s, track = least_time_s(plan(start, points)), run.cross_track
+    took_s = run.duration_s if run.reached_s is None else run.reached_s
+    share = f", {took_s / least_s:.2f} x the least time" if least_s else ""
+    lost = run.violations(limits)
+    return [
+        f"time         {took_s:.2f} s{share}",
+        f"at the end   {run.error_m * 1e3:.1f} mm and {run.heading_error_rad:.4f} rad off the goal",
+        f"cross-track  {track.rms * 1e3:.1f} mm rms, {track.most * 1e3:.1f} mm at most,"
+        " on legs of 1 m and more",
+        f"turning      {run.turning_rad_s:.2f} rad/s in all changes",
+        f"limits       {f'{lost} commands beyond them' if lost else 'kept'}",
+    ]
+
+
+def limits_of(chain: MotionChain) -> VelocityLimits:
+    """Return the limits that a chain is configured to keep."""
+    follower = chain.path_follower
+    dv, dw = steps(
+        follower.max_acc_v.value,
+        follower.max_acc_w.value,
+        PERIOD_US / 1e6,
+        follower.acc_cycle.value,
+    )
+    return VelocityLimits(follower.max_v.value, follower.max_w.value, dv, dw)

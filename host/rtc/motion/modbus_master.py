@@ -8,14 +8,16 @@ from typing import Final
 
 from tickrig.host.links.link import Link
 from tickrig.wire.errors import WireError
-from tickrig.wire.modbus.requests import (
+from tickrig.wire.modbus import (
     ERROR_BIT,
+    MAX_FRAME_BYTES,
     ExceptionCode,
     Request,
+    encode_frame,
     encode_request,
     encode_response,
+    parse_frame,
 )
-from tickrig.wire.modbus.rtu import MAX_FRAME_BYTES, encode_frame, parse_frame
 
 TIMEOUT_US: Final = 20_000
 """How long an answer may take (rh3-control, drive protocol)."""

@@ -37,11 +37,11 @@ class Umbmark:
     @property
     def most_m(self) -> float:
         """E_max,syst: the larger distance of the two centres of gravity."""
-        return max(hypot(*centre(self.clockwise)), hypot(*centre(self.counter_clockwise)))
+        return max(hypot(*_centre(self.clockwise)), hypot(*_centre(self.counter_clockwise)))
 
     def corrected(self, wheels: Wheels, side_m: float = SIDE_M) -> Wheels:
         """Return the geometry that makes up for the errors; the mean radius stays."""
-        (x_cw, _), (x_ccw, _) = centre(self.clockwise), centre(self.counter_clockwise)
+        (x_cw, _), (x_ccw, _) = _centre(self.clockwise), _centre(self.counter_clockwise)
         alpha = (x_cw + x_ccw) / (-4 * side_m)
         beta = (x_cw - x_ccw) / (-4 * side_m)
         axle = wheels.axle * (pi / 2) / (pi / 2 - alpha)
@@ -54,10 +54,10 @@ class Umbmark:
         return Wheels(2 * mean / (ratio + 1), 2 * mean * ratio / (ratio + 1), axle)
 
 
-def centre(errors: Sequence[Error]) -> Error:
+def _centre(errors: Sequence[Error]) -> Error:
     """Return the centre of gravity.
 
-    >>> centre([(0.0, 1.0), (2.0, 3.0)])
+    >>> _centre([(0.0, 1.0), (2.0, 3.0)])
     (1.0, 2.0)
     """
     return fsum(x for x, _ in errors) / len(errors), fsum(y for _, y in errors) / len(errors)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from tickrig.host.rtc.ports.connector import Connector
-from tickrig.host.rtc.ports.connector_options import ConnectorOptions
+from tickrig.host.rtc.ports.connector import Connector, ConnectorOptions
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile, automatic_id
 from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServiceConnector, ServicePort
@@ -43,7 +42,7 @@ def connect(
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
     for port in (first, second) if connector_id else ():
         refuse_known_id(port, connector_id)
-    connector = _connector(first, second, properties or {}, Names(name, connector_id))
+    connector = _connector(first, second, properties or {}, ConnectorNames(name, connector_id))
     connector.begin()
     return connector
 
@@ -55,7 +54,7 @@ def refuse_known_id(port: AnyPort, connector_id: str) -> None:
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
 
 
-class Names(NamedTuple):
+class ConnectorNames(NamedTuple):
     """What a caller wants a connector to be called; empty where that does not matter."""
 
     name: str
@@ -63,7 +62,7 @@ class Names(NamedTuple):
 
 
 def _connector(
-    first: AnyPort, second: AnyPort, properties: Properties, names: Names
+    first: AnyPort, second: AnyPort, properties: Properties, names: ConnectorNames
 ) -> ConnectorBase:
     match first, second:
         case OutPort(), InPort():
@@ -77,7 +76,7 @@ def _connector(
 
 
 def _profile(
-    first: AnyPort, second: AnyPort, properties: Properties, names: Names
+    first: AnyPort, second: AnyPort, properties: Properties, names: ConnectorNames
 ) -> ConnectorProfile:
     ports = (first.full_name, second.full_name)
     connector_id = names.connector_id or automatic_id(ports)
@@ -85,7 +84,7 @@ def _profile(
 
 
 def _data_connector(
-    out: OutPort[Any], in_: InPort[Any], properties: Properties, names: Names
+    out: OutPort[Any], in_: InPort[Any], properties: Properties, names: ConnectorNames
 ) -> ConnectorBase:
     if out.data_type is not in_.data_type:
         raise RtcRefused(
@@ -98,7 +97,7 @@ def _data_connector(
 
 
 def _service_connector(
-    first: ServicePort, second: ServicePort, properties: Properties, names: Names
+    first: ServicePort, second: ServicePort, properties: Properties, names: ConnectorNames
 ) -> ConnectorBase:
     pairs = (*_pairs(first, second), *_pairs(second, first))
     if not pairs:

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final, Generic, TypeVar
 
-from tickrig.host.rtc.ports.connector import Connector
-from tickrig.host.rtc.ports.connector_options import DataflowType, InterfaceType, SubscriptionType
+from tickrig.host.rtc.ports.connector import (
+    Connector,
+    DataflowType,
+    InterfaceType,
+    SubscriptionType,
+)
 from tickrig.host.rtc.ports.port import Port
 from tickrig.host.rtc.states import PortStatus
 from tickrig.wire.rtc_types.idl import Struct

@@ -13,7 +13,7 @@ from tickrig.host.rtc.states import PortStatus
 T = TypeVar("T")
 
 DEFAULT_LENGTH: Final = 8
-MAX_LENGTH: Final = 1_000_000
+_MAX_LENGTH: Final = 1_000_000
 
 _OK: Final = PortStatus.PORT_OK
 """To look a member of an enum up takes 0.1 us."""
@@ -66,8 +66,8 @@ class BufferOptions:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not 1 <= self.length <= MAX_LENGTH:
-            raise ValueError(f"buffer length {self.length} is not in 1..{MAX_LENGTH}")
+        if not 1 <= self.length <= _MAX_LENGTH:
+            raise ValueError(f"buffer length {self.length} is not in 1..{_MAX_LENGTH}")
         if not 0 <= self.skip_count < self.length:
             raise ValueError(f"skip_count {self.skip_count} is not in 0..{self.length - 1}")
 

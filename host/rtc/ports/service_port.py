@@ -59,7 +59,7 @@ class Consumer(Generic[T]):
         self._provider = provider
 
 
-Interface = Provider[Any] | Consumer[Any]
+_Interface = Provider[Any] | Consumer[Any]
 
 
 class ServicePort(Port["ServiceConnector"]):
@@ -83,7 +83,7 @@ class ServicePort(Port["ServiceConnector"]):
         return consumer
 
     def _interfaces(self) -> tuple[InterfaceProfile, ...]:
-        interfaces: list[Interface] = [*self.providers, *self.consumers]
+        interfaces: list[_Interface] = [*self.providers, *self.consumers]
         return tuple(interface.profile for interface in interfaces)
 
 

@@ -2,22 +2,184 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import count
 from typing import Final, TypeVar
 
-from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.component_types import COMPONENT_TYPES, installed_type
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorProfile
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
-from tickrig.host.rtc.system.name_service import NameService
-from tickrig.host.rtc.system.remotes import Remotes
 from tickrig.host.rtc.system.schedule import Schedule
+
+# Component types that a manager finds by name: ours, and those of installed packages.
+
+_HERE: Final = "tickrig.host.rtc.components"
+_UCODE: Final = {
+    "infrared_rays_reader": "InfraredRaysReader",
+    "ucode_settlement": "UcodeSettlement",
+    "contents_interpretation": "ContentsInterpretation",
+}
+_MOTION: Final[dict[str, str]] = {
+    "RefHardRh3": "components.ref_hard:RefHardRh3",
+    "Odometry": "components.odometry:Odometry",
+    "PositionInput": "components.position_input:PositionInput",
+    "OmniTo2WD": "components.omni_to_2wd:OmniTo2WD",
+    "Navigation": "components.navigation:Navigation",
+    "PathFollower": "components.path_follower:PathFollower",
+    "GamePad": "options.game_pad:GamePad",
+    "SwitchInputRTC": "options.switch_input:SwitchInput",
+    "LRFCapture_URG": "options.lrf_capture_urg:LrfCaptureUrg",
+    "Urg_to_Obstacles": "options.obstacles:UrgToObstacles",
+    "ObstacleMonitor": "options.obstacles:ObstacleMonitor",
+    "CollisionDetection": "options.obstacles:CollisionDetection",
+    "ObstaclesAvoidance": "options.obstacles:ObstaclesAvoidance",
+    "Follower": "options.follower:Follower",
+    "GoalInterface": "iis.interfaces:GoalInterface",
+    "RunningInformation": "iis.interfaces:RunningInformation",
+    "PathInterface": "iis.path_interface:PathInterface",
+    "Velocity1To2": "iis.adapters:Velocity1To2",
+    "Velocity2To1": "iis.adapters:Velocity2To1",
+    "Velocity2To3": "iis.adapters:Velocity2To3",
+    "Velocity3To2": "iis.adapters:Velocity3To2",
+    "Position2To3": "iis.adapters:Position2To3",
+    "Position3To2": "iis.adapters:Position3To2",
+    "PositiveHeading": "iis.adapters:PositiveHeading",
+    "WrappedHeading": "iis.adapters:WrappedHeading",
+}
+"""The motion chain of RH3, what is around it, and the interfaces of IIS, in `host.rtc.motion`."""
+
+
+def _is_component_type(found: object) -> bool:
+    """Return whether this is a class of components, one that can be registered."""
+    return (
+        isinstance(found, type)
+        and issubclass(found, RtComponent)
+        and isinstance(getattr(found, "spec", None), ModuleSpec)
+    )
+
+
+COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
+    "tickrig.components",
+    "component type",
+    {
+        name: f"{_HERE}:{name}"
+        for name in ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample")
+    }
+    | {name: f"tickrig.host.rtc.ucode.{module}:{name}" for module, name in _UCODE.items()}
+    | {name: f"tickrig.host.rtc.motion.{place}" for name, place in _MOTION.items()},
+    _is_component_type,
+    "an RtComponent with a spec",
+)
+"""The entry-point group `tickrig.components` (docs/howto/extending.md)."""
+
+
+def _installed_type(name: str) -> type[RtComponent]:
+    """Load one of them; RtcRefused if that fails, or if its class has another name."""
+    try:
+        found = COMPONENT_TYPES.load(name)
+    except ExtensionError as error:
+        raise RtcRefused(str(error)) from error
+    if found.spec.type_name != name:
+        raise RtcRefused(f"component type {name!r} calls itself {found.spec.type_name!r}")
+    return found
+
+
+# What a system has to do with components that run elsewhere: an engine looks after it.
+
+
+@dataclass(frozen=True, slots=True)
+class RemoteEntry:
+    """A component that runs elsewhere.
+
+    Attributes:
+        name: how it is called in the system, such as `Joystick0` in `Joystick0.out`.
+        path: where its engine finds it, such as `localhost:2809/robot.host_cxt/Joystick0.rtc`.
+    """
+
+    name: str
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class RemoteConnection:
+    """A connector of a port of ours with one of a component that runs elsewhere.
+
+    Attributes:
+        port: full name of ours.
+        remote: the component that runs elsewhere.
+        remote_port: its port, without the name of the component.
+        ports: both full names, in the order in which they were given.
+        name: for people.
+        properties: what is to hold for it.
+        connector_id: its ID.
+    """
+
+    port: str
+    remote: RemoteEntry
+    remote_port: str
+    ports: tuple[str, str]
+    name: str = ""
+    properties: Mapping[str, str] = field(default_factory=dict)
+    connector_id: str = ""
+
+
+@dataclass(slots=True)
+class Remotes:
+    """The components that run elsewhere and the connectors with them, as a system file has them."""
+
+    components: list[RemoteEntry] = field(default_factory=list)
+    connections: list[RemoteConnection] = field(default_factory=list)
+
+
+# The name service of a manager: components by path.
+
+
+class NameService:
+    """Components by path, as rtshell writes them: `localhost/ConsoleIn0.rtc`.
+
+    In process: not emulated is the CORBA naming service, which others could ask.
+    """
+
+    def __init__(self) -> None:
+        self._components: dict[str, RtComponent] = {}
+
+    def bind(self, path: str, component: RtComponent) -> None:
+        """Give a component a path; RtcRefused if it is taken."""
+        path = _plain(path)
+        if path in self._components:
+            raise RtcRefused(f"{path} is taken")
+        self._components[path] = component
+
+    def unbind(self, path: str) -> None:
+        """Take a path away; one that is not there is no error."""
+        self._components.pop(_plain(path), None)
+
+    def resolve(self, path: str) -> RtComponent:
+        """Return the component at a path; RtcRefused if there is none."""
+        path = _plain(path)
+        if path not in self._components:
+            known = ", ".join(self._components) or "none"
+            raise RtcRefused(f"nothing at {path}; known: {known}")
+        return self._components[path]
+
+    def names(self, context: str = "") -> tuple[str, ...]:
+        """Return what stands in a naming context: names, and contexts with `/` at their end."""
+        prefix = f"{_plain(context)}/" if _plain(context) else ""
+        rests = (path.removeprefix(prefix) for path in self._components if path.startswith(prefix))
+        heads = (rest.partition("/") for rest in rests)
+        return tuple(dict.fromkeys(head + slash for head, slash, _ in heads))
+
+
+def _plain(path: str) -> str:
+    return path.strip("/")
+
 
 R = TypeVar("R", bound=RtComponent)
 
@@ -346,7 +508,7 @@ class Manager(Schedule):
             return self._registered[name]
         if name not in self._installed:
             raise RtcRefused(f"no component type {name!r}; known: {', '.join(self.types)}")
-        return installed_type(name)
+        return _installed_type(name)
 
     def _request(
         self,

@@ -18,12 +18,12 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System, given_id
 
-RTS: Final = "http://www.openrtp.org/namespaces/rts"
-EXT: Final = "http://www.openrtp.org/namespaces/rts_ext"
-XSI: Final = "http://www.w3.org/2001/XMLSchema-instance"
+_RTS: Final = "http://www.openrtp.org/namespaces/rts"
+_EXT: Final = "http://www.openrtp.org/namespaces/rts_ext"
+_XSI: Final = "http://www.w3.org/2001/XMLSchema-instance"
 
 _DECLARATION: Final = '<?xml version="1.0" encoding="UTF-8"?>'
-_PREFIXES: Final = {"rts": RTS, "rtsExt": EXT, "xsi": XSI}
+_PREFIXES: Final = {"rts": _RTS, "rtsExt": _EXT, "xsi": _XSI}
 _KINDS: Final[Mapping[str, str]] = {
     "Components": "component_ext",
     "DataPorts": "dataport_ext",
@@ -90,7 +90,7 @@ def parse_rts_profile(text: str) -> System:
 
 
 def _rts(name: str) -> str:
-    return f"{{{RTS}}}{name}"
+    return f"{{{_RTS}}}{name}"
 
 
 def _set(node: ET.Element, **attributes: str) -> None:
@@ -101,7 +101,7 @@ def _set(node: ET.Element, **attributes: str) -> None:
 def _child(parent: ET.Element, name: str, /, **attributes: str) -> ET.Element:
     node = ET.SubElement(parent, _rts(name))
     if name in _KINDS:
-        node.set(f"{{{XSI}}}type", f"rtsExt:{_KINDS[name]}")
+        node.set(f"{{{_XSI}}}type", f"rtsExt:{_KINDS[name]}")
     _set(node, **attributes)
     return node
 
@@ -143,9 +143,9 @@ def _add_connector(root: ET.Element, profile: ConnectorProfile, manager: Manager
         end = _child(node, f"{role}{word}Port", portName=port, instanceName=owner.instance_name)
         _set(end, componentId=_component_id(owner))
     for key, value in properties.items():
-        extra = ET.SubElement(node, f"{{{EXT}}}Properties")
-        extra.set(f"{{{EXT}}}name", key)
-        extra.set(f"{{{EXT}}}value", value)
+        extra = ET.SubElement(node, f"{{{_EXT}}}Properties")
+        extra.set(f"{{{_EXT}}}name", key)
+        extra.set(f"{{{_EXT}}}value", value)
 
 
 def _need(node: ET.Element, name: str) -> str:
@@ -190,8 +190,8 @@ def _connection(node: ET.Element, word: str) -> ConnectionEntry:
         interval_s = _number(node, "pushInterval")
         if interval_s > 0:
             properties["dataport.publisher.push_rate"] = str(1 / interval_s)
-    for extra in node.findall(f"{{{EXT}}}Properties"):
-        properties[extra.get(f"{{{EXT}}}name", "")] = extra.get(f"{{{EXT}}}value", "")
+    for extra in node.findall(f"{{{_EXT}}}Properties"):
+        properties[extra.get(f"{{{_EXT}}}name", "")] = extra.get(f"{{{_EXT}}}value", "")
     properties.pop("dataport.data_type", None)  # of rtcryo; the ports say it
     ports, connector_id = (source, target), node.get(_rts("connectorId"), "")
     name, given = node.get(_rts("name"), ""), given_id(connector_id, (source, target))

@@ -7,13 +7,18 @@ from dataclasses import dataclass, field, replace
 
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.configuration import DEFAULT
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.port import ConnectorProfile, automatic_id
 from tickrig.host.rtc.states import LifeCycleState, RtcRefused
-from tickrig.host.rtc.system.manager import DEFAULT_RATE_HZ, Manager
-from tickrig.host.rtc.system.remotes import RemoteConnection, RemoteEntry, Remotes
+from tickrig.host.rtc.system.manager import (
+    DEFAULT_RATE_HZ,
+    Manager,
+    RemoteConnection,
+    RemoteEntry,
+    Remotes,
+)
 
-Sets = Mapping[str, Mapping[str, str]]
+_Sets = Mapping[str, Mapping[str, str]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +42,7 @@ class ComponentEntry:
     context: str = ""
     active: bool = False
     configuration_set: str = DEFAULT
-    configuration: Sets = field(default_factory=dict)
+    configuration: _Sets = field(default_factory=dict)
     path: str = field(default="", compare=False)
 
 

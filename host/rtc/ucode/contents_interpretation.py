@@ -9,16 +9,15 @@ from typing import ClassVar, Final
 
 from tickrig.host.rtc.component import ModuleSpec
 from tickrig.host.rtc.ports.data_port import OutPort
-from tickrig.host.rtc.ucode.cache import Cache
+from tickrig.host.rtc.ucode.cache import LookupCache, OpenSource
 from tickrig.host.rtc.ucode.http_source import HttpSource
-from tickrig.host.rtc.ucode.lookup import Lookup, Wanted
-from tickrig.host.rtc.ucode.source import OpenSource
+from tickrig.host.rtc.ucode.lookup import Lookup, WantedUcode
 from tickrig.wire.rtc_types.basic import TimedStringSeq
 from tickrig.wire.rtc_types.extended_2d import Point2D, TimedPoint2D
 
-FAR_M: Final = 1e6
-MOST_PROPERTIES: Final = 32
-MOST_CHARACTERS: Final = 200
+_FAR_M: Final = 1e6
+_MOST_PROPERTIES: Final = 32
+_MOST_CHARACTERS: Final = 200
 """Of a property."""
 
 
@@ -55,17 +54,17 @@ class ContentsInterpretation(Lookup[Contents]):
     )
 
     def __init__(self, instance_name: str, open_source: OpenSource = HttpSource) -> None:
-        super().__init__(instance_name, "addresses", Cache(parse_contents), open_source)
+        super().__init__(instance_name, "addresses", LookupCache(parse_contents), open_source)
         self.position = self.add_port(OutPort("position", TimedPoint2D))
         self.place = self.add_port(OutPort("place", TimedStringSeq))
         self._add_outputs()
 
-    def _wanted(self, value: TimedStringSeq) -> Iterator[Wanted]:
+    def _wanted(self, value: TimedStringSeq) -> Iterator[WantedUcode]:
         words = value.data
         for ucode, address in zip(words[::2], words[1::2], strict=False):
-            yield Wanted(ucode, address, value.tm)
+            yield WantedUcode(ucode, address, value.tm)
 
-    def _write(self, found: list[tuple[Wanted, Contents]]) -> None:
+    def _write(self, found: list[tuple[WantedUcode, Contents]]) -> None:
         for wanted, contents in found:
             point = Point2D(contents.x_m, contents.y_m)
             self.position.write(TimedPoint2D(wanted.received, point))
@@ -89,19 +88,19 @@ def parse_contents(text: str) -> Contents:
     if not isinstance(found, dict):
         raise ValueError(f"{text[:60]!r} is no JSON object")
     x_m, y_m = (_metres(found.pop(name, None), name) for name in ("x_m", "y_m"))
-    if len(found) > MOST_PROPERTIES:
-        raise ValueError(f"{len(found)} properties are more than {MOST_PROPERTIES}")
+    if len(found) > _MOST_PROPERTIES:
+        raise ValueError(f"{len(found)} properties are more than {_MOST_PROPERTIES}")
     return Contents(x_m, y_m, tuple(_property(name, found[name]) for name in sorted(found)))
 
 
 def _metres(value: object, name: str) -> float:
-    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) <= FAR_M:
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) <= _FAR_M:
         raise ValueError(f"{name} is a number of metres, not {json.dumps(value)[:40]}")
     return float(value)
 
 
 def _property(name: str, value: object) -> str:
     text = f"{name}={value if isinstance(value, str) else json.dumps(value)}"
-    if len(text) > MOST_CHARACTERS or not text.isprintable():
+    if len(text) > _MOST_CHARACTERS or not text.isprintable():
         raise ValueError(f"the property {name[:40]!r} is no short line")
     return text

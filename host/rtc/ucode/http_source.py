@@ -11,10 +11,10 @@ from io import BytesIO
 from typing import Final
 from urllib.parse import SplitResult, urlsplit
 
-from tickrig.host.rtc.remote.peer_thread import PeerThread
-from tickrig.host.rtc.ucode.source import Fetched, SourceStatus
+from tickrig.host.rtc.system.peer_thread import PeerThread
+from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
 
-TIMEOUT_S: Final = 1.0
+_TIMEOUT_S: Final = 1.0
 MOST_OCTETS: Final = 8_192
 """Of an answer, with its head."""
 
@@ -31,7 +31,7 @@ class HttpSource:
         timeout_s: for a whole answer.
     """
 
-    def __init__(self, name: str, hosts: tuple[str, ...], timeout_s: float = TIMEOUT_S) -> None:
+    def __init__(self, name: str, hosts: tuple[str, ...], timeout_s: float = _TIMEOUT_S) -> None:
         self._hosts, self._timeout_s = hosts, timeout_s
         self._thread = PeerThread(name)
         self._ended: queue.SimpleQueue[Fetched] = queue.SimpleQueue()

@@ -7,24 +7,23 @@ from collections.abc import Iterable
 from typing import Final, Generic, NamedTuple, TypeVar
 
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
+from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import ReturnCode
-from tickrig.host.rtc.ucode.cache import Cache, CacheLimits
-from tickrig.host.rtc.ucode.source import OpenSource, Source
+from tickrig.host.rtc.ucode.cache import CacheLimits, LookupCache, OpenSource, Source
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types.basic import Time, TimedLongSeq, TimedStringSeq
 
 V = TypeVar("V")
 
-WAIT_US: Final = 2_000_000
+_WAIT_US: Final = 2_000_000
 """What comes later than this after it was wanted is not written: the robot is elsewhere."""
 
-MOST_COUNTED: Final = 2**31 - 1
+_MOST_COUNTED: Final = 2**31 - 1
 _LOG: Final = log_of(__name__)
 
 
-class Wanted(NamedTuple):
+class WantedUcode(NamedTuple):
     """A ucode whose information is wanted: where that is, and when the ucode was received."""
 
     ucode: str
@@ -58,7 +57,7 @@ class Lookup(RtComponent, Generic[V]):
         self,
         instance_name: str,
         in_port: str,
-        cache: Cache[V],
+        cache: LookupCache[V],
         open_source: OpenSource,
     ) -> None:
         super().__init__(instance_name)
@@ -72,7 +71,7 @@ class Lookup(RtComponent, Generic[V]):
         self.in_ = self.add_port(InPort(in_port, TimedStringSeq))
         self.cache, self._open_source = cache, open_source
         self._source: Source | None = None
-        self._waiting: dict[str, tuple[Wanted, int]] = {}
+        self._waiting: dict[str, tuple[WantedUcode, int]] = {}
         self._failing_since_us: int | None = None
         self._invalid = ""
 
@@ -81,11 +80,11 @@ class Lookup(RtComponent, Generic[V]):
         self.cache_state = self.add_port(OutPort("cache", TimedLongSeq))
 
     @abstractmethod
-    def _wanted(self, value: TimedStringSeq) -> Iterable[Wanted]:
+    def _wanted(self, value: TimedStringSeq) -> Iterable[WantedUcode]:
         """Say what is wanted for a value that arrived."""
 
     @abstractmethod
-    def _write(self, found: list[tuple[Wanted, V]]) -> None:
+    def _write(self, found: list[tuple[WantedUcode, V]]) -> None:
         """Write what was found, one thing at least, all received at one time."""
 
     @property
@@ -134,19 +133,19 @@ class Lookup(RtComponent, Generic[V]):
     def _write_late(self, address: str, now_us: int) -> None:
         """Write what has come for a ucode that still is wanted."""
         waiting, value = self._waiting.pop(address, None), self.cache.value(address)
-        if waiting is not None and value is not None and now_us - waiting[1] <= WAIT_US:
+        if waiting is not None and value is not None and now_us - waiting[1] <= _WAIT_US:
             self._write([(waiting[0], value)])
 
     def _write_cache_state(self, now: Time) -> None:
         counts = self.cache.counts
         numbers = (counts.hits, counts.stale, counts.misses, counts.unknown, counts.failures)
         shown = (*numbers, len(self.cache), counts.age_us // 1_000)
-        self.cache_state.write(TimedLongSeq(now, tuple(min(n, MOST_COUNTED) for n in shown)))
+        self.cache_state.write(TimedLongSeq(now, tuple(min(n, _MOST_COUNTED) for n in shown)))
 
     def _watch(self, now_us: int) -> None:
         """Forget who waited too long; log in a line when the service fails or is back."""
         for address, (_, wanted_us) in tuple(self._waiting.items()):
-            if now_us - wanted_us > WAIT_US:
+            if now_us - wanted_us > _WAIT_US:
                 del self._waiting[address]
         trouble, since_us = self.cache.trouble, self._failing_since_us
         if trouble and since_us is None:

@@ -7,16 +7,15 @@ from typing import ClassVar, Final
 
 from tickrig.host.rtc.component import ModuleSpec
 from tickrig.host.rtc.ports.data_port import OutPort
-from tickrig.host.rtc.ucode.cache import Cache
+from tickrig.host.rtc.ucode.cache import LookupCache, OpenSource
 from tickrig.host.rtc.ucode.http_source import HttpSource
-from tickrig.host.rtc.ucode.lookup import Lookup, Wanted
-from tickrig.host.rtc.ucode.source import OpenSource
+from tickrig.host.rtc.ucode.lookup import Lookup, WantedUcode
 from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_types.basic import TimedStringSeq
-from tickrig.wire.sensors.ucode import parse_ucode
+from tickrig.wire.ucode import parse_ucode
 
-SERVICE: Final = "http://127.0.0.1:8640"
-MOST_CHARACTERS: Final = 1_000
+_SERVICE: Final = "http://127.0.0.1:8640"
+_MOST_CHARACTERS: Final = 1_000
 """Of an address."""
 
 
@@ -38,13 +37,13 @@ class UcodeSettlement(Lookup[str]):
     spec: ClassVar[ModuleSpec] = ModuleSpec("UcodeSettlement", "Addresses of ucodes, cached")
 
     def __init__(self, instance_name: str, open_source: OpenSource = HttpSource) -> None:
-        super().__init__(instance_name, "ucodes", Cache(parse_address), open_source)
-        self._service = self.configuration.bind("service", SERVICE)
+        super().__init__(instance_name, "ucodes", LookupCache(parse_address), open_source)
+        self._service = self.configuration.bind("service", _SERVICE)
         self.addresses = self.add_port(OutPort("addresses", TimedStringSeq))
         self._add_outputs()
         self.invalid_ucodes = 0
 
-    def _wanted(self, value: TimedStringSeq) -> Iterator[Wanted]:
+    def _wanted(self, value: TimedStringSeq) -> Iterator[WantedUcode]:
         service = self._service.value.rstrip("/")
         for word in value.data:
             try:
@@ -52,9 +51,9 @@ class UcodeSettlement(Lookup[str]):
             except FieldError:
                 self.invalid_ucodes += 1
             else:
-                yield Wanted(ucode, f"{service}/ucodes/{ucode}", value.tm)
+                yield WantedUcode(ucode, f"{service}/ucodes/{ucode}", value.tm)
 
-    def _write(self, found: list[tuple[Wanted, str]]) -> None:
+    def _write(self, found: list[tuple[WantedUcode, str]]) -> None:
         words = (word for wanted, address in found for word in (wanted.ucode, address))
         self.addresses.write(TimedStringSeq(found[0][0].received, tuple(words)))
 
@@ -66,6 +65,6 @@ def parse_address(text: str) -> str:
         ValueError: it is none.
     """
     address = text.strip()
-    if not address.startswith("http://") or len(address) > MOST_CHARACTERS:
+    if not address.startswith("http://") or len(address) > _MOST_CHARACTERS:
         raise ValueError(f"{address[:60]!r} is no address, http://...")
     return address

@@ -5,17 +5,17 @@ from tickrig._lazy import lazy
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tickrig.emulators.testing.conformance.conformance import conformance as conformance
+    from tickrig.emulators.testing.conformance.conformance import (
+        conformance_text as conformance_text,
+    )
+    from tickrig.emulators.testing.conformance.conformance import (
+        write_conformance as write_conformance,
+    )
     from tickrig.emulators.testing.conformance.pytest_suite import (
         conformance_tests as conformance_tests,
     )
-    from tickrig.emulators.testing.conformance.written import (
-        conformance_text as conformance_text,
-    )
-    from tickrig.emulators.testing.conformance.written import (
-        write_conformance as write_conformance,
-    )
-    from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz as DeviceFuzz
-    from tickrig.emulators.testing.fuzz.device_fuzz import (
+    from tickrig.emulators.testing.fuzz import DeviceFuzz as DeviceFuzz
+    from tickrig.emulators.testing.fuzz import (
         SilentDeviceError as SilentDeviceError,
     )
     from tickrig.emulators.testing.machine import strategies as strategies
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.machine.check_host import replay_host as replay_host
     from tickrig.emulators.testing.machine.fuzz_one_input import fuzz_one_input as fuzz_one_input
     from tickrig.emulators.testing.properties.check_device import check_device as check_device
-    from tickrig.host.canopen.master.open_master import open_master as open_master
+    from tickrig.host.canopen.master.canopen_master import open_master as open_master
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
-            "tickrig.emulators.testing.conformance.conformance": ("conformance",),
             "tickrig.emulators.testing.conformance.pytest_suite": ("conformance_tests",),
-            "tickrig.emulators.testing.conformance.written": (
+            "tickrig.emulators.testing.conformance.conformance": (
+                "conformance",
                 "conformance_text",
                 "write_conformance",
             ),
-            "tickrig.emulators.testing.fuzz.device_fuzz": ("DeviceFuzz", "SilentDeviceError"),
+            "tickrig.emulators.testing.fuzz": ("DeviceFuzz", "SilentDeviceError"),
             "tickrig.emulators.testing.machine": ("strategies",),
             "tickrig.emulators.testing.machine.bench_machine": (
                 "BenchMachine",
@@ -47,6 +47,6 @@ else:
             "tickrig.emulators.testing.machine.check_host": ("check_host", "replay_host"),
             "tickrig.emulators.testing.machine.fuzz_one_input": ("fuzz_one_input",),
             "tickrig.emulators.testing.properties.check_device": ("check_device",),
-            "tickrig.host.canopen.master.open_master": ("open_master",),
+            "tickrig.host.canopen.master.canopen_master": ("open_master",),
         },
     )

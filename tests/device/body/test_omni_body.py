@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.body.omni_body import OmniBody, OmniParameters, Velocity
+from tickrig.device.body import OmniBody, OmniParameters, Velocity
 
 speeds = st.floats(-0.3, 0.3)
 

@@ -8,9 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.body.contact import GRAVITY_M_S2, Contact
-from tickrig.device.body.pose import Pose
-from tickrig.device.body.wheeled_body import STEP_S, BodyParameters, WheeledBody
+from tickrig.device.body import GRAVITY_M_S2, STEP_S, BodyParameters, Contact, Pose, WheeledBody
 
 RADIUS, TREAD = 0.05, 0.4
 ways = st.floats(-10, 10)

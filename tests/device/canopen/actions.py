@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.wire.canopen.time_of_day import TimeOfDay
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.wire.canopen.datatypes import TimeOfDay
 
 
 class SlaveActions:

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from tests.emulators.can.can_bench import Log
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import f_palette, motor_core_unit
+from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.wire.can import CanFrame
-from tickrig.wire.candump import LogLine
+from tickrig.wire.can import CanFrame, LogLine
 
 GOLDEN: Final = Path(__file__).parents[2] / "golden"
 ROWS: Final = json.loads((GOLDEN / "canopen" / "fig120.json").read_text())["fig120_setup"]

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.dictionary import Dictionary, SdoAbort
+from tickrig.device.canopen.slave import Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 RW = Access.READ | Access.WRITE
 RO = Access.READ

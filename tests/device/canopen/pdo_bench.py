@@ -6,16 +6,14 @@ from collections.abc import Iterable
 
 from tests.device.canopen.reference import NODE_ID, U8, U32, U64, make_dictionary
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.service import Service
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.dictionary import Dictionary, SdoAbort
+from tickrig.device.canopen.nmt import NmtSlave
+from tickrig.device.canopen.pdo.rpdo import PdoConsumer
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.slave import CanopenSlave, Service
+from tickrig.device.canopen.sync import Sync
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 RW = Access.READ | Access.WRITE
 OFF = 0x8000_0000

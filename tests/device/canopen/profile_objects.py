@@ -7,7 +7,7 @@ from typing import Final
 
 from tests.device.canopen import reference as r1
 from tests.device.canopen.reference import BOOL, I8, I16, I32, RO, RPDO, RW, TPDO, U8, U16, U32
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 GENERIC_IO: Final = "401"

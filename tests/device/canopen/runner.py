@@ -11,7 +11,7 @@ from collections import defaultdict, deque
 from enum import Enum
 from typing import Final
 
-from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.core import Device
 from tickrig.wire.can import CanFrame, Frames
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tests.device.canopen.reference import NODE_ID, make_dictionary
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.sdo import SdoServers
 from tickrig.device.canopen.stack import make_slave
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateRequest,
     Request,
@@ -17,7 +17,7 @@ from tickrig.wire.canopen.sdo.sdo import (
     UploadSegmentRequest,
     parse_response,
 )
-from tickrig.wire.canopen.sdo.sdo_block import (
+from tickrig.wire.canopen.sdo_frame import (
     BlockAcknowledge,
     BlockDownloadInitiateRequest,
     BlockDownloadInitiateResponse,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.slave import TICK_US, CanopenSlave
 from tickrig.wire.can import CanFrame, Frames
 
 

@@ -7,9 +7,9 @@ from tests.device.canopen.conformance import Check, load_all, run_check
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.runner import Pace, Runner
-from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.slave import Application
 from tickrig.device.canopen.stack import make_slave
 
 pytestmark = pytest.mark.unmeasured

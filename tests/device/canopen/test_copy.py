@@ -10,10 +10,9 @@ import pytest
 
 from tests.device.canopen.pdo_bench import OFF, PdoBench
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models import epos
-from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
-from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
+from tickrig.device.canopen.models.motor_core_unit import MotorCoreUnit, make_motor_core_unit
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame, Frames
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.objects import U8, array, errors, make_bus, u8, u16, u32
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.slave import TICK_US, UNCONFIGURED
+from tickrig.device.canopen.slave import TICK_US, UNCONFIGURED
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 

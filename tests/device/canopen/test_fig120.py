@@ -8,10 +8,10 @@ import pytest
 
 from tests.device.canopen.fig120 import MEASURED, POTENTIOMETER, SETUP, Demo, look, make_motor
 from tests.wire.candump_port import CandumpPort
-from tickrig.device.canopen.core.application import Application
+from tickrig.device.canopen.slave import Application
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.wire.candump import parse_log
+from tickrig.wire.can import parse_log
 
 pytestmark = pytest.mark.unmeasured
 

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.canopen.pdo_bench import PdoBench, u8, u32, u64
-from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.pdo import Dispatched, Scanned
 

@@ -5,10 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.slave import TICK_US, Application
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.can import CanFrame
 

@@ -5,10 +5,9 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.service import Service
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.nmt import NmtSlave
+from tickrig.device.canopen.slave import CanopenSlave, Service
 from tickrig.wire.instant import NEVER
 
 

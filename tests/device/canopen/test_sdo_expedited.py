@@ -6,7 +6,7 @@ from tests.device.canopen.objects import make_bus
 from tests.device.canopen.sdo_client import Client, booted
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.sdo import DownloadInitiateRequest
+from tickrig.wire.canopen.sdo import DownloadInitiateRequest
 
 UPLOADS = [
     ("605#4000100000000000", "585#4300100091010F00"),  # UE-01

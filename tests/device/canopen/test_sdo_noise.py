@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.sdo_client import OPEN_SECOND, Client, booted, pattern
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -16,7 +16,7 @@ from tickrig.wire.canopen.sdo.sdo import (
     UploadInitiateResponse,
     parse_response,
 )
-from tickrig.wire.canopen.sdo.sdo_block import BlockEnded
+from tickrig.wire.canopen.sdo_frame import BlockEnded
 
 pytestmark = pytest.mark.unmeasured
 

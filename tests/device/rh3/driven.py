@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from tickrig.device.rh3.base import Rh3Base
+from tickrig.device.rh3.driver import TABLE
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
-from tickrig.device.rh3.register_map import TABLE
-from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
-from tickrig.wire.modbus.rh3 import Command, Mode
-from tickrig.wire.modbus.rtu import encode_frame, parse_frame
+from tickrig.wire.modbus import (
+    READ,
+    WRITE,
+    Command,
+    Mode,
+    Request,
+    encode_frame,
+    encode_request,
+    parse_frame,
+)
 
 BY_NAME = {register.name: register for register in TABLE}
 M_S = COUNTS_PER_RAD / 0.0995

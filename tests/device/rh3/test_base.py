@@ -5,11 +5,10 @@ from math import pi
 import pytest
 
 from tests.device.rh3.driven import M_S, Driven
+from tickrig.device.rh3.driver import OUTPUTS
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
-from tickrig.device.rh3.terminals import OUTPUTS
 from tickrig.wire.instant import NEVER
-from tickrig.wire.modbus.rh3 import Command, Fault, Mode, Status
-from tickrig.wire.modbus.rtu import encode_frame
+from tickrig.wire.modbus import Command, Fault, Mode, Status, encode_frame
 
 
 def moving(left: float = 0.3, right: float = 0.3, **parameters: float) -> Driven:

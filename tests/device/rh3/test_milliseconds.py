@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from tests.device.rh3.driven import M_S, Driven
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.wire.modbus.rh3 import Command, Mode
+from tickrig.wire.modbus import Command, Mode
 
 COUNTS_S = round(M_S)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import TICK_US, Rrc
+from tickrig.device.rrc.settings import RrcConfig
 
 
 class RrcBench:

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rrc.bench import RrcBench
-from tickrig.device.rrc.config import FailTarget, RrcConfig
+from tickrig.device.rrc.settings import FailTarget, RrcConfig
 
 
 def test_the_power_on_event_can_be_that_of_the_manuals_table() -> None:

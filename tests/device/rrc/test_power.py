@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rrc.bench import RrcBench
-from tickrig.device.rrc.config import RrcConfig
-from tickrig.device.rrc.settings import Settings
+from tickrig.device.rrc.settings import RrcConfig, Settings
 from tickrig.wire.instant import NEVER
 
 CAUSES = {

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 from tests.device.rrc.bench import RrcBench
-from tickrig.device.rrc.drive import apply_limits, shape
-from tickrig.device.rrc.gearbox import Gearbox
-from tickrig.wire.rrc.commands import Joystick, Limit
+from tickrig.device.rrc.drive import Gearbox, apply_limits, shape
+from tickrig.wire.rrc import Joystick, Limit
 
 VECTORS: dict[str, list[dict[str, Any]]] = json.loads(
     (Path(__file__).parents[2] / "golden" / "rrc.json").read_text("utf-8")

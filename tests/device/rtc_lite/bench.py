@@ -6,14 +6,11 @@ from collections.abc import Callable
 
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.component import ERROR, Result
-from tickrig.device.rtc_lite.component import LiteComponent
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.component import LiteComponent, LiteInPort, LiteOutPort
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
-from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteFrame
-from tickrig.wire.rtc_lite.layout import REPLIES
+from tickrig.wire.rtc_lite.frame import REPLIES, LiteDecoder, LiteFrame
 from tickrig.wire.rtc_lite.values import LONG
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.device.rtc_lite.reference_model import NO_ARGUMENTS, ReferenceNode, checked
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.wire.rtc_lite.codes import LiteContextType
 
 pytestmark = pytest.mark.unmeasured

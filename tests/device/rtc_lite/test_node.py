@@ -9,10 +9,9 @@ import pytest
 from tests.device.rtc_lite.bench import NodeBench, Recorder
 from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.physical import InputSignal
-from tickrig.device.rtc_lite.component import LiteComponent, LiteEcho
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.component import LiteComponent, LiteEcho, LiteInPort, LiteOutPort
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_lite.codes import LiteContextType
 from tickrig.wire.rtc_lite.frame import Checksum, Framing

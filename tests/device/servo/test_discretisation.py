@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.servo.differential_equations import Equations, State
-from tickrig.device.servo.discretisation import STEP_S, Discretisation, Row, discretise, exponential
-from tickrig.device.servo.parameters import MotorParameters
-from tickrig.device.servo.presets import CORE_MOTOR, PRESETS, RE_30
+from tickrig.device.servo.parameters import CORE_MOTOR, PRESETS, RE_30, MotorParameters
+from tickrig.device.servo.plant import STEP_S, Discretisation, Row, discretise, exponential
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from tickrig.device.servo.heat import I2t
-from tickrig.device.servo.presets import EPOS_24_5
+from tickrig.device.servo.parameters import EPOS_24_5
+from tickrig.device.servo.readings import I2t
 
 PEAK, CONTINUOUS = 10.0, 5.0
 

@@ -10,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.device.servo.differential_equations import Equations
-from tickrig.device.servo.discretisation import STEP_S
-from tickrig.device.servo.parameters import ServoParameters
-from tickrig.device.servo.plant import BREAKAWAY, Plant
-from tickrig.device.servo.presets import EPOS_WHEEL, MOTOR_CORE_UNIT, PRESETS
+from tickrig.device.servo.parameters import EPOS_WHEEL, MOTOR_CORE_UNIT, PRESETS, ServoParameters
+from tickrig.device.servo.plant import BREAKAWAY, STEP_S, Plant
 
 FULL_A = 1_000.0  # more than any voltage allows, so the voltage is imposed
 

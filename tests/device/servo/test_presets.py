@@ -7,9 +7,16 @@ from math import pi
 
 import pytest
 
-from tickrig.device.servo.parameters import Encoders, GearParameters
-from tickrig.device.servo.presets import EPOS_24_5, EPOS_WHEEL, FTMD, MOTOR_CORE_UNIT, RE_30
-from tickrig.device.servo.sizing import free_speed_rad_s
+from tickrig.device.servo.parameters import (
+    EPOS_24_5,
+    EPOS_WHEEL,
+    FTMD,
+    MOTOR_CORE_UNIT,
+    RE_30,
+    Encoders,
+    GearParameters,
+    free_speed_rad_s,
+)
 
 RAD_S_PER_RPM = pi / 30
 

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.device.servo.parameters import ServoParameters
-from tickrig.device.servo.presets import EPOS_WHEEL, PRESETS
+from tickrig.device.servo.parameters import EPOS_WHEEL, PRESETS, ServoParameters
 from tickrig.device.servo.servo import Servo
 
 SECOND_US = 1_000_000

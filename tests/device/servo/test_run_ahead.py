@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.servo.parameters import EPOS_WHEEL
 from tickrig.device.servo.servo import STEP_US, Servo
 
 ANYWHERE = (-inf, inf)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from tests.device.servo.trapezoid import Trapezoid
-from tickrig.device.servo.presets import EPOS_WHEEL, MOTOR_CORE_UNIT, PRESETS
+from tickrig.device.servo.parameters import EPOS_WHEEL, MOTOR_CORE_UNIT, PRESETS
+from tickrig.device.servo.readings import COPPER_PER_K
 from tickrig.device.servo.servo import Servo
-from tickrig.device.servo.thermal import COPPER_PER_K
 
 SECOND_US = 1_000_000
 QUICKLY_WARM = replace(

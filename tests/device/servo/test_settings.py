@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.device.servo.settings import ServoSettings
+from tickrig.device.servo.readings import ServoSettings
 
 
 class Motor(ServoSettings):

@@ -2,10 +2,14 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.servo.parameters import ServoParameters
-from tickrig.device.servo.presets import PRESETS
+from tickrig.device.servo.parameters import (
+    PRESETS,
+    ServoParameters,
+    free_speed_rad_s,
+    of_size,
+    peak_torque_nm,
+)
 from tickrig.device.servo.servo import Servo
-from tickrig.device.servo.sizing import free_speed_rad_s, of_size, peak_torque_nm
 
 SIZES = (0.03, 0.5, 3.0, 40.0)
 

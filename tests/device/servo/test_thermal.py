@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.servo.presets import RE_30
-from tickrig.device.servo.thermal import COPPER_PER_K, HOTTEST_C, ThermalModel
+from tickrig.device.servo.parameters import RE_30
+from tickrig.device.servo.readings import COPPER_PER_K, HOTTEST_C, ThermalModel
 
 COLD = (25.0, 25.0)
 AGES_S = 1e6

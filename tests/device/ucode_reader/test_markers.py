@@ -6,9 +6,8 @@ from math import nan, pi
 
 import pytest
 
-from tickrig.device.body.pose import Pose
-from tickrig.device.ucode_reader.markers import Marker, Reception, receive
-from tickrig.device.ucode_reader.parameters import ReaderParameters
+from tickrig.device.body import Pose
+from tickrig.device.ucode_reader import Marker, ReaderParameters, Reception, receive
 
 READER = ReaderParameters(range_m=4.0, cone_deg=90)
 NEAR, FAR, BESIDE, BEHIND, AWAY = markers = [

@@ -6,11 +6,10 @@ from math import pi
 
 import pytest
 
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.device.ucode_reader.reader import MOST_RECEIVED, UcodeReader
+from tickrig.device.ucode_reader import MOST_RECEIVED, Marker, UcodeReader
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
-from tickrig.wire.sensors.ucode import UcodeLine, parse_line
+from tickrig.wire.ucode import UcodeLine, parse_line
 
 DOOR = Marker("00001C00000000000001000000000001", 1.0, 0.0)
 LIFT = Marker("00001C00000000000001000000000002", -2.0, 0.0)

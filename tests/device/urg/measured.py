@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.device.urg.parameters import UrgParameters
 from tickrig.device.urg.sensor import Urg
-from tickrig.device.urg.world import World
-from tickrig.wire.sensors.scip.command import Command
-from tickrig.wire.sensors.scip.reply import Reply, ReplySplitter
-from tickrig.wire.sensors.scip.scan import parse_scan
+from tickrig.device.urg.world import UrgParameters, World
+from tickrig.wire.scip import Command, Reply, ReplySplitter, parse_scan
 
 
 class Measured:

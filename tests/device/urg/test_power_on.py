@@ -10,10 +10,8 @@ from typing import Any, Final
 import pytest
 
 from tests.device.urg.measured import Measured
-from tickrig.device.urg.parameters import UrgParameters
-from tickrig.device.urg.world import World, room
-from tickrig.wire.sensors.scip.description import encode_lines, parse_lines
-from tickrig.wire.sensors.scip.encoding import parse_number, parse_numbers, without_sum
+from tickrig.device.urg.world import UrgParameters, World, room
+from tickrig.wire.scip import encode_lines, parse_lines, parse_number, parse_numbers, without_sum
 
 GOLDEN: Final[dict[str, Any]] = json.loads(
     (Path(__file__).parents[2] / "golden" / "scip_urg_04lx.json").read_text()

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tickrig.device.urg.ray_cast import Beams
-from tickrig.device.urg.world import Post, Wall, World, rays_of, room
+from tickrig.device.urg.world import Beams, Post, Wall, World, rays_of, room
 
 TURN = 1_024
 OFF_RAD = [(step - 384) * tau / TURN for step in range(44, 726)]

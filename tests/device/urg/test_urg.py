@@ -6,13 +6,10 @@ from math import pi
 import pytest
 
 from tests.device.urg.measured import Measured
-from tickrig.device.urg.parameters import UrgParameters
-from tickrig.device.urg.terminals import INPUTS, OUTPUTS
-from tickrig.device.urg.world import Post, Wall, World, room
+from tickrig.device.urg.sensor import INPUTS, OUTPUTS
+from tickrig.device.urg.world import Post, UrgParameters, Wall, World, room
 from tickrig.wire.instant import NEVER
-from tickrig.wire.sensors.scip.encoding import parse_number
-from tickrig.wire.sensors.scip.reply import Reply
-from tickrig.wire.sensors.scip.scan import parse_scan
+from tickrig.wire.scip import Reply, parse_number, parse_scan
 
 AHEAD = World((Wall(2, -10, 2, 10),))
 """A wall 2 m in front of the origin."""

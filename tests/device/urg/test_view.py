@@ -7,10 +7,8 @@ from math import tau
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.body.pose import Pose
-from tickrig.device.urg.parameters import LAST_STEP, URG_04LX, UrgParameters
-from tickrig.device.urg.view import View
-from tickrig.device.urg.world import Post, World, room
+from tickrig.device.body import Pose
+from tickrig.device.urg.world import LAST_STEP, URG_04LX, Post, UrgParameters, View, World, room
 
 KIND = URG_04LX
 

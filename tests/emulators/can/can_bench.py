@@ -5,8 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from tickrig.emulators.can.wire import CanWire
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame, Frames
 
 
 def frames(text: str) -> Frames:

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.can.busy_time import KEPT_SPANS, BusyTime
+from tickrig.emulators.can.transmission_outcomes import KEPT_SPANS, BusyTime
 
 frames = st.lists(st.tuples(st.sampled_from((0, 0, 1, 30)), st.integers(1, 50)), max_size=20)
 

@@ -16,8 +16,7 @@ from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import CanFrame, ErrorState, Frames
 from tickrig.wire.instant import NEVER
 
 SWITCH = 0x101

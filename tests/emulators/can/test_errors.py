@@ -12,9 +12,7 @@ from tests.emulators.can.can_bench import Log, frames
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.emulators.can.wire import CanWire
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import frame_bits
-from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorState
+from tickrig.wire.can import BIT_ERROR, NO_ACK, CanFrame, ErrorState, frame_bits
 from tickrig.wire.instant import NEVER
 
 ACTIVE, PASSIVE, BUS_OFF = ErrorState.ACTIVE, ErrorState.PASSIVE, ErrorState.BUS_OFF

@@ -10,8 +10,7 @@ from tests.emulators.can.can_bench import Log, frames
 from tests.emulators.can.test_errors import ACTIVE, BUS_OFF, bus_off, counters
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
-from tickrig.wire.can_bits import frame_bits
-from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorState
+from tickrig.wire.can import BIT_ERROR, NO_ACK, ErrorState, frame_bits
 from tickrig.wire.instant import NEVER
 
 RETURN_BITS = 128 * 11

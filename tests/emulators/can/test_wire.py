@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from tests.emulators.can.can_bench import Log, frames, some_frames
 from tickrig.emulators.can.arbitration import priority
 from tickrig.emulators.can.wire import CanWire
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can import CanFrame, frame_bits
 from tickrig.wire.instant import NEVER
 
 BIT_RATES = (10_000, 20_000, 33_333, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)

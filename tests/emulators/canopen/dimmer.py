@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 
 TABLE = (

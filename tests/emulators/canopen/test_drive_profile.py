@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from canopen.profiles.p402 import BaseNode402
 
-from tickrig.device.canopen.ds402.state.automaton import DriveState
+from tickrig.device.canopen.ds402.automaton import DriveState
 from tickrig.device.canopen.models import epos
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire

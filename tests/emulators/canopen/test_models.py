@@ -8,13 +8,13 @@ import canopen
 import pytest
 from canopen.objectdictionary import ODVariable, import_od
 
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
+from tickrig.emulators.canopen.choices import NodeSpec
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.models import MODELS, Model
-from tickrig.emulators.canopen.node.node import NODE_OUTPUTS
-from tickrig.emulators.canopen.node.node_spec import NodeSpec
+from tickrig.emulators.canopen.models import MODELS, EmulatedModel
+from tickrig.emulators.canopen.node import NODE_OUTPUTS
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription, ObjectCode
 
@@ -38,7 +38,7 @@ def default_of(entry: EntryDescription) -> object:
 
 
 @each_model
-def test_the_shipped_eds_is_what_the_model_writes(model: Model) -> None:
+def test_the_shipped_eds_is_what_the_model_writes(model: EmulatedModel) -> None:
     description = model.describe()
     text = (SHIPPED / f"{model.name}.eds").read_text("utf-8")
     again = f"canopen-slave-emu --model {model.name} --write-eds examples/eds/{model.name}.eds"
@@ -52,7 +52,7 @@ def test_each_shipped_eds_has_its_model() -> None:
 
 
 @each_model
-def test_the_canopen_library_reads_the_shipped_eds(model: Model) -> None:
+def test_the_canopen_library_reads_the_shipped_eds(model: EmulatedModel) -> None:
     library = in_library(SHIPPED / f"{model.name}.eds")
     entries = {(entry.index, entry.sub): entry for entry in model.dictionary().description}
     assert library.keys() == entries.keys()
@@ -67,7 +67,7 @@ def test_the_canopen_library_reads_the_shipped_eds(model: Model) -> None:
 
 
 @each_model
-def test_the_shipped_eds_gives_the_same_dictionary(model: Model) -> None:
+def test_the_shipped_eds_gives_the_same_dictionary(model: EmulatedModel) -> None:
     def rows(dictionary: Dictionary) -> list[tuple[object, ...]]:
         return [
             (entry.key, entry.name, entry.data_type, entry.access, entry.default, entry.relative)
@@ -81,7 +81,7 @@ def test_the_shipped_eds_gives_the_same_dictionary(model: Model) -> None:
 
 
 @each_model
-def test_the_canopen_library_finds_the_pdos_of_the_shipped_eds(model: Model) -> None:
+def test_the_canopen_library_finds_the_pdos_of_the_shipped_eds(model: EmulatedModel) -> None:
     network = canopen.Network()
     node = network.add_node(model.node_id, str(SHIPPED / f"{model.name}.eds"))
     template = model.dictionary()
@@ -99,7 +99,7 @@ def test_the_canopen_library_finds_the_pdos_of_the_shipped_eds(model: Model) -> 
 
 
 @each_model
-def test_each_model_boots_and_is_quiet(model: Model) -> None:
+def test_each_model_boots_and_is_quiet(model: EmulatedModel) -> None:
     wire = CanWire()
     nodes = make_nodes(describe_nodes([NodeSpec(model.name, None)]), wire)
     bench = make_bench(wire, nodes)
@@ -110,7 +110,7 @@ def test_each_model_boots_and_is_quiet(model: Model) -> None:
 
 
 @each_model
-def test_no_output_of_a_model_hides_one_that_every_node_has(model: Model) -> None:
+def test_no_output_of_a_model_hides_one_that_every_node_has(model: EmulatedModel) -> None:
     (node,) = make_nodes(describe_nodes([NodeSpec(model.name, None)]), CanWire())
     assert not {item.name for item in NODE_OUTPUTS} & node.application.outputs.keys()
     for name in node.outputs:

@@ -9,18 +9,18 @@ import pytest
 from click.testing import CliRunner, Result
 from examples.device_rtc_gripper import Gripper
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.device_rtc.device import make_dictionary
+from tickrig.device.canopen.device_rtc import make_dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.canopen.eds import read_eds
 
 ROOT = Path(__file__).parents[3]
 GRIPPER = "examples/device_rtc_gripper.py:Gripper"
 COMPONENT = """
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.ports import CanopenInPort
+from tickrig.device.canopen.device_rtc import CanopenComponent
+from tickrig.device.canopen.device_rtc import CanopenInPort
 from tickrig.device.physical import InputSignal
-from tickrig.wire.rtc_canopen.port_types import CHARACTER, STRING
+from tickrig.wire.rtc_canopen import CHARACTER, STRING
 
 class Mine(CanopenComponent):
     type_name = "Mine"

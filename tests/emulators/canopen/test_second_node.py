@@ -14,8 +14,8 @@ from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bus_port import port_on
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import make_bench
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.host.links.can_message import to_message
+from tickrig.emulators.canopen.node import Node
+from tickrig.host.links.can_link import to_message
 
 CHANNEL = "second_node"
 

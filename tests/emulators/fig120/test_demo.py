@@ -10,14 +10,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.interop.buses import GROUP
+from tickrig.emulators import fig120 as stage_module
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.fig120 import stage as stage_module
-from tickrig.emulators.fig120.demo import run_demo
-from tickrig.emulators.fig120.samples import Sample
-from tickrig.emulators.fig120.set_up import set_up
-from tickrig.emulators.fig120.stage import CAST, VirtualStage
+from tickrig.emulators.fig120 import CAST, CurveSample, VirtualStage, run_demo, set_up
 from tickrig.emulators.rig.rig import Rig
 
 GOLDEN = Path(__file__).parents[2] / "golden/canopen/fig120.json"
@@ -30,11 +27,11 @@ def fig120(*words: str) -> Result:
 
 
 @pytest.fixture(scope="module")
-def samples() -> list[Sample]:
+def samples() -> list[CurveSample]:
     return run_demo(VirtualStage(), lambda text: None)
 
 
-def test_the_motor_takes_every_angle_of_the_table(samples: list[Sample]) -> None:
+def test_the_motor_takes_every_angle_of_the_table(samples: list[CurveSample]) -> None:
     references = {round(sample.reference_deg, 4) for sample in samples if sample.time_s < 3}
     assert references == {0.0, *ANGLES}
     for end_s, angle_deg in zip((1.2, 1.8, 2.4, 3.0), ANGLES, strict=True):
@@ -54,7 +51,7 @@ def test_the_master_sends_the_frames_of_the_report() -> None:
     ]
 
 
-def test_it_runs_the_same_each_time(samples: list[Sample]) -> None:
+def test_it_runs_the_same_each_time(samples: list[CurveSample]) -> None:
     assert run_demo(VirtualStage(), lambda text: None) == samples
 
 

@@ -8,20 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.body import BodyParameters, WheeledBody
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
+from tickrig.device.canopen.slave import Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
+from tickrig.emulators.canopen.body import BodyOnDrives, DrivenWheel
 from tickrig.emulators.canopen.eds import EdsCache, read_eds
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.record.bench_replay import read_bench_recording, replay_device
-from tickrig.emulators.record.replay_port import Difference
-from tickrig.emulators.record.trace_recorder import TraceRecorder
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.record.recorder import TraceRecorder
+from tickrig.emulators.record.replay import ReplayDifference, read_bench_recording, replay_device
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
@@ -53,7 +52,10 @@ class Bench:
         header = BenchHeader({"rrc": DeviceEntry("line", "rrc"), **entries}, WIRES)
         self.recorder = TraceRecorder(None, header)
         self.nodes = {name: Node(name, slave, self.can) for name, slave in slaves.items()}
-        wheels = [Wheel("left", self.nodes["left"]), Wheel("right", self.nodes["right"], -1)]
+        wheels = [
+            DrivenWheel("left", self.nodes["left"]),
+            DrivenWheel("right", self.nodes["right"], -1),
+        ]
         parameters = BodyParameters(
             kind="differential", wheel_radius_m=0.1, tread_m=0.4, mass_kg=20.0, friction=0.02
         )
@@ -81,7 +83,7 @@ class Bench:
         return "".join(f"{line}\n" for line in lines).encode()
 
 
-def differences(trace: bytes) -> dict[str, Difference[Any]]:
+def differences(trace: bytes) -> dict[str, ReplayDifference[Any]]:
     recording, cache = read_bench_recording(trace), EdsCache()
     header = recording.header
     return {

@@ -4,8 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.record.comparison import Pair, Said, compare
-from tickrig.emulators.record.tolerance import NumberRule, Tolerance, parse_number_rule
+from tickrig.emulators.record.comparison import (
+    NumberRule,
+    Pair,
+    Said,
+    Tolerance,
+    compare,
+    parse_number_rule,
+)
 
 STRICT = Tolerance(20_000)
 END_US = 10_000_000

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
-from tickrig.emulators.record.replay import Recording, read_recording, replay
-from tickrig.emulators.record.replay_port import Difference
+from tickrig.emulators.record.replay import RecordedRun, ReplayDifference, read_recording, replay
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
@@ -43,7 +42,7 @@ def record(path: Path, *, device: Emulated[bytes] | None = None, close: bool = T
     return path.read_text()
 
 
-def reading(text: str) -> Recording:
+def reading(text: str) -> RecordedRun:
     return read_recording(text.encode())
 
 
@@ -91,18 +90,20 @@ def test_a_reset_is_recorded_and_replayed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "difference"),
     [
-        (r"< ab\xff", r"< ab", Difference(2_000, b"ab", b"ab\xff", 4)),
-        (r"0.005000 < click\n", r"0.006000 < click\n", Difference(5_000, b"", b"click\n", 0)),
-        ("0.001000 < hi\\n\n", "", Difference(1_000, b"", b"hi\n", 0)),
+        (r"< ab\xff", r"< ab", ReplayDifference(2_000, b"ab", b"ab\xff", 4)),
+        (r"0.005000 < click\n", r"0.006000 < click\n", ReplayDifference(5_000, b"", b"click\n", 0)),
+        ("0.001000 < hi\\n\n", "", ReplayDifference(1_000, b"", b"hi\n", 0)),
         (
             "0.009000 .",
             "0.008000 < more\\n\n0.009000 .",
-            Difference(8_000, b"more\n", b"", 8),
+            ReplayDifference(8_000, b"more\n", b"", 8),
         ),
-        ("0.005000 ! key=1\n", "", Difference(5_000, b"click\n", b"", 6)),
+        ("0.005000 ! key=1\n", "", ReplayDifference(5_000, b"click\n", b"", 6)),
     ],
 )
-def test_the_first_difference_is_found(old: str, new: str, difference: Difference[bytes]) -> None:
+def test_the_first_difference_is_found(
+    old: str, new: str, difference: ReplayDifference[bytes]
+) -> None:
     text = (HEADER + HEARD).replace(old, new)
     assert text != HEADER + HEARD
     assert replay(reading(text), Lamp()) == difference
@@ -110,7 +111,7 @@ def test_the_first_difference_is_found(old: str, new: str, difference: Differenc
 
 def test_another_device_is_seen_to_differ() -> None:
     difference = replay(reading(HEADER + HEARD), Lamp(b"hello\n"))
-    assert difference == Difference(1_000, b"hi\n", b"hello\n", 2)
+    assert difference == ReplayDifference(1_000, b"hi\n", b"hello\n", 2)
 
 
 def test_a_killed_writer_costs_the_last_tick_only(tmp_path: Path) -> None:

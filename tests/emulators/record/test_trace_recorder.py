@@ -12,8 +12,8 @@ from tickrig.device.canopen.models.epos import NODE_ID, make_epos
 from tickrig.device.twin import twin
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.record.trace_recorder import TraceRecorder
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.rh3.cart.convoy import Convoy, OmniCart
+from tickrig.emulators.rh3.convoy import Convoy, OmniCart
 from tickrig.host.rtc import Manager, OutPort, connect
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.rtc_types import iis

@@ -6,13 +6,12 @@ from math import pi
 
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.device.urg.world import Post, World
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
-from tickrig.emulators.rh3.cart.convoy import place
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.convoy import place
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.options.collision_guard import CollisionGuard
-from tickrig.host.rtc.motion.options.game_pad import GamePad
-from tickrig.host.rtc.motion.options.game_pad_devices import StickPosition
+from tickrig.host.rtc.motion.options.game_pad import GamePad, StickPosition
+from tickrig.host.rtc.motion.options.obstacles import CollisionGuard
 from tickrig.host.rtc.motion.options.switch_input import SwitchInput
 
 SECOND_US = 1_000_000

@@ -13,8 +13,8 @@ from itertools import pairwise
 
 import pytest
 
-from tickrig.device.body.pose import Pose
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.device.body import Pose
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc import OutPort
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.wire.rtc_types.rh2 import Path, RunMode

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.iis.interfaces import GoalInterface, RunningInformation

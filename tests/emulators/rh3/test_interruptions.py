@@ -8,12 +8,12 @@ import pytest
 
 from tests.host.rtc.motion.port_bench import at
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc import OutPort
 from tickrig.host.rtc.motion.components.ref_hard import RefHardRh3
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.ports.connect import connect
-from tickrig.wire.modbus.rh3 import Status
+from tickrig.wire.modbus import Status
 from tickrig.wire.rtc_types import iis
 
 AHEAD = Pose(1.0)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc.motion.components.omni_to_2wd import plan
 from tickrig.host.rtc.motion.control_laws import VelocityLimits
 from tickrig.host.rtc.motion.drive import drive, set_latency, start

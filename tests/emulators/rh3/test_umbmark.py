@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from tickrig.device.rh3.parameters import BaseParameters
-from tickrig.emulators.rh3.cart.closed_loop import ClosedLoop
+from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc.motion.drive import drive, start
 from tickrig.host.rtc.motion.geometry import Pose, Wheels
 from tickrig.host.rtc.motion.umbmark import run_umbmark, square

@@ -15,15 +15,14 @@ from tickrig.device.rh3.base import Rh3Base
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node as CanopenNode
+from tickrig.emulators.canopen.node import Node as CanopenNode
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
 from tickrig.wire.can import CanFrame
-from tickrig.wire.modbus.rtu import encode_frame
+from tickrig.wire.modbus import encode_frame
 
 Act = tuple[int, str, Any]
 """How long to wait, what to do then, and with what."""

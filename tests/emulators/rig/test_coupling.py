@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.rig.coupling import Coupling
-from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.rig import Coupling, Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.control.clock import RealClock
 from tickrig.wire.can import Frames

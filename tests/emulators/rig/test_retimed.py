@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import time
 
-from tickrig.emulators.rig.retimed import retime, retimed
+from tickrig.emulators.can.outside.sim_network import retime, retimed
 
 
 class Watch:

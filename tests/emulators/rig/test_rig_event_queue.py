@@ -16,7 +16,7 @@ from tests.emulators.lamp import Lamp
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.bench.transcript import Transcript
+from tickrig.emulators.bench.running_emulator import Transcript
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.outside.interface import CHANNELS
@@ -24,17 +24,16 @@ from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import make_bench
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import RigClock, SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import ScenarioParser
+from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent
 
 DESCRIPTION = read_eds(Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds")
 TO_US = 4_000_000
@@ -136,7 +135,7 @@ def test_a_scenario_is_played_while_a_link_waits() -> None:
         "10ms press key for 5ms\n+0ms expect click within 20ms\n20ms send hello\n30ms set lamp 0\n",
         "test",
     )
-    player = Player(emulator, lines, Transcript(emulator, shown.append), stays=True)
+    player = ScenarioPlayer(emulator, lines, Transcript(emulator, shown.append), stays=True)
     link = SimLink(emulator.rig, emulator.host_end)
     heard = b""
     while link.now_us < 50_000:

@@ -7,7 +7,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 
 
 def linked() -> SimLink:

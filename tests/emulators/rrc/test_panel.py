@@ -9,13 +9,11 @@ from typing import Any
 import pytest
 
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.inbox import EmulatorEnded, Inbox
+from tickrig.emulators.bench.control import EmulatorControl, EmulatorEnded, RequestInbox
 from tickrig.emulators.rrc import panel as rrc_panel
 from tickrig.emulators.rrc import panel_text, small_panel_text
-from tickrig.emulators.rrc.panel import HELP, RrcPanel
-from tickrig.emulators.rrc.panel_run import run_panel
-from tickrig.emulators.rrc.panel_text import View
+from tickrig.emulators.rrc.panel import HELP, RrcPanel, run_panel
+from tickrig.emulators.rrc.panel_text import PanelView
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import Object
 
@@ -238,12 +236,12 @@ def test_a_load_that_is_too_much_fits_and_is_marked() -> None:
         "pace_lines_s": 0,
         "state": "Standby",
     }
-    view = View(values)
+    view = PanelView(values)
     roomy, small = panel_text.outputs_pane(view), small_panel_text.outputs_pane(view)
     assert "load   1030 %, margin -930 %; at most 0 lines/s" in roomy.plain.split("\n")
     assert small.plain.split("\n")[1].endswith(" load 1030 %, margin -930 % ≤0/s")
     assert max(len(row) for row in small.plain.split("\n")) <= 60
-    assert [panel_text.load(View({"margin_pct": pct})).style for pct in (10, 9, -1)] == [
+    assert [panel_text.load(PanelView({"margin_pct": pct})).style for pct in (10, 9, -1)] == [
         "",
         panel_text.ON,
         panel_text.FAULT,
@@ -335,15 +333,15 @@ def test_the_sa_line_goes_at_once_when_vr2_does() -> None:
     ],
 )
 def test_what_the_stick_waits_for_is_told(state: str, drives: int, hint: str) -> None:
-    view = View({"state": state, "stick_drives": drives})
+    view = PanelView({"state": state, "stick_drives": drives})
     assert panel_text.stick_hint(view) == hint
     assert len(hint) <= 21
 
 
 def test_an_sa_line_that_cannot_be_read_is_shown_as_it_is() -> None:
     for panes in (panel_text, small_panel_text):
-        assert panes.report_line(View(report="SA:nonsense")).plain == "SA:nonsense"
-        assert panes.report_line(View()).plain == ""
+        assert panes.report_line(PanelView(report="SA:nonsense")).plain == "SA:nonsense"
+        assert panes.report_line(PanelView()).plain == ""
 
 
 def test_the_picture_is_the_panel() -> None:
@@ -373,11 +371,11 @@ def test_trouble_is_in_the_status_line() -> None:
         **{"link": "/tmp/rrc", "now_us": 1_500_000, "late_steps": 3, "lost_bytes": 4},
         **{"host_setting": "9600 8N1", "trace_error": "disk full"},
     }
-    assert panel_text.status_line(View(status=status)).plain == (
+    assert panel_text.status_line(PanelView(status=status)).plain == (
         " /tmp/rrc   1.5 s   late ticks 3   lost bytes 4   host at 9600 8N1"
         "   trace ended: disk full"
     )
-    assert panel_text.status_line(View()).plain == "    0.0 s   late ticks 0   lost bytes 0"
+    assert panel_text.status_line(PanelView()).plain == "    0.0 s   late ticks 0   lost bytes 0"
 
 
 def test_what_goes_wrong_in_the_rig_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -394,7 +392,7 @@ def test_what_goes_wrong_in_the_rig_is_not_lost(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_an_inbox_answers_together_and_refuses_after_the_end() -> None:
-    inbox = Inbox(EmulatorControl(Emulator("rrc", Rrc())))
+    inbox = RequestInbox(EmulatorControl(Emulator("rrc", Rrc())))
     asked = inbox.post([{"v": 1, "do": "get", "names": ["gauge"]}, {"v": 1, "do": "nope"}])
     assert not asked.done()
     inbox.serve()

@@ -15,7 +15,7 @@ EXAMPLES = ROOT / "examples"
 
 NODE = """
 from tickrig.device.rtc_lite.component import LiteComponent
-from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
+from tickrig.device.rtc_lite.component import LiteInPort, LiteOutPort
 from tickrig.wire.rtc_lite.values import CHAR_SEQ, LONG, SHORT_SEQ
 
 class Divider(LiteComponent):

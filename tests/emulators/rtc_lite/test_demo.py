@@ -9,8 +9,7 @@ from click.testing import CliRunner
 
 from tests.host.spy_link import LateLink
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.rtc_lite.demo.play import run_demo
-from tickrig.emulators.rtc_lite.demo.setup import NODES, VirtualSetup
+from tickrig.emulators.rtc_lite.demo import NODES, VirtualSetup, run_demo
 
 LINE = re.compile(r" +(\d+\.\d{3}) (.*)")
 LOSS = [f"* {event} of LiteA0" for event in ("FatalError", "Removed", "Rediscovered")]

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
-from tickrig.device.rtc_lite.config import LiteConfig
-from tickrig.emulators.rtc_lite.frame_log import frame_splitter
+from tickrig.device.rtc_lite.server import LiteConfig
+from tickrig.emulators.rtc_lite.line import frame_splitter
 from tickrig.host.text.trace import Mark
 from tickrig.wire.rtc_lite.frame import Framing
 

@@ -6,12 +6,12 @@ import pytest
 
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.transcript import Transcript
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import (
-    End,
+from tickrig.emulators.bench.running_emulator import Transcript
+from tickrig.emulators.scenario import (
     Press,
+    ScenarioEnd,
     ScenarioParser,
+    ScenarioPlayer,
     Send,
     Set,
 )
@@ -31,12 +31,12 @@ def parse(text: str, emulator: Emulator) -> tuple[tuple[int | None, object], ...
     )
 
 
-def play(text: str, *, steps: int = 0, stays: bool = False) -> tuple[list[str], Player]:
+def play(text: str, *, steps: int = 0, stays: bool = False) -> tuple[list[str], ScenarioPlayer]:
     out: list[str] = []
     emulator = Emulator("lamp", Lamp())
     parser = ScenarioParser(emulator.device, emulator.operator, {"shout": shout})
     scenario = parser.parse(text, "s.txt")
-    player = Player(emulator, scenario, Transcript(emulator, out.append), stays=stays)
+    player = ScenarioPlayer(emulator, scenario, Transcript(emulator, out.append), stays=stays)
     while emulator.running and (not steps or len(out) < steps):
         emulator.step()
     return out, player
@@ -64,7 +64,7 @@ def test_a_scenario_is_read_into_values() -> None:
         (2_000_000, ("a *", 5_000)),
     )
     assert parse("1 send\n2 end", Emulator("lamp", Lamp()))[0] == (1_000_000, Send(b"\n", b""))
-    assert parse("2 end", Emulator("lamp", Lamp())) == ((2_000_000, End()),)
+    assert parse("2 end", Emulator("lamp", Lamp())) == ((2_000_000, ScenarioEnd()),)
 
 
 @pytest.mark.parametrize(

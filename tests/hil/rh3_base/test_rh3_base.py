@@ -11,9 +11,18 @@ import pytest
 from tests.hil.line_host import PATIENCE, LineHost
 from tests.hil.rigs import RIGS
 from tickrig import Bench
-from tickrig.wire.modbus.requests import READ, WRITE, Request, encode_request
-from tickrig.wire.modbus.rh3 import DEVICE_ID, Address, Command, Mode
-from tickrig.wire.modbus.rtu import encode_frame, parse_frame
+from tickrig.wire.modbus import (
+    DEVICE_ID,
+    READ,
+    WRITE,
+    Address,
+    Command,
+    Mode,
+    Request,
+    encode_frame,
+    encode_request,
+    parse_frame,
+)
 
 pytestmark = pytest.mark.needs("device:rh3_base")
 

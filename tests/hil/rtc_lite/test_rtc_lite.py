@@ -10,9 +10,7 @@ from tests.hil.line_host import PATIENCE, LineHost
 from tests.hil.rigs import RIGS
 from tickrig import Bench
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteState, LiteStatus
-from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteFrame
-from tickrig.wire.rtc_lite.layout import REPLIES
+from tickrig.wire.rtc_lite.frame import REPLIES, LiteDecoder, LiteFrame
 from tickrig.wire.rtc_lite.messages import LitePortData, LiteReply, parse_reply
 from tickrig.wire.rtc_lite.values import LONG
 

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.monitor_setup import MonitorSetup
-from tickrig.host.canmon.workspace import Workspace, WorkspaceError
+from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
 
 TEXT = """\

@@ -13,9 +13,9 @@ from click.testing import CliRunner, Result
 from tests.host.canmon.tui.pilot import drive_session, on_monitor
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.extensions import make_decoder
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.panels.tabs import TABS, make_panels
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.tui.app import MonitorApp
+from tickrig.host.canmon.tui.panels.panel import TABS, make_panels
 from tickrig.wire.can import CanFrame
 
 PAGE = Path(__file__).parents[3] / "docs" / "howto/extending.md"
@@ -171,7 +171,7 @@ def test_a_foreign_tab_is_shown() -> None:
     foreign = TABS.load("scale")
     shown: list[str] = []
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("1")
         monitor.refresh_view()
         await pilot.pause()

@@ -11,15 +11,14 @@ from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.traffic.bit_rates import BitRates
+from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.output.listening import bit_rates_of
 from tickrig.host.canmon.output.transmitter import Transmitter
 from tickrig.host.canmon.sources.bus_source import merged
-from tickrig.host.canmon.sources.source_spec import BusSpec, parse_source
+from tickrig.host.canmon.sources.source import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.links.can_message import to_fd_frame, to_frame
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.links.can_link import to_fd_frame, to_frame
+from tickrig.wire.can import CanFrame, FdFrame
 
 LOG = """\
 (1600000000.000000) can0 123##1AABB

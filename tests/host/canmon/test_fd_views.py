@@ -9,11 +9,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.views.trace import Trace
-from tickrig.host.canmon.sources import block_log
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.trace import FrameTrace
+from tickrig.host.canmon.sources import file_source as block_log
 from tickrig.host.canmon.tui.trace_line import TraceLines, line_text
-from tickrig.wire.can_fd import FdFrame
+from tickrig.wire.can import FdFrame
 
 WIDE = "00" * 63
 LOG = "".join(
@@ -60,7 +60,7 @@ def test_info_and_dump_tell_of_it(log: Path) -> None:
 
 
 def test_the_trace_of_the_tui_shows_64_bytes_and_what_changed() -> None:
-    trace, lines = Trace(), TraceLines()
+    trace, lines = FrameTrace(), TraceLines()
     trace.take(Record(0, "can0", FdFrame(0x123, bytes(64))))
     line = lines.line(trace.take(Record(1_000, "can0", FdFrame(0x123, bytes(63) + b"\x01"))))
     assert line_text(line).split()[2:4] == ["123#", "[64]"]

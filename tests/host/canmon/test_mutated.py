@@ -17,10 +17,9 @@ from click.testing import CliRunner
 from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.columns import column_reader
-from tickrig.host.canmon.monitor_setup import MonitorSetup
-from tickrig.host.canmon.sources import block_log
-from tickrig.host.canmon.workspace import Workspace, WorkspaceError
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canmon.sources import file_source as block_log
+from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
+from tickrig.host.cli.messages import Refused
 
 TOKENS = (
     *(b"inf", b"nan", b"-1", b"1e400", b"999999999999", b"1.0", b"", b"\xff\xfe", b"\0", b"#"),

@@ -9,7 +9,7 @@ from itertools import count
 
 import can
 
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_link import to_frame, to_message
 from tickrig.wire.can import CanFrame
 
 PATIENCE_S = 10

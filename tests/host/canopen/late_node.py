@@ -7,14 +7,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import cycle
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RO, RW, Element, ObjectTable
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 from tickrig.wire.instant import NEVER
 
 NODE_ID = 5

@@ -14,10 +14,10 @@ from tickrig.host.canopen.dialogue import (
     SDO_TIMEOUT_US,
     AwaitReport,
     AwaitState,
-    Command,
     Dialogue,
     Failure,
     Guard,
+    NmtRequest,
     Object,
     Pause,
     QueuedScript,
@@ -293,7 +293,7 @@ def test_a_job_that_is_forgotten_leaves_its_question_open() -> None:
 
 def test_jobs_run_one_after_the_other() -> None:
     def pausing() -> Script[None]:
-        yield Command(NmtCommand.START)
+        yield NmtRequest(NmtCommand.START)
         yield Pause(1_000)
 
     talk = Talk(pausing())

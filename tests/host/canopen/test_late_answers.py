@@ -25,21 +25,21 @@ from tests.host.rtc.canopen.bench import EDS
 from tests.soak import examples
 from tickrig import Bench
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
-from tickrig.host.canopen.block_download import download_blocks
+from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryTask
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
-from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.commissioning.program import download_blocks
+from tickrig.host.canopen.conform.bus.exchange import BusExchange
+from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.dialogue import QueuedScript
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
-from tickrig.host.canopen.gateway.gateway import Gateway
+from tickrig.host.canopen.gateway import Gateway
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.canopen_master import CanopenMaster
 from tickrig.host.canopen.sdo_transfer import upload
 from tickrig.host.links.link import StampedFrames, StampedLink
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.serve import read_files, serve
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.wire.can import CanFrame
 
@@ -245,8 +245,8 @@ def test_what_a_gateway_has_not_read_while_it_was_idle_answers_nothing() -> None
     late.clock()
 
 
-def exchange_on(link: StampedLink) -> Exchange:
-    return Exchange(link, NODE_ID, bit_rate=1_000_000, max_load=1, permit=lambda frame: None)
+def exchange_on(link: StampedLink) -> BusExchange:
+    return BusExchange(link, NODE_ID, bit_rate=1_000_000, max_load=1, permit=lambda frame: None)
 
 
 SLOW = Passage(530 * MS_US)

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from tickrig.emulators.can.outside.bus_port import open_bus
 from tickrig.host.cli.can_options import GREEDY, BusCommand, BusOptions, bus_options, open_raw
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 
 
 @pytest.fixture(autouse=True)

@@ -13,8 +13,7 @@ import pytest
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.serial.emulator import Emulator
-from tickrig.host.control.line_server import IDLE_S, MAX_CLIENTS, MAX_LINE, MAX_UNSENT
-from tickrig.host.control.server import ControlServer
+from tickrig.host.control.server import IDLE_S, MAX_CLIENTS, MAX_LINE, MAX_UNSENT, ControlServer
 
 
 @pytest.fixture

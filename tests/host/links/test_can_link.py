@@ -19,11 +19,9 @@ from tests.emulators.can.can_bench import frames
 from tests.host.links.slcan_adapter import Adapter
 from tickrig.emulators.can.outside.bus_port import CanBusPort
 from tickrig.host.canmon.sources.bus_source import BusReader
-from tickrig.host.links.can_link import MOST_FAULTS, CanLink, prepare_bus
-from tickrig.host.links.can_message import to_frame, to_message
-from tickrig.host.links.errors import LinkClosed
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorState
+from tickrig.host.links.can_link import MOST_FAULTS, CanLink, prepare_bus, to_frame, to_message
+from tickrig.host.links.link import LinkClosed
+from tickrig.wire.can import CanFrame, ErrorState
 
 
 @pytest.fixture

@@ -10,13 +10,9 @@ from contextlib import closing, contextmanager
 import pytest
 
 from tests.host.live import served
-from tickrig.emulators.serial.network.network_port import NetworkPort
-from tickrig.emulators.serial.network.rfc2217_connection import Rfc2217Connection
-from tickrig.emulators.serial.network.serve_url import parse_serve_url
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.reopening_link import ReopeningLink
-from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.links.tcp import tune
+from tickrig.emulators.serial.network import NetworkPort, Rfc2217Connection, parse_serve_url
+from tickrig.host.links.link import LinkClosed, ReopeningLink
+from tickrig.host.links.serial_link import SerialLink, tune
 
 pytestmark = [
     pytest.mark.realtime,

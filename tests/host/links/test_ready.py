@@ -146,6 +146,6 @@ def test_nothing_else_waits_with_select() -> None:
         "emulators/serial/pty_port.py",  # epoll
         "host/cli/start.py",  # poll
         "host/links/terminal.py",  # poll
-        "emulators/testing/host_clock/host_waits.py",
-        "emulators/testing/host_clock/kept_names.py",
+        "emulators/testing/host_clock/patched_time.py",
+        "emulators/testing/host_clock/patches.py",
     }

@@ -10,12 +10,12 @@ from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.record.bench_replay import read_bench_recording
+from tickrig.emulators.record.replay import read_bench_recording
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.recording_link import RecordingLink
 from tickrig.host.rrc.client import RrcClient
 from tickrig.wire.can import CanFrame

@@ -11,8 +11,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.reopening_link import ReopeningLink
+from tickrig.host.links.link import LinkClosed, ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from tests.host.live import LiveRrc, live_rrc, pty, served
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent
 
 
 def test_a_loop_gives_back_what_was_sent() -> None:

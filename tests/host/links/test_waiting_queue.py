@@ -11,7 +11,7 @@ from types import FrameType
 
 import pytest
 
-from tickrig.host.links.waiting_queue import WaitingQueue
+from tickrig.host.links.ready import WaitingQueue
 
 TRIES = 20_000
 """SimpleQueue hangs in one of some ten thousand."""

@@ -5,9 +5,9 @@ from itertools import pairwise
 import pytest
 
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
-from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import Arrival, RrcClient
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent
 
 
 def test_events_come_in_order_until_none_comes_in_time() -> None:

@@ -3,10 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
-from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
-from tickrig.wire.rrc.commands import StableMode
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent, StableMode
 
 
 def spoiled(line: bytes) -> bytes:

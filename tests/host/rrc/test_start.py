@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
-from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
 
 

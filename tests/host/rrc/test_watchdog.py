@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.host.rigs import ScriptedLink, standby_bench
-from tickrig.host.links.errors import LinkTimeout
+from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent
 
 
 @pytest.mark.parametrize("stable", [False, True])

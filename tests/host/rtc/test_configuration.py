@@ -8,8 +8,7 @@ from tests.host.rtc.chain import PERIOD_US, make_manager
 from tests.host.rtc.spy import BrokenError
 from tickrig.host.rtc import LifeCycleState, Manager, RtcRefused
 from tickrig.host.rtc.components import ConfigSample
-from tickrig.host.rtc.configuration import Configuration
-from tickrig.host.rtc.parameter import Constraint, Parameter, as_text
+from tickrig.host.rtc.configuration import Configuration, Constraint, Parameter, as_text
 
 
 @pytest.mark.parametrize(

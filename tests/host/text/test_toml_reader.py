@@ -5,8 +5,7 @@ from random import Random
 
 import pytest
 
-from tickrig.host.text.toml_document import BROKEN
-from tickrig.host.text.toml_reader import ONE_LINE, read_toml
+from tickrig.host.text.toml_reader import BROKEN, ONE_LINE, read_toml
 
 TEXT = '''\
 # a comment with [[step]]

@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.tui.key_footer import Key, key_at, key_rows
+from tickrig.host.tui import Key, key_at, key_rows
 
 KEYS = st.lists(st.builds(Key, st.text(max_size=3), st.text(max_size=5), st.text(max_size=12)))
 

@@ -7,7 +7,7 @@ from rich.style import Style
 from textual.app import App, ComposeResult
 
 from tests.host.canmon.tui.pilot import screen_text
-from tickrig.host.tui.line_view import LineView, line_strip, plain, rounded_up
+from tickrig.host.tui import LineView, line_strip, plain, rounded_up
 
 LINE = (("185 ", "bold"), ("37 02", ""))
 

@@ -8,14 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.urg.sensor_bench import SensorBench
-from tickrig.device.urg.parameters import URG_04LX
+from tickrig.device.urg.world import URG_04LX
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.links.errors import DeviceRefused, LinkClosed
-from tickrig.host.urg.client import UrgClient
-from tickrig.wire.sensors.scip.reply import Reply
-from tickrig.wire.sensors.scip.scan import encode_scan
+from tickrig.host.links.link import DeviceRefused, LinkClosed
+from tickrig.host.urg import UrgClient
+from tickrig.wire.scip import Reply, encode_scan
 
 REPLIES = [
     Reply(b"PP", "00", URG_04LX.lines).encode(),

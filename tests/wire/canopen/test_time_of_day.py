@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.wire.canopen.time_of_day import DAY_MS, TimeOfDay
+from tickrig.wire.canopen.datatypes import DAY_MS, TimeOfDay
 from tickrig.wire.errors import FieldError, FramingError, WireError
 
 TIMES = st.builds(TimeOfDay, st.integers(0, DAY_MS - 1), st.integers(0, 0xFFFF))

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.errors import WireError
-from tickrig.wire.modbus.requests import (
+from tickrig.wire.modbus import (
     MAX_READ,
     MAX_WRITE,
     MAX_WRITE_WHILE_READ,
@@ -13,11 +13,13 @@ from tickrig.wire.modbus.requests import (
     Refusal,
     Request,
     encode_exception,
+    encode_frame,
     encode_request,
     encode_response,
+    parse_frame,
     parse_request,
+    silence_us,
 )
-from tickrig.wire.modbus.rtu import encode_frame, parse_frame, silence_us
 
 words = st.integers(0, 0xFFFF)
 reads = st.tuples(words, st.integers(1, MAX_READ)).filter(lambda r: sum(r) <= 0x1_0000)

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from tickrig.wire.modbus.rh3 import Fault, Report, Status
+from tickrig.wire.modbus import Fault, Report, Status
 
 
 def test_a_report_is_read_from_its_registers() -> None:

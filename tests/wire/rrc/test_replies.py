@@ -5,8 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireError
-from tickrig.wire.rrc.check import check_digit
-from tickrig.wire.rrc.replies import (
+from tickrig.wire.rrc import (
     Event,
     Ok,
     Refusal,
@@ -14,6 +13,7 @@ from tickrig.wire.rrc.replies import (
     RrcEvent,
     StatusA,
     Text,
+    check_digit,
     parse_reply,
 )
 

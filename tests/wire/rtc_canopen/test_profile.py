@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_canopen.objects import object_table
-from tickrig.wire.rtc_canopen.port_types import (
+from tickrig.wire.rtc_canopen import (
     BOOLEAN,
     CHARACTER,
     DOUBLE,
@@ -24,14 +23,13 @@ from tickrig.wire.rtc_canopen.port_types import (
     STRING,
     WIDE_CHARACTER,
     WIDE_STRING,
-    CanopenPortType,
-    integer,
-)
-from tickrig.wire.rtc_canopen.profile import (
     CanopenPortProfile,
+    CanopenPortType,
     PortDirection,
     PortTransport,
     RtcProfile,
+    integer,
+    object_table,
 )
 
 # NEDO report, 3.4.43.3, Table 4: RTC, bits (0 where it varies), code.

@@ -6,11 +6,16 @@ from hypothesis import strategies as st
 
 from tests.wire.rtc_lite.vectors import REPLIES, REQUESTS, raw
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_lite import layout
+from tickrig.wire.rtc_lite import frame as layout
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault, LiteStatus
-from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import Checksum, LiteFrame, fault_frame
-from tickrig.wire.rtc_lite.layout import MAX_DATA_BYTES, Layout
+from tickrig.wire.rtc_lite.frame import (
+    MAX_DATA_BYTES,
+    Checksum,
+    Layout,
+    LiteDecoder,
+    LiteFrame,
+    fault_frame,
+)
 
 DIRECTIONS = {"request": layout.REQUESTS, "reply": layout.REPLIES}
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireError
-from tickrig.wire.sensors.ucode import HIGHEST, LineType, UcodeLine, parse_line, parse_ucode
+from tickrig.wire.ucode import HIGHEST, LineType, UcodeLine, parse_line, parse_ucode
 
 DOOR = "00001C00000000000001000000000001"
 GOLDEN = {

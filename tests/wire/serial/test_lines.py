@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.wire.serial.lines import LineSplitter
+from tickrig.wire.lines import LineSplitter
 
 pieces = st.lists(st.sampled_from([b"a", b"\n", b"\r", b"bcd", b"\r\n", b"efghijkl"]), max_size=20)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tickrig.wire.errors import FieldError
 from tickrig.wire.instant import NEVER
-from tickrig.wire.serial.uart import PS_PER_S, Character, Parity, UartReceiver, UartSetting, sample
+from tickrig.wire.uart import PS_PER_S, Character, Parity, UartReceiver, UartSetting, sample
 
 EVERY_BYTE = bytes(range(256))
 PARITIES: tuple[Parity, ...] = get_args(Parity)

@@ -2,28 +2,319 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final
+from itertools import islice
+from typing import Final, NamedTuple
 
-from tickrig.wire.canopen.eds.compact_pdo import implied_pdos
-from tickrig.wire.canopen.eds.eds_entry import object_kind, read_object
-from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.modules import module_objects
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_entry import (
+    HIGHEST_SUB,
+    count_of,
+    object_kind,
+    read_entry,
+    read_object,
+    read_value_beside,
+)
+from tickrig.wire.canopen.eds.eds_file import EdsFile, shorten
+from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_writer import VARIABLES
 from tickrig.wire.canopen.eds.object_table import (
     BIT_RATES,
     BIT_RATES_KBIT,
+    CONST,
+    RW,
+    Access,
     DeviceInfo,
     EntryDescription,
     ObjectCode,
     ObjectDescription,
 )
 
+# The PDOs that an EDS implies by CompactPDO, and does not describe (CiA 306-1, [DeviceInfo]).
+
+_MOST_PDOS: Final = 0x200
+"""Each way."""
+_MAPPING: Final = 0x200
+_MOST_MAPPED: Final = 0x40
+_PREDEFINED: Final = 4
+"""PDOs each way that have a CAN-ID by the predefined connection set (CiA 301)."""
+_OFF: Final = 0x8000_0000
+
+_U8: Final = DataType.UNSIGNED8
+_U16: Final = DataType.UNSIGNED16
+_U32: Final = DataType.UNSIGNED32
+ELEMENTS: Final = (
+    *(("COB-ID", _U32), ("Transmission type", _U8), ("Inhibit time", _U16)),
+    *(("Compatibility entry", _U8), ("Event timer", _U16), ("SYNC start value", _U8)),
+)
+"""Sub-indices 1 to 6 of a communication parameter; bits 0 to 5 of CompactPDO say which it has."""
+
+_Implied = tuple[ObjectDescription, list[EntryDescription]]
+
+
+class Way(NamedTuple):
+    """What RPDOs and TPDOs differ in.
+
+    Attributes:
+        name: of one.
+        key: of their number in [DeviceInfo].
+        first: index of the first communication parameter.
+        can_id: of the first, without the node-ID.
+    """
+
+    name: str
+    key: str
+    first: int
+    can_id: int
+
+
+WAYS: Final = (
+    Way("RPDO", "NrOfRXPDO", 0x1400, 0x200),
+    Way("TPDO", "NrOfTXPDO", 0x1800, 0x180),
+)
+
+
+def _implied_pdos(file: EdsFile) -> Iterator[_Implied]:
+    """Give the communication and mapping parameters that CompactPDO stands for.
+
+    NrOfRXPDO and NrOfTXPDO count all PDOs: those that are described, and behind them as many
+    more as are missing, on the lowest numbers that are free. What is described stays as it is,
+    and only its other half is implied. A mapping parameter has 64 entries, as Lely's reader has
+    it. The file says no defaults, so the COB-IDs are those of CiA 301: the first four by the
+    predefined connection set, the others off; a DCF may give values, as in [1600Value].
+    """
+    mask = file.number("DeviceInfo", "CompactPDO")
+    subs = [sub for sub in range(1, len(ELEMENTS) + 1) if mask >> sub - 1 & 1]
+    if not subs:
+        return
+    described = {index for _, index, _ in file.objects()}
+    for way in WAYS:
+        for number in _numbers(file, way, described):
+            index = way.first + number
+            if index not in described:
+                yield _parameter(file, way, number, subs)
+            if index + _MAPPING not in described:
+                yield _mapping(file, way, number)
+
+
+def _numbers(file: EdsFile, way: Way, described: set[int]) -> list[int]:
+    """Return the numbers of all PDOs, from 0 on."""
+    begun, free = list[int](), list[int]()
+    for number in range(_MOST_PDOS):
+        parameter = way.first + number
+        is_begun = parameter in described or parameter + _MAPPING in described
+        (begun if is_begun else free).append(number)
+    missing = max(file.number("DeviceInfo", way.key) - len(begun), 0)
+    return sorted([*begun, *islice(free, missing)])
+
+
+def _parameter(file: EdsFile, way: Way, number: int, subs: list[int]) -> _Implied:
+    index = way.first + number
+    count = EntryDescription(index, 0, "Highest sub-index supported", _U8, CONST, default=subs[-1])
+    rows = [_entry(file, index, sub, *ELEMENTS[sub - 1], RW) for sub in subs]
+    if subs[0] == 1 and not rows[0].has_default:
+        rows[0] = _cob_id(way, number)
+    title = f"{way.name}{number + 1} communication parameter"
+    return ObjectDescription(title, ObjectCode.RECORD), [count, *rows]
+
+
+def _cob_id(way: Way, number: int) -> EntryDescription:
+    """Make the COB-ID of a PDO as CiA 301 has it."""
+    index, (name, kind), on = way.first + number, ELEMENTS[0], number < _PREDEFINED
+    cob_id = way.can_id + 0x100 * number if on else _OFF
+    return EntryDescription(index, 1, name, kind, RW, default=cob_id, relative=on)
+
+
+def _mapping(file: EdsFile, way: Way, number: int) -> _Implied:
+    index = way.first + _MAPPING + number
+    rows = [_entry(file, index, 0, "Number of mapped objects", _U8, RW)]
+    for sub in range(1, _MOST_MAPPED + 1):
+        rows.append(_entry(file, index, sub, f"Mapped object {sub}", _U32, RW))
+    title = f"{way.name}{number + 1} mapping parameter"
+    return ObjectDescription(title, ObjectCode.RECORD), rows
+
+
+def _entry(  # noqa: PLR0913, PLR0917 - a row of an object table
+    file: EdsFile, index: int, sub: int, name: str, kind: DataType, access: Access
+) -> EntryDescription:
+    default, relative = read_value_beside(file, index, sub, kind)
+    return EntryDescription(index, sub, name, kind, access, default=default, relative=relative)
+
+
+# The objects that the connected modules of a modular device add (CiA 306-1, modular devices).
+
+_SUPPORTED: Final = "SupportedModules"
+_CONNECTED: Final = "ConnectedModules"
+_MODULE_LIST: Final = 0x1027
+_HIGHEST_INDEX: Final = 0xFFFF
+
+_Added = tuple[ObjectDescription, list[EntryDescription]]
+_Objects = Mapping[int, ObjectDescription]
+
+
+def _module_objects(
+    file: EdsFile, entries: Iterable[EntryDescription], objects: _Objects
+) -> Iterator[_Added]:
+    """Give the objects of the modules that a DCF connects, and the list of them (1027h).
+
+    A fixed object is there once, however many modules have it. A sub-index extension adds
+    sub-indices in the order of the modules, and goes on in the next object behind the sub-index
+    that ObjExtend gives. What the file describes itself, as a DCF may, stays as it is.
+
+    Args:
+        file: takes what is wrong: modules that are not described, or none that is connected.
+        entries: those that the file describes.
+        objects: their names and kinds.
+
+    Returns:
+        Name and kind of each object, and all of its entries.
+    """
+    if _CONNECTED not in file.sections:
+        if file.number(_SUPPORTED, "NrOfEntries"):
+            reason = (
+                "a modular device: the objects of its modules are left out, for"
+                f" [{_CONNECTED}] of a DCF has to say which are there"
+            )
+            file.warn(_SUPPORTED, reason, "modules")
+        return
+    rows = list(entries)
+    modules = _list_numbers(file, _CONNECTED)
+    for module in dict.fromkeys(modules):
+        kinds = ("ModuleInfo", "FixedObjects", "SubExtends")
+        if not any(f"M{module}{kind}" in file.sections for kind in kinds):
+            _missing(file, _CONNECTED, f"M{module}ModuleInfo")
+    yield from _listed(modules, rows, objects)
+    yield from _fixed(file, modules)
+    whole = {row.index for row in rows if row.sub or objects[row.index].code in VARIABLES}
+    for index, sections in _extensions(file, modules).items():
+        if index not in whole:
+            yield from _extended(file, index, sections, objects)
+
+
+def _missing(file: EdsFile, section: str, wanted: str) -> None:
+    reason = f"there is no [{wanted}]: what it would add is left out"
+    file.warn(section, reason, "modules")
+
+
+def _list_numbers(file: EdsFile, section: str) -> list[int]:
+    """Return the numbers of a list, in its order; 0 is none."""
+    keys = (key for key in file.sections.get(section, {}) if key.isascii() and key.isdigit())
+    found = (file.number(section, key) for key in sorted(keys, key=int))
+    return [number for number in found if number]
+
+
+def _listed(
+    modules: list[int], rows: Iterable[EntryDescription], objects: _Objects
+) -> Iterator[_Added]:
+    """Give 1027h with the numbers of the modules, where the file leaves them open."""
+    own = [row for row in rows if row.index == _MODULE_LIST]
+    if own:
+        count = min(len(modules), max(row.sub for row in own))
+        values = dict(enumerate([count, *modules]))
+        filled = (
+            row if row.has_default or not row.data_type.is_integer else _filled(row, values)
+            for row in own
+        )
+        yield objects[_MODULE_LIST], list(filled)
+
+
+def _filled(row: EntryDescription, values: Mapping[int, int]) -> EntryDescription:
+    value = values.get(row.sub, 0)
+    low, high = row.data_type.limits
+    return row.with_default(value) if low <= value <= high else row
+
+
+def _fixed(file: EdsFile, modules: list[int]) -> Iterator[_Added]:
+    """Give the fixed objects of modules."""
+    seen: set[int] = set()
+    for module in dict.fromkeys(modules):
+        listing = f"M{module}FixedObjects"
+        for index in _list_numbers(file, listing):
+            head = f"M{module}Fixed{index:04X}"
+            if index in seen or f"{index:04X}" in file.sections or index > _HIGHEST_INDEX:
+                continue
+            if head not in file.sections:
+                _missing(file, listing, head)
+                continue
+            seen.add(index)
+            subs = [(f"{head}sub{sub:X}", sub) for sub in range(0x100)]
+            subs = [each for each in subs if each[0] in file.sections]
+            kind = object_kind(file, head, bool(subs))
+            rows = [] if kind is None else list(read_object(file, head, index, kind, subs))
+            if kind is not None and rows:
+                yield ObjectDescription(file.value(head, "ParameterName"), kind), rows
+
+
+def _extensions(file: EdsFile, modules: list[int]) -> dict[int, list[str]]:
+    """Return the sections that extend objects, each as often as its module is there, by index."""
+    found: dict[int, list[str]] = {}
+    for module in modules:
+        listing = f"M{module}SubExtends"
+        for index in _list_numbers(file, listing):
+            section = f"M{module}SubExt{index:04X}"
+            if section in file.sections and index <= _HIGHEST_INDEX:
+                found.setdefault(index, []).append(section)
+            else:
+                _missing(file, listing, section)
+    return found
+
+
+def _extended(
+    file: EdsFile, index: int, sections: list[str], objects: _Objects
+) -> Iterator[_Added]:
+    """Give an object with the sub-indices that modules add, and those that it goes on in."""
+    rows: list[EntryDescription] = []
+    free_bits = 0
+    for section in sections:
+        count, bits = _count(file, section)
+        width = max(read_entry(file, section, index, 1, "").data_type.bits, 1)
+        if bits:
+            count = max(-((free_bits - bits) // width), 0)
+            free_bits += count * width - bits
+        last = min(file.number(section, "ObjExtend"), HIGHEST_SUB)
+        for _ in range(count):
+            if len(rows) >= (last or HIGHEST_SUB):
+                if not last or index >= _HIGHEST_INDEX or index + 1 in objects:
+                    reason = f"{index:04X}h has no sub-index free: what it adds is left out"
+                    file.warn(section, reason, "modules")
+                    break
+                yield _object(file, index, rows, objects, section)
+                index, rows = index + 1, []
+            sub = len(rows) + 1
+            name = f"{file.value(section, 'ParameterName')}{sub}"
+            rows.append(read_entry(file, section, index, sub, name))
+    yield _object(file, index, rows, objects, sections[0])
+
+
+def _object(
+    file: EdsFile, index: int, rows: list[EntryDescription], objects: _Objects, section: str
+) -> _Added:
+    usual = ObjectDescription(file.value(section, "ParameterName"), ObjectCode.ARRAY)
+    return objects.get(index, usual), [count_of(index, rows), *rows]
+
+
+def _count(file: EdsFile, section: str) -> tuple[int, int]:
+    """Return how many sub-indices a module adds, or how many bits of one (`0;2`)."""
+    text = file.value(section, "Count")
+    whole, _, bits = text.partition(";")
+    try:
+        count = parse_number(plain_numbers(whole.strip()))
+        part = 0 if count else parse_number(plain_numbers(bits.strip()))
+        if 0 <= count <= HIGHEST_SUB and 0 <= part <= HIGHEST_SUB and (count or part):
+            return count, part
+    except ValueError:
+        pass
+    reason = f"Count={shorten(text)} is not N, or 0;BITS, of at most {HIGHEST_SUB}: 1 is taken"
+    file.warn(section, reason, "no-number", "Count")
+    return 1, 0
+
+
 COMMISSIONING: Final = "DeviceComissioning"
-UNSET_NODE_IDS: Final = (0, 0xFF)
+_UNSET_NODE_IDS: Final = (0, 0xFF)
 HIGHEST_NODE_ID: Final = 127
 
-Kinds = dict[int, ObjectCode]
+_Kinds = dict[int, ObjectCode]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,10 +354,10 @@ def read_device(file: EdsFile) -> EdsDevice:
     }
     if not (entries or file.errors):
         file.refuse("", "has no objects", "no-objects")
-    for described, rows in implied_pdos(file) if entries else ():
+    for described, rows in _implied_pdos(file) if entries else ():
         objects[rows[0].index] = described
         entries += rows
-    for described, rows in module_objects(file, entries, objects):
+    for described, rows in _module_objects(file, entries, objects):
         objects[rows[0].index] = described
         added = {row.key for row in rows}
         entries = [row for row in entries if row.key not in added] + rows
@@ -97,7 +388,7 @@ def _device_info(file: EdsFile) -> DeviceInfo:
 
 def _node_id(file: EdsFile) -> int | None:
     node_id = file.number(COMMISSIONING, "NodeID")
-    if node_id in UNSET_NODE_IDS:
+    if node_id in _UNSET_NODE_IDS:
         return None
     if node_id > HIGHEST_NODE_ID:
         reason = f"NodeID={node_id} is not in 1..127: none is taken"
@@ -118,7 +409,7 @@ def _bit_rate(file: EdsFile) -> int | None:
     return known
 
 
-def _kinds(file: EdsFile) -> Kinds:
+def _kinds(file: EdsFile) -> _Kinds:
     """Return the kind of each object; those that only define a data type are left out."""
     kinds = {}
     with_subs = {index for _, index, sub in file.objects() if sub is not None}
@@ -128,7 +419,7 @@ def _kinds(file: EdsFile) -> Kinds:
     return kinds
 
 
-def _entries(file: EdsFile, kinds: Kinds) -> Iterator[EntryDescription]:
+def _entries(file: EdsFile, kinds: _Kinds) -> Iterator[EntryDescription]:
     subs: dict[int, list[tuple[str, int]]] = {}
     for section, index, sub in file.objects():
         if sub is not None:

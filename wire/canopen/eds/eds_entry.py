@@ -27,25 +27,120 @@ from tickrig.wire.canopen.eds.object_table import (
     EntryDescription,
     ObjectCode,
 )
-from tickrig.wire.canopen.eds.standard_objects import standard_type
 
-SIMPLE_TYPES: Final = range(0x1C)
-NUMBERS: Final = (*FLOATS, *TIMES)
+# The objects of the communication area: their kind, types and access (CiA 301, CiA 302).
+
+_U8: Final = DataType.UNSIGNED8
+_U16: Final = DataType.UNSIGNED16
+_U32: Final = DataType.UNSIGNED32
+_TEXT: Final = DataType.VISIBLE_STRING
+_OCTETS: Final = DataType.OCTET_STRING
+
+
+class StandardObject(NamedTuple):
+    """One object, or each of a range.
+
+    Attributes:
+        composed: it has sub-indices.
+        types: data type by sub-index.
+        others: that of the sub-indices not named, None where it may be any.
+        fixed: nobody may write it.
+    """
+
+    composed: bool
+    types: dict[int, DataType]
+    others: DataType | None = None
+    fixed: bool = False
+
+
+def _variable(kind: DataType, *, fixed: bool = False) -> StandardObject:
+    return StandardObject(False, {0: kind}, None, fixed)
+
+
+def _composed(kind: DataType | None, *, fixed: bool = False, **types: DataType) -> StandardObject:
+    subs = {int(name[1:]): each for name, each in types.items()}
+    return StandardObject(True, {0: _U8, **subs}, kind, fixed)
+
+
+_PDO: Final = _composed(None, s1=_U32, s2=_U8, s3=_U16, s4=_U8, s5=_U16, s6=_U8)
+_MAPPING: Final = _composed(_U32)
+_SDO: Final = _composed(None, s1=_U32, s2=_U32, s3=_U8)
+
+_SINGLE: Final = {
+    **dict.fromkeys((0x1000, 0x1002), _variable(_U32, fixed=True)),
+    0x1001: _variable(_U8, fixed=True),
+    **dict.fromkeys((0x1005, 0x1006, 0x1007, 0x1012, 0x1013, 0x1014), _variable(_U32)),
+    **dict.fromkeys((0x100B, 0x100E, 0x100F), _variable(_U32)),
+    **dict.fromkeys((0x1008, 0x1009, 0x100A), _variable(_TEXT)),
+    **dict.fromkeys((0x100C, 0x1015, 0x1017, 0x1022), _variable(_U16)),
+    **dict.fromkeys((0x100D, 0x1019, 0x1024), _variable(_U8)),
+    **dict.fromkeys((0x1003, 0x1010, 0x1011, 0x1016, 0x1020, 0x1028), _composed(_U32)),
+    0x1018: _composed(_U32, fixed=True),
+    0x1021: _variable(DataType.DOMAIN),
+    **dict.fromkeys((0x1023, 0x1025), _composed(_OCTETS, s2=_U8)),
+    **dict.fromkeys((0x1026, 0x1029), _composed(_U8)),
+    0x1027: _composed(_U16),
+    **dict.fromkeys((0x1F20, 0x1F22, 0x1F23, 0x1F50), _composed(DataType.DOMAIN)),
+    **dict.fromkeys((0x1F21, 0x1F24, 0x1F51, 0x1F82, 0x1F83), _composed(_U8)),
+    **dict.fromkeys((0x1F26, 0x1F27, 0x1F52, 0x1F55, 0x1F56, 0x1F57), _composed(_U32)),
+    **dict.fromkeys((0x1F81, *range(0x1F84, 0x1F89)), _composed(_U32)),
+    **dict.fromkeys((0x1F80, 0x1F89), _variable(_U32)),
+}
+_RANGES: Final = (
+    (range(0x1200, 0x1300), _SDO),
+    (range(0x1400, 0x1600), _PDO),
+    (range(0x1600, 0x1800), _MAPPING),
+    (range(0x1800, 0x1A00), _PDO),
+    (range(0x1A00, 0x1C00), _MAPPING),
+)
+
+
+def standard_object(index: int) -> StandardObject | None:
+    """Return what CiA 301 says of an object; None where it says nothing that is checked."""
+    for area, found in _RANGES:
+        if index in area:
+            return found
+    return _SINGLE.get(index)
+
+
+def _standard_type(index: int, sub: int, *, composed: bool) -> DataType | None:
+    """Return the data type of an entry, None where the documents give none.
+
+    Args:
+        index: of the object.
+        sub: sub-index.
+        composed: whether it is described as an element, not as a variable.
+
+    >>> _standard_type(0x1017, 0, composed=False).name
+    'UNSIGNED16'
+    >>> _standard_type(0x1A00, 8, composed=True).name
+    'UNSIGNED32'
+    >>> _standard_type(0x2000, 0, composed=False), _standard_type(0x1017, 1, composed=True)
+    (None, None)
+    """
+    standard = standard_object(index)
+    if standard is None or standard.composed is not composed:
+        return None
+    return standard.types.get(sub, standard.others)
+
+
+_SIMPLE_TYPES: Final = range(0x1C)
+_NUMBERS: Final = (*FLOATS, *TIMES)
 """Data types of numbers that are no integers."""
-ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
-TRUTH: Final = (0, 1)
-TRUTH_WORDS: Final = {"yes": 1, "true": 1, "no": 0, "false": 0}
-TYPE_WORDS: Final = {kind.name.lower(): int(kind) for kind in DataType}
-KIND_WORDS: Final = {code.name.lower(): int(code) for code in ObjectCode}
+_ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
+_TRUTH: Final = (0, 1)
+_TRUTH_WORDS: Final = {"yes": 1, "true": 1, "no": 0, "false": 0}
+_TYPE_WORDS: Final = {kind.name.lower(): int(kind) for kind in DataType}
+_KIND_WORDS: Final = {code.name.lower(): int(code) for code in ObjectCode}
 HIGHEST_SUB: Final = 254
-NO_DATA: Final = (0, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT)
+_NO_DATA: Final = (0, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT)
 """Kinds of objects that hold nothing: NULL, and definitions of data types."""
-DESCRIBED: Final = (*VARIABLES, ObjectCode.ARRAY, ObjectCode.RECORD)
-ERROR_FIELD: Final = 0x1003
-COUNTS: Final = (ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
+_DESCRIBED: Final = (*VARIABLES, ObjectCode.ARRAY, ObjectCode.RECORD)
+_ERROR_FIELD: Final = 0x1003
+COUNTS: Final = (_ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
 """Objects whose sub-index 0 counts what is in use, not what is there."""
 LONE_LETTERS: Final = {"r": "ro", "w": "wo"}
-MISSING: Final = {
+_MISSING: Final = {
     "ParameterName": "name-missing",
     "DataType": "data-type-missing",
     "AccessType": "access-missing",
@@ -66,7 +161,7 @@ def read_entry(
         name: that of the file's `ParameterName` if left out.
     """
     if name is None:
-        name = required(file, section, "ParameterName", "")
+        name = _required(file, section, "ParameterName", "")
     derived = _data_type(file, section, index, sub)
     kind, access = derived.kind, _access(file, section)
     default, relative = _default(file, section, index, sub, derived)
@@ -83,12 +178,12 @@ def read_entry(
     )
 
 
-def required(file: EdsFile, section: str, key: str, instead: str) -> str:
+def _required(file: EdsFile, section: str, key: str, instead: str) -> str:
     """Return the text of a keyword that every entry has; `instead`, and a warning, without it."""
     if file.has(section, key):
         return file.value(section, key)
     taken = f"{instead} is taken" if instead else "none is taken"
-    file.warn(section, f"{key} is missing: {taken}", MISSING[key])
+    file.warn(section, f"{key} is missing: {taken}", _MISSING[key])
     return instead
 
 
@@ -103,12 +198,12 @@ class _Type(NamedTuple):
 
 
 def _data_type(file: EdsFile, section: str, index: int, sub: int) -> _Type:
-    if file.number(section, "ObjectType", ObjectCode.VAR, words=KIND_WORDS) == ObjectCode.DOMAIN:
+    if file.number(section, "ObjectType", ObjectCode.VAR, words=_KIND_WORDS) == ObjectCode.DOMAIN:
         return _Type(DataType.DOMAIN)
     usual = _usual_type(section, index, sub)
-    required(file, section, "DataType", usual.name)
-    number = file.number(section, "DataType", usual, words=TYPE_WORDS)
-    if number not in SIMPLE_TYPES and (own := _own_type(file, number)) is not None:
+    _required(file, section, "DataType", usual.name)
+    number = file.number(section, "DataType", usual, words=_TYPE_WORDS)
+    if number not in _SIMPLE_TYPES and (own := _own_type(file, number)) is not None:
         return _derived(file, section, number, own)
     kind = _known_type(file, section, number, usual)
     return _Type(kind, number == kind and bool(file.word(section, "DataType")))
@@ -119,7 +214,7 @@ def _usual_type(section: str, index: int, sub: int) -> DataType:
     if section.endswith("sub0"):
         return DataType.UNSIGNED8
     composed = bool(sub) or not section.endswith(f"{index:04X}")
-    return standard_type(index, sub, composed=composed) or DataType.DOMAIN
+    return _standard_type(index, sub, composed=composed) or DataType.DOMAIN
 
 
 def _derived(file: EdsFile, section: str, number: int, own: tuple[str, str, str]) -> _Type:
@@ -164,10 +259,10 @@ def _known_type(
 
 
 def _access(file: EdsFile, section: str) -> Access:
-    required(file, section, "AccessType", "rw")
+    _required(file, section, "AccessType", "rw")
     text = file.word(section, "AccessType") if file.has(section, "AccessType") else "rw"
     known = LONE_LETTERS.get(text.lower(), text or "rw")
-    mappable = bool(file.number(section, "PDOMapping", words=TRUTH_WORDS))
+    mappable = bool(file.number(section, "PDOMapping", words=_TRUTH_WORDS))
     try:
         access = Access.from_eds(known, mappable=mappable)
     except ValueError:
@@ -202,7 +297,7 @@ def _text(file: EdsFile, section: str, key: str, kind: DataType) -> str:
     """Return the text of a value: of a number without a comment, and as CiA 306 writes it."""
     if kind.is_integer:
         return file.numeric(section, key)
-    return file.word(section, key) if kind in NUMBERS else file.value(section, key)
+    return file.word(section, key) if kind in _NUMBERS else file.value(section, key)
 
 
 def read_value_beside(
@@ -242,10 +337,10 @@ def _value(
 ) -> tuple[bytes | None, bool]:
     text = _text(file, section, key, kind)
     try:
-        if kind in ASCII_TEXTS and not text.isascii():
+        if kind in _ASCII_TEXTS and not text.isascii():
             return _foreign_text(file, section, key, kind), False
         value, relative = parse_value(kind, text)
-        if kind is DataType.BOOLEAN and value not in TRUTH:
+        if kind is DataType.BOOLEAN and value not in _TRUTH:
             reason = f"{key}={shorten(text)} is no BOOLEAN: 1 is taken"
             file.warn(section, reason, "boolean-value", key)
         if is_said:
@@ -330,10 +425,10 @@ def _factor(file: EdsFile, section: str) -> float:
 def object_kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | None:
     """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
     usual = ObjectCode.RECORD if with_subs else ObjectCode.VAR
-    number = file.number(section, "ObjectType", usual, words=KIND_WORDS)
-    if number in NO_DATA:
+    number = file.number(section, "ObjectType", usual, words=_KIND_WORDS)
+    if number in _NO_DATA:
         return None
-    if number not in DESCRIBED:
+    if number not in _DESCRIBED:
         reason = f"ObjectType={number} is no kind of object: {usual.name} is taken"
     elif with_subs and number in VARIABLES:
         reason = f"ObjectType={number} has no sub-indices, and there are: RECORD is taken"
@@ -359,7 +454,7 @@ def read_object(
         yield read_entry(file, head, index, 0)
         return
     if head in file.sections:
-        required(file, head, "ParameterName", "")
+        _required(file, head, "ParameterName", "")
     described = [read_entry(file, section, index, sub) for section, sub in subs]
     count = min(file.number(head, "CompactSubObj"), HIGHEST_SUB)
     if file.value(head, "ParameterValue") and not count:
@@ -388,7 +483,7 @@ def _compact(file: EdsFile, head: str, index: int, count: int) -> Iterator[Entry
 def count_of(index: int, elements: list[EntryDescription]) -> EntryDescription:
     """Make the sub-index 0 of a compact object."""
     u8 = DataType.UNSIGNED8
-    if index == ERROR_FIELD:
+    if index == _ERROR_FIELD:
         return EntryDescription(index, 0, "Number of errors", u8, RW, default=0)
     used, access = len(elements), RO
     if index in COUNTS:

@@ -7,25 +7,23 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
-from tickrig.wire.canopen.eds.eds_lines import (
+from tickrig.wire.canopen.eds.eds_value import (
     KNOWN_SECTIONS,
     EdsLine,
     describes_device,
-    object_section,
-    read_lines,
-)
-from tickrig.wire.canopen.eds.eds_value import (
     is_plain_number,
+    object_section,
     parse_number,
     plain_numbers,
+    read_lines,
     without_comment,
 )
 from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
-LONGEST: Final = 40
-LONGEST_TITLE: Final = len("1018sub01")
+_LONGEST: Final = 40
+_LONGEST_TITLE: Final = len("1018sub01")
 """Of a sub-index by CiA 311."""
-DCF_ENDINGS: Final = (".dcf", ".xdc")
+_DCF_ENDINGS: Final = (".dcf", ".xdc")
 
 
 class Finding(NamedTuple):
@@ -78,11 +76,11 @@ def shorten(text: str) -> str:
     """
     if not text.isprintable():
         text = "".join(letter if letter.isprintable() else "?" for letter in text)
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
-Section = dict[str, str]
-NO_WORDS: Final[Mapping[str, int]] = {}
+_Section = dict[str, str]
+_NO_WORDS: Final[Mapping[str, int]] = {}
 
 _OWN_WORD: Final = re.compile(r"(MaxBytes|DefaultBytes) of (\w+) is (\w+)")
 
@@ -109,7 +107,7 @@ class EdsFile:
 
     def __init__(self, name: str, text: str) -> None:
         self.name = name
-        self.sections: dict[str, Section] = {}
+        self.sections: dict[str, _Section] = {}
         self.is_xml = is_xml(text)
         self.lines: list[EdsLine] = []
         self._places: dict[tuple[str, str], int] = {}
@@ -136,7 +134,7 @@ class EdsFile:
     @property
     def is_dcf(self) -> bool:
         """Whether it is of one node: its name says so, or that it has a node-ID."""
-        return self.name.lower().endswith(DCF_ENDINGS) or "DeviceComissioning" in self.sections
+        return self.name.lower().endswith(_DCF_ENDINGS) or "DeviceComissioning" in self.sections
 
     def refuse(self, section: str, reason: str, rule: str, key: str = "") -> None:
         """Note an error, at the line of a keyword or a section."""
@@ -195,7 +193,7 @@ class EdsFile:
         default: int = 0,
         low: int = 0,
         high: int = 0xFFFF_FFFF,
-        words: Mapping[str, int] = NO_WORDS,
+        words: Mapping[str, int] = _NO_WORDS,
     ) -> int:
         """Return the number of a keyword.
 
@@ -229,7 +227,7 @@ class EdsFile:
         return iter(self._objects)
 
     def _parse(self) -> None:
-        section: Section = {}
+        section: _Section = {}
         for line in self.lines:
             if line.title:
                 section = self._begin(line)
@@ -248,13 +246,13 @@ class EdsFile:
                 key, section, value = match.groups()
                 self.sections.get(section, {}).setdefault(key.lower(), value)
 
-    def _begin(self, line: EdsLine) -> Section:
+    def _begin(self, line: EdsLine) -> _Section:
         """Begin a section, or go on with one that is there already."""
         title = line.section
         if self.is_xml and title not in KNOWN_SECTIONS.values() and object_section(title) is None:
             reason = "is no index of four, or sub-index of two hexadecimal digits: it is lost"
             self._errors[Finding(self.name, title, reason, line.number, "object-index")] = None
-        is_long = self.is_xml and len(line.title) > LONGEST_TITLE
+        is_long = self.is_xml and len(line.title) > _LONGEST_TITLE
         if is_long and not self._has_long_titles and object_section(title) is not None:
             self._has_long_titles = True  # some editors write all of them so
             reason = "subIndex has more than two digits, taken for one number; others may follow"
@@ -265,7 +263,7 @@ class EdsFile:
         self._places.setdefault((title, ""), line.number)
         return self.sections.setdefault(title, {})
 
-    def _add(self, section: Section, line: EdsLine) -> None:
+    def _add(self, section: _Section, line: EdsLine) -> None:
         key = line.key.lower()
         if key[:1] == "0" and key.isascii() and key.isdigit():
             key = key.lstrip("0") or "0"  # a number of a list

@@ -20,23 +20,23 @@ from tickrig.wire.canopen.eds.object_table import (
     ObjectDescription,
 )
 
-MANDATORY: Final = (0x1000, 0x1001, 0x1018)
-MANUFACTURER: Final = range(0x2000, 0x6000)
-IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
-SERIAL_NUMBER: Final = 4
-LSS_ADDRESS: Final = frozenset({1, 2, 3, SERIAL_NUMBER})
+_MANDATORY: Final = (0x1000, 0x1001, 0x1018)
+_MANUFACTURER: Final = range(0x2000, 0x6000)
+_IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
+_SERIAL_NUMBER: Final = 4
+_LSS_ADDRESS: Final = frozenset({1, 2, 3, _SERIAL_NUMBER})
 """Sub-indices of 1018h by which LSS selects a node (CiA 305)."""
-DUMMY_TYPES: Final = range(1, 8)
+_DUMMY_TYPES: Final = range(1, 8)
 VARIABLES: Final = (ObjectCode.VAR, ObjectCode.DOMAIN)
-MAPPABLE: Final = Access.TPDO | Access.RPDO
-ACCESS_TYPES: Final = {
+_MAPPABLE: Final = Access.TPDO | Access.RPDO
+_ACCESS_TYPES: Final = {
     Access.READ: "ro",
     Access.WRITE: "wo",
     Access.READ | Access.WRITE: "rw",
     Access.READ | Access.CONST: "const",
 }
 
-NO_INFO: Final = DeviceInfo()
+_NO_INFO: Final = DeviceInfo()
 
 _NO_WORD: Final = re.compile(r"[^a-z0-9]+")
 
@@ -54,7 +54,7 @@ class Table(Protocol):
         ...
 
 
-def write_eds(table: Table, info: DeviceInfo = NO_INFO) -> str:
+def write_eds(table: Table, info: DeviceInfo = _NO_INFO) -> str:
     """Write the objects with their default values.
 
     What CiA 306 has no keyword for stands in its comments, where it is needed:
@@ -78,7 +78,7 @@ def write_dcf(
     node_id: int,
     bit_rate: int,
     values: Mapping[int, bytes],
-    info: DeviceInfo = NO_INFO,
+    info: DeviceInfo = _NO_INFO,
 ) -> str:
     """Write the objects with default and present values, for one node.
 
@@ -94,7 +94,7 @@ def write_dcf(
         "[DeviceComissioning]",
         *(f"NodeID={node_id}", "NodeName=", f"Baudrate={bit_rate // 1_000}"),
         *("NetNumber=0", "NetworkName=", "CANopenManager=0"),
-        *(f"LSS_SerialNumber=0x{_identity(table).get(SERIAL_NUMBER, 0):08X}", ""),
+        *(f"LSS_SerialNumber=0x{_identity(table).get(_SERIAL_NUMBER, 0):08X}", ""),
     ]
     present = {row.key: row.power_on_data(node_id) for row in table} | dict(values)
     objects = _objects(table, present)
@@ -110,7 +110,7 @@ def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
     ):
         yield f"{key}={_name(text)}"
     numbers = _identity(table)
-    for sub, key in IDENTITY:
+    for sub, key in _IDENTITY:
         yield f"{key}=0x{numbers.get(sub, 0):08X}"
     for kbit in BIT_RATES_KBIT:
         yield f"BaudRate_{kbit}={int(1_000 * kbit in info.bit_rates)}"
@@ -118,8 +118,8 @@ def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
         yield f"{key}={sum(index in area for index in table.objects)}"
     yield from ("SimpleBootUpMaster=0", "SimpleBootUpSlave=1", "Granularity=1")
     yield from ("DynamicChannelsSupported=0", "GroupMessaging=0")
-    yield from (f"LSS_Supported={int(numbers.keys() >= LSS_ADDRESS)}", "")
-    yield from ("[DummyUsage]", *(f"Dummy{kind:04d}=1" for kind in DUMMY_TYPES), "")
+    yield from (f"LSS_Supported={int(numbers.keys() >= _LSS_ADDRESS)}", "")
+    yield from ("[DummyUsage]", *(f"Dummy{kind:04d}=1" for kind in _DUMMY_TYPES), "")
     if comments := list(_comments(table)):
         yield from ("[Comments]", f"Lines={len(comments)}")
         yield from (f"Line{number}={text}" for number, text in enumerate(comments, 1))
@@ -153,8 +153,8 @@ def _comments(table: Table) -> Iterator[str]:
 
 
 def _objects(table: Table, values: Mapping[int, bytes] | None = None) -> Iterator[str]:
-    mandatory = [index for index in table.objects if index in MANDATORY]
-    manufacturer = [index for index in table.objects if index in MANUFACTURER]
+    mandatory = [index for index in table.objects if index in _MANDATORY]
+    manufacturer = [index for index in table.objects if index in _MANUFACTURER]
     optional = [index for index in table.objects if index not in {*mandatory, *manufacturer}]
     for title, indices in (
         ("MandatoryObjects", mandatory),
@@ -217,7 +217,7 @@ def _variable(
     kind = entry.data_type
     yield from (f"[{title}]", f"ParameterName={_name(entry.name)}", f"ObjectType=0x{code:X}")
     yield from (f"DataType=0x{kind:04X}", f"AccessType={access_type(entry)}")
-    yield f"PDOMapping={int(bool(entry.access & MAPPABLE))}"
+    yield f"PDOMapping={int(bool(entry.access & _MAPPABLE))}"
     yield f"DefaultValue={_default(entry) or ''}"
     if values is not None:
         value = format_value(kind, values[entry.key])
@@ -239,8 +239,8 @@ def access_type(entry: EntryDescription) -> str:
     >>> access_type(EntryDescription(0x6040, 0, "Controlword", DataType.UNSIGNED16, RWW))
     'rww'
     """
-    mappable = entry.access & MAPPABLE
-    name = ACCESS_TYPES.get(entry.access & ~MAPPABLE, "")
+    mappable = entry.access & _MAPPABLE
+    name = _ACCESS_TYPES.get(entry.access & ~_MAPPABLE, "")
     if name == "rw" and mappable in (Access.TPDO, Access.RPDO):
         name = "rwr" if mappable is Access.TPDO else "rww"
     if not name or Access.from_eds(name, mappable=bool(mappable)) != entry.access:

@@ -11,11 +11,11 @@ from typing import Final
 from xml.parsers import expat
 
 from tickrig._compiled import mypyc_attr
-from tickrig.wire.canopen.eds.eds_lines import EdsLine, canonical_section
+from tickrig.wire.canopen.eds.eds_value import EdsLine, canonical_section
 
-DEEPEST: Final = 64
+_DEEPEST: Final = 64
 
-DATA_TYPES: Final = {
+_DATA_TYPES: Final = {
     **{"BOOL": 0x01, "SINT": 0x02, "INT": 0x03, "DINT": 0x04, "LINT": 0x15},
     **{"USINT": 0x05, "UINT": 0x06, "UDINT": 0x07, "ULINT": 0x1B},
     **{"BYTE": 0x05, "WORD": 0x06, "DWORD": 0x07, "LWORD": 0x1B},
@@ -24,7 +24,7 @@ DATA_TYPES: Final = {
 }
 """Data types of parameters (CiA 311, after IEC 61131-3) and those of CiA 301."""
 
-ACCESS: Final = {
+_ACCESS: Final = {
     **{"const": "const", "read": "ro", "write": "wo", "readWrite": "rw"},
     **{"readWriteInput": "rwr", "readWriteOutput": "rww"},
 }
@@ -34,29 +34,29 @@ _RATE: Final = re.compile(
     r"([0-9]++) *+(?:(k)|(m))? *+(?:bps|bit/s|bd|baud)?", re.ASCII | re.IGNORECASE
 )
 
-IDENTITY: Final = {
+_IDENTITY: Final = {
     **{"vendorName": "VendorName", "vendorID": "VendorNumber", "productName": "ProductName"},
     **{"productID": "ProductNumber", "orderNumber": "OrderCode"},
 }
-FEATURES: Final = {
+_FEATURES: Final = {
     **{"granularity": "Granularity", "nrOfRxPDO": "NrOfRXPDO", "nrOfTxPDO": "NrOfTXPDO"},
     **{"bootUpSlave": "SimpleBootUpSlave", "bootUpMaster": "SimpleBootUpMaster"},
     **{"groupMessaging": "GroupMessaging", "dynamicChannels": "DynamicChannelsSupported"},
     **{"layerSettingServiceSlave": "LSS_Supported", "ngSlave": "NG_Slave"},
     **{"ngMaster": "NG_Master", "NrOfNG_MonitoredNodes": "NrOfNG_MonitoredNodes"},
 }
-COMMISSIONING: Final = {
+_COMMISSIONING: Final = {
     **{"nodeID": "NodeID", "NodeID": "NodeID", "nodeName": "NodeName"},
     **{"networkName": "NetworkName", "networkNumber": "NetNumber"},
     "CANopenManager": "CANopenManager",
 }
 """`nodeID` by CiA 311, `NodeID` as CANopenEditor writes it."""
-OBJECT: Final = {
+_OBJECT: Final = {
     **{"name": "ParameterName", "subNumber": "SubNumber", "defaultValue": "DefaultValue"},
     **{"actualValue": "ParameterValue", "denotation": "Denotation", "objFlags": "ObjFlags"},
     **{"lowLimit": "LowLimit", "highLimit": "HighLimit"},
 }
-FILE: Final = {
+_FILE: Final = {
     **{"fileName": "FileName", "fileVersion": "FileVersion", "fileCreator": "CreatedBy"},
     **{"fileModifiedBy": "ModifiedBy"},
 }
@@ -143,8 +143,8 @@ class _Reader:
         return self.skipped + self.parser.CurrentLineNumber if self.parser is not None else 0
 
     def begin(self, name: str, attributes: dict[str, str]) -> None:
-        if len(self._open) >= DEEPEST:
-            raise XddError(f"is nested deeper than {DEEPEST} elements", self._line)
+        if len(self._open) >= _DEEPEST:
+            raise XddError(f"is nested deeper than {_DEEPEST} elements", self._line)
         plain = {key.rpartition(":")[2]: value for key, value in attributes.items()}
         element = Element(name.rpartition(":")[2], plain, self._line)
         if self._open:
@@ -163,11 +163,11 @@ class _Reader:
         raise XddError("has a document type, which is refused", self._line)
 
 
-Item = tuple[str, str, int]
+_Item = tuple[str, str, int]
 """A keyword, its text, and the line of its element."""
 
 
-def _section(title: str, line: int, items: Iterable[Item]) -> Iterator[EdsLine]:
+def _section(title: str, line: int, items: Iterable[_Item]) -> Iterator[EdsLine]:
     """Give the lines of a section."""
     section = canonical_section(title)
     yield EdsLine(line, f"[{title}]", section, title or "-", content=f"[{title}]")
@@ -176,7 +176,7 @@ def _section(title: str, line: int, items: Iterable[Item]) -> Iterator[EdsLine]:
         yield EdsLine(number, text, section, "", key, value, text)
 
 
-def _renamed(element: Element, names: Mapping[str, str]) -> Iterator[Item]:
+def _renamed(element: Element, names: Mapping[str, str]) -> Iterator[_Item]:
     """Give those attributes of an element that an EDS has keywords for."""
     for name, key in names.items():
         if name in element.attributes:
@@ -185,7 +185,7 @@ def _renamed(element: Element, names: Mapping[str, str]) -> Iterator[Item]:
 
 
 def _head(elements: list[Element]) -> Iterator[EdsLine]:
-    found: dict[str, list[Item]] = {}
+    found: dict[str, list[_Item]] = {}
     for element in elements:
         for title, item in _head_items(element):
             found.setdefault(title, []).append(item)
@@ -193,15 +193,15 @@ def _head(elements: list[Element]) -> Iterator[EdsLine]:
         yield from _section(title, items[0][2], dict.fromkeys(items))
 
 
-def _head_items(element: Element) -> Iterator[tuple[str, Item]]:
+def _head_items(element: Element) -> Iterator[tuple[str, _Item]]:
     """Give what an element says of the file or device, each with its section."""
     match element.name:
         case "ProfileBody":
-            yield from (("FileInfo", item) for item in _renamed(element, FILE))
+            yield from (("FileInfo", item) for item in _renamed(element, _FILE))
         case "CANopenGeneralFeatures" | "CANopenMasterFeatures":
-            yield from (("DeviceInfo", item) for item in _renamed(element, FEATURES))
+            yield from (("DeviceInfo", item) for item in _renamed(element, _FEATURES))
         case "deviceCommissioning":
-            yield from (("DeviceComissioning", item) for item in _renamed(element, COMMISSIONING))
+            yield from (("DeviceComissioning", item) for item in _renamed(element, _COMMISSIONING))
             if "actualBaudRate" in element.attributes:
                 rate = _kbit(element.attributes["actualBaudRate"])
                 yield "DeviceComissioning", ("Baudrate", rate, element.line)
@@ -211,8 +211,8 @@ def _head_items(element: Element) -> Iterator[tuple[str, Item]]:
         case "dummy":
             key, _, value = element.attributes.get("entry", "").partition("=")
             yield "DummyUsage", (key, value, element.line)
-        case name if name in IDENTITY:
-            yield "DeviceInfo", (IDENTITY[name], element.text.strip(), element.line)
+        case name if name in _IDENTITY:
+            yield "DeviceInfo", (_IDENTITY[name], element.text.strip(), element.line)
         case _:
             pass
 
@@ -241,13 +241,13 @@ def _objects(elements: list[Element], parameters: _Parameters) -> Iterator[EdsLi
                 yield from _section(f"{index}sub{sub}", child.line, _entry(child, parameters))
 
 
-def _entry(element: Element, parameters: _Parameters) -> Iterator[Item]:
+def _entry(element: Element, parameters: _Parameters) -> Iterator[_Item]:
     """Give the keywords of an object or one of its entries; its own attributes come first."""
     parameter = parameters.of(element)
-    said = {key: (text, line) for key, text, line in _renamed(element, OBJECT)}
+    said = {key: (text, line) for key, text, line in _renamed(element, _OBJECT)}
     kind = element.attributes.get("objectType", "7")
     said["ObjectType"] = kind, element.line
-    if kind not in COMPOSED:
+    if kind not in _COMPOSED:
         for key, text, line in (*_own(element), *parameters.items(parameter)):
             said.setdefault(key, (text, line))
         mapping = element.attributes.get("PDOmapping", "no")
@@ -263,11 +263,11 @@ def _entry(element: Element, parameters: _Parameters) -> Iterator[Item]:
         yield key, text, line
 
 
-COMPOSED: Final = ("8", "9")
+_COMPOSED: Final = ("8", "9")
 """Object types of arrays and records, which have their values in sub-objects."""
 
 
-def _own(element: Element) -> Iterator[Item]:
+def _own(element: Element) -> Iterator[_Item]:
     """Give data type and access of an element itself."""
     if "dataType" in element.attributes:
         text = element.attributes["dataType"].removeprefix("0x")
@@ -290,12 +290,12 @@ class _Parameters:
         """Return what an element refers to, None if that is not there."""
         return self._known.get(element.attributes.get("uniqueIDRef", ""))
 
-    def items(self, parameter: Element | None) -> Iterator[Item]:
+    def items(self, parameter: Element | None) -> Iterator[_Item]:
         """Give the keywords that a parameter holds."""
         if parameter is None:
             return
         access = parameter.attributes.get("access", "read")
-        yield "AccessType", ACCESS.get(access, access), parameter.line
+        yield "AccessType", _ACCESS.get(access, access), parameter.line
         for child in parameter.children:
             match child.name:
                 case "defaultValue" | "actualValue":
@@ -308,15 +308,15 @@ class _Parameters:
                 case _:
                     yield from self._data_type(child)
 
-    def _data_type(self, child: Element) -> Iterator[Item]:
+    def _data_type(self, child: Element) -> Iterator[_Item]:
         """Give the data type that an element names, or that what it refers to is made of."""
         referred = self.of(child) if child.name == "dataTypeIDRef" else None
         for element in (child, *(referred.children if referred is not None else ())):
-            if element.name in DATA_TYPES:
-                yield "DataType", f"0x{DATA_TYPES[element.name]:04X}", child.line
+            if element.name in _DATA_TYPES:
+                yield "DataType", f"0x{_DATA_TYPES[element.name]:04X}", child.line
 
 
-def _limits(allowed: Element) -> Iterator[Item]:
+def _limits(allowed: Element) -> Iterator[_Item]:
     for area in allowed.children:
         for bound in area.children if area.name == "range" else ():
             if key := {"minValue": "LowLimit", "maxValue": "HighLimit"}.get(bound.name):

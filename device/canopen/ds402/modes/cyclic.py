@@ -5,13 +5,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar, Final
 
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.automaton import Statusword
+from tickrig.device.canopen.ds402.axis import STEP_S, Control, Ramp
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
-from tickrig.device.canopen.ds402.motion.reference import STEP_S, Control
-from tickrig.device.canopen.ds402.motion.stopping import Ramp
-from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.state.automaton import Statusword
 
-STEP_US: Final = 1_000
+_STEP_US: Final = 1_000
 
 
 class LatchedSetPoint(Mode):
@@ -124,7 +123,7 @@ class CyclicPosition(LatchedSetPoint):
 
     def _begin(self) -> None:
         settings = self.settings
-        self._left = max(1, settings.interpolation_us // STEP_US)
+        self._left = max(1, settings.interpolation_us // _STEP_US)
         offset = self.number(indices.VELOCITY_OFFSET)
         self._goal, self._ahead = self.target(), offset * settings.units.per_velocity
 
@@ -220,3 +219,81 @@ class CyclicVelocity(Mode):
         )
         self.flags = Statusword.MODE_12
         return reached
+
+
+# Maxon's own modes: a setting value is the reference at once (EPOS Firmware Specification).
+
+_CURRENT_SETTING: Final = 0x2030
+_POSITION_SETTING: Final = 0x2062
+_VELOCITY_SETTING: Final = 0x206B
+
+SETTINGS: Final = (_CURRENT_SETTING, _POSITION_SETTING, _VELOCITY_SETTING)
+
+
+class PositionSetting(LatchedSetPoint):
+    """Position mode, -1: 2062h in position units.
+
+    That bit 8 of the controlword does nothing in these modes is DECISION K21.
+    """
+
+    index = _POSITION_SETTING
+
+    def follow(self, now_us: int) -> bool:
+        """Be at the setting value."""
+        self.reference.place(self.target())
+        return True
+
+
+class VelocitySetting(Mode):
+    """Velocity mode, -2: 206Bh in velocity units.
+
+    When the mode is chosen while the drive is enabled, 206Bh takes the present
+    velocity (DECISION K21).
+    """
+
+    control = Control.VELOCITY
+    halts = False
+
+    def enter(self, *, enabled: bool) -> None:
+        """Take the present velocity, unless the drive is just being enabled."""
+        if enabled:
+            present = round(self.reference.velocity / self.settings.units.per_velocity)
+            self.drive.parameters.write(_VELOCITY_SETTING, present)
+
+    def run(self, now_us: int) -> bool:
+        """Turn as fast as the setting value."""
+        wanted = self.number(_VELOCITY_SETTING) * self.settings.units.per_velocity
+        velocity = self.take(self.drive.limits.velocity(wanted))
+        self.reference.place(self.reference.position, velocity)
+        return True
+
+
+class CurrentSetting(Mode):
+    """Current mode, -3: 2030h in milliamperes.
+
+    When the mode is chosen while the drive is enabled, 2030h takes the present
+    current (DECISION K21).
+    """
+
+    control = Control.CURRENT
+    halts = False
+
+    def enter(self, *, enabled: bool) -> None:
+        """Take the present current, unless the drive is just being enabled."""
+        if enabled:
+            present = round(1_000 * self.reference.current_a) * self.axis.forward
+            self.drive.parameters.write(_CURRENT_SETTING, present)
+
+    def run(self, now_us: int) -> bool:
+        """Have the current of the setting value."""
+        wanted_a = self.number(_CURRENT_SETTING) / 1_000 * self.axis.forward
+        self.reference.current_a = self.take(self.drive.limits.current(wanted_a))
+        return True
+
+
+MODES: Final[dict[int, type[Mode]]] = {
+    -1: PositionSetting,
+    -2: VelocitySetting,
+    -3: CurrentSetting,
+}
+"""By number in 6060h."""

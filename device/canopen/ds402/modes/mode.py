@@ -5,15 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tickrig.device.canopen.ds402.motion.axis import Axis
-from tickrig.device.canopen.ds402.motion.limits import Clamped, Limits
-from tickrig.device.canopen.ds402.motion.reference import Control
-from tickrig.device.canopen.ds402.motion.stopping import Stopping
-from tickrig.device.canopen.ds402.motion.switches import Switches
-from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.objects.parameters import Parameters
-from tickrig.device.canopen.ds402.objects.settings import Settings
-from tickrig.device.canopen.ds402.state.automaton import Controlword, Statusword
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.automaton import Controlword, Statusword
+from tickrig.device.canopen.ds402.axis import Axis, Clamped, Control, Limits, Stopping, Switches
+from tickrig.device.canopen.ds402.settings import Parameters, Settings
 from tickrig.device.twin import Part
 
 

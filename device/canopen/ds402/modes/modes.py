@@ -3,21 +3,120 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final
+from typing import ClassVar, Final
 
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.automaton import Statusword
+from tickrig.device.canopen.ds402.axis import STEP_S, Control
 from tickrig.device.canopen.ds402.modes.cyclic import (
     CyclicPosition,
     CyclicVelocity,
     InterpolatedPosition,
 )
 from tickrig.device.canopen.ds402.modes.homing import Homing
-from tickrig.device.canopen.ds402.modes.mode import Mode
+from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
 from tickrig.device.canopen.ds402.modes.profile_position import ProfilePosition
-from tickrig.device.canopen.ds402.modes.velocity_and_torque import (
-    CyclicTorque,
-    ProfileTorque,
-    ProfileVelocity,
-)
+
+# Profile velocity, profile torque and cyclic synchronous torque mode (CiA 402-2).
+
+
+class ProfileVelocity(Mode):
+    """Ramps to the target velocity with 6083h and 6084h.
+
+    Bit 10: the velocity is within 606Dh of the target for 606Eh; without a window,
+    the ramp has ended. Bit 12: the speed is not above 606Fh for 6070h; without a
+    threshold, it stands.
+
+    Not emulated: the maximum slippage, bit 13; ramps of other shapes (6086h).
+    """
+
+    control: ClassVar[Control] = Control.VELOCITY
+
+    def __init__(self, drive: DriveView) -> None:
+        super().__init__(drive)
+        self._arrived, self._slow = Window(), Window()
+
+    def run(self, now_us: int) -> bool:
+        """Accelerate or brake."""
+        settings = self.settings
+        wanted = self.target_velocity()
+        ended = self.reference.ramp(wanted, settings.acceleration, settings.deceleration)
+        self._show(now_us, ended, wanted)
+        return ended and not (self._arrived.waiting or self._slow.waiting)
+
+    def halt(self, now_us: int) -> bool:
+        """Brake as 605Dh says."""
+        stands = self.drive.stopping.by(indices.HALT_OPTION)
+        self._show(now_us, stands, 0.0)
+        return stands and not (self._arrived.waiting or self._slow.waiting)
+
+    def _show(self, now_us: int, ended: bool, wanted: float) -> None:
+        settings = self.settings
+        actual, window = self.axis.motor.velocity_counts_s, settings.velocity_window
+        near = abs(actual - wanted) <= window if window else ended
+        threshold = settings.velocity_threshold
+        slow = abs(actual) <= threshold if threshold else self.reference.velocity == 0
+        flags = Statusword(0)
+        if self._arrived.holds(now_us, near, settings.velocity_window_us):
+            flags |= Statusword.TARGET_REACHED
+        if self._slow.holds(now_us, slow, settings.velocity_threshold_us):
+            flags |= Statusword.MODE_12
+        self.flags = flags
+
+
+class ProfileTorque(Mode):
+    """Ramps the current to the target torque, 6071h, with the slope 6087h.
+
+    The torque is taken as the current: rated torque at rated current, without
+    friction. Halt ramps it to zero. Bit 10: the ramp has ended.
+
+    Not emulated: other torque profiles than the linear ramp (6088h).
+    """
+
+    control: ClassVar[Control] = Control.CURRENT
+
+    def run(self, now_us: int) -> bool:
+        """Ramp to the target."""
+        return self._ramp(self.target_current())
+
+    def halt(self, now_us: int) -> bool:
+        """Ramp to zero."""
+        return self._ramp(0.0)
+
+    def _ramp(self, wanted_a: float) -> bool:
+        reference, most = self.reference, self.settings.torque_slope_a_s * STEP_S
+        away = wanted_a - reference.current_a
+        if abs(away) <= most:
+            reference.current_a, self.flags = wanted_a, Statusword.TARGET_REACHED
+            return True
+        reference.current_a += most if away > 0 else -most
+        self.flags = Statusword(0)
+        return False
+
+
+class CyclicTorque(Mode):
+    """Has the torque 6071h and the offset 60B2h at once.
+
+    When the mode is chosen while the drive is enabled, the target torque becomes
+    that of the motor.
+    """
+
+    control: ClassVar[Control] = Control.CURRENT
+    halts = False
+
+    def enter(self, *, enabled: bool) -> None:
+        """Take the present torque for the target, unless the drive is just being enabled."""
+        if enabled:
+            present = self.axis.per_mille_of(self.reference.current_a)
+            offset = self.number(indices.TORQUE_OFFSET)
+            self.drive.parameters.write(indices.TARGET_TORQUE, present - offset)
+
+    def run(self, now_us: int) -> bool:
+        """Follow."""
+        self.reference.current_a = self.target_current(self.number(indices.TORQUE_OFFSET))
+        self.flags = Statusword.MODE_12
+        return True
+
 
 MODES: Final[dict[int, type[Mode]]] = {
     0: Mode,

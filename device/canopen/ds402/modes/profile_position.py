@@ -5,18 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.automaton import Controlword, Statusword
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
-from tickrig.device.canopen.ds402.motion.path_follower import PathFollower, began_us
-from tickrig.device.canopen.ds402.motion.trapezoid import (
+from tickrig.device.canopen.ds402.settings import Settings
+from tickrig.device.canopen.ds402.trapezoid import (
     Path,
+    PathFollower,
     PathLimits,
     RampShape,
+    began_us,
     to_position,
     to_velocity,
 )
-from tickrig.device.canopen.ds402.objects import indices
-from tickrig.device.canopen.ds402.objects.settings import Settings
-from tickrig.device.canopen.ds402.state.automaton import Controlword, Statusword
 from tickrig.device.twin import Immutable
 
 SLOWEST: Final = 1.0
@@ -121,13 +122,13 @@ class ProfilePosition(Mode):
         self._last, cut = self.drive.limits.position(target)
         number = self.number(indices.MOTION_PROFILE)
         shape = RampShape.SIN2 if number == RampShape.SIN2 else RampShape.LINEAR
-        limits = profile_limits(settings, shape)
+        limits = _profile_limits(settings, shape)
         return SetPoint(self._last, limits, settings.end_velocity, cut)
 
     def _plan(self, now_us: int) -> Path:
         start, point = self._path.motion, self._present
         if point is None:
-            return to_velocity(now_us, start, 0.0, profile_limits(self.settings))
+            return to_velocity(now_us, start, 0.0, _profile_limits(self.settings))
         return to_position(now_us, start, point.target, point.limits, point.end_velocity)
 
     def _show(self, now_us: int) -> None:
@@ -148,7 +149,7 @@ class ProfilePosition(Mode):
             self.flags |= Statusword.MODE_12
 
 
-def profile_limits(settings: Settings, shape: RampShape = RampShape.LINEAR) -> PathLimits:
+def _profile_limits(settings: Settings, shape: RampShape = RampShape.LINEAR) -> PathLimits:
     """Return what 6081h, 6083h and 6084h allow; a profile velocity of 0 is the slowest one."""
     return PathLimits(
         max(SLOWEST, settings.profile_velocity),

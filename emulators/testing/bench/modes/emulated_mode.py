@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from tickrig.emulators.bench.control import EmulatorControl
-from tickrig.emulators.bench.fault_order import FaultOrder
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
-from tickrig.emulators.testing.bench.triggers import Condition, text_of, when
+from tickrig.emulators.testing.bench.tasks import Condition, text_of, when
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.host.control.requests import VERSION, Object
 
@@ -61,7 +60,7 @@ class EmulatedMode(ABC):
     def request(self, do: str, **fields: object) -> Object:
         """Ask as the control socket is asked; ValueError if it is refused."""
         request = {"v": VERSION, "do": do, **fields}
-        return answer_of(self.act(lambda rig: self._control.answer(request)))
+        return _answer_of(self.act(lambda rig: self._control.answer(request)))
 
     def fault(
         self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
@@ -140,7 +139,7 @@ class EmulatedMode(ABC):
         return self.act(lambda rig: rig.journal.unfinished())
 
 
-def answer_of(answer: Object) -> Object:
+def _answer_of(answer: Object) -> Object:
     """Return an answer; ValueError with its text if it is a refusal."""
     if not answer["ok"]:
         raise ValueError(str(answer["error"]))

@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from tickrig.emulators.bench.fault_order import FaultOrder
-from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig
-from tickrig.emulators.testing.bench.triggers import Condition
+from tickrig.emulators.testing.bench.tasks import Condition
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.host.control.requests import Object
 

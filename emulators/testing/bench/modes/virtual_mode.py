@@ -11,9 +11,8 @@ from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchError
 from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
-from tickrig.emulators.testing.bench.modes.virtual_doors import VirtualDoors
+from tickrig.emulators.testing.bench.modes.virtual_doors import LONGEST_US, RigPassing, VirtualDoors
 from tickrig.emulators.testing.bench.tasks import DAY_US
-from tickrig.emulators.testing.host_clock.rig_passing import LONGEST_US, RigPassing
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
 
@@ -26,11 +25,11 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-LOOK_US: Final = 1_000
-LOOKS: Final = 10_000
+_LOOK_US: Final = 1_000
+_LOOKS: Final = 10_000
 """A condition is looked at each millisecond, in long waits so often."""
 
-EXACT: Final = Tolerances(stick_pct=0, time_us=0)
+_EXACT: Final = Tolerances(stick_pct=0, time_us=0)
 
 
 class VirtualMode(EmulatedMode):
@@ -43,7 +42,7 @@ class VirtualMode(EmulatedMode):
     name = "virtual"
 
     def __init__(self, rig: BenchRig) -> None:
-        super().__init__(rig, EXACT)
+        super().__init__(rig, _EXACT)
         self._doors, self._closed = VirtualDoors(rig), False
 
     @property
@@ -72,7 +71,7 @@ class VirtualMode(EmulatedMode):
         rig = self._rig.rig
         for_ever = rig.now_us + within_us >= NEVER
         until_us = rig.now_us + (DAY_US if for_ever else within_us)
-        look_us = max(LOOK_US, (LONGEST_US if for_ever else within_us) // LOOKS)
+        look_us = max(_LOOK_US, (LONGEST_US if for_ever else within_us) // _LOOKS)
         found = done()
         while not found:
             if rig.now_us >= until_us or (for_ever and rig.next_us == NEVER):

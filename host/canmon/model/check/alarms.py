@@ -8,10 +8,9 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
 from tickrig.host.canmon.model.check.checker import Checker
-from tickrig.host.canmon.model.check.rule import Finding
+from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import NO_LOSS, Rules
-from tickrig.host.canmon.model.frames.quantity import s_text
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record, s_text
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
@@ -29,7 +28,7 @@ KEPT: Final = 1_000
 """Findings that are kept."""
 
 
-class State(StrEnum):
+class AlarmState(StrEnum):
     """How a rule stands."""
 
     HOLDS = "holds"
@@ -51,17 +50,17 @@ class Alarm:
 
     rule: str
     count: int = 0
-    finding: Finding | None = None
+    finding: TrafficFinding | None = None
     lasting: bool = False
     acknowledged: bool = True
 
-    def state(self, now_us: int) -> State:
+    def state(self, now_us: int) -> AlarmState:
         """Return how it stands."""
         if self.finding is None:
-            return State.HOLDS
+            return AlarmState.HOLDS
         if self.lasting or now_us - self.finding.at_us < RECENT_US:
-            return State.BROKEN
-        return State.HOLDS if self.acknowledged else State.WAS_BROKEN
+            return AlarmState.BROKEN
+        return AlarmState.HOLDS if self.acknowledged else AlarmState.WAS_BROKEN
 
 
 @dataclass(slots=True)
@@ -84,7 +83,7 @@ class Alarms:
     rules: Rules
     bit_rate: int | None = None
     data_bit_rate: int | None = None
-    findings: deque[Finding] = field(init=False)
+    findings: deque[TrafficFinding] = field(init=False)
     judged: bool = field(init=False)
     _checker: Checker = field(init=False)
     _alarms: dict[str, Alarm] = field(init=False)
@@ -120,7 +119,7 @@ class Alarms:
         if self._begin_us is None or now_us < self._begin_us:  # until a frame has told its time
             self._begin_us = now_us
         if lost > self._lost and self.rules.no_loss:
-            self._found(Finding(now_us, NO_LOSS, f"{lost - self._lost} frames were lost"))
+            self._found(TrafficFinding(now_us, NO_LOSS, f"{lost - self._lost} frames were lost"))
         self._lost = lost
         for finding in self._checker.advance(now_us - LATE_US):
             self._found(finding)
@@ -133,14 +132,14 @@ class Alarms:
 
     def broken(self, now_us: int) -> int:
         """Count the rules that are broken now."""
-        return sum(alarm.state(now_us) is State.BROKEN for alarm in self._alarms.values())
+        return sum(alarm.state(now_us) is AlarmState.BROKEN for alarm in self._alarms.values())
 
     def acknowledge(self) -> None:
         """Take note of all that was broken."""
         for alarm in self._alarms.values():
             alarm.acknowledged = True
 
-    def _miss(self, missing: list[Finding]) -> None:
+    def _miss(self, missing: list[TrafficFinding]) -> None:
         """Note what is missing: once, however long it lasts."""
         for alarm in self._alarms.values():
             finding = _joined([one for one in missing if one.rule == alarm.rule])
@@ -152,31 +151,31 @@ class Alarms:
                 self._found(finding)
                 alarm.lasting = True
 
-    def _found(self, finding: Finding) -> None:
+    def _found(self, finding: TrafficFinding) -> None:
         alarm = self._alarms[finding.rule]
         alarm.count += 1
         alarm.finding, alarm.acknowledged = finding, False
         self.findings.append(finding)
 
 
-def _joined(findings: list[Finding]) -> Finding | None:
+def _joined(findings: list[TrafficFinding]) -> TrafficFinding | None:
     if not findings:
         return None
     return findings[0]._replace(text="; ".join(one.text for one in findings))
 
 
 RULE: Final = "RULE"
-RULE_WIDTHS: Final = (20, 40)
+_RULE_WIDTHS: Final = (20, 40)
 """The first column, and how wide it is at least and at most."""
 
-NO_FRAME: Final = "no frame"
+_NO_FRAME: Final = "no frame"
 """The state of a rule that does not hold yet: nothing came."""
 
 
 def render_alarms(alarms: Alarms, now_us: int) -> list[str]:
     """Return a line for each rule below a head, then the findings, the latest first."""
     rows = alarms.rows()
-    least, most = RULE_WIDTHS
+    least, most = _RULE_WIDTHS
     width = min(most, max([least, *(len(alarm.rule) for alarm in rows)]))
     head = f"{RULE:<{width}} {'STATE':<10} {'COUNT':>6} {'AGO':>8}  LATEST"
     lines = [head, *(_line(alarm, now_us, alarms.judged, width) for alarm in rows)]
@@ -186,8 +185,8 @@ def render_alarms(alarms: Alarms, now_us: int) -> list[str]:
 
 def _line(alarm: Alarm, now_us: int, judged: bool, width: int) -> str:
     state, finding = str(alarm.state(now_us)), alarm.finding
-    if state == State.HOLDS and not judged:
-        state = NO_FRAME
+    if state == AlarmState.HOLDS and not judged:
+        state = _NO_FRAME
     ago = "" if finding is None else f"{s_text(now_us - finding.at_us)} s"
     text = "" if finding is None else finding.text
     name = alarm.rule if len(alarm.rule) <= width else f"{alarm.rule[: width - 1]}…"

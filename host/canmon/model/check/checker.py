@@ -13,19 +13,21 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from tickrig.host.canmon.model.check.frame_rules import NoErrorFrames
-from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, Finding, Rule, Seen
+from tickrig.host.canmon.model.check.rule import (
+    ONE_TIME,
+    CheckedTraffic,
+    Rule,
+    Seen,
+    TrafficFinding,
+)
 from tickrig.host.canmon.model.check.rules import NO_EDS, NO_LOSS, EdsHeartbeats, Rules
 from tickrig.host.canmon.model.check.time_rules import MaxLoad
-from tickrig.host.canmon.model.frames.ident import ERROR, any_ident
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
-from tickrig.host.canmon.model.traffic.bit_rates import BitRates
-from tickrig.host.canmon.model.traffic.traffic import Load, Window
-from tickrig.wire.can_bits import frame_bits
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.model.frames import ERROR, AnyFrame, Record, any_ident
+from tickrig.host.canmon.model.traffic import BitRates, BusSecond, Load
+from tickrig.wire.can import ErrorFrame, FdFrame, frame_bits
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check.expression.expression_rule import ExpressionRule
+    from tickrig.host.canmon.model.check.expression_rule import ExpressionRule
     from tickrig.host.canmon.model.decode.decoded import Decoded
 
 
@@ -58,7 +60,7 @@ class Checker:
         self._expressions = [rule for one in rules.expressions for rule in one.make()]
         self._rates = BitRates(bit_rate or rules.bit_rate, data_bit_rate)
 
-    def take(self, record: Record, decoded: Decoded | None = None) -> list[Finding]:
+    def take(self, record: Record, decoded: Decoded | None = None) -> list[TrafficFinding]:
         """Return what is wrong with a frame, and with the second that it ended.
 
         Args:
@@ -74,12 +76,12 @@ class Checker:
                 found.append(finding)
         return found
 
-    def advance(self, now_us: int) -> list[Finding]:
+    def advance(self, now_us: int) -> list[TrafficFinding]:
         """Return what has not come in time, where no frame tells the time."""
         late = [rule for rule in self._expressions if rule.due_us < now_us]
         return [one for rule in late for one in rule.advance(now_us)]
 
-    def _taken(self, record: Record) -> list[Finding]:
+    def _taken(self, record: Record) -> list[TrafficFinding]:
         at_us, channel, frame, _ = record
         if not self._begun:
             self._begun = True
@@ -105,7 +107,7 @@ class Checker:
         lost: Iterable[str] = (),
         judged_us: int | None = None,
         errors: Iterable[str] = (),
-    ) -> list[Finding]:
+    ) -> list[TrafficFinding]:
         """Return what is missing.
 
         Args:
@@ -120,7 +122,7 @@ class Checker:
         judged_us = end_us if judged_us is None else judged_us
         return found + self.advance(judged_us) + self._written_ended(judged_us)
 
-    def missing(self, now_us: int) -> list[Finding]:
+    def missing(self, now_us: int) -> list[TrafficFinding]:
         """Return what is missing until now; listening goes on."""
         found = ended(self._rules, self._made, self._latest(), now_us, (), ())
         return found + self._written_ended(now_us)
@@ -142,22 +144,22 @@ class Checker:
             latest[ident] = max(at_us, latest.get(ident, at_us))
         return latest
 
-    def _written_ended(self, end_us: int) -> list[Finding]:
+    def _written_ended(self, end_us: int) -> list[TrafficFinding]:
         return [one for rule in self._expressions for one in rule.end(end_us)]
 
-    def judge_window(self, channel: str, window: Window) -> list[Finding]:
+    def judge_window(self, channel: str, window: BusSecond) -> list[TrafficFinding]:
         """Return what is wrong with a second of a bus."""
         text = self._load.judge(channel, window) if self._load else None
-        return [] if text is None else [Finding(window.at_us, "max-load", text)]
+        return [] if text is None else [TrafficFinding(window.at_us, "max-load", text)]
 
-    def _judged(self, ident: int, record: Record, gap_us: int | None) -> list[Finding]:
+    def _judged(self, ident: int, record: Record, gap_us: int | None) -> list[TrafficFinding]:
         wanting = self._wanting.get(ident)
         if wanting is None:
             wanting = self._wanting[ident] = [rule for rule in self._made if rule.wants(ident)]
         texts = ((rule.name, rule.judge(record, gap_us)) for rule in wanting)
-        return [Finding(record.at_us, name, text, record) for name, text in texts if text]
+        return [TrafficFinding(record.at_us, name, text, record) for name, text in texts if text]
 
-    def _too_busy(self, at_us: int, channel: str, frame: AnyFrame) -> list[Finding]:
+    def _too_busy(self, at_us: int, channel: str, frame: AnyFrame) -> list[TrafficFinding]:
         load = self._loads.get(channel)
         if load is None:
             load = self._loads[channel] = Load(at_us)
@@ -175,14 +177,16 @@ def ended(  # noqa: PLR0913, PLR0917 - all that there is at the end
     end_us: int,
     lost: Iterable[str],
     errors: Iterable[str],
-) -> list[Finding]:
+) -> list[TrafficFinding]:
     """Return what rules miss at the end, and what the source says that they forbid."""
     found = [
-        Finding(end_us, rule.name, text) for rule in made for text in rule.end(latest_us, end_us)
+        TrafficFinding(end_us, rule.name, text)
+        for rule in made
+        for text in rule.end(latest_us, end_us)
     ]
     if rules.no_error_frames:
-        found += [Finding(end_us, NoErrorFrames.name, text) for text in errors]
-    return found + [Finding(end_us, NO_LOSS, text) for text in lost if rules.no_loss]
+        found += [TrafficFinding(end_us, NoErrorFrames.name, text) for text in errors]
+    return found + [TrafficFinding(end_us, NO_LOSS, text) for text in lost if rules.no_loss]
 
 
 class Unjudged(NamedTuple):

@@ -13,24 +13,32 @@ from tickrig.host.canmon.model.check.checker import Unjudged, ended, unjudged
 from tickrig.host.canmon.model.check.rule import (
     NO_GAP_US,
     CheckedTraffic,
-    Finding,
     FrameSelection,
     Rule,
     Seen,
+    TrafficFinding,
 )
 from tickrig.host.canmon.model.check.rules import NO_EDS, EdsHeartbeats, Rules
 from tickrig.host.canmon.model.check.time_rules import MaxLoad
 from tickrig.host.canmon.model.columns.column_bits import column_bits
-from tickrig.host.canmon.model.columns.column_load import ColumnLoad
-from tickrig.host.canmon.model.columns.columns import Columns, Ints, by_channel, records, select
-from tickrig.host.canmon.model.columns.runs import Identifiers, Runs, grown
-from tickrig.host.canmon.model.frames.ident import ERROR
+from tickrig.host.canmon.model.columns.columns import (
+    ColumnLoad,
+    Columns,
+    Identifiers,
+    Ints,
+    Runs,
+    by_channel,
+    grown,
+    records,
+    select,
+)
+from tickrig.host.canmon.model.frames import ERROR
 
-Flags = npt.NDArray[np.bool_]
+_Flags = npt.NDArray[np.bool_]
 
-NEVER_US: Final = np.iinfo(np.int64).max
+_NEVER_US: Final = np.iinfo(np.int64).max
 
-Placed = tuple[int, int, Finding]
+_Placed = tuple[int, int, TrafficFinding]
 """A finding with its row, and its place among those of the row: the order of `Checker`."""
 
 
@@ -61,13 +69,13 @@ class ColumnChecker:
         self._loads: dict[str, ColumnLoad] = {}
         self._last_us, self._begun = 0, False
 
-    def take(self, columns: Columns) -> list[Finding]:
+    def take(self, columns: Columns) -> list[TrafficFinding]:
         """Return what is wrong with a block of frames, and with the seconds that they ended."""
         if len(columns) and not self._begun:
             self._begun = True
             for rule in self._made:
                 rule.begin(int(columns.at_us[0]))
-        placed: list[Placed] = []
+        placed: list[_Placed] = []
         found, gaps_us = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
         for channel, rows, frames in by_channel(columns):
             if self._limit is not None:
@@ -82,7 +90,7 @@ class ColumnChecker:
         placed.sort(key=lambda one: one[:2])
         return [finding for _, _, finding in placed]
 
-    def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[Finding]:
+    def end(self, lost: Iterable[str] = (), errors: Iterable[str] = ()) -> list[TrafficFinding]:
         """Return what is missing.
 
         Args:
@@ -93,7 +101,7 @@ class ColumnChecker:
         for channel, seconds in sorted(self._loads.items()):
             window = seconds.load.end()
             text = self._limit.judge(channel, window) if self._limit else None
-            found += [Finding(window.at_us, MaxLoad.name, text)] if text else []
+            found += [TrafficFinding(window.at_us, MaxLoad.name, text)] if text else []
         latest_us: dict[int, int] = {}
         for selection in self._selections.values():
             for ident, one in selection.seen():
@@ -112,16 +120,16 @@ class ColumnChecker:
 
     def _too_busy(
         self, limit: MaxLoad, channel: str, rows: Ints, frames: Columns
-    ) -> Iterable[Placed]:
+    ) -> Iterable[_Placed]:
         if channel not in self._loads:
             self._loads[channel] = ColumnLoad(int(frames.at_us[0]))
         plain = np.flatnonzero(frames.ident & ERROR == 0)
         bits = column_bits(frames.ident[plain], frames.dlc[plain], frames.payload[plain])
         for window, row in self._loads[channel].take(frames.at_us[plain], bits):
             if text := limit.judge(channel, window):
-                yield int(rows[plain[row]]), 0, Finding(window.at_us, limit.name, text)
+                yield int(rows[plain[row]]), 0, TrafficFinding(window.at_us, limit.name, text)
 
-    def _judged(self, columns: Columns, rows: Ints, gaps_us: Ints) -> Iterable[Placed]:
+    def _judged(self, columns: Columns, rows: Ints, gaps_us: Ints) -> Iterable[_Placed]:
         """Let the rules see selected frames, in the order of the log."""
         order = np.argsort(rows, kind="stable")
         rows, selected = rows[order], select(columns, rows[order])
@@ -142,7 +150,7 @@ class ColumnChecker:
             for place, rule in wanting:
                 text = rule.judge(record, None if gap_us == NO_GAP_US else gap_us)
                 if text:
-                    yield row, place, Finding(record.at_us, rule.name, text, record)
+                    yield row, place, TrafficFinding(record.at_us, rule.name, text, record)
 
 
 class BusSelection:
@@ -190,7 +198,7 @@ class BusSelection:
         self._below_us, self._above_us = grown(self._below_us, count), grown(self._above_us, count)
         self._all, self._firsts = grown(self._all, count), grown(self._firsts, count)
         self._bytes, self._frames = grown(self._bytes, count), grown(self._frames, count)
-        self._above_us[before:] = NEVER_US
+        self._above_us[before:] = _NEVER_US
         for number in range(before, count):
             ident = int(self._idents.idents[number])
             for rule in self._rules:
@@ -207,7 +215,7 @@ class BusSelection:
         if above_us is not None:
             self._above_us[number] = min(self._above_us[number], above_us)
 
-    def _selected(self, runs: Runs, payload: npt.NDArray[np.uint64]) -> Flags:
+    def _selected(self, runs: Runs, payload: npt.NDArray[np.uint64]) -> _Flags:
         """Say which frames are selected, in the order of the runs."""
         numbers, lengths = runs.numbers, runs.lengths
         selected = np.repeat(self._all[numbers], lengths)

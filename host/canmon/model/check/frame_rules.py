@@ -12,21 +12,18 @@ from tickrig.host.canmon.model.check.time_rules import (
     ERROR_CONTROL_IDS,
     REQUEST_IDS,
 )
-from tickrig.host.canmon.model.frames.ident import ERROR, any_ident, ident_text, sender_of
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import ERROR, Record, any_ident, ident_text, sender_of
 from tickrig.host.text.values import counted
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame, describe_error_frame
+from tickrig.wire.can import CanFrame, ErrorFrame, describe_error_frame
 from tickrig.wire.canopen.emcy import describe
 from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
-from tickrig.wire.canopen.sdo.abort import describe_abort
-from tickrig.wire.canopen.sdo.sdo_command import FRAME_BYTES, ClientCommand, index_sub
+from tickrig.wire.canopen.sdo_frame import FRAME_BYTES, ClientCommand, describe_abort, index_sub
 
-EMCY_IDS: Final = range(0x081, 0x100)
-NODE_MASK: Final = 0x7F
-CODE_BYTES: Final = 2
-EMCY_BYTES: Final = 8
-NAMED_BYTES: Final = 4
+_EMCY_IDS: Final = range(0x081, 0x100)
+_NODE_MASK: Final = 0x7F
+_CODE_BYTES: Final = 2
+_EMCY_BYTES: Final = 8
+_NAMED_BYTES: Final = 4
 """An SDO frame of so many bytes names its object."""
 
 
@@ -48,19 +45,19 @@ class NoEmcy(CanopenRule):
 
     def wants(self, ident: int, /) -> bool:
         """Take the COB-IDs of EMCY."""
-        return ident in EMCY_IDS
+        return ident in _EMCY_IDS
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Name the error."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
-        data, node = frame.data, frame.can_id & NODE_MASK
-        code = int.from_bytes(data[:CODE_BYTES], "little")
-        if len(data) < CODE_BYTES:
+        data, node = frame.data, frame.can_id & _NODE_MASK
+        code = int.from_bytes(data[:_CODE_BYTES], "little")
+        if len(data) < _CODE_BYTES:
             self._cut += 1
-        if not code or len(data) < CODE_BYTES:
+        if not code or len(data) < _CODE_BYTES:
             return None
-        length = "" if len(data) == EMCY_BYTES else f" ({len(data)} B, {EMCY_BYTES} are right)"
+        length = "" if len(data) == _EMCY_BYTES else f" ({len(data)} B, {_EMCY_BYTES} are right)"
         return f"node {node}: EMCY {code:04X}h {describe(code)}{length}"
 
     def notes(self, evidence: CheckedTraffic, /) -> Iterable[str]:
@@ -87,7 +84,7 @@ class NoSdoAbort(CanopenRule):
         frame = record.frame
         assert isinstance(frame, CanFrame)
         data = frame.data
-        if len(data) < NAMED_BYTES or data[0] != ClientCommand.ABORT:
+        if len(data) < _NAMED_BYTES or data[0] != ClientCommand.ABORT:
             return None
         index, sub = index_sub(data)
         which = f"{index:04X}h:{sub:02X}" if index or sub else "its transfer"
@@ -95,7 +92,7 @@ class NoSdoAbort(CanopenRule):
         reason = describe_abort(int.from_bytes(data[4:], "little"))
         if len(data) < FRAME_BYTES:
             reason = f"without a whole abort code ({len(data)} B, {FRAME_BYTES} are right)"
-        node = frame.can_id & NODE_MASK
+        node = frame.can_id & _NODE_MASK
         return f"node {node}: {side} aborts {which}, {reason}"
 
 
@@ -153,7 +150,7 @@ def _text(record: Record) -> str:
     return ident_text(any_ident(record.frame))
 
 
-RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
+_RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
 
 
 class NodesPresent(Rule):
@@ -199,7 +196,7 @@ class NoReboot(CanopenRule):
     def selection(self, ident: int, /) -> FrameSelection:
         """Suspect resets and boot-ups; the first frame of anything else tells of its node."""
         if ident == NMT_COB_ID:
-            return FrameSelection(first_bytes=RESETS)
+            return FrameSelection(first_bytes=_RESETS)
         boot_up = frozenset(BOOT_UP) if ident in ERROR_CONTROL_IDS else frozenset()
         return FrameSelection(first_bytes=boot_up, firsts=True)
 
@@ -209,7 +206,7 @@ class NoReboot(CanopenRule):
         assert isinstance(frame, CanFrame)
         node = sender_of(frame.can_id)
         if node is None:
-            if len(frame.data) == 2 and frame.data[0] in RESETS:
+            if len(frame.data) == 2 and frame.data[0] in _RESETS:
                 self._expect_reset(frame.data[1])
             return None
         is_new = (record.channel, node) not in self._present

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tickrig.host.canmon.model.frames.ident import ERROR, REMOTE
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import ERROR, REMOTE, Record
 from tickrig.wire.can import STANDARD_MAX
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
-    from tickrig.host.canmon.model.frames.dump_line import DumpLines
+    from tickrig.host.canmon.model.frames import DumpLines
 
 
-class Finding(NamedTuple):
+class TrafficFinding(NamedTuple):
     """What is wrong, where and when.
 
     Attributes:
@@ -50,7 +49,7 @@ class Finding(NamedTuple):
         head = self.line if lines is None else self._line(lines.stamp(self.at_us).strip())
         if not self.around:
             return head
-        from tickrig.host.canmon.model.frames.dump_line import (  # noqa: PLC0415 - seldom wanted
+        from tickrig.host.canmon.model.frames import (  # noqa: PLC0415 - seldom wanted
             DumpLines,
             Stamp,
             decoded_text,

@@ -24,13 +24,15 @@ from tickrig.host.canmon.model.check.time_rules import (
     MaxLoad,
     NoLostHeartbeat,
 )
-from tickrig.host.canmon.model.frames.ident import FD, REMOTE, ident_text, parse_ident
+from tickrig.host.canmon.model.frames import FD, REMOTE, ident_text, parse_ident
 from tickrig.host.text.names import closest
-from tickrig.host.text.values import parse_time_with_unit_us
+from tickrig.host.text.toml_reader import load_toml, read_toml
+from tickrig.host.text.values import counted, parse_time_with_unit_us
 from tickrig.wire.can import EXTENDED_MAX
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.check.expression.parse_rule import Expression
+    from tickrig.host.canmon.model.check.rule_parser import Expression
+
 
 NO_LOSS: Final = "no-loss"
 """The rule that no frame was lost and every line of a log is one."""
@@ -115,7 +117,7 @@ class Rules:
 RuleValues = Mapping[str, object]
 """Rules by their names with underscores: True, a number, text, a list of texts, or a table."""
 
-LoadRule = Callable[[str], Callable[[], Rule]]
+_LoadRule = Callable[[str], Callable[[], Rule]]
 
 SWITCHES: Final = (
     "no_emcy",
@@ -125,14 +127,14 @@ SWITCHES: Final = (
     "no_lost_heartbeat",
     "no_loss",
 )
-NUMBERS: Final = ("max_load", "bitrate")
-LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
-VALUES: Final = (*NUMBERS, *LISTS)
+_NUMBERS: Final = ("max_load", "bitrate")
+_LISTS: Final = ("heartbeat", "nodes", "max_gap", "known", "rule")
+VALUES: Final = (*_NUMBERS, *_LISTS)
 
 _HEARTBEAT: Final = re.compile(r"([0-9]{1,3})=([^±+]+)(?:±|\+-)([0-9]+(?:\.[0-9]+)?)(%|s|ms|us)")
 _NAMES: Final = re.compile(r"[\w.-]*(?:\s*,\s*[\w.-]+)*", re.ASCII)
 _NAMED: Final = re.compile(r"(.*\S): (.*)", re.DOTALL)
-ONE_WORD: Final = ("dlc",)
+_ONE_WORD: Final = ("dlc",)
 """Rules that are written out as one word, and no names."""
 _NODES: Final = re.compile(r"([0-9]{1,9})(?:-([0-9]{1,9}))?")
 _MAX_NODE: Final = 127
@@ -143,7 +145,7 @@ def _no_rule(name: str) -> Callable[[], Rule]:
     raise ValueError(f"no rule {name!r}")
 
 
-def parse_rules(words: RuleValues, load_rule: LoadRule = _no_rule) -> Rules:
+def parse_rules(words: RuleValues, load_rule: _LoadRule = _no_rule) -> Rules:
     """Read rules.
 
     Args:
@@ -190,7 +192,7 @@ def joined(first: RuleValues, second: RuleValues) -> RuleValues:
     """
     out = dict(first)
     for name, value in second.items():
-        both = name in LISTS and name in first
+        both = name in _LISTS and name in first
         out[name] = [*_texts(name, first), *_texts(name, second)] if both else value
     return out
 
@@ -200,10 +202,10 @@ def _named_and_written(texts: Iterable[str]) -> tuple[list[str], tuple[Expressio
     names: list[str] = []
     expressions: list[Expression] = []
     for text in texts:
-        if _NAMES.fullmatch(text) and text not in ONE_WORD:
+        if _NAMES.fullmatch(text) and text not in _ONE_WORD:
             names += [part.strip() for part in text.split(",")]
             continue
-        from tickrig.host.canmon.model.check.expression.parse_rule import (  # noqa: PLC0415 - seldom wanted
+        from tickrig.host.canmon.model.check.rule_parser import (  # noqa: PLC0415 - seldom wanted
             parse_rule,
         )
 
@@ -291,3 +293,51 @@ def _idents(text: str) -> Iterator[int]:
         yield ident
         if not ident & FD:
             yield ident | REMOTE
+
+
+# A file of rules, in TOML: all that is wrong with it is told at once.
+
+
+def parse_rule_file(text: str, load_rule: _LoadRule) -> RuleValues:
+    """Return the rules of a file by their names.
+
+    Args:
+        text: the whole file.
+        load_rule: see `parse_rules`.
+
+    Raises:
+        ValueError: what is wrong, each mistake with its line.
+    """
+    try:
+        words = load_toml(text)
+        parse_rules(words, load_rule)
+    except ValueError as error:
+        mistakes = _mistakes(text, load_rule) or [str(error)]
+        if len(mistakes) == 1:
+            raise ValueError(mistakes[0]) from None
+        lines = (f"\n  {mistake}" for mistake in mistakes)
+        raise ValueError(f"{counted(len(mistakes), 'mistake')}{''.join(lines)}") from None
+    return words
+
+
+def _mistakes(text: str, load_rule: _LoadRule) -> list[str]:
+    """Try each rule alone; of text that is no TOML nothing else is said."""
+    document = read_toml(text)
+    found = [(line, reason) for line, reason in document.mistakes]
+    for path, words in () if found else _alone(document.values):
+        try:
+            parse_rules(words, load_rule)
+        except ValueError as error:
+            found.append((document.line_of(path), str(error)))
+    return [f"line {line}: {reason}" for line, reason in sorted(found)]
+
+
+def _alone(words: RuleValues) -> Iterator[tuple[tuple[str | int, ...], RuleValues]]:
+    """Give each rule with its path."""
+    for name, value in words.items():
+        if name in _LISTS and isinstance(value, Mapping):
+            yield from (((name, key), {name: {key: entry}}) for key, entry in value.items())
+        elif name in _LISTS and isinstance(value, list):
+            yield from (((name, at), {name: [entry]}) for at, entry in enumerate(value))
+        else:
+            yield (name,), {name: value}

@@ -7,14 +7,12 @@ from collections.abc import Iterable, Mapping
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, FrameSelection, Rule
-from tickrig.host.canmon.model.frames.ident import REMOTE, ident_text
-from tickrig.host.canmon.model.frames.quantity import ms_text
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.traffic import WINDOW_US, Window
+from tickrig.host.canmon.model.frames import REMOTE, Record, ident_text, ms_text
+from tickrig.host.canmon.model.traffic import WINDOW_US, BusSecond
 from tickrig.host.text.values import counted
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 
 class MaxLoad:
@@ -33,7 +31,7 @@ class MaxLoad:
     def __init__(self, percent: float, bit_rate: int) -> None:
         self._percent, self._bit_rate = percent, bit_rate
 
-    def judge(self, channel: str, window: Window) -> str | None:
+    def judge(self, channel: str, window: BusSecond) -> str | None:
         """Say that a second is too busy."""
         percent = window.bits * 100_000_000 / (self._bit_rate * WINDOW_US)
         if percent <= self._percent:
@@ -125,11 +123,11 @@ class Heartbeat(Rule):
         return f"node {node}: {ms_text(gap_us)} ms since its last heartbeat, {said}"
 
 
-GUARD_TOGGLE: Final = 0x80
-NODE_MASK: Final = 0x7F
-LOST_AFTER: Final = 1.5
+_GUARD_TOGGLE: Final = 0x80
+_NODE_MASK: Final = 0x7F
+_LOST_AFTER: Final = 1.5
 """A heartbeat is lost after so many of its periods, as on the node board."""
-SURE_GAPS: Final = 2
+_SURE_GAPS: Final = 2
 """So many gaps tell a period, where a heartbeat comes after all; silence wants one."""
 
 
@@ -155,7 +153,7 @@ class Watched:
             Heartbeats,
             NodeMemory,
         )
-        from tickrig.host.canmon.model.decode.sdo.sdo_channel import SdoChannel  # noqa: PLC0415
+        from tickrig.host.canmon.model.decode.sdo import SdoChannel  # noqa: PLC0415
 
         values = {HEARTBEAT_TIME: period_ms.to_bytes(2, "little")} if period_ms else {}
         self._name, self._memory = f"{channel} node {node}", NodeMemory(EdsObjects(values=values))
@@ -180,7 +178,7 @@ class Watched:
             self.guarded = self.requested = False
             self._doubted = None
             return None
-        self.guarded |= bool(data and data[0] & GUARD_TOGGLE)
+        self.guarded |= bool(data and data[0] & _GUARD_TOGGLE)
         said = self._lost_before(at_us)
         self._heartbeats.take(at_us, learns=not self.requested)
         self.requested = False
@@ -190,14 +188,14 @@ class Watched:
         """Say that a heartbeat is lost before one: what is heard goes before what an EDS says."""
         beats = self._heartbeats
         said = self.overdue(at_us)
-        if beats.by_sdo or len(beats.gaps) >= SURE_GAPS:
+        if beats.by_sdo or len(beats.gaps) >= _SURE_GAPS:
             return said
         if not beats.gaps:
             doubted, self._doubted = self._doubted, said
         else:
             doubted, self._doubted = self._doubted, None
         keeps_eds = beats.since_us is not None and at_us - beats.since_us <= (
-            LOST_AFTER * self._eds_us
+            _LOST_AFTER * self._eds_us
         )
         return doubted if keeps_eds else None
 
@@ -262,7 +260,7 @@ class NoLostHeartbeat(Rule):
         """Compare the gap with the period."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
-        node = self._watched(record.channel, frame.can_id & NODE_MASK)
+        node = self._watched(record.channel, frame.can_id & _NODE_MASK)
         if frame.can_id not in ERROR_CONTROL_IDS:
             node.take_sdo(record.at_us, frame.data, request=frame.can_id in REQUEST_IDS)
         elif frame.remote:
@@ -278,7 +276,10 @@ class NoLostHeartbeat(Rule):
                 yield text
         begin_us = end_us if self._begin_us is None else self._begin_us
         for node_id, period_ms in sorted(self._periods_ms.items()):
-            if not self._is_watched(node_id) and end_us - begin_us > LOST_AFTER * period_ms * 1_000:
+            if (
+                not self._is_watched(node_id)
+                and end_us - begin_us > _LOST_AFTER * period_ms * 1_000
+            ):
                 since = ms_text(end_us - begin_us)
                 yield f"node {node_id}: no heartbeat for {since} ms, its EDS says {period_ms} ms"
 

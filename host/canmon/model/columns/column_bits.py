@@ -8,11 +8,12 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.canmon.model.frames.ident import REMOTE
-from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES
-from tickrig.wire.can_bits import (
+from tickrig.host.canmon.model.frames import REMOTE
+from tickrig.wire.can import (
     EXTENDED_BITS,
     EXTENDED_FLAGS,
+    EXTENDED_MAX,
+    MAX_DATA_BYTES,
     NEXT,
     STANDARD_BITS,
     START_EXTENDED,
@@ -21,13 +22,13 @@ from tickrig.wire.can_bits import (
     crc16,
 )
 
-BLOCK: Final = 1 << 14
+_BLOCK: Final = 1 << 14
 """Frames at a time: what is computed of them stays in the cache."""
 
-HEAD_BYTES: Final = (3, 5)
+_HEAD_BYTES: Final = (3, 5)
 """Bytes in front of the data, 11-bit and 29-bit."""
 
-Ints = npt.NDArray[np.int64]
+_Ints = npt.NDArray[np.int64]
 
 _NEXT: Final = np.array(NEXT, np.int64)
 _STUFFED: Final = np.array(STUFFED, np.int64)
@@ -35,7 +36,7 @@ _STUFFED: Final = np.array(STUFFED, np.int64)
 
 def column_bits(
     ident: npt.NDArray[np.uint32], dlc: npt.NDArray[np.uint8], payload: npt.NDArray[np.uint64]
-) -> Ints:
+) -> _Ints:
     """Return the bits of each frame with stuff bits and interframe space.
 
     Args:
@@ -44,13 +45,13 @@ def column_bits(
         payload: bytes as a little-endian number, 0 for those that are not there.
     """
     out = np.empty(len(ident), np.int64)
-    for begin in range(0, len(ident), BLOCK):
-        part = slice(begin, begin + BLOCK)
+    for begin in range(0, len(ident), _BLOCK):
+        part = slice(begin, begin + _BLOCK)
         out[part] = _block(ident[part].astype(np.int64), dlc[part].astype(np.int64), payload[part])
     return out
 
 
-def _block(ident: Ints, dlc: Ints, payload: npt.NDArray[np.uint64]) -> Ints:
+def _block(ident: _Ints, dlc: _Ints, payload: npt.NDArray[np.uint64]) -> _Ints:
     lengths = np.where(ident & REMOTE, 0, dlc)
     forms = (ident >> 31) * (MAX_DATA_BYTES + 1) + lengths
     out = np.empty(len(ident), np.int64)
@@ -62,7 +63,7 @@ def _block(ident: Ints, dlc: Ints, payload: npt.NDArray[np.uint64]) -> Ints:
     return out
 
 
-def _heads(ident: Ints, dlc: Ints, extended: bool) -> Ints:
+def _heads(ident: _Ints, dlc: _Ints, extended: bool) -> _Ints:
     control = (ident & REMOTE) >> 24 | dlc
     can_id = ident & EXTENDED_MAX
     if extended:
@@ -70,8 +71,8 @@ def _heads(ident: Ints, dlc: Ints, extended: bool) -> Ints:
     return can_id << 7 | control
 
 
-def _same_form(heads: Ints, payload: npt.NDArray[np.uint64], extended: bool, length: int) -> Ints:
-    head_bytes = HEAD_BYTES[extended]
+def _same_form(heads: _Ints, payload: npt.NDArray[np.uint64], extended: bool, length: int) -> _Ints:
+    head_bytes = _HEAD_BYTES[extended]
     columns = [heads >> 8 * place & 0xFF for place in reversed(range(head_bytes))]
     octets = payload.astype("<u8").view(np.uint8).reshape(-1, 8)
     columns += [octets[:, place].astype(np.int64) for place in range(length)]
@@ -82,7 +83,7 @@ def _same_form(heads: Ints, payload: npt.NDArray[np.uint64], extended: bool, len
     return _feed([*columns, crc >> 8, crc & 0xFF], extended) + 8 * length
 
 
-def _feed(columns: list[Ints], extended: bool) -> Ints:
+def _feed(columns: list[_Ints], extended: bool) -> _Ints:
     """Run the stuffing automaton over each frame."""
     state = np.full(len(columns[0]), (START_EXTENDED if extended else START_STANDARD) << 8)
     bits = np.full(len(columns[0]), EXTENDED_BITS if extended else STANDARD_BITS)
@@ -94,7 +95,7 @@ def _feed(columns: list[Ints], extended: bool) -> Ints:
 
 
 @lru_cache
-def _crc_tables(length: int) -> tuple[Ints, ...]:
+def _crc_tables(length: int) -> tuple[_Ints, ...]:
     """Return a table for each byte of a stream; the CRC is linear, so what they give is xored."""
     return tuple(
         np.array([crc16(bytes([byte]) + bytes(behind)) for byte in range(256)], np.int64)

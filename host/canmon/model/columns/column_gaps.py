@@ -14,23 +14,22 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from tickrig.host.canmon.model.columns.columns import Ints
-from tickrig.host.canmon.model.columns.runs import Runs, grown
-from tickrig.host.canmon.model.traffic.gaps import EXACT_US, SUB_BITS, Gaps
+from tickrig.host.canmon.model.columns.columns import Ints, Runs, grown
+from tickrig.host.canmon.model.traffic import EXACT_US, SUB_BITS, Gaps
 
-MANTISSA_BITS: Final = 52
-EXPONENT_BIAS: Final = 1023
-COARSE: Final = -1 << 12
+_MANTISSA_BITS: Final = 52
+_EXPONENT_BIAS: Final = 1023
+_COARSE: Final = -1 << 12
 """Leaves as many bits of the longest times as the mantissa has."""
 
-BUCKET_BITS: Final = 12
-BUCKET_MASK: Final = (1 << BUCKET_BITS) - 1
+_BUCKET_BITS: Final = 12
+_BUCKET_MASK: Final = (1 << _BUCKET_BITS) - 1
 """All buckets there are."""
 
-MERGED: Final = 1 << 16
+_MERGED: Final = 1 << 16
 """Counts at least that are added up at once."""
 
-LONGEST_US: Final = np.iinfo(np.int64).max
+_LONGEST_US: Final = np.iinfo(np.int64).max
 
 
 class ColumnGaps:
@@ -58,9 +57,9 @@ class ColumnGaps:
         self._max_us[numbers] = np.maximum(self._max_us[numbers], longest)
         self._count(runs, column_buckets(gaps_us))
         if len(firsts):
-            self._min_us[numbers[runs.fresh]] = LONGEST_US
+            self._min_us[numbers[runs.fresh]] = _LONGEST_US
             gaps_us = gaps_us.copy()
-            gaps_us[firsts] = LONGEST_US
+            gaps_us[firsts] = _LONGEST_US
         shortest = np.minimum.reduceat(gaps_us, runs.begins)
         self._min_us[numbers] = np.minimum(self._min_us[numbers], shortest)
 
@@ -91,16 +90,16 @@ class ColumnGaps:
         """Count what fell into each bucket of each identifier."""
         # 32 bits are sorted three times as fast as 64.
         places = np.repeat(
-            np.arange(len(runs.numbers), dtype=np.int32) << BUCKET_BITS, runs.lengths
+            np.arange(len(runs.numbers), dtype=np.int32) << _BUCKET_BITS, runs.lengths
         )
         places += buckets
         places = np.delete(places, runs.begins[runs.fresh])
         places.sort()
         begins = np.flatnonzero(np.diff(places, prepend=-1))
         found, counts = places[begins], np.diff(begins, append=len(places))
-        keys = runs.numbers[found >> BUCKET_BITS] << BUCKET_BITS | found & BUCKET_MASK
+        keys = runs.numbers[found >> _BUCKET_BITS] << _BUCKET_BITS | found & _BUCKET_MASK
         self._new.append((keys, counts))
-        if sum(len(new) for new, _ in self._new) > max(MERGED, len(self._keys)):
+        if sum(len(new) for new, _ in self._new) > max(_MERGED, len(self._keys)):
             self._merge()
 
     def _merge(self) -> None:
@@ -122,8 +121,8 @@ class ColumnGaps:
                 int(self._wander_us[number]),
             )
             gaps.min_us, gaps.max_us = int(self._min_us[number]), int(self._max_us[number])
-            first = number << BUCKET_BITS
-            begin, end = np.searchsorted(self._keys, (first, first + (1 << BUCKET_BITS)))
+            first = number << _BUCKET_BITS
+            begin, end = np.searchsorted(self._keys, (first, first + (1 << _BUCKET_BITS)))
             buckets = (self._keys[begin:end] - first).tolist()
             gaps.buckets = dict(zip(buckets, self._counts[begin:end].tolist(), strict=True))
         return gaps
@@ -136,7 +135,7 @@ def column_buckets(times_us: Ints) -> npt.NDArray[np.int16]:
     are read off its bits. Longer times than it is exact for lose low bits first, so that none is
     rounded up.
     """
-    exact = np.where(times_us >> MANTISSA_BITS, times_us & COARSE, times_us)
-    bits = exact.astype(np.float64).view(np.int64) >> MANTISSA_BITS - SUB_BITS
-    wide = bits - (EXPONENT_BIAS + SUB_BITS - 1 << SUB_BITS)
+    exact = np.where(times_us >> _MANTISSA_BITS, times_us & _COARSE, times_us)
+    bits = exact.astype(np.float64).view(np.int64) >> _MANTISSA_BITS - SUB_BITS
+    wide = bits - (_EXPONENT_BIAS + SUB_BITS - 1 << SUB_BITS)
     return np.where(times_us < EXACT_US, times_us, wide).astype(np.int16)

@@ -12,9 +12,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canmon.model.columns.candump_block import CandumpBlock
+import numpy as np
+import numpy.typing as npt
+
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, Rows
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import EXTENDED, Record
 from tickrig.host.canmon.model.logs.log_file import (
     LogError,
     LogFormat,
@@ -23,13 +25,187 @@ from tickrig.host.canmon.model.logs.log_file import (
     read_blocks,
 )
 from tickrig.host.canmon.model.logs.log_reader import WholeLines, parse_log_line, read_log
+from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.model.logs.screen_line import HEAD, ScreenClock
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
+
+# Whole lines of a candump log, taken apart all at once; needs numpy.
+
+_Words = npt.NDArray[np.uint64]
+_Places = npt.NDArray[np.int64]
+_Flags = npt.NDArray[np.bool_]
+
+_DOT: Final = 11
+_CHANNEL: Final = 20
+_LONGEST_NAME: Final = 16
+_PADDING: Final = b"\n" * 48
+"""Places and words reach so far behind a short last line."""
+
+_NO_DIGIT: Final = 0x80
+_VALUES: Final = bytes(
+    int(chr(byte), 16) if chr(byte) in "0123456789abcdefABCDEF" else _NO_DIGIT
+    for byte in range(256)
+)
+_MASKS: Final = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64)
+"""Words of which the first bytes are wanted."""
+
+
+def _word(text: bytes) -> np.uint64:
+    return np.uint64(int.from_bytes(text, "little"))
+
+
+_NOT_HEX: Final = _word(b"\x80" * 8)
+_NOT_DECIMAL: Final = _word(b"\xf0" * 8)
+_SIXES: Final = _word(b"\x06" * 8)
+_BYTES: Final = _word(b"\xff\0" * 4)
+_PAIRS: Final = _word(b"\xff\xff\0\0" * 2)
+_FOURS: Final = _word(b"\xff\xff\xff\xff")
+_FIRST_TWO: Final = _word(b"\xff\xff")
+_LAST_SIX: Final = _word(b"\0\0" + b"\xff" * 6)
+_LAST_THREE: Final = _word(b"\0" * 5 + b"\xff" * 3)
+_BRACKETS: Final = _word(b"\xff" + b"\0" * 6 + b"\xff")
+_DOT_BRACKET: Final = _word(b"." + b"\0" * 6 + b")")
+_4, _8, _16, _32 = np.uint64(4), np.uint64(8), np.uint64(16), np.uint64(32)
+
+
+class CandumpBlock:
+    """Whole lines of a candump log, taken apart all at once.
+
+    A line as candump writes it has fixed places:
+
+        (1436509052.249713) can0 044#2A366C2BBA
+        0          11     18 20  the '#' behind 3 or 8 digits, data up to the line's end
+
+    Each place is read for all lines together, as words of eight bytes at any address. A table has
+    turned hex digits into their values before that, and everything else into 0x80; so eight digits
+    are checked by one AND. Values are put together by shifts within the words: two digits, four,
+    eight. A line of which any check fails is none of these, and is left to the parser of single
+    lines.
+
+    Args:
+        text: the lines, each with its LF.
+
+    Attributes:
+        starts: where each line begins.
+        ends: where its data end: before LF, CR and a direction.
+    """
+
+    def __init__(self, text: bytes) -> None:
+        padded = text + _PADDING
+        values = padded.translate(_VALUES)
+        self._text, self._raw = text, np.frombuffer(padded, np.uint8)
+        self._raw_words, self._value_words = _words(padded), _words(values)
+        ends = np.flatnonzero(self._raw[: len(text)] == ord("\n"))
+        self.starts: _Places = np.concatenate(([0], ends[:-1] + 1))
+        if b"\r" in text:
+            ends = ends - (self._raw[ends - 1] == ord("\r"))
+        last = self._raw[ends - 1]
+        directed = (self._raw[ends - 2] == ord(" ")) & ((last == ord("R")) | (last == ord("T")))
+        self.ends: _Places = ends - 2 * directed
+        self._lines_end = ends
+
+    def line(self, row: int) -> str:
+        """Return a line."""
+        return self._text[self.starts[row] : self._lines_end[row]].decode("latin-1")
+
+    def take(self, rows: Rows, channels: ChannelNames) -> None:
+        """Write the rows of the lines that are as candump writes them."""
+        marks, known = self._marks()
+        rows.at_us[:], fits = self._stamps()
+        known &= fits
+        standard = self._raw[marks - 4] == ord(" ")
+        known &= standard | (self._raw[marks - 9] == ord(" "))
+        rows.ident[:], fits = self._idents(marks, standard)
+        known &= fits
+        rows.payload[:], rows.dlc[:], fits = self._data(marks)
+        known &= fits
+        self._name(marks - np.where(standard, 4, 9), known, rows, channels)
+        rows.known[:] = known
+
+    def _marks(self) -> tuple[_Places, _Flags]:
+        """Return the place of the first # of each line, and whether it has one."""
+        marks = np.flatnonzero(self._raw[: len(self._text)] == ord("#"))
+        if len(marks) != len(self.starts) or (marks < self.starts).any():
+            marks = np.append(marks, len(self._text))
+            marks = marks[np.searchsorted(marks[:-1], self.starts)]
+        known = (marks < self.ends) & (marks > self.starts + _CHANNEL)
+        return np.where(known, marks, _CHANNEL), known
+
+    def _stamps(self) -> tuple[_Places, _Flags]:
+        """Return times: eight digits, then two before the dot and six behind it."""
+        starts = self.starts
+        high = self._value_words[starts + 1]
+        low = self._value_words[starts + 9] & _FIRST_TWO
+        low |= self._value_words[starts + 10] & _LAST_SIX
+        known = ((high + _SIXES) | (low + _SIXES)) & _NOT_DECIMAL == 0
+        known &= self._raw[starts] == ord("(")
+        known &= self._raw_words[starts + _DOT] & _BRACKETS == _DOT_BRACKET
+        known &= self._raw[starts + _CHANNEL - 1] == ord(" ")
+        at_us = _decimal(high) * np.uint64(100_000_000) + _decimal(low)
+        return at_us.view(np.int64), known
+
+    def _idents(self, marks: _Places, standard: _Flags) -> tuple[_Words, _Flags]:
+        """Return identifiers with the flag of extended ones."""
+        digits = self._value_words[marks - 8]
+        digits = np.where(standard, digits & _LAST_THREE, digits)
+        known = digits & _NOT_HEX == 0
+        pairs = (digits << _4 | digits >> _8) & _BYTES
+        fours = (pairs << _8 | pairs >> _16) & _PAIRS
+        can_ids = (fours << _16 | fours >> _32) & _FOURS
+        known &= can_ids <= np.where(standard, STANDARD_MAX, EXTENDED_MAX)
+        return can_ids | np.where(standard, np.uint64(0), np.uint64(EXTENDED)), known
+
+    def _data(self, marks: _Places) -> tuple[_Words, _Places, _Flags]:
+        """Return data as numbers, and lengths."""
+        digits = self.ends - marks - 1
+        known = (digits & 1 == 0) & (digits <= 16) & (digits >= 0)
+        low = self._value_words[marks + 1] & _MASKS[np.clip(digits, 0, 8)]
+        high = self._value_words[marks + 9] & _MASKS[np.clip(digits - 8, 0, 8)]
+        known &= (low | high) & _NOT_HEX == 0
+        return _bytes(low) | _bytes(high) << _32, digits >> 1, known
+
+    def _name(self, ends: _Places, known: _Flags, rows: Rows, channels: ChannelNames) -> None:
+        """Write the places of the buses; lines with unusual names are none of these."""
+        starts = self.starts + _CHANNEL
+        lengths = ends - starts
+        known &= (lengths > 0) & (lengths <= _LONGEST_NAME)
+        low = self._raw_words[starts] & _MASKS[np.clip(lengths, 0, 8)]
+        high = self._raw_words[starts + 8] & _MASKS[np.clip(lengths - 8, 0, 8)]
+        left = known.copy()
+        while left.any():
+            row = int(left.argmax())
+            same = left & (low == low[row]) & (high == high[row]) & (lengths == lengths[row])
+            name = self._text[starts[row] : ends[row]].decode("latin-1")
+            if name.isascii() and name.isprintable() and " " not in name:
+                rows.channel[same] = channels.place(name)
+            else:
+                known &= ~same
+            left &= ~same
+
+
+def _words(text: bytes) -> _Words:
+    """Return the words that begin at each byte."""
+    return np.ndarray((len(text) - 7,), "<u8", text, strides=(1,))
+
+
+def _decimal(digits: _Words) -> _Words:
+    """Return the numbers of eight decimal digits."""
+    pairs = (digits * np.uint64(10) + (digits >> _8)) & _BYTES
+    fours = (pairs * np.uint64(100) + (pairs >> _16)) & _PAIRS
+    return (fours * np.uint64(10_000) + (fours >> _32)) & _FOURS
+
+
+def _bytes(digits: _Words) -> _Words:
+    """Return four bytes of eight hex digits each, the first one lowest."""
+    values = (digits << _4 | digits >> _8) & _BYTES
+    values = (values | values >> _8) & _PAIRS
+    return (values | values >> _16) & _FOURS
+
 
 BLOCK_BYTES: Final = 1 << 20
 """Some 23 000 lines: what is computed of them stays in the cache, and numpy's calls cost little."""
 
-BATCH: Final = 1 << 13
+_BATCH: Final = 1 << 13
 """Frames of a block, where they are read one by one."""
 
 
@@ -57,7 +233,7 @@ class ColumnReader:
     """
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._path, self._kind, self.tally = path, kind, Tally()
+        self._path, self._kind, self.tally = path, kind, LogTally()
         self._channels = ChannelNames()
 
     def __iter__(self) -> Iterator[Columns]:
@@ -72,10 +248,10 @@ class ColumnReader:
         while more:
             batch: list[Record] = []
             try:
-                batch.extend(islice(frames, BATCH))
+                batch.extend(islice(frames, _BATCH))
             except (LogError, OSError) as error:  # all that was read before it counts
                 failed = error
-            self.tally, more = reader.tally, len(batch) == BATCH and failed is None
+            self.tally, more = reader.tally, len(batch) == _BATCH and failed is None
             if batch:
                 yield Rows.of(batch, self._channels)
         if failed is not None:

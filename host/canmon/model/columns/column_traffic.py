@@ -1,22 +1,121 @@
-"""Statistics of logs in blocks, the same as `Traffic` finds frame by frame; needs numpy."""
+"""Statistics and nodes of logs in blocks, as `Traffic` and `NodeBoard` have them; needs numpy."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Final
+
 import numpy as np
+import numpy.typing as npt
 
 from tickrig.host.canmon.model.columns.column_bits import column_bits
-from tickrig.host.canmon.model.columns.column_changes import ColumnChanges
 from tickrig.host.canmon.model.columns.column_gaps import ColumnGaps
-from tickrig.host.canmon.model.columns.column_load import ColumnLoad
-from tickrig.host.canmon.model.columns.columns import Columns, by_channel, records, split_errors
-from tickrig.host.canmon.model.columns.runs import Identifiers, grown
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.controller import ErrorStatistics
-from tickrig.host.canmon.model.traffic.gaps import Gaps
-from tickrig.host.canmon.model.traffic.tally import BitRow, IdRow
-from tickrig.host.canmon.model.traffic.traffic import BusRow, Snapshot
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.columns.columns import (
+    ColumnLoad,
+    Columns,
+    Identifiers,
+    Ints,
+    Runs,
+    by_channel,
+    grown,
+    records,
+    select,
+    split_errors,
+)
+from tickrig.host.canmon.model.decode.bus_decoder import BusDecoder, Effect
+from tickrig.host.canmon.model.decode.decoder import Decoder
+from tickrig.host.canmon.model.decode.node_board import NodeBoard
+from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record
+from tickrig.host.canmon.model.traffic import (
+    PAYLOAD_BITS,
+    BitRow,
+    BusRow,
+    ErrorStatistics,
+    Gaps,
+    IdRow,
+    TrafficSnapshot,
+)
+from tickrig.wire.can import STANDARD_MAX, CanFrame, ErrorFrame
+
+# How often each payload bit changes, block after block, as in `BitMemory`; needs numpy.
+
+_Payloads = npt.NDArray[np.uint64]
+
+_BYTES: Final = 8
+_ADDED: Final = 255
+"""So many bits are added up in a byte."""
+
+_SPREAD: Final = (
+    np.unpackbits(np.arange(256, dtype=np.uint8)[:, np.newaxis], axis=1, bitorder="little")
+    .view("<u8")[:, 0]
+    .astype(np.uint64)
+)
+"""The bits of each byte, a byte of a word each."""
+
+
+class ColumnChanges:
+    """Counts the changes of each bit of each identifier of a bus.
+
+    A payload that is shorter than the one before counts as filled up with zeros.
+
+    Attributes:
+        payload: the latest of each.
+    """
+
+    def __init__(self) -> None:
+        self.payload, self._latest = np.empty(0, np.uint64), np.empty(0, np.uint64)
+        self._counts = np.empty((0, PAYLOAD_BITS), np.int64)
+
+    def take(self, runs: Runs, payload: _Payloads, count: int) -> None:
+        """Compare the payloads of a block; there are `count` identifiers now."""
+        self.payload, self._latest = grown(self.payload, count), grown(self._latest, count)
+        self._counts = grown(self._counts, count)
+        ordered = payload[runs.order]
+        changes = ordered ^ np.roll(ordered, 1)
+        across = ordered[runs.begins] ^ self.payload[runs.numbers]
+        changes[runs.begins] = np.where(runs.fresh, np.uint64(0), across)
+        self.payload[runs.numbers] = ordered[runs.ends - 1]
+        self._latest[runs.numbers] = changes[runs.ends - 1]
+        self._add(runs, changes)
+
+    def rows(self) -> list[BitRow]:
+        """Return what changed in each identifier."""
+        planes, latest = _planes(self._counts), self._latest.tolist()
+        return [BitRow(*row) for row in zip(latest, planes, strict=True)]
+
+    def _add(self, runs: Runs, changes: _Payloads) -> None:
+        """Add up each byte's bits side by side: as many rows at once as a byte can count."""
+        begins, pieces = _pieces(runs)
+        octets = changes.astype("<u8").view(np.uint8).reshape(-1, _BYTES)
+        for place in range(_BYTES):
+            column = octets[:, place]
+            if column.any():
+                words = np.add.reduceat(_SPREAD[column], begins)
+                counts = words.astype("<u8").view(np.uint8).reshape(-1, 8).astype(np.int64)
+                bits = slice(8 * place, 8 * place + 8)
+                self._counts[runs.numbers, bits] += np.add.reduceat(counts, pieces, axis=0)
+
+
+def _pieces(runs: Runs) -> tuple[Ints, Ints]:
+    """Cut runs; return where each piece begins, and the first piece of each run."""
+    counts = -(-runs.lengths // _ADDED)
+    firsts = np.cumsum(counts) - counts
+    nth = np.arange(int(counts.sum())) - np.repeat(firsts, counts)
+    return np.repeat(runs.begins, counts) + nth * _ADDED, firsts
+
+
+def _planes(counts: Ints) -> list[tuple[int, ...]]:
+    most = [int(row).bit_length() for row in counts.max(axis=1)]
+    stacked = [
+        np.packbits((counts >> place & 1).astype(np.uint8), axis=1, bitorder="little")
+        .view("<u8")[:, 0]
+        .tolist()
+        for place in range(max(most, default=0))
+    ]
+    return [tuple(plane[run] for plane in stacked[:depth]) for run, depth in enumerate(most)]
+
+
+# Statistics of logs in blocks, the same as `Traffic` finds frame by frame; needs numpy.
 
 
 class ColumnTraffic:
@@ -34,11 +133,11 @@ class ColumnTraffic:
             self._buses[channel].take(frames)
             self._last_us = int(columns.at_us[-1])
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> TrafficSnapshot:
         """Return all rows, at the time of the latest frame."""
         buses = [self._buses[channel] for channel in sorted(self._buses)]
         rows = tuple(row for bus in buses for row in bus.id_rows())
-        return Snapshot(self._last_us, tuple(bus.row(self._last_us) for bus in buses), rows)
+        return TrafficSnapshot(self._last_us, tuple(bus.row(self._last_us) for bus in buses), rows)
 
 
 class ColumnBus:
@@ -128,3 +227,72 @@ def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
     known_us = gap_us if gaps.count else None
     times = (gaps.count + 1, first_us, latest.at_us)
     return IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)
+
+
+# The node board of a log in blocks: only frames that can change it are decoded; needs numpy.
+
+_PIECE: Final = 1 << 10
+"""Frames in Python at once."""
+
+
+class ColumnNodes:
+    """Feeds a node board with blocks; what it shows at their end is as frame by frame.
+
+    Of `NodeStatus.pdos`, which the verb does not show, only those that matter to it are there.
+
+    Args:
+        decoder: it must be `standard`.
+        board: fed by nobody else.
+    """
+
+    def __init__(self, decoder: Decoder, board: NodeBoard) -> None:
+        self._decoder, self._board, self._begun = decoder, board, False
+
+    def take(self, columns: Columns) -> None:
+        """Take a block of frames."""
+        if not len(columns):
+            return
+        if not self._begun:  # nodes with an EDS are on the bus of the very first frame
+            self._feed(columns, np.arange(1))
+            columns, self._begun = select(columns, np.arange(1, len(columns))), True
+        for channel, _, frames in by_channel(columns):
+            self._take_bus(self._decoder.bus(channel), frames)
+            self._board.now_us = max(self._board.now_us, int(frames.at_us.max()))
+
+    def _take_bus(self, bus: BusDecoder, frames: Columns) -> None:
+        before = bus.changes
+        for row, record in _rows(frames, _that_matter(bus, frames)):
+            self._board.take(record, self._decoder.take(record))
+            if bus.changes != before:
+                self._feed(frames, np.arange(row + 1, len(frames)))
+                return
+
+    def _feed(self, frames: Columns, rows: Ints) -> None:
+        """Take frames whatever they mean."""
+        for _, record in _rows(frames, rows):
+            self._board.take(record, self._decoder.take(record))
+
+
+def _rows(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
+    for begin in range(0, len(rows), _PIECE):
+        piece = rows[begin : begin + _PIECE]
+        yield from zip(piece.tolist(), records(select(frames, piece)), strict=True)
+
+
+def _that_matter(bus: BusDecoder, frames: Columns) -> Ints:
+    """Return the rows of frames that can change what is known of nodes."""
+    can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
+    can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1
+    effects = np.zeros(STANDARD_MAX + 2, np.uint8)
+    for can_id in np.flatnonzero(np.bincount(can_ids)[: STANDARD_MAX + 1]).tolist():
+        effects[can_id] = bus.effect(can_id)
+    found = effects[can_ids]
+    each = np.flatnonzero(found >= Effect.ALONE)
+    latest = np.flatnonzero(found == Effect.LATEST)
+    if not len(latest):
+        return each
+    low = frames.payload[each] & np.uint64(0xFF)
+    between = np.searchsorted(each[(found[each] == Effect.EACH) | (low == 0)], latest)
+    kinds = can_ids[latest] << 5 | (frames.ident[latest] & REMOTE != 0) << 4 | frames.dlc[latest]
+    _, last = np.unique((between << 16 | kinds)[::-1], return_index=True)
+    return np.sort(np.concatenate((each, latest[::-1][last])))

@@ -8,7 +8,13 @@ from enum import IntEnum
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
+from tickrig.host.canmon.model.decode.decoded import (
+    Decoded,
+    Signal,
+    Transfer,
+    TransferOutcome,
+    write_entry,
+)
 from tickrig.host.canmon.model.decode.node_memory import (
     DEVICE_TYPE,
     HEARTBEAT_TIME,
@@ -16,8 +22,13 @@ from tickrig.host.canmon.model.decode.node_memory import (
     NodeMemory,
 )
 from tickrig.host.canmon.model.decode.object_text import ObjectText
-from tickrig.host.canmon.model.decode.pdos import PDO_OBJECTS, Pdo, PdoLayout, PdoTable, pdos_of
-from tickrig.host.canmon.model.decode.sdo.transfer import Outcome, Transfer, write_entry
+from tickrig.host.canmon.model.decode.pdos import (
+    PDO_OBJECTS,
+    NodePdo,
+    PdoDecoder,
+    PdoTable,
+    pdos_of,
+)
 from tickrig.host.canmon.model.decode.services import (
     decode_emcy,
     decode_error_control,
@@ -25,30 +36,29 @@ from tickrig.host.canmon.model.decode.services import (
     decode_sync,
     decode_time,
 )
-from tickrig.host.canmon.model.frames.ident import sender_of
+from tickrig.host.canmon.model.frames import sender_of
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID
-from tickrig.wire.canopen.nmt import NMT_COB_ID
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, INVALID, NMT_COB_ID
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.decode.sdo.sdo_channel import SdoChannel, Step
+    from tickrig.host.canmon.model.decode.sdo import SdoChannel, SdoStep
 
-Route = Callable[[int, CanFrame], Decoded]
+_Route = Callable[[int, CanFrame], Decoded]
 
-SYNC_ID: Final = 0x080
-TIME_ID: Final = 0x100
-PDO_IDS: Final = range(0x181, 0x580)
-NODE_MASK: Final = 0x7F
+_SYNC_ID: Final = 0x080
+_TIME_ID: Final = 0x100
+_PDO_IDS: Final = range(0x181, 0x580)
+_NODE_MASK: Final = 0x7F
 COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
-SDO_SERVERS: Final = range(0x1201, 0x1280)
-LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
-PRE_DEFINED: Final[dict[int, Route]] = {
+_SDO_SERVERS: Final = range(0x1201, 0x1280)
+_LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
+_PRE_DEFINED: Final[dict[int, _Route]] = {
     NMT_COB_ID: decode_nmt,
-    SYNC_ID: decode_sync,
-    TIME_ID: decode_time,
+    _SYNC_ID: decode_sync,
+    _TIME_ID: decode_time,
 }
 
 
@@ -82,11 +92,11 @@ class BusDecoder:
         self._channels: dict[tuple[int, int], SdoChannel] = {}
         self._guarded: set[int] = set()
         self._pdos = PdoTable()
-        self._configured: dict[int, Route] = {}
-        self._routes: dict[int, Route] = {}
+        self._configured: dict[int, _Route] = {}
+        self._routes: dict[int, _Route] = {}
         for node, objects in eds.items():
             self._refresh(pdos_of(node, (index for index, _ in objects.values)))
-            for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *SDO_SERVERS):
+            for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *_SDO_SERVERS):
                 self._learn_cob_ids(node, index)
 
     def take(self, at_us: int, frame: CanFrame) -> Decoded:
@@ -105,7 +115,7 @@ class BusDecoder:
             alone = route.func in (self._error_control, _emcy)
             return Effect.ALONE if alone else Effect.EACH
         layout = getattr(route, "__self__", None)
-        if isinstance(layout, PdoLayout):
+        if isinstance(layout, PdoDecoder):
             return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
         return Effect.NONE if layout is None and route is not decode_nmt else Effect.EACH
 
@@ -121,19 +131,19 @@ class BusDecoder:
             memory = self._memories[node] = NodeMemory(self._eds.get(node))
         return memory
 
-    def _route(self, can_id: int) -> Route:
-        told = self._configured.get(can_id) or PRE_DEFINED.get(can_id)
+    def _route(self, can_id: int) -> _Route:
+        told = self._configured.get(can_id) or _PRE_DEFINED.get(can_id)
         if told is not None:
             return told
-        if can_id in LSS_IDS:
+        if can_id in _LSS_IDS:
             return _lss_route()
         layout = self._pdos.layout(can_id)
         if layout is not None:
             return layout.decode
-        node = can_id & NODE_MASK
+        node = can_id & _NODE_MASK
         return self._node_route(node, can_id) if node else _raw
 
-    def _node_route(self, node: int, can_id: int) -> Route:
+    def _node_route(self, node: int, can_id: int) -> _Route:
         """Return what the pre-defined connection set says of a CAN-ID with a node-ID in it."""
         match can_id - node:
             case 0x080:
@@ -143,10 +153,10 @@ class BusDecoder:
             case 0x700:
                 return partial(self._error_control, node)
             case _:
-                return partial(_unmapped, node) if can_id in PDO_IDS else _raw
+                return partial(_unmapped, node) if can_id in _PDO_IDS else _raw
 
-    def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
-        from tickrig.host.canmon.model.decode.sdo.sdo_channel import (  # noqa: PLC0415 - not on every bus
+    def _sdo_route(self, node: int, can_id: int, request_id: int) -> _Route:
+        from tickrig.host.canmon.model.decode.sdo import (  # noqa: PLC0415 - not on every bus
             SdoChannel,
         )
 
@@ -167,7 +177,7 @@ class BusDecoder:
         return decoded
 
     def _sdo(
-        self, node: int, take: Callable[[int, bytes], Step], at_us: int, frame: CanFrame
+        self, node: int, take: Callable[[int, bytes], SdoStep], at_us: int, frame: CanFrame
     ) -> Decoded:
         if frame.remote:
             return Decoded("sdo", node, "remote frame")
@@ -203,7 +213,7 @@ class BusDecoder:
             self._refresh(self._pdos.known(transfer.node))
         self._learn_cob_ids(transfer.node, entry[0])
 
-    def _refresh(self, pdos: Iterable[Pdo]) -> None:
+    def _refresh(self, pdos: Iterable[NodePdo]) -> None:
         """Read again what is known of some PDOs."""
         for pdo in pdos:
             self.changes += 1
@@ -212,7 +222,7 @@ class BusDecoder:
 
     def _learn_cob_ids(self, node: int, index: int) -> None:
         """Learn a CAN-ID that is not that of the pre-defined connection set."""
-        if index in SDO_SERVERS:
+        if index in _SDO_SERVERS:
             request, response = (self._configured_id(node, index, sub) for sub in (1, 2))
             if request is not None and response is not None:
                 self._configure(request, self._sdo_route(node, request, request))
@@ -234,7 +244,7 @@ class BusDecoder:
         flags = EXTENDED if index in (COB_ID_SYNC, COB_ID_TIME) else EXTENDED | INVALID
         return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
 
-    def _configure(self, can_id: int, route: Route) -> None:
+    def _configure(self, can_id: int, route: _Route) -> None:
         self.changes += 1
         self._configured[can_id] = route
         self._routes.pop(can_id, None)
@@ -250,15 +260,19 @@ def _odd_length(kind: DataType | None, data: bytes, *, sized: bool) -> str:
 
 
 def _signals(transfer: Transfer) -> tuple[Signal, ...]:
-    told = transfer.outcome is Outcome.DONE and not transfer.flaws and transfer.entry is not None
+    told = (
+        transfer.outcome is TransferOutcome.DONE
+        and not transfer.flaws
+        and transfer.entry is not None
+    )
     if not told or transfer.value is None:
         return ()
     name = transfer.name or write_entry(transfer.entry)
     return (Signal(name, transfer.value, transfer.unit, transfer.text),)
 
 
-def _lss_route() -> Route:
-    from tickrig.host.canmon.model.decode.lss_messages import (  # noqa: PLC0415 - on few buses
+def _lss_route() -> _Route:
+    from tickrig.host.canmon.model.decode.services import (  # noqa: PLC0415 - on few buses
         decode_lss,
     )
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tickrig.host.canmon.model.decode.decoded import DBC, Decoded, Signal
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import ErrorFrame
 from tickrig.wire.canopen.datatypes import Value
 
 if TYPE_CHECKING:

@@ -9,18 +9,16 @@ from typing import Final, Protocol
 
 from tickrig.host.canmon.model.decode.bus_decoder import BusDecoder
 from tickrig.host.canmon.model.decode.dbc_file import DbcFile
-from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory, read_eds_objects
-from tickrig.host.canmon.model.decode.sdo.transfer import Transfer
 from tickrig.host.canmon.model.decode.services import decode_error
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import ErrorFrame, FdFrame
 
 FD: Final = Decoded("fd", None, "no CANopen service")
 """CANopen is spoken in classic frames (CiA 301, 5.3); CANopen FD is another protocol."""
 
-NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
+_NO_EDS: Final[Mapping[int, Path | EdsObjects]] = MappingProxyType({})
 
 
 class FrameDecoder(Protocol):
@@ -47,7 +45,7 @@ class Decoder:
 
     def __init__(
         self,
-        eds: Mapping[int, Path | EdsObjects] = NO_EDS,
+        eds: Mapping[int, Path | EdsObjects] = _NO_EDS,
         dbc: Sequence[Path] = (),
         first: Sequence[FrameDecoder] = (),
     ) -> None:

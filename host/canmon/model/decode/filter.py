@@ -18,18 +18,23 @@ term   = 181 | 181-18F | 18FF0000-18FFFFFF | 123:7FF | 400~700 | #FF
 Numbers after `id` and bare CAN-IDs are hexadecimal, all others as in Python, or as `8130h`.
 
 >>> from tickrig.host.canmon.model.decode.decoded import Decoded
->>> from tickrig.host.canmon.model.frames.record import Record
+>>> from tickrig.host.canmon.model.frames import Record
 >>> from tickrig.wire.can import CanFrame
 >>> record = Record(0, "can0", CanFrame.parse("085#3081110700000000"))
 >>> parse_filter("node=5 and (pdo or emcy)").matches(record, Decoded("emcy", 5))
 True
+
+The words of filters and rules, with where they stand.
+
+>>> [token.text for token in tokens_of("x>=-1.5 in {-2..8130h} ±10%")]
+['x', '>=', '-1.5', 'in', '{', '-2', '..', '8130h', '}', '±', '10%', '']
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.decode.filter_terms import (
     COMPARISONS,
@@ -58,18 +63,41 @@ from tickrig.host.canmon.model.decode.filter_terms import (
     state_test,
     word_test,
 )
-from tickrig.host.canmon.model.frames.ident import CandumpFilter
-from tickrig.host.canmon.model.frames.tokens import Token, tokens_of
+from tickrig.host.canmon.model.frames import CandumpFilter
 from tickrig.host.text.names import closest
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
 
-LONGEST: Final = 10_000
+_TOKEN: Final = re.compile(
+    r"\s*([()\[\]{},±]|\+-|\.\.|==|!=|<=|>=|[=<>]|(?:(?!\.\.|\+-)[^\s()\[\]{},±=!<>])+|.)"
+)
+
+
+class Token(NamedTuple):
+    """A word or a sign, and its column from 1."""
+
+    text: str
+    column: int
+
+
+def tokens_of(text: str) -> list[Token]:
+    """Take a text apart; the last token is empty."""
+    tokens = []
+    at, end = 0, len(text.rstrip())
+    while at < end:
+        match = _TOKEN.match(text, at)
+        assert match is not None  # a token is any character
+        tokens.append(Token(match[1], match.start(1) + 1))
+        at = match.end()
+    return [*tokens, Token("", end + 1)]
+
+
+_LONGEST: Final = 10_000
 """Characters of a filter or a rule."""
 
-DEEPEST: Final = 50
+_DEEPEST: Final = 50
 """So many brackets and `not` may stand in each other."""
 
-SHOWN: Final = 200
+_SHOWN: Final = 200
 
 
 class FilterError(ValueError):
@@ -83,7 +111,7 @@ class FilterError(ValueError):
     what = "filter"
 
     def __init__(self, text: str, column: int, reason: str) -> None:
-        shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+        shown = text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
         super().__init__(f"{self.what} {shown!r}, column {column}: {reason}")
         self.column = column
 
@@ -113,8 +141,8 @@ class FilterParser:
         self._text = text
         self._signals: set[str] = set()
         self._nodes: set[range] = set()
-        if len(text) > LONGEST:
-            raise self.wrong(text, LONGEST, f"it has {len(text)} characters, at most {LONGEST}")
+        if len(text) > _LONGEST:
+            raise self.wrong(text, _LONGEST, f"it has {len(text)} characters, at most {_LONGEST}")
         self._tokens, self._depth = tokens_of(text), 0
 
     def parse(self) -> tuple[Test, frozenset[str]]:
@@ -157,8 +185,8 @@ class FilterParser:
     def _not(self) -> Test:
         if self._next.text not in ("not", "!", "("):
             return self._term()
-        if self._depth == DEEPEST:
-            raise self._error(f"nested deeper than {DEEPEST}")
+        if self._depth == _DEEPEST:
+            raise self._error(f"nested deeper than {_DEEPEST}")
         self._depth += 1
         if self._take("not", "!"):
             inner = self._not()

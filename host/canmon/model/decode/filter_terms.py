@@ -7,20 +7,23 @@ import re
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from tickrig.host.canmon.model.decode.decoded import DBC, EDS, SEEN, Decoded, Signal
+from tickrig.host.canmon.model.decode.decoded import (
+    DBC,
+    EDS,
+    SEEN,
+    Decoded,
+    Signal,
+    TransferOutcome,
+)
 from tickrig.host.canmon.model.decode.object_text import BITS
-from tickrig.host.canmon.model.decode.sdo.transfer import Outcome
-from tickrig.host.canmon.model.frames.ident import CandumpFilter, flagged_id
-from tickrig.host.canmon.model.frames.record import AnyRecord, Record
-from tickrig.wire.can import EXTENDED_MAX, CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import MAX_FD_BYTES, FdFrame
+from tickrig.host.canmon.model.frames import AnyRecord, CandumpFilter, Record, flagged_id
+from tickrig.wire.can import EXTENDED_MAX, MAX_FD_BYTES, CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.canopen.nmt import NmtState
 
 Test = Callable[[AnyRecord, Decoded], bool]
-Compare = Callable[[float, float], bool]
+_Compare = Callable[[float, float], bool]
 
-COMPARISONS: Final[dict[str, Compare]] = {
+COMPARISONS: Final[dict[str, _Compare]] = {
     "=": operator.eq,
     "==": operator.eq,
     "!=": operator.ne,
@@ -34,15 +37,15 @@ KINDS: Final = (
     *("nmt", "sync", "time", "emcy", "heartbeat", "boot-up", "guard", "sdo", "lss", "dbc"),
     *("unmapped", "raw", "error", "rrc", "rtc-lite"),
 )
-FD_KINDS: Final[dict[str, Callable[[FdFrame], bool]]] = {
+_FD_KINDS: Final[dict[str, Callable[[FdFrame], bool]]] = {
     "fd": lambda frame: True,
     "brs": lambda frame: frame.brs,
     "esi": lambda frame: frame.esi,
 }
-OUTCOMES: Final = {
-    "sdo.aborted": Outcome.ABORTED,
-    "sdo.unanswered": Outcome.UNANSWERED,
-    "sdo.broken": Outcome.BROKEN,
+_OUTCOMES: Final = {
+    "sdo.aborted": TransferOutcome.ABORTED,
+    "sdo.unanswered": TransferOutcome.UNANSWERED,
+    "sdo.broken": TransferOutcome.BROKEN,
 }
 FIELDS: Final[dict[str, Callable[[AnyRecord, Decoded], int | None]]] = {
     "node": lambda record, decoded: decoded.node,
@@ -73,7 +76,7 @@ KNOWN_WORDS: Final = {
 """What the words of `WORDS` can be, beside PDOs by their numbers."""
 FREE: Final = ("kind", "src")
 """Decoders of installed packages may say others."""
-ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
+_ERROR_CONTROL: Final = ("boot-up", "heartbeat", "guard")
 NMT_STATES: Final = {state.name.lower().replace("_", "-"): int(state) for state in NmtState}
 
 _STATE: Final = re.compile(r"state of node ([0-9]+)")
@@ -85,13 +88,13 @@ _NODE: Final = re.compile(r"([0-9]{1,3})\.(.+)")
 
 def kind_test(word: str) -> Test | None:
     """Return the test for a kind of frame, or for how an SDO transfer ended."""
-    if word in FD_KINDS:
-        test = FD_KINDS[word]
+    if word in _FD_KINDS:
+        test = _FD_KINDS[word]
         return lambda record, decoded: isinstance(record.frame, FdFrame) and test(record.frame)
     if word in KINDS:
         return lambda record, decoded: decoded.kind == word
-    if word in OUTCOMES:
-        outcome = OUTCOMES[word]
+    if word in _OUTCOMES:
+        outcome = _OUTCOMES[word]
         return lambda record, decoded: any(t.outcome is outcome for t in decoded.transfers)
     match = _PDO.fullmatch(word)
     if match is None:
@@ -114,7 +117,7 @@ def state_test(nodes: range, state: int) -> Test:
     """Return the test for nodes that tell an NMT state."""
     return lambda record, decoded: (
         decoded.node in nodes
-        and decoded.kind in ERROR_CONTROL
+        and decoded.kind in _ERROR_CONTROL
         and any(signal.value == state for signal in decoded.signals)
     )
 
@@ -167,7 +170,7 @@ def is_word(name: str, value: str) -> bool:
     return name not in KNOWN_WORDS or value in KNOWN_WORDS[name] or is_pdo
 
 
-def field_test(name: str, compare: Compare, value: float) -> Test:
+def field_test(name: str, compare: _Compare, value: float) -> Test:
     """Return the test for a number that every frame of some kind has."""
     field = FIELDS[name]
 
@@ -229,7 +232,7 @@ def signal_reader(path: str) -> Callable[[Decoded], Signal | None]:
 def _state_reader(node: int) -> Callable[[Decoded], Signal | None]:
     return lambda decoded: (
         decoded.signals[0]
-        if decoded.node == node and decoded.kind in ERROR_CONTROL and decoded.signals
+        if decoded.node == node and decoded.kind in _ERROR_CONTROL and decoded.signals
         else None
     )
 

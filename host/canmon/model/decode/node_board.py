@@ -1,26 +1,54 @@
-"""All nodes at a glance: states, heartbeats, boot-ups, EMCYs, SDO errors, drives."""
+"""All nodes at a glance: what they do, as rows, as text and JSON, and a card of each.
+
+Who a node is, and what its PDOs carry, as far as anybody said it.
+
+>>> from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory
+>>> values = {(0x1000, 0): 0x20192, (0x1018, 1): 0x13F, (0x1018, 3): 0x10002, (0x1A00, 0): 1}
+>>> values[0x1A00, 1] = 0x60410010
+>>> eds = EdsObjects({}, {at: value.to_bytes(4, "little") for at, value in values.items()})
+>>> row = NodeStatus("can0", 5, NodeMemory(eds))
+>>> identity_words(row)
+'CiA 402 drive, vendor 0000013Fh, revision 1.2'
+>>> [(pdo.kind, hex(pdo.can_id), pdo.text) for pdo in pdo_contents(row)]
+[('tpdo1', '0x185', 'statusword (eds)')]
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer, TransferOutcome, write_entry
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_memory import HEARTBEAT_TIME, Heartbeats, NodeMemory
+from tickrig.host.canmon.model.decode.node_memory import (
+    DEVICE_TYPE,
+    HEARTBEAT_TIME,
+    Heartbeats,
+    NodeMemory,
+)
 from tickrig.host.canmon.model.decode.object_text import drive_state
-from tickrig.host.canmon.model.decode.pdos import UNMAPPED
-from tickrig.host.canmon.model.decode.sdo.transfer import Outcome, Transfer
+from tickrig.host.canmon.model.decode.pdos import (
+    DUMMIES,
+    MPDO,
+    UNMAPPED,
+    can_id_of,
+    mapped_objects,
+    pdos_of,
+)
 from tickrig.host.canmon.model.decode.services import nmt_state_name
-from tickrig.host.canmon.model.frames.ident import ident_of, sender_of
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record, ident_of, sender_of
+from tickrig.host.text.page_text import json_text
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.emcy import describe
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS
 
-EMCY_KEPT: Final = 16
-DEVICE_NAME: Final = (0x1008, 0)
+# All nodes at a glance: states, heartbeats, boot-ups, EMCYs, SDO errors, drives.
+
+_EMCY_KEPT: Final = 16
+_DEVICE_NAME: Final = (0x1008, 0)
 
 _TARGETS: Final = {
     NmtCommand.START: NmtState.OPERATIONAL,
@@ -73,7 +101,7 @@ class NodeStatus:
     boots: int = 0
     unrequested_boots: int = 0
     late: int = 0
-    emcys: deque[EmcyRecord] = field(default_factory=lambda: deque(maxlen=EMCY_KEPT))
+    emcys: deque[EmcyRecord] = field(default_factory=lambda: deque(maxlen=_EMCY_KEPT))
     emcy_count: int = 0
     error_code: int = 0
     sdo_errors: int = 0
@@ -157,17 +185,17 @@ class NodeStatus:
     def transfer(self, at_us: int, transfer: Transfer) -> None:
         """Take an SDO transfer that ended."""
         self.present = self.present or transfer.outcome.answered
-        if transfer.outcome is not Outcome.DONE:
+        if transfer.outcome is not TransferOutcome.DONE:
             self.sdo_errors += 1
             self.sdo_error = str(transfer)
         elif transfer.entry == HEARTBEAT_TIME:
             self._heartbeats.learn(at_us, transfer)
-        elif transfer.entry == DEVICE_NAME and isinstance(transfer.value, str):
+        elif transfer.entry == _DEVICE_NAME and isinstance(transfer.value, str):
             self.name = transfer.value
 
 
-STATUSWORD: Final = "statusword"
-ERROR_CONTROL: Final = ("heartbeat", "guard")
+_STATUSWORD: Final = "statusword"
+_ERROR_CONTROL: Final = ("heartbeat", "guard")
 
 
 class NodeBoard:
@@ -216,7 +244,7 @@ class NodeBoard:
             self._status(record.channel, node).emcy(record.at_us, decoded)
         elif kind == "boot-up":
             self._status(record.channel, node).boot(record.at_us)
-        elif kind in ERROR_CONTROL and decoded.signals:
+        elif kind in _ERROR_CONTROL and decoded.signals:
             state = decoded.signals[0].value
             assert isinstance(state, int)
             self._status(record.channel, node).heartbeat(record.at_us, state)
@@ -246,7 +274,7 @@ class NodeBoard:
         status = self._status(channel, node)
         status.present, status.pdos[decoded.kind] = True, decoded
         for signal in decoded.signals:
-            if signal.name == STATUSWORD and isinstance(signal.value, int):
+            if signal.name == _STATUSWORD and isinstance(signal.value, int):
                 status.drive_state = drive_state(signal.value)
 
     def _transfers(self, record: Record, node: int, decoded: Decoded) -> None:
@@ -255,5 +283,207 @@ class NodeBoard:
             answered = transfer.outcome.answered
             if answered or (channel, node) in self._nodes:
                 self._status(channel, node).transfer(record.at_us, transfer)
-            if transfer.name == STATUSWORD and isinstance(transfer.value, int):
+            if transfer.name == _STATUSWORD and isinstance(transfer.value, int):
                 self._status(channel, node).drive_state = drive_state(transfer.value)
+
+
+# The node board as lines of text, and as JSON.
+
+_VERSION: Final = 1
+_GAP: Final = "  "
+_BAR_CELLS: Final = 5
+_HEADS: Final = ("NODE", "NAME", "NMT STATE", "HEARTBEAT", "BOOT-UPS", "DRIVE", "EMCY", "SDO ERROR")
+
+
+def render_board(board: NodeBoard, now_us: int, width: int, height: int) -> list[str]:
+    """Return the board as lines: a table, and below it the latest EMCYs.
+
+    Args:
+        board: the board.
+        now_us: the time for which ages are told.
+        width: columns of the terminal.
+        height: lines that may be used.
+    """
+    rows = board.rows()
+    several = len({row.channel for row in rows}) > 1
+    cells = [_HEADS, *(_cells(row, now_us, with_bus=several) for row in rows)]
+    used = [column for column in range(len(_HEADS)) if any(line[column] for line in cells[1:])]
+    widths = {column: max(len(line[column]) for line in cells) for column in used}
+    lines = [_GAP.join(line[column].ljust(widths[column]) for column in used) for line in cells]
+    if not rows:
+        lines = ["no node was heard"]
+    lines += emcy_history(rows)
+    return [_cut(line.rstrip(), width) for line in lines[:height]]
+
+
+def board_json(board: NodeBoard, now_us: int) -> list[str]:
+    """Return one JSON object a node."""
+    return [json_text(_fields(row, now_us)) for row in board.rows()]
+
+
+def _cells(row: NodeStatus, now_us: int, *, with_bus: bool) -> tuple[str, ...]:
+    boots = (
+        f"{row.boots} ({row.unrequested_boots} unasked)"
+        if row.unrequested_boots
+        else f"{row.boots}"
+    )
+    return (
+        f"{row.channel} {row.node}" if with_bus else str(row.node),
+        row.name,
+        row.state_text,
+        _heartbeat(row, now_us),
+        boots if row.boots else "",
+        row.drive_state,
+        _emcy(row),
+        f"{row.sdo_error} [{row.sdo_errors}]" if row.sdo_errors else "",
+    )
+
+
+def _heartbeat(row: NodeStatus, now_us: int) -> str:
+    """Write age, period, and how much of one and a half periods has gone."""
+    age_us, period_us = row.age_us(now_us), row.period_us
+    if age_us is None:
+        return "never heard" if row.period_us else ""
+    if period_us is None:
+        return f"{age_us // 1_000} ms ago"
+    share = min(_BAR_CELLS, age_us * _BAR_CELLS * 2 // (3 * period_us))
+    bar = "#" * share + "." * (_BAR_CELLS - share)
+    about = "~" if row.learnt else ""
+    words = [f"{bar} {age_us // 1_000}/{about}{period_us // 1_000} ms"]
+    words += ["LATE"] if row.is_late(now_us) else []
+    words += [f"late so far: {row.late}"] if row.late else []
+    return " ".join(words)
+
+
+def _emcy(row: NodeStatus) -> str:
+    if not row.emcy_count:
+        return ""
+    now = f"{row.error_code:04X}h {describe(row.error_code)}" if row.error_code else "gone"
+    return f"{now} [{row.emcy_count}]"
+
+
+def emcy_history(rows: Sequence[NodeStatus]) -> list[str]:
+    """Return an empty line, a head, and the EMCYs of all nodes, the latest first; or nothing."""
+    found = sorted((emcy.at_us, row.node, emcy.text) for row in rows for emcy in row.emcys)
+    lines = [f"{at_us / 1e6:.6f}  node {node}  {text}" for at_us, node, text in reversed(found)]
+    return ["", "EMCY, latest first", *lines] if lines else []
+
+
+def _cut(line: str, width: int) -> str:
+    return line if len(line) <= width else line[: width - 1] + "…"
+
+
+def _fields(row: NodeStatus, now_us: int) -> dict[str, object]:
+    age_us, period_us = row.age_us(now_us), row.period_us
+    return {
+        "v": _VERSION,
+        "ev": "node",
+        "t": now_us / 1e6,
+        "ch": row.channel,
+        "node": row.node,
+        "name": row.name,
+        "state": row.state_text,
+        "heartbeat_ms": None if period_us is None else period_us / 1_000,
+        "learnt": row.learnt,
+        "age_ms": None if age_us is None else age_us / 1_000,
+        "late": row.is_late(now_us),
+        "late_count": row.late,
+        "boots": row.boots,
+        "unasked_boots": row.unrequested_boots,
+        "drive": row.drive_state,
+        "error_code": row.error_code,
+        "emcy": [{"t": e.at_us / 1e6, "code": e.code, "text": e.text} for e in row.emcys],
+        "sdo_errors": row.sdo_errors,
+        "sdo_error": row.sdo_error,
+    }
+
+
+_IDENTITY: Final = 0x1018
+_PROFILES: Final = {401: "I/O", 402: "drive", 405: "PLC", 406: "encoder", 410: "inclinometer"}
+
+
+class PdoContent(NamedTuple):
+    """A PDO that has a CAN-ID.
+
+    Attributes:
+        kind: as of `Decoded`.
+        can_id: its own.
+        receives: the node takes it.
+        names: of the objects in it; none where the mapping is not known.
+        text: these, with their latest values where it was heard, and where they are known from.
+    """
+
+    kind: str
+    can_id: int
+    receives: bool
+    names: tuple[str, ...]
+    text: str
+
+
+def pdo_contents(row: NodeStatus) -> list[PdoContent]:
+    """Return the PDOs of a node that are known, those that it sends first."""
+    return list(_pdos(row))
+
+
+def _pdos(row: NodeStatus) -> Iterator[PdoContent]:
+    memory = row.memory
+    for pdo in sorted(pdos_of(row.node, memory.indices)):
+        can_id, count = can_id_of(pdo, memory), memory.number(pdo.mapping, 0)
+        if can_id is None or count == 0:
+            continue
+        source = memory.source(pdo.mapping) or memory.source(pdo.parameter)
+        names: tuple[str, ...] = ()
+        if count is None:
+            text = "mapping was not heard"
+        elif count in MPDO:
+            text = f"multiplexed: each frame names its object ({source})"
+        else:
+            names = _names(memory, pdo.mapping, min(count, MAX_MAPPED_OBJECTS))
+            heard = row.pdos.get(pdo.kind)
+            text = f"{heard.text if heard else ', '.join(names)} ({source})"
+        yield PdoContent(pdo.kind, can_id, pdo.receives, names, text)
+
+
+def _names(memory: NodeMemory, mapping: int, count: int) -> tuple[str, ...]:
+    """Return the names of what is mapped; what is left out goes by."""
+    mapped = mapped_objects(memory, mapping, count)
+    entries = [(item.index, item.sub) for item in mapped if item.index not in DUMMIES]
+    return tuple(memory.describe(*entry).name or write_entry(entry) for entry in entries)
+
+
+def maker_text(row: NodeStatus) -> str:
+    """Return vendor and product in short: names where a file has them, else numbers."""
+    vendor, product = row.memory.number(_IDENTITY, 1), row.memory.number(_IDENTITY, 2)
+    words = [row.memory.eds.vendor or ("" if not vendor else f"{vendor:08X}h")]
+    words += [f"{product:08X}h"] if product else []
+    return " ".join(filter(None, words))
+
+
+def identity_words(row: NodeStatus) -> str:
+    """Return profile, vendor, product, revision and serial number, as far as they are known."""
+    memory = row.memory
+    vendor, product, revision, serial = (memory.number(_IDENTITY, sub) for sub in range(1, 5))
+    maker = " ".join(filter(None, [memory.eds.vendor, _hex(vendor)]))
+    device_type = memory.number(*DEVICE_TYPE)
+    words = ["" if device_type is None else profile_text(device_type)]
+    words += [f"vendor {maker}"] * bool(maker)
+    words += [f"product {_hex(product)}"] * (product is not None)
+    if revision is not None:
+        words.append(f"revision {revision >> 16}.{revision & 0xFFFF}")
+    words += [f"serial {serial}"] * bool(serial)
+    return ", ".join(filter(None, words)) or "not known: no EDS, and nobody has read 1000h or 1018h"
+
+
+def _hex(number: int | None) -> str:
+    return "" if number is None else f"{number:08X}h"
+
+
+def profile_text(device_type: int) -> str:
+    """Say which profile a device type (1000h) names.
+
+    >>> profile_text(0x20192), profile_text(0x0), profile_text(0xFFFF0191)
+    ('CiA 402 drive', 'no profile', 'CiA 401 I/O')
+    """
+    profile = device_type & 0xFFFF
+    name = _PROFILES.get(profile, "")
+    return f"CiA {profile} {name}".rstrip() if profile else "no profile"

@@ -8,14 +8,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canmon.model.decode.decoded import EDS, SEEN
+from tickrig.host.canmon.model.decode.decoded import (
+    EDS,
+    SEEN,
+    Transfer,
+    TransferDirection,
+    TransferOutcome,
+)
 from tickrig.host.canmon.model.decode.object_text import (
     ObjectText,
     describe_drive,
     describe_standard,
     slug,
 )
-from tickrig.host.canmon.model.decode.sdo.transfer import Direction, Outcome, Transfer
 from tickrig.host.canopen.eds import read_sound
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_file import Finding
@@ -84,16 +89,16 @@ def _text(device: EdsDevice, row: EntryDescription) -> ObjectText:
     return ObjectText(name, row.data_type, row.unit, row.factor, EDS)
 
 
-STORE: Final = 0x1010
-SAVE: Final = b"save"
+_STORE: Final = 0x1010
+_SAVE: Final = b"save"
 DEVICE_TYPE: Final = (0x1000, 0)
 HEARTBEAT_TIME: Final = (0x1017, 0)
 STATUSWORD: Final = (0x6041, 0)
-STATUSWORD_BYTES: Final = 2
-DRIVE_PROFILE: Final = 402
-SEVERAL_PROFILES: Final = 0xFFFF
-DRIVE_WORDS: Final = (0x6040, 0x6041)
-COMMUNICATION: Final = range(0x1000, 0x2000)
+_STATUSWORD_BYTES: Final = 2
+_DRIVE_PROFILE: Final = 402
+_SEVERAL_PROFILES: Final = 0xFFFF
+_DRIVE_WORDS: Final = (0x6040, 0x6041)
+_COMMUNICATION: Final = range(0x1000, 0x2000)
 """Objects that say how the others travel."""
 
 Entry = tuple[int, int]
@@ -124,26 +129,31 @@ class NodeMemory:
 
     def written(self, entry: Entry, data: bytes) -> None:
         """Learn a value that was downloaded and confirmed."""
-        if entry[0] == STORE:
-            if data == SAVE:
+        if entry[0] == _STORE:
+            if data == _SAVE:
                 self._power_on, self._written = dict(self._now), set()
             return
         self._keep(entry, data)
         self._written.add(entry)
 
     def _keep(self, entry: Entry, data: bytes) -> None:
-        if entry[0] in COMMUNICATION:
+        if entry[0] in _COMMUNICATION:
             self._now[entry] = data
-        elif entry == STATUSWORD and len(data) == STATUSWORD_BYTES:
+        elif entry == STATUSWORD and len(data) == _STATUSWORD_BYTES:
             self._has_statusword = True
 
     def learn(self, transfer: Transfer) -> bool:
         """Learn from a transfer that ended; return whether it tells anything."""
         entry, data = transfer.entry, transfer.data
-        if entry is None or data is None or transfer.flaws or transfer.outcome is not Outcome.DONE:
+        if (
+            entry is None
+            or data is None
+            or transfer.flaws
+            or transfer.outcome is not TransferOutcome.DONE
+        ):
             return False
         data = self.describe(*entry).fitted(data, sized=transfer.sized)
-        if transfer.direction is Direction.UPLOAD:
+        if transfer.direction is TransferDirection.UPLOAD:
             self.read(entry, data)
         else:
             self.written(entry, data)
@@ -188,9 +198,9 @@ class NodeMemory:
         16 bits does.
         """
         device_type = self.number(*DEVICE_TYPE)
-        if device_type is None or device_type >> 16 == SEVERAL_PROFILES:
+        if device_type is None or device_type >> 16 == _SEVERAL_PROFILES:
             return self._has_statusword
-        return device_type & 0xFFFF == DRIVE_PROFILE
+        return device_type & 0xFFFF == _DRIVE_PROFILE
 
     def describe(self, index: int, sub: int) -> ObjectText:
         """Return what is known of an object; the words of a drive have the names of CiA 402."""
@@ -199,7 +209,7 @@ class NodeMemory:
             told = standard
         elif standard is not None:
             told = told._replace(in_hex=standard.in_hex)
-        if self.is_drive and (told is None or index in DRIVE_WORDS):
+        if self.is_drive and (told is None or index in _DRIVE_WORDS):
             text = describe_drive(index, sub) or ObjectText()
             return text if told is None else text._replace(source=told.source)
         return told or ObjectText()
@@ -207,7 +217,7 @@ class NodeMemory:
 
 LATE: Final = 1.5
 """A heartbeat is late after so many of its periods; the real limit is its consumer's (1016h)."""
-GAPS_KEPT: Final = 9
+_GAPS_KEPT: Final = 9
 
 
 @dataclass(slots=True)
@@ -230,7 +240,7 @@ class Heartbeats:
     from_boot: bool = True
     last_us: int | None = None
     since_us: int | None = None
-    gaps: deque[float] = field(default_factory=lambda: deque(maxlen=GAPS_KEPT))
+    gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_GAPS_KEPT))
     _merged: int = 0  # gaps that the latest of them is the mean of
     _booted: bool = False
 
@@ -262,7 +272,7 @@ class Heartbeats:
 
     def learn(self, at_us: int, transfer: Transfer) -> None:
         """Take a transfer of 1017h that the memory has learnt: a new period begins anew."""
-        if transfer.direction is Direction.DOWNLOAD or self.since_us is None:
+        if transfer.direction is TransferDirection.DOWNLOAD or self.since_us is None:
             self.gaps.clear()
             self.since_us = at_us
 

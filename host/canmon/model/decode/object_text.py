@@ -13,7 +13,7 @@ from tickrig.host.canopen.master.cia402.drive_state import DriveState, state_of
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.errors import FieldError
 
-STATUSWORD_BITS: Final = {
+_STATUSWORD_BITS: Final = {
     "ready_to_switch_on": 0,
     "switched_on": 1,
     "operation_enabled": 2,
@@ -26,7 +26,7 @@ STATUSWORD_BITS: Final = {
     "target_reached": 10,
     "internal_limit_active": 11,
 }
-CONTROLWORD_BITS: Final = {
+_CONTROLWORD_BITS: Final = {
     "switch_on": 0,
     "enable_voltage": 1,
     "quick_stop": 2,
@@ -34,7 +34,7 @@ CONTROLWORD_BITS: Final = {
     "fault_reset": 7,
     "halt": 8,
 }
-BITS: Final = {"statusword": STATUSWORD_BITS, "controlword": CONTROLWORD_BITS}
+BITS: Final = {"statusword": _STATUSWORD_BITS, "controlword": _CONTROLWORD_BITS}
 """Bits by name, of the objects whose bits have names."""
 
 
@@ -49,7 +49,7 @@ def drive_state(statusword: int) -> str:
     return _BY_BITS[statusword & 0x7F]
 
 
-MAX_NUMBER_BYTES: Final = 8
+_MAX_NUMBER_BYTES: Final = 8
 
 _OTHERS: Final = re.compile(r"[^0-9a-z]+")
 
@@ -116,7 +116,7 @@ class ObjectText(NamedTuple):
 
 def _number(data: bytes) -> tuple[Value, str]:
     """Read bytes as a number without a type."""
-    if not 1 <= len(data) <= MAX_NUMBER_BYTES:
+    if not 1 <= len(data) <= _MAX_NUMBER_BYTES:
         return data, write_bytes(data)
     number = int.from_bytes(data, "little")
     return number, f"0x{number:0{2 * len(data)}X}"
@@ -144,7 +144,7 @@ def write_bytes(data: bytes) -> str:
 
 
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
-TEXT: Final = DataType.VISIBLE_STRING
+_TEXT: Final = DataType.VISIBLE_STRING
 
 _VARIABLES: Final[dict[int, tuple[str, DataType]]] = {
     0x1000: ("device_type", U32),
@@ -153,9 +153,9 @@ _VARIABLES: Final[dict[int, tuple[str, DataType]]] = {
     0x1005: ("cob_id_sync", U32),
     0x1006: ("sync_period", U32),
     0x1007: ("sync_window", U32),
-    0x1008: ("device_name", TEXT),
-    0x1009: ("hardware_version", TEXT),
-    0x100A: ("software_version", TEXT),
+    0x1008: ("device_name", _TEXT),
+    0x1009: ("hardware_version", _TEXT),
+    0x100A: ("software_version", _TEXT),
     0x100C: ("guard_time", U16),
     0x100D: ("life_time_factor", U8),
     0x1012: ("cob_id_time", U32),

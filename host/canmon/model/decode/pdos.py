@@ -5,23 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
+from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, write_entry
 from tickrig.host.canmon.model.decode.node_memory import STATUSWORD, NodeMemory
 from tickrig.host.canmon.model.decode.object_text import ObjectText, drive_state
-from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, INVALID
 from tickrig.wire.canopen.pdo import DAM_MPDO, MAX_MAPPED_OBJECTS, SAM_MPDO, MappedObject, Mpdo
 from tickrig.wire.errors import WireError
 
 MPDO: Final = (SAM_MPDO, DAM_MPDO)
-MPDO_BYTES: Final = 8
+_MPDO_BYTES: Final = 8
 DUMMIES: Final = range(0x0020)
 UNMAPPED: Final = "unmapped"
 
-Write = Callable[[int], str]
-Convert = Callable[[int], Value]
+_Write = Callable[[int], str]
+_Convert = Callable[[int], Value]
 
 
 class Field(NamedTuple):
@@ -41,12 +40,12 @@ class Field(NamedTuple):
     shift: int
     mask: int
     sign: int = 0
-    convert: Convert | None = None
+    convert: _Convert | None = None
     unit: str = ""
-    write: Write | None = None
+    write: _Write | None = None
 
 
-class PdoLayout:
+class PdoDecoder:
     """Decodes the frames of one PDO.
 
     Args:
@@ -101,7 +100,7 @@ class MpdoLayout:
         try:
             mpdo = Mpdo.parse(frame.data)
         except WireError as error:
-            return Decoded(self.kind, self.node, str(error), (), self.source, size=MPDO_BYTES)
+            return Decoded(self.kind, self.node, str(error), (), self.source, size=_MPDO_BYTES)
         text = self._describe(mpdo.index, mpdo.sub)
         data = mpdo.data[: text.kind.size] if text.kind and text.kind.size else mpdo.data
         value, written = text.read(data)
@@ -109,10 +108,10 @@ class MpdoLayout:
         way = f"to {mpdo.node_id or 'all'}" if mpdo.destination else f"from {mpdo.node_id}"
         signals = (Signal(name, value, text.unit, written),)
         said = f"{signals[0]} {way}"
-        return Decoded(self.kind, self.node, said, signals, self.source, size=MPDO_BYTES)
+        return Decoded(self.kind, self.node, said, signals, self.source, size=_MPDO_BYTES)
 
 
-def make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
+def _make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
     """Return how a mapped object is read; a type of another size than mapped is not used."""
     name = text.name or write_entry((mapped.index, mapped.sub))
     kind = text.kind if text.kind and _fits(text.kind, mapped.bits) else None
@@ -125,7 +124,7 @@ def make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
     if kind is None:
         return field._replace(write=in_hex)
     if name == "statusword":
-        return field._replace(write=write_statusword)
+        return field._replace(write=_write_statusword)
     if text.in_hex or name == "controlword":
         return field._replace(write=in_hex)
     sign = 1 << mapped.bits - 1 if kind.signed else 0
@@ -136,7 +135,7 @@ def make_field(mapped: MappedObject, shift: int, text: ObjectText) -> Field:
     return field._replace(sign=sign)
 
 
-def write_statusword(raw: int) -> str:
+def _write_statusword(raw: int) -> str:
     """Write a statusword with its state."""
     return f"0x{raw:04X}[{drive_state(raw) or '?'}]"
 
@@ -145,7 +144,7 @@ def _fits(kind: DataType, bits: int) -> bool:
     return kind.bits == bits or (kind.is_integer and not kind.signed and bits <= kind.bits)
 
 
-def _converter(kind: DataType, text: ObjectText) -> Convert:
+def _converter(kind: DataType, text: ObjectText) -> _Convert:
     def convert(raw: int) -> Value:
         value = kind.decode(raw.to_bytes(kind.size, "little"))
         return value * text.factor if isinstance(value, float) else value
@@ -154,7 +153,7 @@ def _converter(kind: DataType, text: ObjectText) -> Convert:
 
 
 PDOS: Final = 512
-PREDEFINED: Final = 4
+_PREDEFINED: Final = 4
 """So many PDOs of each direction have a CAN-ID in the pre-defined connection set."""
 PDO_OBJECTS: Final = range(0x1400, 0x1C00)
 
@@ -162,10 +161,10 @@ _TPDO, _RPDO = "tpdo", "rpdo"
 _INDICES: Final = {_TPDO: (0x1800, 0x1A00, 0x180), _RPDO: (0x1400, 0x1600, 0x200)}
 """First communication parameter, first mapping, pre-defined CAN-ID of the first PDO."""
 
-Layout = PdoLayout | MpdoLayout
+_Layout = PdoDecoder | MpdoLayout
 
 
-class Pdo(NamedTuple):
+class NodePdo(NamedTuple):
     """One PDO of one node; those that are sent come first."""
 
     receives: bool
@@ -192,15 +191,15 @@ class PdoTable:
     """PDOs by CAN-ID, as far as anybody said what they are."""
 
     def __init__(self) -> None:
-        self._by_can_id: dict[int, dict[Pdo, Layout]] = {}
-        self._can_ids: dict[Pdo, int] = {}
+        self._by_can_id: dict[int, dict[NodePdo, _Layout]] = {}
+        self._can_ids: dict[NodePdo, int] = {}
 
-    def layout(self, can_id: int) -> Layout | None:
+    def layout(self, can_id: int) -> _Layout | None:
         """Return what carries this CAN-ID: who sends it, rather than who receives it."""
         claims = self._by_can_id.get(can_id)
         return claims[min(claims)] if claims else None
 
-    def update(self, pdo: Pdo, memory: NodeMemory) -> set[int]:
+    def update(self, pdo: NodePdo, memory: NodeMemory) -> set[int]:
         """Read again what is known of a PDO; return the CAN-IDs whose meaning may be new."""
         before = self._can_ids.pop(pdo, None)
         if before is not None:
@@ -212,39 +211,39 @@ class PdoTable:
         self._by_can_id.setdefault(can_id, {})[pdo] = layout
         return {can_id} if before is None else {can_id, before}
 
-    def known(self, node: int) -> tuple[Pdo, ...]:
+    def known(self, node: int) -> tuple[NodePdo, ...]:
         """Return the PDOs of a node that have a CAN-ID."""
         return tuple(pdo for pdo in self._can_ids if pdo.node == node)
 
 
-def pdo_of(node: int, index: int) -> Pdo:
+def _pdo_of(node: int, index: int) -> NodePdo:
     """Return the PDO that an object 1400h to 1BFFh is about."""
-    return Pdo(index < 0x1800, node, index % PDOS + 1)
+    return NodePdo(index < 0x1800, node, index % PDOS + 1)
 
 
-def pdos_of(node: int, indices: Iterable[int]) -> set[Pdo]:
+def pdos_of(node: int, indices: Iterable[int]) -> set[NodePdo]:
     """Return the PDOs that some objects are about."""
-    return {pdo_of(node, index) for index in indices if index in PDO_OBJECTS}
+    return {_pdo_of(node, index) for index in indices if index in PDO_OBJECTS}
 
 
-def can_id_of(pdo: Pdo, memory: NodeMemory) -> int | None:
+def can_id_of(pdo: NodePdo, memory: NodeMemory) -> int | None:
     """Return its CAN-ID; None if it is not valid or not known."""
     predefined = _INDICES[_RPDO if pdo.receives else _TPDO][2]
     cob_id = memory.number(pdo.parameter, 1)
     if cob_id is not None:
         return None if cob_id & (INVALID | EXTENDED) else cob_id & CAN_ID_MASK
-    if pdo.number > PREDEFINED:
+    if pdo.number > _PREDEFINED:
         return None
     return predefined + 0x100 * (pdo.number - 1) + pdo.node
 
 
-def _layout(pdo: Pdo, memory: NodeMemory) -> Layout | None:
+def _layout(pdo: NodePdo, memory: NodeMemory) -> _Layout | None:
     mapping = pdo.mapping
     count, source = memory.number(mapping, 0), memory.source(mapping)
     if count is None:
         source = memory.source(pdo.parameter)
         note = f"{UNMAPPED}: {mapping:04X}h was not heard"
-        return PdoLayout((pdo.kind, pdo.node, source), note=note) if source else None
+        return PdoDecoder((pdo.kind, pdo.node, source), note=note) if source else None
     if count in MPDO:
         return MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
     entries = mapped_objects(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
@@ -254,7 +253,7 @@ def _layout(pdo: Pdo, memory: NodeMemory) -> Layout | None:
     note = missing if len(entries) < count else ""
     bits = sum(item.bits for item in entries)
     fields = _fields(memory, entries)
-    return PdoLayout((pdo.kind, pdo.node, source), fields, bits, note)
+    return PdoDecoder((pdo.kind, pdo.node, source), fields, bits, note)
 
 
 def mapped_objects(memory: NodeMemory, mapping: int, count: int) -> list[MappedObject]:
@@ -273,6 +272,6 @@ def _fields(memory: NodeMemory, entries: list[MappedObject]) -> list[Field]:
     for item in entries:
         if item.index not in DUMMIES:
             text = memory.describe(item.index, item.sub)
-            fields.append(make_field(item, shift, text))
+            fields.append(_make_field(item, shift, text))
         shift += item.bits
     return fields

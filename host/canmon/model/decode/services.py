@@ -1,18 +1,31 @@
-"""NMT, SYNC, TIME, EMCY, error control (CiA 301) and error frames (linux/can/error.h), decoded."""
+"""NMT, SYNC, TIME, EMCY, error control (CiA 301), LSS (CiA 305) and error frames, decoded."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
 from typing import Final
 
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.canopen.datatypes import TimeOfDay
 from tickrig.wire.canopen.emcy import Emcy, ErrorRegister, describe
+from tickrig.wire.canopen.lss import (
+    BIT_RATES,
+    FASTSCAN_RESET,
+    LSS_MASTER_COB_ID,
+    MESSAGE_BYTES,
+    STANDARD_TABLE,
+    FastScan,
+    LssCommand,
+    LssError,
+    number_of,
+)
 from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand, NmtState
-from tickrig.wire.canopen.time_of_day import TimeOfDay
 from tickrig.wire.errors import WireError
+
+# NMT, SYNC, TIME, EMCY, error control (CiA 301) and error frames (linux/can/error.h), decoded.
 
 _CLASSES: Final = (
     "TX timeout",
@@ -50,11 +63,11 @@ def decode_error(frame: ErrorFrame) -> Decoded:
     return Decoded("error", None, text, (Signal("class", frame.error_class, "", word),))
 
 
-TOGGLE: Final = 0x80
-TIME_ZERO: Final = datetime(1984, 1, 1, tzinfo=UTC)
-HIGHEST_NODE: Final = 127
+_TOGGLE: Final = 0x80
+_TIME_ZERO: Final = datetime(1984, 1, 1, tzinfo=UTC)
+_HIGHEST_NODE: Final = 127
 
-_COMMANDS: Final = frozenset(NmtCommand)
+_NMT_COMMANDS: Final = frozenset(NmtCommand)
 _STATES: Final = {int(state): state.name.lower().replace("_", "-") for state in NmtState}
 
 
@@ -65,7 +78,7 @@ def decode_nmt(at_us: int, frame: CanFrame) -> Decoded:
     'start, node 5'
     """
     data = frame.data
-    if len(data) != 2 or data[1] > HIGHEST_NODE or data[0] not in _COMMANDS:
+    if len(data) != 2 or data[1] > _HIGHEST_NODE or data[0] not in _NMT_COMMANDS:
         return Decoded("nmt", None, f"no NMT command: {_dump(frame)}")
     command, node = NmtCommand(data[0]), data[1]
     whom = "all nodes" if node == ALL_NODES else f"node {node}"
@@ -92,7 +105,7 @@ def decode_time(at_us: int, frame: CanFrame) -> Decoded:
         time = TimeOfDay.parse(frame.data)
     except WireError as error:
         return Decoded("time", None, str(error))
-    moment = TIME_ZERO + timedelta(days=time.days, milliseconds=time.ms)
+    moment = _TIME_ZERO + timedelta(days=time.days, milliseconds=time.ms)
     text = moment.strftime("%Y-%m-%d %H:%M:%S.") + f"{time.ms % 1_000:03d}"
     return Decoded("time", None, text, (Signal("days", time.days), Signal("ms", time.ms)))
 
@@ -133,8 +146,8 @@ def decode_error_control(node: int, frame: CanFrame, *, guarded: bool) -> Decode
     byte = frame.data[0]
     if byte == NmtState.INITIALISING and not guarded:
         return Decoded("boot-up", node, "boot-up", (Signal("state", 0),))
-    state = byte & ~TOGGLE
-    kind = "guard" if guarded or byte & TOGGLE else "heartbeat"
+    state = byte & ~_TOGGLE
+    kind = "guard" if guarded or byte & _TOGGLE else "heartbeat"
     toggle = f", toggle {byte >> 7}" if kind == "guard" else ""
     signal = Signal("state", state, "", nmt_state_name(state))
     return Decoded(kind, node, f"{nmt_state_name(state)}{toggle}", (signal,))
@@ -155,3 +168,79 @@ def _words(name: str) -> str:
 
 def _dump(frame: CanFrame) -> str:
     return frame.data.hex(" ").upper() or "no data"
+
+
+# LSS messages, decoded (CiA 305).
+
+_LSS_COMMANDS: Final = frozenset(LssCommand)
+_ANSWERED: Final = (
+    LssCommand.CONFIGURE_NODE_ID,
+    LssCommand.CONFIGURE_BIT_TIMING,
+    LssCommand.STORE,
+)
+_ADDRESSES: Final = range(LssCommand.SWITCH_VENDOR, LssCommand.IDENTIFY_NON_CONFIGURED)
+_UNSET: Final = 0xFF
+_PARTS: Final = ("vendor", "product", "revision", "serial")
+
+
+def decode_lss(at_us: int, frame: CanFrame) -> Decoded:
+    """Decode a message of the LSS master or of a slave.
+
+    >>> decode_lss(0, CanFrame.parse("7E5#1105000000000000")).text
+    'master: configure node id 5'
+    >>> decode_lss(0, CanFrame.parse("7E4#1100000000000000")).text
+    'slave: configure node id done'
+    """
+    data = frame.data
+    by_master = frame.can_id == LSS_MASTER_COB_ID
+    who = "master" if by_master else "slave"
+    if len(data) != MESSAGE_BYTES or data[0] not in _LSS_COMMANDS:
+        return Decoded("lss", None, f"{who}: no LSS message: {data.hex(' ').upper()}")
+    command = LssCommand(data[0])
+    text = _master(command, data) if by_master else _slave(command, data)
+    name = command.name.lower().replace("_", " ")
+    word = Signal("command", data[0], "", name.replace(" ", "-"))
+    signals = (word, Signal("number", number_of(data)))
+    return Decoded("lss", None, f"{who}: {name} {text}".rstrip(), signals)
+
+
+def _master(command: LssCommand, data: bytes) -> str:
+    if command in _ADDRESSES:
+        return f"{number_of(data):08X}h"
+    write = _ARGUMENTS.get(command)
+    return write(data) if write else ""
+
+
+def _bit_timing(data: bytes) -> str:
+    if data[1] == STANDARD_TABLE and data[2] in BIT_RATES:
+        return f"{BIT_RATES[data[2]] // 1_000} kbit/s"
+    return f"table {data[1]} index {data[2]}"
+
+
+def _fastscan(data: bytes) -> str:
+    scan = FastScan.parse(data)
+    if scan.bit_check == FASTSCAN_RESET:
+        return "reset"
+    part = _PARTS[scan.sub] if scan.sub < len(_PARTS) else str(scan.sub)
+    return f"{part} {scan.id_number:08X}h from bit {scan.bit_check}"
+
+
+def _slave(command: LssCommand, data: bytes) -> str:
+    if command in _ANSWERED:
+        if data[1] == LssError.NONE:
+            return "done"
+        return f"refused, error {data[1]}" + (f", {data[2]}" if data[2] else "")
+    if command is LssCommand.INQUIRE_NODE_ID:
+        return str(data[1])
+    inquiries = range(LssCommand.INQUIRE_VENDOR, LssCommand.INQUIRE_NODE_ID)
+    return f"{number_of(data):08X}h" if command in inquiries else ""
+
+
+_ARGUMENTS: Final[dict[LssCommand, Callable[[bytes], str]]] = {
+    LssCommand.SWITCH_GLOBAL: lambda data: "configuration" if data[1] else "waiting",
+    LssCommand.CONFIGURE_NODE_ID: lambda data: "none" if data[1] == _UNSET else str(data[1]),
+    LssCommand.CONFIGURE_BIT_TIMING: _bit_timing,
+    LssCommand.ACTIVATE_BIT_TIMING: lambda data: f"after {data[1] | data[2] << 8} ms",
+    LssCommand.FASTSCAN: _fastscan,
+}
+"""What the master says beside a command."""

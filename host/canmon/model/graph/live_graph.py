@@ -8,18 +8,17 @@ from enum import StrEnum
 from typing import Final, assert_never
 
 from tickrig.host.canmon.model.decode.decoded import Decoded
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.chart import chart
-from tickrig.host.canmon.model.graph.collector import Collector
 from tickrig.host.canmon.model.graph.plot import render
-from tickrig.host.canmon.model.graph.series import LEAST_US, Series, View
-from tickrig.host.canmon.model.graph.signal_spec import SignalSpec
+from tickrig.host.canmon.model.graph.series import LEAST_US, Collector, Series, View
+from tickrig.host.canmon.model.graph.signal_spec import CurveSpec
 
 MOST: Final = 200_000
 """Samples of a signal that are kept."""
 
-WINDOW_US: Final = 10_000_000
-COLUMNS: Final = 200
+_WINDOW_US: Final = 10_000_000
+_COLUMNS: Final = 200
 """In how many columns the range of an axis is looked for."""
 
 
@@ -47,20 +46,20 @@ class LiveGraph:
     """
 
     def __init__(self, mode: ViewMode = ViewMode.LIVE) -> None:
-        self.words: list[SignalSpec] = []
-        self.mode, self.window_us, self.axis = mode, WINDOW_US, 1
+        self.words: list[CurveSpec] = []
+        self.mode, self.window_us, self.axis = mode, _WINDOW_US, 1
         self.cursor_us: int | None = None
         self.now_us = 0
         self._collector = Collector((), None)
         self._ranges: dict[int, tuple[float, float]] = {}
-        self._held, self._origin_us = View(0, WINDOW_US), 0
+        self._held, self._origin_us = View(0, _WINDOW_US), 0
 
     @property
     def series(self) -> list[Series]:
         """The samples of each signal."""
         return self._collector.series
 
-    def add(self, word: SignalSpec, past: Iterable[tuple[Record, Decoded | None]] = ()) -> None:
+    def add(self, word: CurveSpec, past: Iterable[tuple[Record, Decoded | None]] = ()) -> None:
         """Show one more signal; its values in frames of the past are taken, too."""
         fresh = Collector([word], None, MOST)
         for record, decoded in past:
@@ -154,7 +153,7 @@ class LiveGraph:
         self._held, self.mode = view, ViewMode.HELD
 
     def _range(self) -> tuple[float, float]:
-        return chart(self.series, self.view(), COLUMNS).ranges.get(self.axis, (0.0, 1.0))
+        return chart(self.series, self.view(), _COLUMNS).ranges.get(self.axis, (0.0, 1.0))
 
     def _set_range(self, low: float, high: float) -> None:
         if low < high:  # floats have an end

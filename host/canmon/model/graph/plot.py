@@ -108,14 +108,14 @@ def _reading(series: Series, at_us: int) -> Reading:
     return Reading(series.label, series.values[index], age_us, series.unit)
 
 
-COLOURS: Final = (36, 33, 35, 32, 34, 31)
+_COLOURS: Final = (36, 33, 35, 32, 34, 31)
 """ANSI codes of the curves, in turn."""
 
 LABEL_WIDTH: Final = 9
 """Letters left of the first axis and right of the second."""
 
-LEAST_WIDTH: Final = 2 * LABEL_WIDTH + 12
-LEAST_HEIGHT: Final = 6
+_LEAST_WIDTH: Final = 2 * LABEL_WIDTH + 12
+_LEAST_HEIGHT: Final = 6
 
 
 def render(
@@ -138,7 +138,7 @@ def render(
         height: in lines.
         colour: colour the curves with ANSI codes.
     """
-    width, height = max(width, LEAST_WIDTH), max(height, LEAST_HEIGHT)
+    width, height = max(width, _LEAST_WIDTH), max(height, _LEAST_HEIGHT)
     names = _names(series, view.cursor_us, width, colour)[: height - 5]
     two_axes = len({one.axis for one in series}) > 1
     inner = width - LABEL_WIDTH * (1 + two_axes) - 1
@@ -212,7 +212,7 @@ def _painted(cells: list[tuple[str, int]], marked: int | None, colour: bool) -> 
 
 
 def _coloured(text: str, number: int) -> str:
-    return f"\x1b[{COLOURS[number % len(COLOURS)]}m{text}\x1b[0m"
+    return f"\x1b[{_COLOURS[number % len(_COLOURS)]}m{text}\x1b[0m"
 
 
 def _labels(drawn: Chart, number: int, rows: int) -> dict[int, str]:

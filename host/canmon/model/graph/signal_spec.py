@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 EXTENDED: Final = 1 << 31
 """In a key: a 29-bit identifier."""
 
-FORM: Final = (
+_FORM: Final = (
     "ID[BYTES]TYPE*FACTOR+OFFSET, as 181[2:6]s*0.001: BYTES is 2, 2:6, bit 2.3 or bits 2.3+5;"
     " TYPE is u, s or f, and b behind it for big-endian"
 )
@@ -40,8 +40,8 @@ _NOTATION: Final = re.compile(
     rf"([usf]?)(b?)(?:([*/])(-?{_NUMBER}))?([+-]{_NUMBER})?",
     re.ASCII,
 )
-MOST_BITS: Final = 64
-FRAME_BITS: Final = 8 * 64
+_MOST_BITS: Final = 64
+_FRAME_BITS: Final = 8 * 64
 _FLOATS: Final = {32: "f", 64: "d"}
 
 
@@ -128,7 +128,7 @@ def parse_slice(text: str) -> FrameSlice:
     """
     match = _NOTATION.fullmatch(text)
     if match is None:
-        raise ValueError(f"{text!r} is not {FORM}")
+        raise ValueError(f"{text!r} is not {_FORM}")
     can_id, byte, end, bit, bits, kind, big, sign, factor, offset = match.groups()
     first_bit = int(byte) * 8 + int(bit or 0)
     width = _width(text, first_bit, end, bit, bits)
@@ -164,10 +164,10 @@ def _width(text: str, first_bit: int, end: str | None, bit: str | None, bits: st
         width = int(end) * 8 - first_bit
     elif bit:
         width = int(bits or 1)
-    if not 1 <= width <= MOST_BITS or first_bit + width > FRAME_BITS:
+    if not 1 <= width <= _MOST_BITS or first_bit + width > _FRAME_BITS:
         raise ValueError(
-            f"{text!r} has {width} bits from bit {first_bit}; a signal has 1 to {MOST_BITS}"
-            f" of the {FRAME_BITS} that a frame has, in classic CAN of 64"
+            f"{text!r} has {width} bits from bit {first_bit}; a signal has 1 to {_MOST_BITS}"
+            f" of the {_FRAME_BITS} that a frame has, in classic CAN of 64"
         )
     return width
 
@@ -203,7 +203,7 @@ class ObjectName:
 
 
 @dataclass(frozen=True, slots=True)
-class SignalSpec:
+class CurveSpec:
     """A curve that is asked for.
 
     Attributes:
@@ -219,7 +219,7 @@ class SignalSpec:
     text: str
 
 
-def parse_signal(text: str) -> SignalSpec:
+def parse_signal(text: str) -> CurveSpec:
     """Read `[LABEL=]SIGNAL[@AXIS]`: a slice as 181[2:6]s*0.001, or an object as 3.position.
 
     Raises:
@@ -230,7 +230,7 @@ def parse_signal(text: str) -> SignalSpec:
         raise ValueError(f"{text!r} is not [LABEL=]SIGNAL[@AXIS], as speed=181[2:6]s*0.001@2")
     label, signal, axis = match.groups()
     source = parse_slice(signal) if "[" in signal else _object(signal)
-    return SignalSpec(label or "", source, int(axis or 1), signal)
+    return CurveSpec(label or "", source, int(axis or 1), signal)
 
 
 def _object(text: str) -> ObjectName:

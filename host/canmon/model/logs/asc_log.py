@@ -13,27 +13,34 @@ import re
 from datetime import UTC, datetime
 from typing import Final
 
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.frames import AnyFrame, Record
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
-from tickrig.host.canmon.model.logs.tally import (
+from tickrig.host.canmon.model.logs.mark import (
     BAD_FRAMES,
     CAN_XL,
     ERRORS_COUNTED,
     OTHER_LINES,
-    Tally,
+    LogTally,
 )
-from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame
-from tickrig.wire.can_error import ErrorClass, ErrorFrame
-from tickrig.wire.can_fd import BRS, ESI, FdFrame
+from tickrig.wire.can import (
+    BRS,
+    ESI,
+    MAX_DATA_BYTES,
+    STANDARD_MAX,
+    CanFrame,
+    ErrorClass,
+    ErrorFrame,
+    FdFrame,
+)
 from tickrig.wire.errors import WireError
 
-BUS_ERROR: Final = ErrorFrame(ErrorClass.BUS_ERROR)
+_BUS_ERROR: Final = ErrorFrame(ErrorClass.BUS_ERROR)
 """What `ErrorFrame` in a line says: it does not name the error as linux/can/error.h does."""
 
-FDF: Final = 0x1000
+_FDF: Final = 0x1000
 """The flag of a CAN FD frame in a line `CANFD`; the bits above it are BRS and ESI."""
-RTR: Final = 0x10
-DECIMAL_DIGITS: Final = 3
+_RTR: Final = 0x10
+_DECIMAL_DIGITS: Final = 3
 """So many a byte has, where it is decimal and filled up with zeros."""
 
 _TIMED: Final = re.compile(r"\s*([0-9]{1,12})\.([0-9]{1,9})\s+(.*\S)\s*", re.ASCII | re.DOTALL)
@@ -104,7 +111,7 @@ class AscLines:
         self._header_us, self._block_us, self._pending = 0, 0, False
         self._now_us = 0
 
-    def read(self, line: str, tally: Tally) -> Record | str | None:
+    def read(self, line: str, tally: LogTally) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line."""
         timed = _TIMED.fullmatch(line)
         if timed is None:
@@ -120,13 +127,13 @@ class AscLines:
         except (ValueError, LookupError):
             return None
 
-    def _head(self, text: str, tally: Tally) -> str:
+    def _head(self, text: str, tally: LogTally) -> str:
         """Take a line without a time: what it says of those that follow."""
         if base := _BASE.match(text):
             self._base, self._guessed = 10 if base[1].lower() == "dec" else 16, False
             self._relative = (base[2] or "").lower() == "relative"
         elif dated := _DATED.fullmatch(text):
-            at_us = date_us(dated[2])
+            at_us = _date_us(dated[2])
             if at_us is None:
                 tally.undated += 1
             elif dated[1].lower() == "date":
@@ -151,13 +158,13 @@ class AscLines:
                 self._block_us = self._header_us
         self._now_us = self._block_us + span_us
 
-    def _event(self, event: str, tally: Tally) -> Record | str | None:
+    def _event(self, event: str, tally: LogTally) -> Record | str | None:
         if classic := _CLASSIC.fullmatch(event):
             channel, ident, extended, direction, kind, length, rest = classic.groups()
             frame = self._classic(ident, bool(extended), kind.lower() == "r", length, rest)
             return self._record(channel, direction, frame)
         if error := _ERROR.match(event):
-            return self._record(error[1], error[2], BUS_ERROR)
+            return self._record(error[1], error[2], _BUS_ERROR)
         if long := _LONG.fullmatch(event):
             kind, channel, direction, words = long.groups()
             fd = kind.upper() == "CANFD"
@@ -182,7 +189,7 @@ class AscLines:
     ) -> CanFrame:
         """Return a frame; of a length code above 8 it has 8 bytes."""
         words, size = rest.split(), 0 if length is None else self._length(length)
-        if self._guessed and any(len(word) == DECIMAL_DIGITS for word in words[:size]):
+        if self._guessed and any(len(word) == _DECIMAL_DIGITS for word in words[:size]):
             self._base = 10  # BUSMASTER does not always write what the base is
         can_id, extended = self._can_id(ident, extended)
         if remote:
@@ -210,7 +217,7 @@ class AscLines:
         ident, *words = words
         brs, esi, dlc, size, *rest = words[0 if words[0].isdecimal() else 1 :]
         length = int(size)
-        data, flags = self._data(rest, length), FDF
+        data, flags = self._data(rest, length), _FDF
         if len(rest) > length + 2:  # behind the duration and the count of bits
             flags = int(rest[length + 2], 16)
         switches = BRS * (brs == "1") | ESI * (esi == "1")
@@ -225,20 +232,20 @@ class AscLines:
         length = int(size)
         fd = kind.upper().startswith("F")
         flags = int(rest[length + 1 + fd], 16)  # behind the stuff count of CAN FD, and the CRC
-        switches = BRS * bool(flags & 2 * FDF) | ESI * bool(flags & 4 * FDF)
+        switches = BRS * bool(flags & 2 * _FDF) | ESI * bool(flags & 4 * _FDF)
         return self._flagged(ident, dlc, self._data(rest, length), flags, switches)
 
     def _flagged(self, ident: str, dlc: str, data: bytes, flags: int, switches: int) -> AnyFrame:
         """Return the frame that its flags say: classic frames stand in such lines, too."""
         can_id, extended = self._can_id(ident.rstrip("xX"), ident[-1:] in ("x", "X"))
-        if flags & FDF or len(data) > MAX_DATA_BYTES:
+        if flags & _FDF or len(data) > MAX_DATA_BYTES:
             return FdFrame(can_id, data, extended, switches).checked()
-        if flags & RTR:
+        if flags & _RTR:
             return CanFrame(can_id, b"", True, extended, self._length(dlc)).checked()
         return CanFrame(can_id, data, False, extended).checked()
 
 
-def _note_errors(event: str, tally: Tally) -> None:
+def _note_errors(event: str, tally: LogTally) -> None:
     """Note what an event says of errors: no frame shows them."""
     if state := _STATE.match(event):
         tally.errors_told[_STATES[state[1].lower()]] += 1
@@ -246,12 +253,12 @@ def _note_errors(event: str, tally: Tally) -> None:
         tally.errors_told[ERRORS_COUNTED] += 1
 
 
-def date_us(text: str) -> int | None:
+def _date_us(text: str) -> int | None:
     """Read a date of a header, which is local time; None if it is none.
 
-    >>> date_us("Sam Sep 30 15:06:13.191 2017") == date_us("Sat Sep 30 03:06:13.191 pm 2017")
+    >>> _date_us("Sam Sep 30 15:06:13.191 2017") == _date_us("Sat Sep 30 03:06:13.191 pm 2017")
     True
-    >>> date_us("yesterday") is None
+    >>> _date_us("yesterday") is None
     True
     """
     match = _DATE.fullmatch(text.strip())

@@ -22,7 +22,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final, Protocol, cast
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import (
     LogError,
     LogFormat,
@@ -30,7 +30,14 @@ from tickrig.host.canmon.model.logs.log_file import (
     open_log,
     read_blocks,
 )
-from tickrig.host.canmon.model.logs.mark import DROP_COUNT, Mark, lost_frames, read_mark
+from tickrig.host.canmon.model.logs.mark import (
+    CAN_XL,
+    DROP_COUNT,
+    LogTally,
+    Mark,
+    lost_frames,
+    read_mark,
+)
 from tickrig.host.canmon.model.logs.notation import (
     LONGEST_NAME,
     parse_csv_line,
@@ -39,7 +46,6 @@ from tickrig.host.canmon.model.logs.notation import (
     parse_json_mark,
 )
 from tickrig.host.canmon.model.logs.screen_line import ScreenClock, parse_screen_line
-from tickrig.host.canmon.model.logs.tally import CAN_XL, Tally
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import WireError
 
@@ -80,7 +86,7 @@ class WholeLines:
             self._held += len(rest)
 
 
-COMMENTS: Final = ("#", ";", "//")
+_COMMENTS: Final = ("#", ";", "//")
 
 _LINE: Final = re.compile(
     r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
@@ -89,7 +95,7 @@ _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 
 
 def parse_log_line(
-    line: str, number: int, tally: Tally, clock: ScreenClock | None = None
+    line: str, number: int, tally: LogTally, clock: ScreenClock | None = None
 ) -> Record | None:
     """Read a line; None if it holds no frame, and then the tally says why.
 
@@ -107,7 +113,7 @@ def parse_log_line(
         clock: of the lines of a screen.
     """
     text = line.strip()
-    if not text or text.startswith(COMMENTS):
+    if not text or text.startswith(_COMMENTS):
         tally.lost += lost_frames(text)
         return None
     record = _parsed(line, text, tally, clock or ScreenClock())
@@ -116,7 +122,7 @@ def parse_log_line(
     return record if isinstance(record, Record) else None
 
 
-def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
+def _parsed(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
     """Return a frame, what was counted instead, or None for a bad line."""
     if text.startswith("{"):
         return parse_json_line(text, tally)
@@ -125,7 +131,7 @@ def _parsed(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | 
     return parse_screen_line(line, tally, clock) or parse_csv_line(text, tally, clock)
 
 
-def _logged(match: re.Match[str], tally: Tally) -> Record | str | None:
+def _logged(match: re.Match[str], tally: LogTally) -> Record | str | None:
     """Return what a line of `candump -L` says."""
     seconds, fraction, channel, notation, direction = match.groups()
     if _XL.fullmatch(notation):
@@ -158,7 +164,7 @@ class LogLines:
     """
 
     def __init__(self) -> None:
-        self.tally, self.marks = Tally(), list[tuple[int, Mark]]()
+        self.tally, self.marks = LogTally(), list[tuple[int, Mark]]()
         self._whole, self._number, self._latest_us = WholeLines(), 0, 0
         self._clock: ScreenClock | None = None
 
@@ -241,23 +247,23 @@ def _usual_frames(lines: list[tuple[str, str, str, str, str, str]]) -> list[Reco
 BLOCK_BYTES: Final = 1 << 13
 """So few frames at once that the garbage collector seldom meets them."""
 
-CAN_LOG: Final = "tickrig.host.canmon.model.logs.can_log"
+_CAN_LOG: Final = "tickrig.host.canmon.model.logs.can_log"
 """python-can is slow to import: this module is when a log needs it."""
 
-CAPTURE: Final = "tickrig.host.canmon.model.logs.pcap.pcap_reader"
+_CAPTURE: Final = "tickrig.host.canmon.model.logs.pcap"
 
-READERS: Final = {
+_READERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogReader"),
     LogFormat.JSONL: (__name__, "TextLogReader"),
     LogFormat.CSV: (__name__, "TextLogReader"),
     LogFormat.GVRET: (__name__, "TextLogReader"),
     LogFormat.ASC: ("tickrig.host.canmon.model.logs.asc_log", "AscLogReader"),
-    LogFormat.BLF: (CAN_LOG, "CanLogReader"),
+    LogFormat.BLF: (_CAN_LOG, "CanLogReader"),
     LogFormat.TRC: ("tickrig.host.canmon.model.logs.trc_log", "TrcLogReader"),
-    LogFormat.MF4: (CAN_LOG, "CanLogReader"),
+    LogFormat.MF4: (_CAN_LOG, "CanLogReader"),
     LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogReader"),
-    LogFormat.PCAPNG: (CAPTURE, "PcapReader"),
-    LogFormat.PCAP: (CAPTURE, "PcapReader"),
+    LogFormat.PCAPNG: (_CAPTURE, "PcapReader"),
+    LogFormat.PCAP: (_CAPTURE, "PcapReader"),
 }
 """Module and class of the reader of each format."""
 
@@ -273,7 +279,7 @@ class LogReader(Protocol):
         LogError: it is not what its name says, likewise.
     """
 
-    tally: Tally
+    tally: LogTally
 
     def __iter__(self) -> Iterator[Record]: ...
 
@@ -289,7 +295,7 @@ def read_log(path: Path) -> LogReader:
         LogFormatError: the file's name tells no format.
     """
     kind = log_format(path)
-    module, name = READERS[kind]
+    module, name = _READERS[kind]
     return cast("LogReader", getattr(import_module(module), name)(path, kind))
 
 
@@ -297,7 +303,7 @@ class TextLogReader:
     """A reader of a log in text."""
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._path, self.tally = path, Tally()
+        self._path, self.tally = path, LogTally()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
@@ -318,14 +324,14 @@ class TextLogReader:
         yield lines.finish(), lines
 
 
-MOST_MARKS: Final = 1_000
+_MOST_MARKS: Final = 1_000
 """Between two frames: more are a damaged log."""
 
 
-class Lines(Protocol):
+class LineParser(Protocol):
     """Reads the lines of one log, in their order."""
 
-    def read(self, line: str, tally: Tally, /) -> Record | str | None:
+    def read(self, line: str, tally: LogTally, /) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line.
 
         Raises:
@@ -343,10 +349,10 @@ class LineLogReader:
     """
 
     comments: tuple[str, ...] = ()
-    make_lines: Callable[[], Lines]
+    make_lines: Callable[[], LineParser]
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._path, self._kind, self.tally = path, kind, Tally()
+        self._path, self._kind, self.tally = path, kind, LogTally()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
@@ -354,8 +360,8 @@ class LineLogReader:
 
     def items(self) -> Iterator[Item]:
         """Read the file, with the marks among its frames: they have the time of the next one."""
-        tally = self.tally = Tally()
-        lines, marks, at_us = type(self).make_lines(), deque[Mark](maxlen=MOST_MARKS), 0
+        tally = self.tally = LogTally()
+        lines, marks, at_us = type(self).make_lines(), deque[Mark](maxlen=_MOST_MARKS), 0
         for number, line in enumerate(self._lines(), 1):
             try:
                 found = lines.read(line, tally)
@@ -382,13 +388,13 @@ class LineLogReader:
             for data in read_blocks(file, self._path, BLOCK_BYTES):
                 if lines := whole.push(data):
                     text = _text(lines[:-1])
-                    yield from (text.removeprefix(BOM) if first else text).split("\n")
+                    yield from (text.removeprefix(_BOM) if first else text).split("\n")
                     first = False
         if rest := whole.finish():
             yield _text(rest)
 
 
-NUMBERLESS: Final = "canX"
+_NUMBERLESS: Final = "canX"
 
 
 def bus_name(number: str) -> str:
@@ -398,10 +404,10 @@ def bus_name(number: str) -> str:
     ('can0', 'canX')
     """
     count = int(number[:LONGEST_NAME])
-    return f"can{count - 1}"[:LONGEST_NAME] if count > 0 else NUMBERLESS
+    return f"can{count - 1}"[:LONGEST_NAME] if count > 0 else _NUMBERLESS
 
 
-BOM: Final = "\ufeff"
+_BOM: Final = "\ufeff"
 
 
 def _text(data: bytes) -> str:

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Final, Protocol, cast
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
 from tickrig.host.canmon.model.logs.mark import Mark
 from tickrig.host.canmon.model.logs.notation import (
@@ -18,31 +18,30 @@ from tickrig.host.canmon.model.logs.notation import (
     gvret_row,
     json_line,
 )
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 
-BLOCK_LINES: Final = 256
+_BLOCK_LINES: Final = 256
 
 
-CAN_LOG_WRITER: Final = "tickrig.host.canmon.model.logs.can_log_writer"
+_CAN_LOG_WRITER: Final = "tickrig.host.canmon.model.logs.can_log"
 """python-can is slow to import: this module is when a log needs it."""
 
 MARKS: Final = "marks of gaps and triggers left out"
 
-CAPTURE_WRITER: Final = "tickrig.host.canmon.model.logs.pcap.pcapng_writer"
+_CAPTURE_WRITER: Final = "tickrig.host.canmon.model.logs.pcap"
 
-WRITERS: Final = {
+_WRITERS: Final = {
     LogFormat.CANDUMP: (__name__, "TextLogWriter"),
     LogFormat.JSONL: (__name__, "TextLogWriter"),
     LogFormat.CSV: (__name__, "CsvLogWriter"),
     LogFormat.GVRET: (__name__, "GvretLogWriter"),
-    LogFormat.ASC: (CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.BLF: (CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.TRC: (CAN_LOG_WRITER, "CanLogWriter"),
-    LogFormat.MF4: (CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.ASC: (_CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.BLF: (_CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.TRC: (_CAN_LOG_WRITER, "CanLogWriter"),
+    LogFormat.MF4: (_CAN_LOG_WRITER, "CanLogWriter"),
     LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogWriter"),
-    LogFormat.PCAPNG: (CAPTURE_WRITER, "PcapngWriter"),
-    LogFormat.PCAP: (CAPTURE_WRITER, "PcapngWriter"),
+    LogFormat.PCAPNG: (_CAPTURE_WRITER, "PcapngWriter"),
+    LogFormat.PCAP: (_CAPTURE_WRITER, "PcapngWriter"),
 }
 """Module and class of the writer of each format."""
 
@@ -88,7 +87,7 @@ def write_log(path: Path) -> LogWriter:
         LogError: its format needs a library that is not there.
     """
     kind = log_format(path)
-    module, name = WRITERS[kind]
+    module, name = _WRITERS[kind]
     return cast("LogWriter", getattr(import_module(module), name)(path, kind))
 
 
@@ -124,7 +123,7 @@ class TextLogWriter:
     def write(self, record: Record, /) -> None:
         """Add a line."""
         self._lines.append(self._row(record))
-        if len(self._lines) >= BLOCK_LINES:
+        if len(self._lines) >= _BLOCK_LINES:
             self._give()
 
     def mark(self, mark: Mark, /) -> None:

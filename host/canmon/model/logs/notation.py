@@ -13,13 +13,28 @@ import re
 from binascii import a2b_base64, b2a_base64
 from typing import Any, Final, Protocol
 
-from tickrig.host.canmon.model.frames.record import AnyFrame, LineRecord, Record
+from tickrig.host.canmon.model.frames import AnyFrame, LineRecord, Record
 from tickrig.host.canmon.model.logs.log_file import to_us
-from tickrig.host.canmon.model.logs.mark import DROP, Mark, dropped, read_mark
-from tickrig.host.canmon.model.logs.tally import SERIAL_LINES, Tally
-from tickrig.wire.can import MAX_DATA_BYTES, STANDARD_MAX, CanFrame
-from tickrig.wire.can_error import ERROR_CLASS_MASK, ErrorFrame
-from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame, parse_sent
+from tickrig.host.canmon.model.logs.mark import (
+    DROP,
+    SERIAL_LINES,
+    LogTally,
+    Mark,
+    dropped,
+    read_mark,
+)
+from tickrig.wire.can import (
+    BRS,
+    ERROR_CLASS_MASK,
+    ESI,
+    FD_LENGTHS,
+    MAX_DATA_BYTES,
+    STANDARD_MAX,
+    CanFrame,
+    ErrorFrame,
+    FdFrame,
+    parse_sent,
+)
 from tickrig.wire.errors import WireError
 
 _CODED: Final = re.compile(r"(.+#(?:[0-9A-Fa-f]{16}|R8))_[9A-Fa-f]")
@@ -43,8 +58,8 @@ LONGEST_NAME: Final = 32
 """Characters of the name of a bus, as in the lines of a candump log."""
 _NAME: Final = re.compile(rf"\S{{1,{LONGEST_NAME}}}", re.ASCII)
 
-VERSION: Final = 1
-LINE_EVENT: Final = "line"
+_VERSION: Final = 1
+_LINE_EVENT: Final = "line"
 """A line of a serial port, which no log of CAN holds."""
 
 
@@ -69,7 +84,8 @@ def json_line(record: Record, more: str = "") -> str:
         remote = f',"rtr":{frame.dlc}' if frame.remote else ""
         what = f'"id":{frame.can_id},"x":{frame.extended:d}{remote}'
     return (
-        f'{{"v":{VERSION},"t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},"ch":{_quoted(channel)},'
+        f'{{"v":{_VERSION},"t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},'
+        f'"ch":{_quoted(channel)},'
         f'{what},"dir":"{"tx" if sent else "rx"}","data":"{frame.data.hex().upper()}"{more}}}'
     )
 
@@ -83,7 +99,7 @@ def line_json(line: LineRecord, more: str = "") -> str:
     """
     at_us = line.at_us
     return (
-        f'{{"v":{VERSION},"ev":"{LINE_EVENT}","t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},'
+        f'{{"v":{_VERSION},"ev":"{_LINE_EVENT}","t":{at_us // 1_000_000}.{at_us % 1_000_000:06d},'
         f'"ch":{_quoted(line.channel)},"dir":"{"tx" if line.sent else "rx"}",'
         f'"data":"{line.data.hex().upper()}"{more}}}'
     )
@@ -95,10 +111,10 @@ def drop_line(lost: int) -> str:
     >>> drop_line(12)
     '{"v":1,"ev":"drop","n":12}'
     """
-    return f'{{"v":{VERSION},"ev":"drop","n":{lost}}}'
+    return f'{{"v":{_VERSION},"ev":"drop","n":{lost}}}'
 
 
-def parse_json_line(text: str, tally: Tally) -> Record | str | None:
+def parse_json_line(text: str, tally: LogTally) -> Record | str | None:
     """Return a frame, the name of an event, or None for anything else."""
     import json  # noqa: PLC0415 - candump's lines are the usual ones
 
@@ -126,11 +142,11 @@ def parse_json_mark(text: str) -> Mark | None:
         return None
 
 
-def _event(said: dict[str, Any], tally: Tally) -> str:
+def _event(said: dict[str, Any], tally: LogTally) -> str:
     """Take an event; one that is not known says nothing to us."""
     if said["ev"] == DROP:
         tally.lost += max(0, int(said["n"]))
-    elif said["ev"] == LINE_EVENT:
+    elif said["ev"] == _LINE_EVENT:
         tally.passed_over[SERIAL_LINES] += 1
     return str(said["ev"])
 
@@ -168,7 +184,7 @@ DUMP_HEADER: Final = "t,ch,id,dir,dlc,data,kind,node,text"
 UNNAMED: Final = "can0"
 """What a bus without a name or number is called."""
 
-SENT: Final = ">"
+_SENT: Final = ">"
 FD, FD_BRS, FD_ESI = "#", "!", "*"
 """Behind the data of a row: base64 does not have them."""
 
@@ -201,7 +217,7 @@ def csv_row(record: Record) -> str:
     `#` there says so, `!` that it has BRS, `*` that it has ESI.
     """
     at_us, _, frame, sent = record
-    marks = SENT * sent
+    marks = _SENT * sent
     if isinstance(frame, ErrorFrame):
         what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"
     elif isinstance(frame, FdFrame):
@@ -215,9 +231,9 @@ def csv_row(record: Record) -> str:
 
 GVRET_HEADER: Final = "Time Stamp,ID,Extended,Dir,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8"
 """Of SavvyCAN's own logs; older ones have no `Dir`."""
-GVRET_BYTES: Final = 8
+_GVRET_BYTES: Final = 8
 """So many columns of data there are, whatever the length."""
-WITHOUT_ERRORS: Final = "a GVRET log holds no error frames"
+_WITHOUT_ERRORS: Final = "a GVRET log holds no error frames"
 
 _GVRET_HEAD: Final = re.compile(r"time stamp,\s*id,\s*extended,.*", re.IGNORECASE)
 _GVRET: Final = re.compile(
@@ -236,13 +252,13 @@ def gvret_row(record: Record, bus: int) -> str:
     frame = record.frame
     assert isinstance(frame, CanFrame), "the log holds no others"
     direction = "Tx" if record.sent else "Rx"
-    cells = frame.data.ljust(GVRET_BYTES, b"\0").hex(",").upper()
+    cells = frame.data.ljust(_GVRET_BYTES, b"\0").hex(",").upper()
     extended = "true" if frame.extended else "false"
     head = f"{record.at_us},{frame.can_id:08X},{extended},{direction},{bus}"
     return f"{head},{len(frame.data)},{cells},"
 
 
-def parse_csv_line(text: str, tally: Tally, clock: Counting) -> Record | str | None:
+def parse_csv_line(text: str, tally: LogTally, clock: Counting) -> Record | str | None:
     """Return a frame, the name of a header or of what was counted instead, or None.
 
     What a row is, itself tells: one of python-can, of `canmon dump --csv`, or of SavvyCAN.
@@ -259,7 +275,7 @@ def parse_csv_line(text: str, tally: Tally, clock: Counting) -> Record | str | N
         return None
 
 
-def _of_savvycan(match: re.Match[str], tally: Tally, clock: Counting) -> Record:
+def _of_savvycan(match: re.Match[str], tally: LogTally, clock: Counting) -> Record:
     """Return the frame of a row; some programs do not say of a CAN-ID that it has 29 bits."""
     stamp, ident, extended, direction, bus, length, cells = match.groups()
     can_id, size = int(ident, 16), int(length)
@@ -270,13 +286,13 @@ def _of_savvycan(match: re.Match[str], tally: Tally, clock: Counting) -> Record:
     fd = size > MAX_DATA_BYTES
     frame = FdFrame(can_id, data, long) if fd else CanFrame(can_id, data, False, long)
     checked = frame.checked()
-    tally.without_errors = WITHOUT_ERRORS
+    tally.without_errors = _WITHOUT_ERRORS
     at_us = clock.counted_us(int(stamp))
     tally.shifted_us = clock.shift_us
     return Record(at_us, f"can{int(bus)}", checked, (direction or "").lower() == "tx")
 
 
-def _dumped(match: re.Match[str], tally: Tally) -> Record | str:
+def _dumped(match: re.Match[str], tally: LogTally) -> Record | str:
     stamp, channel, ident, direction, data = match.groups()
     if not ident:
         tally.passed_over[SERIAL_LINES] += 1
@@ -297,4 +313,4 @@ def _logged(cells: list[str]) -> Record:
         frame = FdFrame(can_id, data, extended == "1", flags).checked()
     else:
         frame = CanFrame(can_id, data, False, extended == "1").checked()
-    return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(SENT))
+    return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(_SENT))

@@ -13,19 +13,22 @@ import re
 from itertools import pairwise
 from typing import Final
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.mark import DROP_COUNT, lost_frames
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.mark import (
+    CAN_XL,
+    DROP_COUNT,
+    SERIAL_LINES,
+    LogTally,
+    lost_frames,
+)
 from tickrig.host.canmon.model.logs.notation import UNNAMED, parse_frame
-from tickrig.host.canmon.model.logs.tally import CAN_XL, SERIAL_LINES, Tally
-from tickrig.wire.can import MAX_DATA_BYTES
-from tickrig.wire.can_error import ERROR_FLAG
-from tickrig.wire.can_fd import BRS, ESI
+from tickrig.wire.can import BRS, ERROR_FLAG, ESI, MAX_DATA_BYTES
 from tickrig.wire.errors import WireError
 
 HEAD: Final = 1 << 13
 """Bytes of a text by which it is told what its stamps are."""
 
-LATE_US: Final = 10_000
+_LATE_US: Final = 10_000
 """Frames of several buses are shown out of order by less."""
 
 _STAMP: Final = (
@@ -58,7 +61,7 @@ _ABSOLUTE: Final = 10
 """Digits of the seconds since the epoch; with fewer it is a span of time."""
 
 
-WRAP_US: Final = 1 << 32
+_WRAP_US: Final = 1 << 32
 """So far a counter of microseconds with 32 bits goes."""
 
 
@@ -83,7 +86,7 @@ class ScreenClock:
         head = text if len(text) <= HEAD else text[: text.rfind("\n", 0, HEAD) + 1]
         spans = [int(f"{sign}{high}{low}") for sign, high, low in _SPANS.findall(head)]
         falls = [before - after for before, after in pairwise(spans) if after < before]
-        return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > LATE_US)
+        return cls(len(falls) * 4 > len(spans) or max(falls, default=0) > _LATE_US)
 
     def at_us(self, sign: str, seconds: str | None, date: str | None, fraction: str | None) -> int:
         """Return the time of a stamp; of the frame before, where there is none.
@@ -111,13 +114,13 @@ class ScreenClock:
         before = self._count
         if before is None:
             self.shift_us = max(0, -count)
-        elif before - count > WRAP_US // 2 and before < WRAP_US:
-            self.shift_us += WRAP_US
+        elif before - count > _WRAP_US // 2 and before < _WRAP_US:
+            self.shift_us += _WRAP_US
         self._count = count
         return max(0, count + self.shift_us)
 
 
-def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
+def parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
     """Return a frame, what was counted or is no fault instead, or None for a bad line."""
     text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
     match = _FRAME.fullmatch(text)
@@ -140,7 +143,7 @@ def parse_screen_line(line: str, tally: Tally, clock: ScreenClock) -> Record | s
     return Record(at_us, channel, frame, direction == "T")
 
 
-def _beside(line: str, text: str, tally: Tally, clock: ScreenClock) -> Record | str | None:
+def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
     """Return what other lines of a screen say.
 
     These are lines of serial ports, error frames in words, frames that candump says were dropped,

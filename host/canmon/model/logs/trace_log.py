@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError, LogFormat, open_log
+from tickrig.host.canmon.model.logs.mark import SERIAL_LINES, LogTally
 from tickrig.host.canmon.model.logs.mark import Mark as LogMark
-from tickrig.host.canmon.model.logs.tally import SERIAL_LINES, Tally
 from tickrig.host.text.bench_header import (
     BenchHeader,
     DeviceEntry,
@@ -23,17 +23,16 @@ from tickrig.host.text.bench_header import (
 )
 from tickrig.host.text.bench_record import BenchParser, BenchRecord
 from tickrig.host.text.trace import Mark, TraceError
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 
-OTHER_BUSES = "frames of other buses"
-ERROR_FRAMES = "error frames"
-LOG_MARKS = "marks of gaps and triggers"
-FD_FRAMES = "CAN FD frames"
+_OTHER_BUSES = "frames of other buses"
+_ERROR_FRAMES = "error frames"
+_LOG_MARKS = "marks of gaps and triggers"
+_FD_FRAMES = "CAN FD frames"
 
-WITHOUT_ERRORS = "a trace holds no error frames"
+_WITHOUT_ERRORS = "a trace holds no error frames"
 
-MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
+_MARKS = {True: Mark.TO_DEVICE, False: Mark.FROM_DEVICE}
 
 
 class TraceLogWriter:
@@ -49,16 +48,16 @@ class TraceLogWriter:
         if not self._channel:
             self._begin(record)
         if record.channel != self._channel or not isinstance(record.frame, CanFrame):
-            kind = ERROR_FRAMES if isinstance(record.frame, ErrorFrame) else FD_FRAMES
-            self._left_out[OTHER_BUSES if record.channel != self._channel else kind] += 1
+            kind = _ERROR_FRAMES if isinstance(record.frame, ErrorFrame) else _FD_FRAMES
+            self._left_out[_OTHER_BUSES if record.channel != self._channel else kind] += 1
             return
         self._latest_us = max(self._latest_us, record.at_us - self._began_us)
-        mark = MARKS[record.sent]
+        mark = _MARKS[record.sent]
         self._put(BenchRecord(self._latest_us, _name(self._channel), mark, record.frame).encode())
 
     def mark(self, mark: LogMark, /) -> None:
         """Count it: a trace has frames alone."""
-        self._left_out[LOG_MARKS] += 1
+        self._left_out[_LOG_MARKS] += 1
 
     def flush(self) -> None:
         """Give what was added to the operating system."""
@@ -103,11 +102,11 @@ class TraceLogReader:
     """
 
     def __init__(self, path: Path, kind: LogFormat) -> None:
-        self._path, self.tally = path, Tally()
+        self._path, self.tally = path, LogTally()
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
-        self.tally = Tally(without_errors=WITHOUT_ERRORS)
+        self.tally = LogTally(without_errors=_WITHOUT_ERRORS)
         try:
             with open_log(self._path) as file:
                 header = parse_bench_header(file.readline().decode("ascii").rstrip("\n"))

@@ -14,30 +14,34 @@ import re
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.frames import AnyFrame, Record
 from tickrig.host.canmon.model.logs.log_file import END_S
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
-from tickrig.host.canmon.model.logs.tally import (
+from tickrig.host.canmon.model.logs.mark import (
     BAD_FRAMES,
     CAN_XL,
     COUNTERS_TOLD,
     NO_TIME,
     OTHER_LINES,
-    Tally,
+    LogTally,
 )
-from tickrig.wire.can import MAX_DATA_BYTES, CanFrame
-from tickrig.wire.can_error import (
+from tickrig.wire.can import (
+    BRS,
+    ESI,
+    FD_LENGTHS,
+    MAX_DATA_BYTES,
     PROTOCOL_BYTE,
     REC_BYTE,
     TEC_BYTE,
+    CanFrame,
     ErrorClass,
     ErrorFrame,
+    FdFrame,
     ProtocolFlag,
 )
-from tickrig.wire.can_fd import BRS, ESI, FD_LENGTHS, FdFrame
 from tickrig.wire.errors import WireError
 
-VERSIONS: Final = {
+_VERSIONS: Final = {
     "1.0": ("N", "O", "I", "L", "D"),
     "1.1": ("N", "O", "T", "I", "L", "D"),
     "1.2": ("N", "O", "B", "T", "I", "L", "D"),
@@ -46,15 +50,15 @@ VERSIONS: Final = {
 """Columns by version: number, offset in ms, bus, type, CAN-ID, reserved, length, data, direction.
 From 2.0 on the file names them: `l` is a count of bytes, `L` a length code."""
 
-FD_FLAGS: Final = {"FD": 0, "FB": BRS, "BI": ESI, "FE": BRS | ESI}
+_FD_FLAGS: Final = {"FD": 0, "FB": BRS, "BI": ESI, "FE": BRS | ESI}
 """Types of CAN FD frames."""
 
 ERROR: Final = "ERROR"
 """In version 1.0 it stands before the data of an error frame."""
-ERRORS: Final = ("Error", "ER")
-STATES: Final = ("Warng", "ST")
-COUNTERS: Final = "EC"
-EVENT: Final = "EV"
+_ERRORS: Final = ("Error", "ER")
+_STATES: Final = ("Warng", "ST")
+_COUNTERS: Final = "EC"
+_EVENT: Final = "EV"
 
 _DAYS_TO_1970: Final = 25_569
 _DAY_US: Final = 86_400_000_000
@@ -68,10 +72,10 @@ _CAN_ID: Final = re.compile(r"[0-9A-Fa-f]{1,8}")
 _BYTE: Final = re.compile(r"[0-9A-Fa-f]{2}")
 _LENGTH: Final = re.compile(r"[0-9]{1,2}", re.ASCII)
 
-STANDARD_DIGITS: Final = 4
+_STANDARD_DIGITS: Final = 4
 """A CAN-ID of more digits has 29 bits."""
 
-STATUS: Final = {
+_STATUS: Final = {
     0x10: "that a controller is bus-off",
     0x4_0000: "that a controller is error passive",
     0x08: "that a controller has reached its warning limit (BUSHEAVY)",
@@ -79,9 +83,9 @@ STATUS: Final = {
 }
 """Bits of a status (PCAN-Basic, PCAN_ERROR_...), the worst first."""
 
-KINDS: Final = {1: ProtocolFlag.BIT, 2: ProtocolFlag.FORM, 4: ProtocolFlag.STUFFING}
-ACK_SLOT: Final = 0x19
-SEGMENT: Final = 0x1F
+_KINDS: Final = {1: ProtocolFlag.BIT, 2: ProtocolFlag.FORM, 4: ProtocolFlag.STUFFING}
+_ACK_SLOT: Final = 0x19
+_SEGMENT: Final = 0x1F
 """Place of an error in the frame, as the SJA1000 tells it, and Linux in byte 3."""
 
 
@@ -102,9 +106,9 @@ class TrcLines:
 
     def __init__(self) -> None:
         self._version, self._start_us = "1.0", 0
-        self._columns: Sequence[str] = VERSIONS["1.0"]
+        self._columns: Sequence[str] = _VERSIONS["1.0"]
 
-    def read(self, line: str, tally: Tally) -> Record | str | None:
+    def read(self, line: str, tally: LogTally) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line.
 
         Raises:
@@ -128,26 +132,26 @@ class TrcLines:
         except (ValueError, LookupError):
             return None
 
-    def _head(self, word: str, value: str, tally: Tally) -> None:
+    def _head(self, word: str, value: str, tally: LogTally) -> None:
         """Take what the file says of itself."""
         match word:
             case "FILEVERSION":
-                self._version, self._columns = value, VERSIONS.get(value, ())
-            case "COLUMNS" if self._version not in VERSIONS:
+                self._version, self._columns = value, _VERSIONS.get(value, ())
+            case "COLUMNS" if self._version not in _VERSIONS:
                 self._columns = value.split(",")
             case "STARTTIME":
                 start_us = _start_us(value)
                 tally.undated += start_us is None
                 self._start_us = start_us or 0
 
-    def _row(self, number: str, words: list[str], tally: Tally) -> Record | str | None:
+    def _row(self, number: str, words: list[str], tally: LogTally) -> Record | str | None:
         at_us, row = self._at_us(words[0]), self._cells([number, *words])
         kind = row.cells.get("T", "Rx")
         what = NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
         if what:
             tally.passed_over[what] += 1
             return what
-        is_error = kind in ERRORS or row.data[:1] == [ERROR]
+        is_error = kind in _ERRORS or row.data[:1] == [ERROR]
         frame = _error(row) if is_error else _frame(row, kind)
         sent = "Tx" in (kind, row.cells.get("d"))
         return Record(at_us, bus_name(row.cells.get("B", "1")), frame, sent)
@@ -165,7 +169,7 @@ class TrcLines:
         names = list(self._columns)
         place = names.index("T") if "T" in names else len(words)
         kind = words[place] if place < len(words) else ""
-        if kind not in ("ER", "EC", "ST", EVENT):
+        if kind not in ("ER", "EC", "ST", _EVENT):
             count = names.index("D")
             return _Row(dict(zip(names, words[:count], strict=False)), words[count:])
         cells = dict(zip(names[: place + 1], words, strict=False))
@@ -181,16 +185,16 @@ class TrcLines:
         return _Row(cells, data)
 
 
-def _aside(row: _Row, kind: str, tally: Tally) -> str:
+def _aside(row: _Row, kind: str, tally: LogTally) -> str:
     """Say what a line is that is no frame of CAN or CAN FD, and note what it says of errors."""
     if kind == "XL":
         return CAN_XL
-    if kind in STATES or row.cells.get("I") == "FFFFFFFF":
+    if kind in _STATES or row.cells.get("I") == "FFFFFFFF":
         _note_status(row.hex_bytes(), tally)
-    elif kind == COUNTERS:
+    elif kind == _COUNTERS:
         if any(row.hex_bytes()):
             tally.errors_told[COUNTERS_TOLD] += 1
-    elif kind != EVENT:
+    elif kind != _EVENT:
         return ""
     return OTHER_LINES
 
@@ -208,20 +212,20 @@ def _start_us(days: str) -> int | None:
 
 def _frame(row: _Row, kind: str) -> AnyFrame:
     """Return a data or remote frame."""
-    if kind not in ("Rx", "Tx", "DT", "RR", *FD_FLAGS):
+    if kind not in ("Rx", "Tx", "DT", "RR", *_FD_FLAGS):
         raise ValueError(f"{kind!r} is no type of a frame")
     ident = row.cells["I"]
     if not _CAN_ID.fullmatch(ident):
         raise ValueError(f"{ident!r} is no CAN-ID")
-    can_id, extended = int(ident, 16), len(ident) > STANDARD_DIGITS
-    length = _length(row.cells, fd=kind in FD_FLAGS)
+    can_id, extended = int(ident, 16), len(ident) > _STANDARD_DIGITS
+    length = _length(row.cells, fd=kind in _FD_FLAGS)
     if kind == "RR" or row.data[:1] in (["RTR"], ["R"]):
         return CanFrame(can_id, b"", True, extended, min(MAX_DATA_BYTES, length)).checked()
     data = row.hex_bytes()
     if len(data) != length:
         raise ValueError(f"{len(data)} bytes, {length} were announced")
-    if kind in FD_FLAGS:
-        return FdFrame(can_id, data, extended, FD_FLAGS[kind]).checked()
+    if kind in _FD_FLAGS:
+        return FdFrame(can_id, data, extended, _FD_FLAGS[kind]).checked()
     return CanFrame(can_id, data, False, extended).checked()
 
 
@@ -247,18 +251,18 @@ def _error(row: _Row) -> ErrorFrame:
     kind, direction, place, received, sent = (data + [0] * 5)[:5]
     transmitting = ProtocolFlag.TRANSMITTING * (len(data) > 1 and not direction)
     said = bytearray(8)
-    said[PROTOCOL_BYTE] = KINDS.get(kind, 0) | transmitting
-    said[3], said[TEC_BYTE], said[REC_BYTE] = place & SEGMENT, sent, received
+    said[PROTOCOL_BYTE] = _KINDS.get(kind, 0) | transmitting
+    said[3], said[TEC_BYTE], said[REC_BYTE] = place & _SEGMENT, sent, received
     error_class = ErrorClass.PROTOCOL | ErrorClass.BUS_ERROR
-    error_class |= ErrorClass.NO_ACK * (place & SEGMENT == ACK_SLOT)
+    error_class |= ErrorClass.NO_ACK * (place & _SEGMENT == _ACK_SLOT)
     error_class |= ErrorClass.COUNTERS * bool(received or sent)
     return ErrorFrame(int(error_class), bytes(said))
 
 
-def _note_status(status: bytes, tally: Tally) -> None:
+def _note_status(status: bytes, tally: LogTally) -> None:
     """Note what a status says of errors; 0 says that all is well."""
     bits = int.from_bytes(status, "big")
-    text = next((text for bit, text in STATUS.items() if bits & bit), None)
+    text = next((text for bit, text in _STATUS.items() if bits & bit), None)
     if text is not None:
         tally.errors_told[text] += 1
 

@@ -3,23 +3,234 @@
 from __future__ import annotations
 
 import errno
+import json
+import os
 import shutil
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.mark import Mark
-from tickrig.host.canmon.model.recorder.index import END, FILE, OPEN, REMOVED, Index
-from tickrig.host.canmon.model.recorder.part import Part, recovered
-from tickrig.host.canmon.model.recorder.plan import RESERVE_BYTES, AtLimit, Plan
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.log_file import LogError
+from tickrig.host.canmon.model.logs.log_reader import read_log
+from tickrig.host.canmon.model.logs.log_writer import in_blocks, write_log
+from tickrig.host.canmon.model.logs.mark import BACK, TRIGGER, VERSION, Mark
+from tickrig.host.canmon.model.recorder.plan import RESERVE_BYTES, AtLimit, RecordingPlan
 
-BLOCK_FRAMES: Final = 1_024
+# One file of a recording.
+
+_BLOCK_US: Final = 1_000_000
+"""How much of a compressed log is lost where this program is killed."""
+
+_READ_BYTES: Final = 32 << 20
+"""Of a file that is read when a recording goes on: a few seconds."""
+
+_USUAL_BYTES: Final = 64
+"""Of a frame, until there are some."""
+
+
+class RecordingPart:
+    """A log under way, and what is in it.
+
+    Args:
+        path: the file; one that exists is replaced.
+
+    Attributes:
+        frames: how many were written.
+        safe_frames: how many of them the operating system has, so that they can be read.
+        bytes: size of the file, as far as it is written.
+        first_us: when the first frame came; None before it.
+        last_us: when the last one came.
+
+    Raises:
+        OSError: it cannot be written, now or later.
+        LogFormatError: its name tells no format.
+        LogError: its format cannot be written here.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path, self._writer, self._in_blocks = path, write_log(path), in_blocks(path)
+        self.frames = self.safe_frames = self.bytes = 0
+        self.first_us: int | None = None
+        self.last_us: int | None = None
+        self._safe_bytes = self._due_us = 0
+        self._marks, self._lost, self._pending = Counter[str](), 0, False
+
+    def room(self, limit: int | None) -> int:
+        """Return how many frames there is room for below a size, at least about."""
+        if limit is None:
+            return 1 << 30
+        each = max(1, self.bytes // self.frames) if self.frames else _USUAL_BYTES
+        return max(0, limit - self.bytes) // each
+
+    def write(self, records: Sequence[Record]) -> None:
+        """Add frames."""
+        write = self._writer.write
+        for record in records:
+            write(record)
+        self.frames += len(records)
+        self.first_us = records[0].at_us if self.first_us is None else self.first_us
+        self.last_us, self._pending = records[-1].at_us, True
+
+    def mark(self, mark: Mark) -> None:
+        """Add a mark."""
+        self._writer.mark(mark)
+        self._marks[mark.event] += 1
+        self._lost += mark.frames
+        self._pending = True
+
+    def flush(self, now_us: int) -> None:
+        """Give to the operating system what was written; what is compressed, once a second."""
+        if not self._pending:
+            return
+        if self._in_blocks:
+            if 0 < self._due_us - now_us <= _BLOCK_US:
+                self.bytes = self.path.stat().st_size
+                return
+            self._due_us = now_us + _BLOCK_US
+        self._writer.flush()
+        self._pending, self.safe_frames = False, self.frames
+        self.bytes = self._safe_bytes = self.path.stat().st_size
+
+    def close(self) -> list[str]:
+        """End the log; return what it could not hold."""
+        self._writer.close()
+        self.bytes, self.safe_frames = self.path.stat().st_size, self.frames
+        return self._writer.messages()
+
+    def rescue(self) -> None:
+        """End it after an error: what is whole stays, and half a frame behind it goes."""
+        with suppress(OSError, ValueError):
+            self._writer.close()
+        with suppress(OSError):
+            if self.path.stat().st_size > self._safe_bytes:
+                os.truncate(self.path, self._safe_bytes)
+        self.bytes = self._safe_bytes
+
+    def summary(self) -> dict[str, object]:
+        """Return what an index says of it."""
+        said: dict[str, object] = {"from": None, "to": None}
+        if self.first_us is not None and self.last_us is not None:
+            said = {"from": self.first_us / 1e6, "to": self.last_us / 1e6}
+        return {
+            **said,
+            "frames": self.safe_frames,
+            "bytes": self.bytes,
+            "lost": self._lost,
+            "gaps": self._marks[BACK],
+            "triggers": self._marks[TRIGGER],
+        }
+
+
+def _recovered(path: Path) -> dict[str, object]:
+    """Return what an index says of a file that its recorder could not end: what can be read.
+
+    A large one is not read: frames come meanwhile, and wait.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    size, frames, first_us, last_us = path.stat().st_size, 0, 0, 0
+    if size > _READ_BYTES:
+        return {"from": None, "to": None, "frames": None, "bytes": size, "cut": True}
+    with suppress(LogError):
+        for frames, record in enumerate(read_log(path), 1):  # noqa: B007 - counted
+            first_us, last_us = first_us or record.at_us, record.at_us
+    said = {"from": first_us / 1e6, "to": last_us / 1e6} if frames else {"from": None, "to": None}
+    return {**said, "frames": frames, "bytes": size, "cut": True}
+
+
+# The index of a recording: a JSON object a line about its files, gaps, losses and triggers.
+
+_OPEN: Final = "open"
+_FILE: Final = "file"
+_REMOVED: Final = "removed"
+_END: Final = "end"
+
+
+class Index:
+    """A file to which lines are added, each at once; one that is there is gone on with.
+
+    Args:
+        path: of the file.
+        is_part: whether a name is that of a part; lines about others are passed over.
+
+    Attributes:
+        files: the size of each file that was ended and is still there, the oldest first.
+        bytes: size of all of them.
+        unended: files that were begun, and neither ended nor removed.
+
+    Raises:
+        OSError: it cannot be written, now or later.
+    """
+
+    def __init__(self, path: Path, is_part: Callable[[str], object]) -> None:
+        self.files: dict[str, int] = {}
+        self.bytes, self.unended = 0, list[str]()
+        self._path, self._is_part = path, is_part
+        text = path.read_text("utf-8", "replace") if path.exists() else ""
+        for said in _objects(text):
+            self._take(said)
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+        if text and not text.endswith("\n"):  # somebody was killed in the middle of a line
+            os.write(self._file, b"\n")
+
+    def write(self, event: str, at_us: int, **more: object) -> None:
+        """Add a line."""
+        said = {"v": VERSION, "ev": event, "t": at_us / 1e6, **more}
+        self._take(said)
+        self._put(json.dumps(said, separators=(",", ":")))
+
+    def mark(self, mark: Mark, file: str) -> None:
+        """Add a mark, and in which file it stands; an empty name for none."""
+        text = mark.json()
+        self._put(f'{text[:-1]},"file":{json.dumps(file)}}}' if file else text)
+
+    def close(self) -> None:
+        """Close the file."""
+        os.close(self._file)
+
+    def _put(self, text: str) -> None:
+        try:
+            os.write(self._file, f"{text}\n".encode())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self._path)) from error
+
+    def _take(self, said: dict[str, Any]) -> None:
+        name = said.get("file")
+        if not isinstance(name, str) or not self._is_part(name):
+            return
+        match said.get("ev"):
+            case "open":
+                self.unended.append(name)
+            case "file" | "removed" as event:
+                self.unended = [one for one in self.unended if one != name]
+                self.bytes -= self.files.pop(name, 0)
+                size = said.get("bytes")
+                if event == _FILE and isinstance(size, int) and size >= 0:
+                    self.files[name] = size
+                    self.bytes += size
+
+
+def _objects(text: str) -> Iterator[dict[str, Any]]:
+    for line in filter(None, text.splitlines()):
+        try:
+            said = json.loads(line)
+        except (ValueError, RecursionError):
+            continue
+        if isinstance(said, dict):
+            yield said
+
+
+# The files of a recording: numbered, of limited size, the oldest removed, in an index.
+
+_BLOCK_FRAMES: Final = 1_024
 """Frames that are written between two looks at sizes."""
 
-LOOK_FRAMES: Final = 512
+_LOOK_FRAMES: Final = 512
 """Frames that come between two looks at the space on the disk."""
 
 
@@ -43,13 +254,13 @@ class Files:
         LogError: the format cannot be written here, likewise.
     """
 
-    def __init__(self, plan: Plan, now_us: int) -> None:
+    def __init__(self, plan: RecordingPlan, now_us: int) -> None:
         self._plan = plan
         self.frames = self.parts = self.removed = self._safe_frames = 0
         self.ended = ""
         self._said: list[str] = []
-        self._part: Part | None = None
-        self._latest_us, self._looked_frames = now_us, -LOOK_FRAMES
+        self._part: RecordingPart | None = None
+        self._latest_us, self._looked_frames = now_us, -_LOOK_FRAMES
         self._index = Index(plan.index, plan.number) if plan.numbered else None
         self._number = 0
         if self._index is None:
@@ -74,7 +285,7 @@ class Files:
         begin = 0
         while begin < len(records) and not self.ended:
             part = self._part_for(records[begin])
-            end = min(begin + min(BLOCK_FRAMES, max(1, self._room(part))), len(records))
+            end = min(begin + min(_BLOCK_FRAMES, max(1, self._room(part))), len(records))
             end = self._up_to_due(part, records, begin, end)
             part.write(records[begin:end])
             self._latest_us = records[end - 1].at_us
@@ -108,7 +319,7 @@ class Files:
         self._part = None
         self._safe_frames += part.safe_frames
         if self._index is not None:
-            self._index.write(FILE, self._latest_us, file=part.path.name, **part.summary())
+            self._index.write(_FILE, self._latest_us, file=part.path.name, **part.summary())
 
     def rescue(self, why: str) -> None:
         """End the recording after an error, so that what is in files can be read."""
@@ -120,22 +331,22 @@ class Files:
             with suppress(OSError):
                 if part is not None:
                     said = {**part.summary(), "frames": part.safe_frames, "cut": True}
-                    self._index.write(FILE, self._latest_us, file=part.path.name, **said)
-                self._index.write(END, self._latest_us, why=why)
+                    self._index.write(_FILE, self._latest_us, file=part.path.name, **said)
+                self._index.write(_END, self._latest_us, why=why)
             self._index.close()
 
     def close(self, why: str) -> None:
         """End the recording."""
         self.end_part()
         if self._index is not None:
-            self._index.write(END, self._latest_us, why=why)
+            self._index.write(_END, self._latest_us, why=why)
             self._index.close()
 
     def messages(self) -> list[str]:
         """Say what formats could not hold, and what was found of an earlier recording."""
         return self._said
 
-    def _part_for(self, record: Record) -> Part:
+    def _part_for(self, record: Record) -> RecordingPart:
         part = self._part
         if part is not None and part.frames and self._is_full(part, record.at_us):
             self.end_part()
@@ -144,16 +355,18 @@ class Files:
             part = self._part = self._begin(record.at_us)
         return part
 
-    def _room(self, part: Part) -> int:
+    def _room(self, part: RecordingPart) -> int:
         return part.room(self._plan.rotate_bytes)
 
-    def _is_full(self, part: Part, at_us: int) -> bool:
+    def _is_full(self, part: RecordingPart, at_us: int) -> bool:
         if self._index is None or self._room(part) <= 0:
             return self._index is not None
         after_us, first_us = self._plan.rotate_us, part.first_us
         return after_us is not None and first_us is not None and at_us - first_us >= after_us
 
-    def _up_to_due(self, part: Part, records: Sequence[Record], begin: int, end: int) -> int:
+    def _up_to_due(
+        self, part: RecordingPart, records: Sequence[Record], begin: int, end: int
+    ) -> int:
         """Return where the first of these frames is that belongs into the next file."""
         after_us = self._plan.rotate_us
         if after_us is None:
@@ -164,14 +377,14 @@ class Files:
         due = bisect_left(records, first_us + after_us, begin, end, key=lambda one: one.at_us)
         return max(due, begin + 1)
 
-    def _begin(self, at_us: int) -> Part:
+    def _begin(self, at_us: int) -> RecordingPart:
         path = self._plan.path
         if self._index is not None:
             self._number += 1
             path = self._plan.part(self._number)
-            self._index.write(OPEN, at_us, file=path.name)
+            self._index.write(_OPEN, at_us, file=path.name)
         self.parts += 1
-        return Part(path)
+        return RecordingPart(path)
 
     def _numbers(self) -> list[int]:
         assert self._index is not None, "there are numbers where there is an index"
@@ -183,11 +396,11 @@ class Files:
         for name in list(index.unended):
             path = self._plan.path.with_name(name)
             if path.is_file():
-                found = recovered(path)
-                index.write(FILE, now_us, file=name, **found)
+                found = _recovered(path)
+                index.write(_FILE, now_us, file=name, **found)
                 self._said.append(f"{name} was not ended by its recorder: {_readable(found)}")
             else:
-                index.write(REMOVED, now_us, file=name)
+                index.write(_REMOVED, now_us, file=name)
 
     def _keep_limit(self) -> None:
         """Remove the oldest files, or end, where disk space is used up."""
@@ -202,7 +415,7 @@ class Files:
             if self._plan.at_limit is AtLimit.END or not self._remove_oldest(index):
                 self.ended = f"{disk_bytes} bytes of disk space are used up"
                 return
-        if self._looked_frames + LOOK_FRAMES > self.frames:
+        if self._looked_frames + _LOOK_FRAMES > self.frames:
             return
         self._looked_frames = self.frames
         while shutil.disk_usage(self._plan.path.parent).free < RESERVE_BYTES:
@@ -219,7 +432,7 @@ class Files:
             return False
         name = next(iter(index.files))
         self._plan.path.with_name(name).unlink(missing_ok=True)
-        index.write(REMOVED, self._latest_us, file=name)
+        index.write(_REMOVED, self._latest_us, file=name)
         self.removed += 1
         return True
 

@@ -5,7 +5,7 @@
 (104857600, 600000000, 1073741824, 'oldest')
 >>> plan.part(12).name, plan.index.name
 ('run-00012.log.gz', 'run.index.jsonl')
->>> parse_span("post", "500ms"), parse_span("pre", "2000")
+>>> _parse_span("post", "500ms"), _parse_span("pre", "2000")
 (Span(frames=None, us=500000), Span(frames=2000, us=None))
 """
 
@@ -25,17 +25,17 @@ from tickrig.host.canmon.model.logs.log_file import (
     log_format,
 )
 
-MIN_BYTES: Final = 64 << 10
+_MIN_BYTES: Final = 64 << 10
 """Of a file: smaller ones are no use."""
 
-MIN_DISK_BYTES: Final = 1 << 20
+_MIN_DISK_BYTES: Final = 1 << 20
 RESERVE_BYTES: Final = 256 << 10
 """Room that is kept free: for frames that are on their way to a file."""
 
 MAX_PRE_FRAMES: Final = 150_000
 """Eight seconds of the busiest bus of 1 Mbit/s, some 50 MiB."""
 
-DISK_PARTS: Final = 4
+_DISK_PARTS: Final = 4
 """Where disk space is limited a file is no larger than this part of it: the oldest can go."""
 
 _SIZE: Final = re.compile(r"([0-9]{1,9})([kMG])")
@@ -51,18 +51,18 @@ class AtLimit(StrEnum):
     END = "end"
 
 
-class Span(NamedTuple):
+class TriggerSpan(NamedTuple):
     """Before or behind a trigger: so many frames, or so long; the other is None."""
 
     frames: int | None
     us: int | None
 
 
-DEFAULT_SPAN: Final = Span(None, 5_000_000)
+DEFAULT_SPAN: Final = TriggerSpan(None, 5_000_000)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class RecordingPlan:
     """A recording; without any of its settings it is the file `path`, and nothing else.
 
     Attributes:
@@ -80,7 +80,7 @@ class Plan:
     rotate_us: int | None = None
     disk_bytes: int | None = None
     at_limit: AtLimit = AtLimit.OLDEST
-    around: tuple[Span, Span] | None = None
+    around: tuple[TriggerSpan, TriggerSpan] | None = None
     parts: bool = False
 
     @property
@@ -123,7 +123,7 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     post: str | None = None,
     waits: bool = False,
     parts: bool = False,
-) -> Plan:
+) -> RecordingPlan:
     """Read what people say of a recording.
 
     Args:
@@ -139,18 +139,18 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     Raises:
         ValueError: one that is none, too small, or goes with none of the others.
     """
-    sizes = [parse_bytes("rotate", word) for word in rotate if _SIZE.fullmatch(word)]
+    sizes = [_parse_bytes("rotate", word) for word in rotate if _SIZE.fullmatch(word)]
     times = [_rotate_us(word) for word in rotate if not _SIZE.fullmatch(word)]
     if len(sizes) > 1 or len(times) > 1:
         raise ValueError(f"rotate takes one size and one time, not {' and '.join(rotate)}")
-    disk_bytes = None if disk is None else parse_bytes("disk", disk, MIN_DISK_BYTES)
+    disk_bytes = None if disk is None else _parse_bytes("disk", disk, _MIN_DISK_BYTES)
     if at_limit is not None and disk_bytes is None:
         raise ValueError("at-limit goes with disk: it says what happens when that is used up")
-    limits = [*sizes, *([disk_bytes // DISK_PARTS] if disk_bytes else [])]
+    limits = [*sizes, *([disk_bytes // _DISK_PARTS] if disk_bytes else [])]
     around = None
     if waits or pre is not None or post is not None:
-        around = parse_span("pre", pre), parse_span("post", post)
-    plan = Plan(
+        around = _parse_span("pre", pre), _parse_span("post", post)
+    plan = RecordingPlan(
         path=path,
         rotate_bytes=min(limits, default=None),
         rotate_us=times[0] if times else None,
@@ -169,7 +169,7 @@ def read_plan(  # noqa: PLR0913 - all that people may say
     return plan
 
 
-def parse_bytes(name: str, word: str, least: int = MIN_BYTES) -> int:
+def _parse_bytes(name: str, word: str, least: int = _MIN_BYTES) -> int:
     """Read a size with its unit.
 
     Raises:
@@ -182,12 +182,12 @@ def parse_bytes(name: str, word: str, least: int = MIN_BYTES) -> int:
     if size < least:
         raise ValueError(
             f"{name} {word!r} is too small: at least {least >> 10}k; "
-            f"rotate takes {MIN_BYTES >> 10}k, disk {MIN_DISK_BYTES >> 10}k or more"
+            f"rotate takes {_MIN_BYTES >> 10}k, disk {_MIN_DISK_BYTES >> 10}k or more"
         )
     return size
 
 
-def parse_span(name: str, word: str | None) -> Span:
+def _parse_span(name: str, word: str | None) -> TriggerSpan:
     """Read a number of frames, or a time; without a word 5 s.
 
     Raises:
@@ -198,12 +198,12 @@ def parse_span(name: str, word: str | None) -> Span:
     if word.isascii() and word.isdecimal() and len(word) <= len("1000000000"):
         if name == "pre" and int(word) > MAX_PRE_FRAMES:
             raise ValueError(f"{name} {word!r}: at most {MAX_PRE_FRAMES} frames are kept")
-        return Span(int(word), None)
+        return TriggerSpan(int(word), None)
     if (us := _time_us(word)) is None:
         raise ValueError(
             f"{name} {word!r} is neither frames as 2000 nor a time as 500ms, 10s, 5min or 1h"
         )
-    return Span(None, us)
+    return TriggerSpan(None, us)
 
 
 def _rotate_us(word: str) -> int:

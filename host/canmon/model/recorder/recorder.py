@@ -2,36 +2,95 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from enum import StrEnum
 from itertools import groupby
 from typing import TYPE_CHECKING, Final, cast
 
-from tickrig.host.canmon.model.frames.dump_line import decoded_text
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record, decoded_text
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.mark import Mark, dropped, triggered
 from tickrig.host.canmon.model.recorder.files import Files
-from tickrig.host.canmon.model.recorder.plan import DEFAULT_SPAN, Plan, Span
-from tickrig.host.canmon.model.recorder.ring import Entry, PreTrigger
+from tickrig.host.canmon.model.recorder.plan import (
+    DEFAULT_SPAN,
+    MAX_PRE_FRAMES,
+    RecordingPlan,
+    TriggerSpan,
+)
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
-    from tickrig.host.canmon.model.frames.record import AnyRecord
+    from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
-LATE_US: Final = 1_000_000
+
+# What came before a trigger.
+
+_Entry = Record | Mark
+
+
+_MAX_MARKS: Final = 1_000
+"""That are kept among frames; the index has all of them."""
+
+
+class PreTrigger:
+    """Keeps the latest frames, and the marks among them.
+
+    Args:
+        span: how many before the latest, or for how long.
+
+    Attributes:
+        short: frames of the span had to go, for there were too many of them.
+    """
+
+    def __init__(self, span: TriggerSpan) -> None:
+        self._us, self._most = span.us, 1 + (MAX_PRE_FRAMES if span.frames is None else span.frames)
+        self._entries: deque[_Entry] = deque()
+        self._frames, self.short = 0, False
+
+    def add(self, record: Record) -> None:
+        """Keep one more frame; give up what is too old."""
+        self._entries.append(record)
+        self._frames += 1
+        if self._us is not None:
+            # a mark has the time of another clock: it goes when all frames before it are gone
+            begin_us, first = record.at_us - self._us, self._entries[0]
+            while first.at_us < begin_us or isinstance(first, Mark):
+                self._give_up()
+                first = self._entries[0]
+            self.short = self.short or self._frames > self._most
+        while self._frames > self._most:
+            self._give_up()
+
+    def mark(self, mark: Mark) -> None:
+        """Keep a mark."""
+        if len(self._entries) - self._frames < _MAX_MARKS:
+            self._entries.append(mark)
+
+    def drain(self) -> list[_Entry]:
+        """Return all that is kept, the oldest first, and keep nothing."""
+        found = list(self._entries)
+        self._entries.clear()
+        self._frames = 0
+        return found
+
+    def _give_up(self) -> None:
+        self._frames -= isinstance(self._entries.popleft(), Record)
+
+
+_LATE_US: Final = 1_000_000
 """A frame is taken to have come by then, when time alone says that a recording is over."""
 
-MOST_CHARACTERS: Final = 200
+_MOST_CHARACTERS: Final = 200
 """Of what is said of a frame that was a trigger."""
 
-LOOK_US: Final = 100_000
+_LOOK_US: Final = 100_000
 """How often rules are asked what is missing."""
 
 
-class State(StrEnum):
+class RecorderState(StrEnum):
     """How a recorder stands."""
 
     WAITING = "waiting"
@@ -43,7 +102,7 @@ class State(StrEnum):
 class _Window:
     """What is recorded behind a trigger; another trigger makes it longer."""
 
-    def __init__(self, span: Span, at_us: int) -> None:
+    def __init__(self, span: TriggerSpan, at_us: int) -> None:
         self._span = span
         self.names: set[str] = set()
         self.extend(at_us)
@@ -59,7 +118,7 @@ class _Window:
         return self._left >= 0
 
     def over(self, now_us: int) -> bool:
-        return self._left == 0 if self._left is not None else now_us > self._until_us + LATE_US
+        return self._left == 0 if self._left is not None else now_us > self._until_us + _LATE_US
 
 
 class Recorder:
@@ -88,7 +147,7 @@ class Recorder:
 
     def __init__(
         self,
-        plan: Plan,
+        plan: RecordingPlan,
         now_us: int = 0,
         triggers: Sequence[Trigger] = (),
         wanted: FilterTrigger | None = None,
@@ -103,14 +162,14 @@ class Recorder:
         self.failed, self.triggers, self._closed = "", 0, False
 
     @property
-    def state(self) -> State:
+    def state(self) -> RecorderState:
         """How it stands."""
         if self.failed:
-            return State.FAILED
+            return RecorderState.FAILED
         if self._files.ended or self._closed:
-            return State.ENDED
+            return RecorderState.ENDED
         waits = self._before is not None and self._window is None
-        return State.WAITING if waits else State.RECORDING
+        return RecorderState.WAITING if waits else RecorderState.RECORDING
 
     @property
     def ended(self) -> str:
@@ -142,7 +201,7 @@ class Recorder:
             now_us: the time.
             marks: what happened behind these frames.
         """
-        if self.state in (State.FAILED, State.ENDED):
+        if self.state in (RecorderState.FAILED, RecorderState.ENDED):
             self._missing += len(decoded_frames)
             return
         try:
@@ -158,7 +217,10 @@ class Recorder:
 
     def trigger(self, why: str, now_us: int) -> None:
         """Record what is kept, and what comes: somebody has pressed a key."""
-        if self._before is not None and self.state in (State.WAITING, State.RECORDING):
+        if self._before is not None and self.state in (
+            RecorderState.WAITING,
+            RecorderState.RECORDING,
+        ):
             try:
                 self._fire(why, why, now_us)
                 self._files.flush(now_us)
@@ -233,7 +295,7 @@ class Recorder:
             what = f": {_what(*seen)}" if seen is not None and why == name else ""
             self._files.mark(triggered(at_us, f"{why}{what}"))
 
-    def _store(self, entries: Sequence[Entry]) -> None:
+    def _store(self, entries: Sequence[_Entry]) -> None:
         """Add frames with the marks among them; these are in the index already."""
         for is_mark, group in groupby(entries, lambda entry: isinstance(entry, Mark)):
             if is_mark:
@@ -254,7 +316,7 @@ class Recorder:
     def _pass_time(self, now_us: int, lost: int) -> None:
         if self._window is not None and self._window.over(now_us):
             self._end_window()
-        if self._triggers and not 0 <= now_us - self._look_us < LOOK_US:
+        if self._triggers and not 0 <= now_us - self._look_us < _LOOK_US:
             self._look_us = now_us
             for trigger in self._triggers:
                 if why := trigger.missing(now_us, lost):
@@ -274,4 +336,4 @@ class Recorder:
 def _what(record: Record, decoded: Decoded | None) -> str:
     """Say which frame it was, and what it means."""
     text = decoded_text(decoded)
-    return f"{record.channel} {record.frame}{f', {text}' if text else ''}"[:MOST_CHARACTERS]
+    return f"{record.channel} {record.frame}{f', {text}' if text else ''}"[:_MOST_CHARACTERS]

@@ -8,7 +8,7 @@ from tickrig.host.canmon.model.check.alarms import Alarms
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.filter import Filter
 from tickrig.host.canmon.model.decode.filter_terms import MissingSignals
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 
 
 class Trigger(Protocol):

@@ -8,22 +8,115 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.net.boot_plan import changes, nothing_expected, of_bus_file, of_eds, risk
+from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.net.group import NetCall
+from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NamedObjects
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
-from tickrig.host.canmon.risks import nmt_risk
-from tickrig.host.canopen.master.assignment import SlaveAssignment
-from tickrig.host.canopen.master.boot_slave import BootOutcome, SlaveBoot
-from tickrig.host.canopen.master.boot_status import BootStatus
-from tickrig.host.canopen.master.boot_talk import BootStep
-from tickrig.host.cli.messages import say
+from tickrig.host.canmon.risks import nmt_risk, write_risk
+from tickrig.host.canopen.bus_file.bus_file import read_bus_file
+from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
+from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
+from tickrig.host.canopen.master.boot_slave import BootOutcome, BootStatus, BootStep, SlaveBoot
+from tickrig.host.canopen.master.from_bus_file import plan_of
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import NODE_ID, PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
-from tickrig.host.text.values import format_time
+from tickrig.host.text.values import counted, format_time
 from tickrig.wire.canopen.nmt import NmtCommand
 
-HALF: Final = "the node is as the steps before left it"
+# What is expected of a node at its boot-up: by a bus.yml, by its EDS or DCF, or nothing.
+
+_HEARTBEAT: Final = (0x1017, 0)
+_U16_BYTES: Final = 2
+_U32: Final = 0xFFFF_FFFF
+_PERIODS: Final = 3
+"""So many periods of its heartbeat are waited for it."""
+
+
+def _of_bus_file(path: Path, node_id: int) -> SlaveAssignment:
+    """Return what a bus.yml expects of a slave.
+
+    Raises:
+        Refused: it cannot be read, is wrong, or has no such slave.
+    """
+    try:
+        bus = read_bus_file(path)
+        if bus.errors:
+            raise ValueError("; ".join(map(str, bus.errors)))
+        plan = plan_of(bus)
+    except OSError as error:
+        refuse_path("--bus", error)
+    except (ImportError, ValueError) as error:
+        raise Refused(f"--bus {error}") from None
+    slaves = {slave.node_id: slave for slave in plan.slaves}
+    if node_id not in slaves:
+        there = ", ".join(map(str, slaves)) or "none"
+        raise Refused(f"--bus {path} has no slave {node_id}; its slaves: {there}")
+    return slaves[node_id]
+
+
+def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
+    """Return what an EDS expects: the device, and of a DCF its configuration; Refused if none.
+
+    Revision and serial number of an EDS are those of one device: any will do.
+    """
+    objects = NamedObjects(node_id, read_device_document(path, "--eds").file)
+    file, device = objects.file, objects.device
+    assert file is not None
+    assert device is not None
+    values = dcf_values(file, device, node_id)
+    power_on = {at: row.power_on_data(node_id) for at, row in objects.rows.items()}
+
+    def number(at: tuple[int, int]) -> int:
+        return int.from_bytes(power_on.get(at, b""), "little")
+
+    writable = {at for at, row in objects.rows.items() if row.writable}
+    try:
+        steps = writes(values, number, writable)
+    except ValueError as error:
+        raise Refused(f"--eds {path}: {error}") from None
+    period_ms = int.from_bytes(values.get(_HEARTBEAT, b"")[:_U16_BYTES], "little")
+    return SlaveAssignment(
+        node_id,
+        writes=tuple(ObjectWrite(*at, data) for at, data in steps),
+        heartbeat_us=_PERIODS * period_ms * 1_000,
+        device_type=number((0x1000, 0)) & _U32,
+        vendor_id=number((0x1018, 1)) & _U32,
+        product_code=number((0x1018, 2)) & _U32,
+    )
+
+
+def _risk(assignment: SlaveAssignment) -> str:
+    """Say what the boot-up may move."""
+    resets = not assignment.reset_communication or assignment.restore_sub or assignment.program
+    if resets:
+        return nmt_risk(NmtCommand.RESET_NODE, assignment.device_type or None)
+    objects = NamedObjects(assignment.node_id)
+    objects.learn(DEVICE_TYPE, assignment.device_type.to_bytes(4, "little"))
+    return write_risk(objects.is_drive, [(write.index, write.sub) for write in assignment.writes])
+
+
+def _changes(assignment: SlaveAssignment) -> list[str]:
+    """Say what the boot-up does to the node, beside reading."""
+    found = []
+    if not assignment.reset_communication:
+        found.append("reset communication, unless it is Operational")
+    if assignment.program:
+        found.append("program download, if its software is another")
+    if assignment.restore_sub:
+        found.append("restore and reset")
+    if assignment.writes:
+        found.append(counted(len(assignment.writes), "write"))
+    return found
+
+
+def _nothing_expected(node_id: int) -> SlaveAssignment:
+    """Return what is expected where nobody says anything: that it answers."""
+    say("no --bus and no --eds: nothing is expected of the node but that it answers")
+    return SlaveAssignment(node_id)
+
+
+_HALF: Final = "the node is as the steps before left it"
 
 
 @click.command()
@@ -60,10 +153,10 @@ def command(  # noqa: PLR0913, PLR0917 - options
     slave = _expected(node, bus_file, eds)
     slave = replace(slave, reset_communication=False) if leaves_alone else slave
     with net_session(call, node) as session:
-        if doing := changes(slave):
+        if doing := _changes(slave):
             what = f"boot-up of node {node}: {', '.join(doing)}"
-            session.confirm(what, yes=yes, risk=risk(slave))
-        session.work.ending = HALF
+            session.confirm(what, yes=yes, risk=_risk(slave))
+        session.work.ending = _HALF
         outcome = _boot(session, slave, explain=explain)
         session.work.ending = ""
         status = outcome.status
@@ -80,8 +173,8 @@ def command(  # noqa: PLR0913, PLR0917 - options
 
 def _expected(node: int, bus_file: Path | None, eds: Path | None) -> SlaveAssignment:
     if bus_file is not None:
-        return of_bus_file(bus_file, node)
-    return nothing_expected(node) if eds is None else of_eds(eds, node)
+        return _of_bus_file(bus_file, node)
+    return _nothing_expected(node) if eds is None else _of_eds(eds, node)
 
 
 def _boot(session: NetSession, slave: SlaveAssignment, *, explain: bool) -> BootOutcome:

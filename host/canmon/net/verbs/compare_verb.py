@@ -9,21 +9,20 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import NodeObjects, known_objects
-from tickrig.host.canmon.net.node_values import differences, line, values_of
+from tickrig.host.canmon.net.node_objects import NamedObjects, known_objects
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
+from tickrig.host.canmon.net.values import differences, line, values_of
 from tickrig.host.canopen.commissioning.configuration import (
     Values,
     dcf_values,
     default_values,
     is_parameter,
 )
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import NODE_ID, PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 
-DIFFERENT: Final = 1
+_DIFFERENT: Final = 1
 
 
 @click.command()
@@ -58,7 +57,7 @@ def command(call: NetCall, node: int, other: str, eds: Path | None) -> None:
                 click.echo(one_line(line(objects, one, where)))
         say(f"objects that differ: {found} of {len(values)}")
     if found:
-        raise click.exceptions.Exit(DIFFERENT)
+        raise click.exceptions.Exit(_DIFFERENT)
 
 
 def _node_id(word: str) -> int:
@@ -69,7 +68,7 @@ def _node_id(word: str) -> int:
     return number
 
 
-def _of_file(objects: NodeObjects) -> Values:
+def _of_file(objects: NamedObjects) -> Values:
     assert objects.file is not None
     assert objects.device is not None
     node_id = objects.node_id
@@ -78,7 +77,7 @@ def _of_file(objects: NodeObjects) -> Values:
     return {at: data for at, data in values.items() if objects.rows[at].readable}
 
 
-def _of_node(session: NetSession, objects: NodeObjects, other_id: int) -> Values:
+def _of_node(session: NetSession, objects: NamedObjects, other_id: int) -> Values:
     """Return the parameters of another node, as this one would have them."""
     rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
     if not rows:

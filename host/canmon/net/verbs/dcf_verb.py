@@ -8,18 +8,16 @@ from pathlib import Path
 import click
 
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import Entry, NodeObjects, known_objects
-from tickrig.host.canmon.net.node_values import differences, line
+from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
-from tickrig.host.canmon.net.stored import save
-from tickrig.host.canmon.net.values import shown
+from tickrig.host.canmon.net.values import differences, line, shown
+from tickrig.host.canmon.net.verbs.store_verb import save
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, disabled, writes
-from tickrig.host.canopen.conform.safety.write_order import Write
+from tickrig.host.canopen.conform.write_order import Write
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import NODE_ID, PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
 
@@ -72,7 +70,7 @@ def command(  # noqa: PLR0913, PLR0917 - options
         _write(session, objects, steps, store=store)
 
 
-def _values(objects: NodeObjects, skip: Sequence[str]) -> Values:
+def _values(objects: NamedObjects, skip: Sequence[str]) -> Values:
     file, device = objects.file, objects.device
     assert file is not None
     assert device is not None
@@ -83,7 +81,7 @@ def _values(objects: NodeObjects, skip: Sequence[str]) -> Values:
     return {at: data for at, data in values.items() if at not in left_out}
 
 
-def _changed(session: NetSession, objects: NodeObjects, values: Values) -> Values:
+def _changed(session: NetSession, objects: NamedObjects, values: Values) -> Values:
     """Return what differs in the node, and say it."""
     found = list(differences(session, objects, values))
     for one in found:
@@ -92,7 +90,7 @@ def _changed(session: NetSession, objects: NodeObjects, values: Values) -> Value
     return {one.entry: one.wanted for one in found}
 
 
-def _steps(session: NetSession, objects: NodeObjects, changed: Values, file: Path) -> list[Write]:
+def _steps(session: NetSession, objects: NamedObjects, changed: Values, file: Path) -> list[Write]:
     """Return what is written; Refused if the file asks for what cannot be."""
     writable = {at for at, row in objects.rows.items() if row.writable}
 
@@ -111,7 +109,7 @@ def _steps(session: NetSession, objects: NodeObjects, changed: Values, file: Pat
 
 def _write(
     session: NetSession,
-    objects: NodeObjects,
+    objects: NamedObjects,
     steps: Sequence[Write],
     *,
     store: bool,

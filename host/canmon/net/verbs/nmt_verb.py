@@ -10,36 +10,35 @@ from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
 from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed
-from tickrig.host.canopen.master.boot_talk import state_text
-from tickrig.host.cli.messages import say
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canopen.master.boot_slave import state_text
+from tickrig.host.cli.messages import Refused, say
 from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand, NmtState
 
-COMMANDS: Final = {
+_COMMANDS: Final = {
     "start": NmtCommand.START,
     "stop": NmtCommand.STOP,
     "pre-op": NmtCommand.ENTER_PRE_OPERATIONAL,
     "reset-node": NmtCommand.RESET_NODE,
     "reset-comm": NmtCommand.RESET_COMMUNICATION,
 }
-AFTER: Final = {
+_AFTER: Final = {
     NmtCommand.START: (NmtState.OPERATIONAL,),
     NmtCommand.STOP: (NmtState.STOPPED,),
     NmtCommand.ENTER_PRE_OPERATIONAL: (NmtState.PRE_OPERATIONAL,),
     NmtCommand.RESET_NODE: (NmtState.INITIALISING,),
     NmtCommand.RESET_COMMUNICATION: (NmtState.INITIALISING,),
 }
-RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
-ALL: Final = "all"
+_RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
+_ALL: Final = "all"
 
-BOOT_UP_US: Final = 5_000_000
-LISTEN_US: Final = 1_500_000
-PERIODS: Final = 3
+_BOOT_UP_US: Final = 5_000_000
+_LISTEN_US: Final = 1_500_000
+_PERIODS: Final = 3
 """So many heartbeat periods are waited for a state."""
 
 
 @click.command()
-@click.argument("word", type=click.Choice(list(COMMANDS)), metavar="COMMAND")
+@click.argument("word", type=click.Choice(list(_COMMANDS)), metavar="COMMAND")
 @click.argument("node", metavar="NODE|all")
 @click.option("--yes", is_flag=True, help="Ask nothing.")
 @click.pass_obj
@@ -54,7 +53,7 @@ def command(call: NetCall, word: str, node: str, yes: bool) -> None:
     canmon net can0 nmt start 5
     canmon net can0 nmt reset-node all --yes
     """  # noqa: D301 - click wants the backspace
-    command, node_id = COMMANDS[word], _node_id(node)
+    command, node_id = _COMMANDS[word], _node_id(node)
     with net_session(call, node_id or None) as session:
         if node_id == ALL_NODES:
             _command_all(session, command, word, yes=yes)
@@ -63,7 +62,7 @@ def command(call: NetCall, word: str, node: str, yes: bool) -> None:
 
 
 def _node_id(word: str) -> int:
-    if word.lower() == ALL:
+    if word.lower() == _ALL:
         return ALL_NODES
     if not (word.isascii() and word.isdecimal() and 1 <= int(word) <= 127):
         raise Refused(f"{word!r} is no node-ID 1..127, and not all")
@@ -80,17 +79,17 @@ def _command_one(
     session.work.plan(f"NMT {word} to node {node_id}")
     session.bus.command(command, node_id)
     session.work.done()
-    wanted, wait_us = AFTER[command], LISTEN_US
-    if command in RESETS:
-        wait_us = BOOT_UP_US
+    wanted, wait_us = _AFTER[command], _LISTEN_US
+    if command in _RESETS:
+        wait_us = _BOOT_UP_US
     elif heartbeat_ms:
-        wait_us = max(PERIODS * heartbeat_ms * 1_000, LISTEN_US)
+        wait_us = max(_PERIODS * heartbeat_ms * 1_000, _LISTEN_US)
     state = session.bus.await_state(node_id, wanted, wait_us)
     if state in wanted:
         say(f"node {node_id}: {state_text(wanted[0])}")
     elif state is not None:
         raise NodeFailed(f"node {node_id} is {state_text(state)}, not {state_text(wanted[0])}")
-    elif command in RESETS:
+    elif command in _RESETS:
         raise NodeFailed(f"node {node_id}: no boot-up within {wait_us // 1_000_000} s")
     elif heartbeat_ms:
         raise NodeFailed(f"node {node_id}: no heartbeat within {wait_us // 1_000} ms")
@@ -119,10 +118,10 @@ def _command_all(session: NetSession, command: NmtCommand, word: str, *, yes: bo
     session.bus.states.clear()
     session.bus.command(command, ALL_NODES)
     session.work.done()
-    session.bus.gather(LISTEN_US)
+    session.bus.gather(_LISTEN_US)
     for node_id, state in sorted(session.bus.states.items()):
         say(f"node {node_id}: {state_text(state)}")
     if not session.bus.states:
         say("sent; no node has reported its state since")
-    elif command not in RESETS:
+    elif command not in _RESETS:
         say("sent; other nodes, if there are any, have no heartbeat that tells their state")

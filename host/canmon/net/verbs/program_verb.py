@@ -3,32 +3,78 @@
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
 import click
 
-from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import Entry
-from tickrig.host.canmon.net.progress_bar import ProgressBar
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
 from tickrig.host.canopen.commissioning.program import COMMANDS, Program, ProgramFailed
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import NODE_ID, PATH
-from tickrig.host.cli.refused import Refused, refuse_path
+from tickrig.host.cli.start import paint
 
-MOST_BYTES: Final = 256 << 20
+# A line on a terminal that says how far a transfer is; none in a pipe.
+
+_WIDTH = 30
+_LEAST_S = 1
+_S_US = 1_000_000
+
+
+class ProgressBar:
+    """Bytes done, of how many, and how fast.
+
+    Args:
+        total: bytes in all.
+        now_us: tells the time of the bus.
+    """
+
+    def __init__(self, total: int, now_us: Callable[[], int]) -> None:
+        self._total, self._now_us, self._begun_us = total, now_us, now_us()
+        self._shown = sys.stderr.isatty()
+        self._text = ""
+
+    def take(self, done: int) -> None:
+        """Show how many bytes are done."""
+        if not done:
+            self._begun_us = self._now_us()
+        text = self._line(done)
+        if self._shown and text != self._text:
+            self._text = text
+            paint(sys.stderr, f"\r\x1b[K{text}")
+
+    def end(self) -> None:
+        """Clear the line."""
+        if self._shown:
+            paint(sys.stderr, "\r\x1b[K")
+
+    def _line(self, done: int) -> str:
+        share = done / self._total if self._total else 1.0
+        full = round(share * _WIDTH)
+        seconds = (self._now_us() - self._begun_us) / _S_US
+        line = f"[{'#' * full}{'.' * (_WIDTH - full)}] {share:4.0%}  {done} of {self._total} bytes"
+        if seconds < _LEAST_S or not done:
+            return line
+        rate = done / seconds
+        return f"{line}  {rate / 1_000:.1f} kB/s  {(self._total - done) / rate:.0f} s left"
+
+
+_MOST_BYTES: Final = 256 << 20
 """A larger file is no firmware."""
-IDENTIFICATION: Final = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
-NAMES: Final = {
+_IDENTIFICATION: Final = re.compile(r"(?:0x)?([0-9a-f]{1,8})h?", re.IGNORECASE)
+_NAMES: Final = {
     0x1F50: "program data",
     0x1F51: "program control",
     0x1F56: "program software identification",
     0x1F57: "flash status",
 }
-RISK: Final = "The program stops: a drive lets go of its motor, what hangs on it may fall"
-HALF: Final = (
+_RISK: Final = "The program stops: a drive lets go of its motor, what hangs on it may fall"
+_HALF: Final = (
     "the node has no whole program; a transfer cannot go on in its middle:"
     " the same command begins it anew"
 )
@@ -86,10 +132,12 @@ def command(  # noqa: PLR0913, PLR0917 - options
                         say(f"node {node}: it runs what is expected; nothing is to be done")
                         return
                     what = f"{len(data)} bytes of {file.name} into program {number} of node {node}"
-                    session.confirm(what, yes=yes, risk=RISK)
+                    session.confirm(what, yes=yes, risk=_RISK)
                     _download(session, program, data, wanted, tries=tries, start=not no_start)
                 elif control is not None:
-                    risk = RISK if control != "start" else "This may turn a motor: the program runs"
+                    risk = (
+                        _RISK if control != "start" else "This may turn a motor: the program runs"
+                    )
                     what = f"program {number} of node {node}: {control}"
                     session.confirm(what, yes=yes, risk=risk)
                     program.command(COMMANDS[control])
@@ -101,25 +149,25 @@ def command(  # noqa: PLR0913, PLR0917 - options
 
 def _title(entry: Entry) -> str:
     """Name an object of a program."""
-    return f"{write_entry(entry)} {NAMES.get(entry[0], '')}".rstrip()
+    return f"{write_entry(entry)} {_NAMES.get(entry[0], '')}".rstrip()
 
 
 def _read(file: Path) -> bytes:
     """Read the firmware; Refused if it cannot be, is empty or too large."""
     try:
         with file.open("rb") as opened:
-            data = opened.read(MOST_BYTES + 1)
+            data = opened.read(_MOST_BYTES + 1)
     except OSError as error:
         refuse_path("FILE", error)
     if not data:
         raise Refused(f"FILE {file}: it is empty")
-    if len(data) > MOST_BYTES:
-        raise Refused(f"FILE {file}: more than {MOST_BYTES >> 20} MiB: no firmware")
+    if len(data) > _MOST_BYTES:
+        raise Refused(f"FILE {file}: more than {_MOST_BYTES >> 20} MiB: no firmware")
     return data
 
 
 def _identification(text: str) -> int:
-    match = IDENTIFICATION.fullmatch(text)
+    match = _IDENTIFICATION.fullmatch(text)
     if match is None:
         raise Refused(f"--expect {text!r} is no identification of up to 8 hex digits, as 1A2B3C4D")
     return int(match[1], 16)
@@ -141,7 +189,7 @@ def _download(  # noqa: PLR0913 - steps
     work.done()
     program.clear()
     work.done()
-    work.ending = HALF
+    work.ending = _HALF
     bar = ProgressBar(len(data), lambda: session.bus.now_us)
     try:
         program.download(data, bar.take, tries)

@@ -10,16 +10,15 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import Entry, NodeObjects, known_objects
+from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects
 from tickrig.host.canmon.net.session import NetSession, failure_text, net_session, of_node
 from tickrig.host.canmon.net.values import shown
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import NODE_ID, PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import json_text, one_line
 
-REFUSED: Final = 1
+_REFUSED: Final = 1
 
 
 @click.command()
@@ -52,10 +51,10 @@ def command(
                 if line:
                     click.echo(line)
     if refused:
-        raise click.exceptions.Exit(REFUSED)
+        raise click.exceptions.Exit(_REFUSED)
 
 
-def _wanted(objects: NodeObjects, names: Sequence[str]) -> list[Entry]:
+def _wanted(objects: NamedObjects, names: Sequence[str]) -> list[Entry]:
     if names:
         return [objects.find(name) for name in names]
     if not objects.rows:
@@ -63,7 +62,7 @@ def _wanted(objects: NodeObjects, names: Sequence[str]) -> list[Entry]:
     return [at for at, row in sorted(objects.rows.items()) if row.readable]
 
 
-def _read(session: NetSession, objects: NodeObjects, entry: Entry, as_json: bool) -> str | None:
+def _read(session: NetSession, objects: NamedObjects, entry: Entry, as_json: bool) -> str | None:
     """Return a line with the value; None if the node refuses, which is told."""
     node_id = objects.node_id
     try:

@@ -7,18 +7,18 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.views.node_card import profile_text
+from tickrig.host.canmon.model.decode.node_board import profile_text
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.session import net_session
-from tickrig.host.canopen.commissioning.network_scan import NetworkScan, NodeFound
-from tickrig.host.canopen.master.boot_talk import state_text
+from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
+from tickrig.host.canopen.master.boot_slave import state_text
 from tickrig.host.cli.messages import say
 from tickrig.host.cli.options import time_option
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted
 
-NOBODY: Final = 1
-WAIT_US: Final = 500_000
+_NOBODY: Final = 1
+_WAIT_US: Final = 500_000
 
 
 @click.command()
@@ -37,7 +37,7 @@ def command(call: NetCall, wait_us: int | None, as_json: bool) -> None:
     """  # noqa: D301 - click wants the backspace
     found: list[NodeFound] = []
     with net_session(call) as session:
-        scan = NetworkScan(session.bus, wait_us or WAIT_US)
+        scan = NetworkScan(session.bus, wait_us or _WAIT_US)
         found += scan.run()
     with until_unread():
         for node in found:
@@ -46,7 +46,7 @@ def command(call: NetCall, wait_us: int | None, as_json: bool) -> None:
         say("nodes without a node-ID are there: canmon net SOURCE lss")
     if not found:
         say("no node answered or was heard")
-        raise click.exceptions.Exit(NOBODY)
+        raise click.exceptions.Exit(_NOBODY)
     say(counted(len(found), "node"))
 
 

@@ -2,21 +2,73 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import click
 
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.session import net_session
-from tickrig.host.canmon.net.stored import AREAS, load_defaults, reset, save
+from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import NODE_ID
-from tickrig.host.cli.refused import Refused
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+
+# Store and restore of a node: 1010h and 1011h.
+
+_STORE: Final = 0x1010
+_RESTORE: Final = 0x1011
+_PATIENCE_US: Final = 10_000_000
+"""A node that writes its memory may answer late."""
+_BOOT_UP_US: Final = 5_000_000
+_ON_COMMAND: Final = 1
+"""Bit 0 of 1010h: it saves on command."""
+
+_AREAS: Final = {"all": 1, "communication": 2, "application": 3}
+_COMMUNICATION: Final = 2
+
+
+def save(session: NetSession, node_id: int, sub: int) -> None:
+    """Have a node store parameters; NodeFailed if it cannot.
+
+    Args:
+        session: the bus.
+        node_id: the node.
+        sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others as its maker says.
+    """
+    with of_node(node_id):
+        data = session.bus.read(node_id, _STORE, sub)
+        if not data[:1] or not data[0] & _ON_COMMAND:
+            raise NodeFailed(
+                f"node {node_id}: {_STORE:04X}h:{sub:02X} is {data[::-1].hex().upper()}h:"
+                " it does not store on command"
+            )
+        session.bus.write(node_id, _STORE, sub, b"save", _PATIENCE_US)
+    say(f"node {node_id}: stored")
+
+
+def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
+    """Have a node forget what was stored; it counts from its next reset."""
+    with of_node(node_id):
+        session.bus.write(node_id, _RESTORE, sub, b"load", _PATIENCE_US)
+    say(f"node {node_id}: restored; the defaults count from its next reset")
+
+
+def reset(session: NetSession, node_id: int, sub: int) -> None:
+    """Reset a node, or its communication where only that was restored; wait for its boot-up."""
+    communication = sub == _COMMUNICATION
+    command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE
+    session.bus.command(command, node_id)
+    wanted = (NmtState.INITIALISING,)
+    if session.bus.await_state(node_id, wanted, _BOOT_UP_US) not in wanted:
+        raise NodeFailed(f"node {node_id}: no boot-up within {_BOOT_UP_US // 1_000_000} s")
+    say(f"node {node_id}: boot-up")
 
 
 def _sub(word: str) -> int:
-    if word in AREAS:
-        return AREAS[word]
+    if word in _AREAS:
+        return _AREAS[word]
     number = int(word) if word.isascii() and word.isdecimal() else 0
     if not 1 <= number <= 0x7F:
-        raise Refused(f"{word!r} is none of {', '.join(AREAS)}, and no sub-index 1..127")
+        raise Refused(f"{word!r} is none of {', '.join(_AREAS)}, and no sub-index 1..127")
     return number
 
 
@@ -62,7 +114,7 @@ def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) ->
     with net_session(call, node) as session:
         session.confirm(f"node {node} forgets its parameters: {area}", yes=yes, risk=risk)
         session.work.plan("restore", *(["reset"] if then_reset else []))
-        load_defaults(session, node, sub)
+        _load_defaults(session, node, sub)
         session.work.done()
         if then_reset:
             reset(session, node, sub)

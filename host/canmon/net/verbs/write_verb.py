@@ -9,19 +9,18 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import Entry, NodeObjects, known_objects
+from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
 from tickrig.host.canmon.net.values import encoded, limits
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import NODE_ID, PATH
-from tickrig.host.cli.refused import Refused
 from tickrig.host.text.page_text import one_line
-from tickrig.wire.canopen.sdo.abort import describe_abort
+from tickrig.wire.canopen.sdo_frame import describe_abort
 
-MAPPING_OFFSET: Final = 0x200
-PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
+_MAPPING_OFFSET: Final = 0x200
+_PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
 
 
 @click.command()
@@ -65,7 +64,7 @@ def _split(word: str) -> tuple[str, str]:
     return name, text
 
 
-def _write(session: NetSession, objects: NodeObjects, entry: Entry, data: bytes) -> None:
+def _write(session: NetSession, objects: NamedObjects, entry: Entry, data: bytes) -> None:
     node_id = objects.node_id
     with of_node(node_id, objects.title):
         try:
@@ -77,6 +76,6 @@ def _write(session: NetSession, objects: NodeObjects, entry: Entry, data: bytes)
 
 def _hint(entry: Entry) -> str:
     """Say what a PDO wants before its mapping is changed; empty for other objects."""
-    if entry[0] not in PDO_MAPPINGS:
+    if entry[0] not in _PDO_MAPPINGS:
         return ""
-    return f"; disable the PDO first: {entry[0] - MAPPING_OFFSET:04X}h:01 with bit 31"
+    return f"; disable the PDO first: {entry[0] - _MAPPING_OFFSET:04X}h:01 with bit 31"

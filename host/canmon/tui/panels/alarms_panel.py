@@ -12,18 +12,17 @@ from textual.content import Content
 from textual.widgets import Static, TabbedContent, TextArea
 
 from tickrig.host.canmon.extensions import load_rule
-from tickrig.host.canmon.model.check.alarms import RULE, Alarms, State, render_alarms
+from tickrig.host.canmon.model.check.alarms import RULE, Alarms, AlarmState, render_alarms
 from tickrig.host.canmon.model.check.rules import SWITCHES, VALUES, Rules, parse_rules
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import below
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
-from tickrig.host.canmon.workspace import SettingError
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
+from tickrig.host.canmon.workspace import SettingError, below
 from tickrig.host.text.toml_reader import load_toml
-from tickrig.host.tui.line_view import Line, LineView, plain
+from tickrig.host.tui import Line, LineView, plain
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
-LOOK_US: Final = 100_000
+_LOOK_US: Final = 100_000
 """How often it is seen whether something is missing."""
 
 
@@ -64,25 +63,25 @@ class AlarmTask(Task):
         for one in records:
             self.alarms.take(*one)
         if now_us >= self._due_us:
-            self._due_us = now_us + LOOK_US
+            self._due_us = now_us + _LOOK_US
             self.alarms.check_missing(self._model.now_us, self._model.lost)
         return ()
 
 
-USUAL: Final = {
+_USUAL: Final = {
     "no_emcy": True,
     "no_error_frames": True,
     "no_lost_heartbeat": True,
     "no_loss": True,
 }
 """What is held where nobody has written rules; bus-off is an error frame, too."""
-USUAL_LOAD: Final = {"max_load": 90}
+_USUAL_LOAD: Final = {"max_load": 90}
 """Beside it where the bit rate is known."""
 LEAST_WIDTH, INDENT = 40, 4
-BADGE_S: Final = 0.5
-BADGES: Final = {State.BROKEN: ("!", "bold red"), State.WAS_BROKEN: ("!", "yellow")}
+_BADGE_S: Final = 0.5
+_BADGES: Final = {AlarmState.BROKEN: ("!", "bold red"), AlarmState.WAS_BROKEN: ("!", "yellow")}
 
-STYLES: Final = {State.BROKEN: "bold red", State.WAS_BROKEN: "yellow"}
+_STYLES: Final = {AlarmState.BROKEN: "bold red", AlarmState.WAS_BROKEN: "yellow"}
 
 
 class AlarmsPanel(Panel):
@@ -129,9 +128,9 @@ class AlarmsPanel(Panel):
         super().__init__(session)
         self.held = AlarmTask(session.model)
         session.tasks.append(self.held)
-        words = {**USUAL, **(USUAL_LOAD if self.held.bit_rate else {})}
+        words = {**_USUAL, **(_USUAL_LOAD if self.held.bit_rate else {})}
         self.held.hold(parse_rules(words))
-        self.rules_text, self._own = rules_toml(words), False
+        self.rules_text, self._own = _rules_toml(words), False
         self._lines: list[str] = []
         self._badge = ""
 
@@ -143,14 +142,14 @@ class AlarmsPanel(Panel):
 
     def on_mount(self) -> None:
         """Let the title of the tab tell, whichever tab is shown."""
-        self.set_interval(BADGE_S, self.refresh_badge)
+        self.set_interval(_BADGE_S, self.refresh_badge)
 
     def refresh_badge(self) -> None:
         """Mark the title of the tab while a rule is broken, and until that is acknowledged."""
         now_us = self.session.model.now_us
         with self.session.lock:
             states = {alarm.state(now_us) for alarm in self.held.alarms.rows()}
-        mark, style = next((BADGES[state] for state in BADGES if state in states), ("", ""))
+        mark, style = next((_BADGES[state] for state in _BADGES if state in states), ("", ""))
         tab = self.screen.query_one(TabbedContent).get_tab(f"tab-{self.section}")
         title = tab.label_text.removesuffix("!") + mark
         if tab.label_text != title or style != self._badge:
@@ -162,7 +161,7 @@ class AlarmsPanel(Panel):
         lines = render_alarms(self.held.alarms, model.now_us)
         rules = lines.index("")  # behind it findings, which go on in the next line
         width = max(LEAST_WIDTH, self.query_one(LineView).scrollable_content_region.width)
-        rest = [part for line in lines[rules:] for part in wrapped(line, width)]
+        rest = [part for line in lines[rules:] for part in _wrapped(line, width)]
         self._lines = [*lines[:rules], *rest]
 
     def paint(self) -> None:
@@ -181,7 +180,7 @@ class AlarmsPanel(Panel):
             raise SettingError(("rules",), "is no table of rules")
         with below("rules"):
             self.held.hold(parse_rules(words, load_rule))
-        self.rules_text, self._own = rules_toml(words), True
+        self.rules_text, self._own = _rules_toml(words), True
 
     def save(self) -> dict[str, Any]:
         """Return those that somebody wrote; None takes one out of a workspace."""
@@ -227,14 +226,14 @@ class AlarmsPanel(Panel):
         self.refresh_view()
 
 
-def wrapped(line: str, width: int) -> list[str]:
+def _wrapped(line: str, width: int) -> list[str]:
     """Return a line as several, where it is longer than the screen is wide."""
     if len(line) <= width:
         return [line]
     return wrap(line, width, subsequent_indent=" " * INDENT, break_on_hyphens=False)
 
 
-def rules_toml(words: Mapping[str, Any]) -> str:
+def _rules_toml(words: Mapping[str, Any]) -> str:
     """Write rules as a person would."""
     import tomlkit  # noqa: PLC0415 - an extra
 
@@ -244,5 +243,5 @@ def rules_toml(words: Mapping[str, Any]) -> str:
 def _styled(line: str) -> Line:
     if line.startswith((f"{RULE} ", "FINDINGS")):
         return plain(line, "bold")
-    found = next((style for state, style in STYLES.items() if f" {state} " in line), "")
+    found = next((style for state, style in _STYLES.items() if f" {state} " in line), "")
     return plain(line, found)

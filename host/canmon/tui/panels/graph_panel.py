@@ -1,6 +1,6 @@
 r"""The tab of the graph: curves of signals, live or of a log.
 
->>> colour_line("━ \x1b[36mspeed\x1b[0m 3")
+>>> _colour_line("━ \x1b[36mspeed\x1b[0m 3")
 (('━ ', ''), ('speed', 'cyan'), (' 3', ''))
 """
 
@@ -16,21 +16,21 @@ import click
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.plot import LABEL_WIDTH
 from tickrig.host.canmon.model.graph.series import LEAST_US
-from tickrig.host.canmon.model.graph.signal_spec import SignalSpec, parse_signal
+from tickrig.host.canmon.model.graph.signal_spec import CurveSpec, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import below, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
+from tickrig.host.canmon.workspace import below, text_of, texts_of
 from tickrig.host.text.values import parse_time_with_unit_us
-from tickrig.host.tui.line_view import Line
+from tickrig.host.tui import Line
 from tickrig.wire.can import Frames
 
-COLOURS: Final = {
+_COLOURS: Final = {
     "31": "red",
     "32": "green",
     "33": "yellow",
@@ -41,12 +41,12 @@ COLOURS: Final = {
 _CODE: Final = re.compile("\x1b\\[([0-9]*)m")
 
 
-def colour_line(text: str) -> Line:
+def _colour_line(text: str) -> Line:
     """Return the line; a colour lasts until the next code."""
     pieces = _CODE.split(text)
     codes = ("", *pieces[1::2])
     found = zip(pieces[::2], codes, strict=True)
-    return tuple((part, COLOURS.get(code, "")) for part, code in found if part)
+    return tuple((part, _COLOURS.get(code, "")) for part, code in found if part)
 
 
 class GraphTask(Task):
@@ -67,9 +67,9 @@ class GraphTask(Task):
         return ()
 
 
-PICTURE: Final = (960, 400)
-QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 181[2:6]s*0.001@2"
-EMPTY: Final = "no signals: a adds one, F1 shows how"
+_PICTURE: Final = (960, 400)
+_QUESTION: Final = "[LABEL=]SIGNAL[@AXIS], as 5.velocity, 5.statusword.fault, 181[2:6]s*0.001@2"
+_EMPTY: Final = "no signals: a adds one, F1 shows how"
 
 
 class GraphPanel(Panel):
@@ -130,9 +130,9 @@ class GraphPanel(Panel):
         self.graph.now_us = model.now_us
         width, height = self.query_one(PictureView).size
         if self.graph.words:
-            self._lines = [colour_line(line) for line in self.graph.render(width, height)]
+            self._lines = [_colour_line(line) for line in self.graph.render(width, height)]
         else:
-            self._lines = [((EMPTY, ""),)]
+            self._lines = [((_EMPTY, ""),)]
 
     def paint(self) -> None:
         """Show it."""
@@ -150,11 +150,11 @@ class GraphPanel(Panel):
 
     def save(self) -> dict[str, Any]:
         """Return them."""
-        return {"signals": list(self._texts), "window": time_text(self.graph.window_us)}
+        return {"signals": list(self._texts), "window": _time_text(self.graph.window_us)}
 
     def action_add(self) -> None:
         """Ask for a signal."""
-        self.query_one(PromptLine).prompt(QUESTION, "", self._add)
+        self.query_one(PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_remove(self) -> None:
         """Ask which signal is shown no more."""
@@ -184,7 +184,7 @@ class GraphPanel(Panel):
         self.refresh_view()
 
     def _add_signal(self, text: str) -> None:
-        word: SignalSpec = parse_signal(text)
+        word: CurveSpec = parse_signal(text)
         with self.session.lock:
             trace = self.session.model.trace
             rows = trace.rows(trace.first, trace.count)
@@ -214,7 +214,7 @@ class GraphPanel(Panel):
             check_graph_path(path)
             with self.session.lock:
                 series, view = deepcopy(self.graph.series), self.graph.view()
-            write_graph(path, series, view, PICTURE)
+            write_graph(path, series, view, _PICTURE)
         except click.ClickException as error:
             raise ValueError(error.message) from None
         self.notify(f"{path} is written", markup=False)
@@ -227,10 +227,10 @@ class GraphPanel(Panel):
         return "   ".join(words)
 
 
-def time_text(time_us: int) -> str:
+def _time_text(time_us: int) -> str:
     """Write a time so that it is read again.
 
-    >>> time_text(10_000_000), time_text(1_500), time_text(2_000)
+    >>> _time_text(10_000_000), _time_text(1_500), _time_text(2_000)
     ('10s', '1500us', '2ms')
     """
     for unit, size_us in (("s", 1_000_000), ("ms", 1_000)):

@@ -1,15 +1,19 @@
-"""What every tab of the monitor is: the contract between the frame and its panels."""
+"""What every tab of the monitor is, and which there are: ours, then those of packages."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any, ClassVar
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, ClassVar, Final
 
 from textual.containers import Vertical
 
-from tickrig.host.canmon.tui.settings import checked_bus
-from tickrig.host.canmon.tui.tasks.session import Model, Session, Task
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.canmon.tui.session import Model, Session, Task
+from tickrig.host.canmon.workspace import checked_bus
+from tickrig.host.cli.extensions import ExtensionGroup
+from tickrig.host.text.user_file import explain_error
+from tickrig.host.tui import LineView
+
+# What every tab of the monitor is: the contract between the frame and its panels.
 
 
 class Panel(Vertical):
@@ -114,3 +118,51 @@ class SendingPanel(Panel):
     def _take_next_bus(self) -> None:
         self._sender.stop()
         self._sender.channel = self.session.next_bus(self._sender.channel)
+
+
+# The tabs of `canmon tui`: ours in their order, then those of installed packages.
+
+_HERE: Final = "tickrig.host.canmon.tui.panels"
+TABS: Final = ExtensionGroup[type[Panel]](
+    "tickrig.tabs",
+    "tab",
+    {
+        "trace": f"{_HERE}.trace_panel:TracePanel",
+        "nodes_view": f"{_HERE}.nodes_panel:NodesPanel",
+        "statistics": f"{_HERE}.statistics_panel:StatisticsPanel",
+        "objects": f"{_HERE}.dictionary_panel:DictionaryPanel",
+        "transmit": f"{_HERE}.transmit_panel:TransmitPanel",
+        "sequence": f"{_HERE}.sequence_panel:SequencePanel",
+        "graph": f"{_HERE}.graph_panel:GraphPanel",
+        "alarms": f"{_HERE}.alarms_panel:AlarmsPanel",
+    },
+    lambda found: isinstance(found, type) and issubclass(found, Panel) and bool(found.title),
+    "a Panel with a title",
+)
+"""By their sections in a workspace; key 1 shows the first, and so on."""
+
+
+def make_panels(session: Session, notify: Callable[[str], None]) -> list[Panel]:
+    """Return all tabs; a foreign one that cannot be made is left out.
+
+    Args:
+        session: what they show.
+        notify: takes a line for people about each that is left out.
+    """
+    return list(_panels(session, notify))
+
+
+def _panels(session: Session, notify: Callable[[str], None]) -> Iterator[Panel]:
+    for name, tab in TABS.load_all(notify).items():
+        tasks = list(session.tasks)
+        try:
+            panel = tab(session)
+            if panel.section != name:
+                raise ValueError(f"its section is {panel.section!r}")
+        except Exception as error:
+            if name in TABS.built_in:
+                raise
+            session.tasks[:] = tasks
+            notify(f"tab {name!r}: {explain_error(error)}")
+            continue
+        yield panel

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
-from tickrig.host.canmon.model.sequence.sequence_run import (
+from tickrig.host.canmon.model.sequence import (
     EventType,
     Sequence,
     SequenceEvent,
@@ -21,19 +21,19 @@ from tickrig.host.canmon.model.sequence.sequence_run import (
 )
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
-from tickrig.host.canmon.tui.tasks.sequence_task import (
+from tickrig.host.canmon.tui.sequence_task import (
     NEW,
     SequenceTask,
     read_texts,
     sequence_name,
     texts_settings,
 )
-from tickrig.host.canmon.tui.tasks.session import Model, Session
+from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.host.text.steps import StepError
 from tickrig.host.text.whole_file import write_whole
-from tickrig.host.tui.line_view import Line, LineView, plain
+from tickrig.host.tui import Line, LineView, plain
 
-STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType.END: "bold"}
+_STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType.END: "bold"}
 _PLACE: Final = re.compile(r".*?:([0-9]+): ")
 
 
@@ -219,4 +219,4 @@ class SequencePanel(SendingPanel):
 
 
 def _line(event: SequenceEvent) -> Line:
-    return plain(event_line(event), STYLES.get(event.mark, ""))
+    return plain(event_line(event), _STYLES.get(event.mark, ""))

@@ -1,6 +1,6 @@
 r"""The tab of the statistics: all identifiers, their rates, gaps, jitter, missed cycles, bits.
 
->>> ansi_line("01 \x1b[7mFF\x1b[0m")
+>>> _ansi_line("01 \x1b[7mFF\x1b[0m")
 (('01 ', ''), ('FF', 'bold yellow'))
 """
 
@@ -13,16 +13,15 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tickrig.host.canmon.model.views.top_columns import PLAIN, REVERSE
-from tickrig.host.canmon.model.views.top_model import UNBOUNDED, Order
+from tickrig.host.canmon.model.top_model import PLAIN, REVERSE, UNBOUNDED, RowOrder
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import choice, truth
-from tickrig.host.canmon.tui.tasks.session import Model, Session
+from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.host.canmon.tui.trace_line import CHANGED
-from tickrig.host.tui.line_view import Line, LineView, plain
+from tickrig.host.canmon.workspace import choice, truth
+from tickrig.host.tui import Line, LineView, plain
 
 
-def ansi_line(text: str) -> Line:
+def _ansi_line(text: str) -> Line:
     """Return the line; what is reversed there has changed."""
     pieces = []
     for part in text.split(REVERSE):
@@ -31,7 +30,7 @@ def ansi_line(text: str) -> Line:
     return tuple(piece for piece in pieces if piece[0])
 
 
-TITLE: Final = "CAN-ID"
+_TITLE: Final = "CAN-ID"
 """Is in the last line above the rows."""
 
 
@@ -76,9 +75,9 @@ class StatisticsPanel(Panel):
         top = model.top
         top.view = replace(top.view, keys=False)
         lines = top.lines(model.now_us, model.lost, self.size.width, UNBOUNDED, model.unread)
-        heads = next((number for number, line in enumerate(lines, 1) if TITLE in line), 0)
+        heads = next((number for number, line in enumerate(lines, 1) if _TITLE in line), 0)
         self._heads = [plain(line, "bold") for line in lines[:heads]]
-        self._lines = [ansi_line(line) for line in lines[heads:]]
+        self._lines = [_ansi_line(line) for line in lines[heads:]]
 
     def paint(self) -> None:
         """Show it."""
@@ -90,9 +89,9 @@ class StatisticsPanel(Panel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take order and what is shown."""
         top = self.session.model.top
-        order = choice(settings, "sort", top.view.order, list(Order))
+        order = choice(settings, "sort", top.view.order, list(RowOrder))
         bits = truth(settings, "bits", top.view.bits)
-        top.view = replace(top.view, order=Order(order), bits=bits)
+        top.view = replace(top.view, order=RowOrder(order), bits=bits)
         if truth(settings, "decode", False):
             top.press("d")
 

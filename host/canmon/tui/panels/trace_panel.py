@@ -12,22 +12,21 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Input, Static
 
 from tickrig.host.canmon.model.decode.filter import Filter, FilterError, parse_filter
-from tickrig.host.canmon.model.frames.dump_line import Stamp
+from tickrig.host.canmon.model.frames import Stamp
 from tickrig.host.canmon.model.logs.log_file import SUFFIXES
-from tickrig.host.canmon.model.views.trace import DisplayFilter, Latest, Ring
-from tickrig.host.canmon.output.log_file import write_records
+from tickrig.host.canmon.model.trace import DisplayFilter, Latest, Ring
+from tickrig.host.canmon.output.recording import write_records
 from tickrig.host.canmon.tui.controls import PromptLine
 from tickrig.host.canmon.tui.panels.panel import Panel
-from tickrig.host.canmon.tui.settings import choice, text_of, truth
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.tui.trace_line import TraceLines
-from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.tui.line_view import Line, LineView, line_text
+from tickrig.host.canmon.workspace import SettingError, choice, text_of, truth
+from tickrig.host.tui import Line, LineView, line_text
 from tickrig.wire.can import Frames
 
-STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
-CHANNEL_MAX: Final = 12
-GAPS_WIDTH: Final = 90
+_STAMPS: Final = (Stamp.ZERO, Stamp.DELTA, Stamp.ABSOLUTE, Stamp.DATE)
+_CHANNEL_MAX: Final = 12
+_GAPS_WIDTH: Final = 90
 """A narrower screen has room for what frames mean, or for the gaps between them."""
 
 
@@ -122,7 +121,7 @@ class TracePanel(Panel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take mode, time stamp, filter and what is shown."""
         self.overwrite = truth(settings, "overwrite", self.overwrite)
-        stamp = choice(settings, "time", self._layout.stamp, [str(one) for one in STAMPS])
+        stamp = choice(settings, "time", self._layout.stamp, [str(one) for one in _STAMPS])
         self._layout = replace(
             self._layout,
             stamp=Stamp(stamp),
@@ -206,8 +205,8 @@ class TracePanel(Panel):
 
     def action_stamp(self) -> None:
         """Show another time: since the first frame, since the one before, absolute, date."""
-        place = (STAMPS.index(self._layout.stamp) + 1) % len(STAMPS)
-        self._layout = replace(self._layout, stamp=STAMPS[place])
+        place = (_STAMPS.index(self._layout.stamp) + 1) % len(_STAMPS)
+        self._layout = replace(self._layout, stamp=_STAMPS[place])
         self.refresh_view()
 
     def action_clear(self) -> None:
@@ -234,7 +233,7 @@ class TracePanel(Panel):
     def _fit(self, passed: Ring, latest: Sequence[Latest]) -> None:
         """Make room for what is there: buses, and the first time."""
         buses = {one.row.record.channel for one in latest}
-        width = min(CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
+        width = min(_CHANNEL_MAX, max(map(len, buses))) if len(buses) > 1 else 0
         first = passed.rows(0, 1) if passed.first == 0 else []
         origin_us = first[0].record.at_us if first else self._layout.origin_us
         self._layout = replace(
@@ -242,7 +241,7 @@ class TracePanel(Panel):
             channel_width=width,
             counts=self.overwrite,
             origin_us=origin_us,
-            gaps=not self._layout.meaning or self.size.width >= GAPS_WIDTH,
+            gaps=not self._layout.meaning or self.size.width >= _GAPS_WIDTH,
         )
 
     def _title(self) -> str:

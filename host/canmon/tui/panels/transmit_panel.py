@@ -1,6 +1,6 @@
 """The tab of the transmit list: frames that are sent cyclically or by hand.
 
->>> read_row({"send": "080#", "every": "10ms"}).every
+>>> _read_row({"send": "080#", "every": "10ms"}).every
 '10ms'
 """
 
@@ -13,10 +13,10 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
-from tickrig.host.canmon.model.transmit.transmit_list import (
+from tickrig.host.canmon.model.transmit import (
     ON,
     AnyFrames,
+    PdoFrames,
     RowText,
     TransmitList,
     parse_row_text,
@@ -24,14 +24,13 @@ from tickrig.host.canmon.model.transmit.transmit_list import (
 )
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
-from tickrig.host.canmon.tui.settings import below, tables, text_of, texts_of
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, Task
-from tickrig.host.tui.line_view import plain
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
+from tickrig.host.canmon.workspace import below, tables, text_of, texts_of
+from tickrig.host.tui import plain
+from tickrig.wire.can import CanFrame, FdFrame
 
 
-def read_row(settings: Mapping[str, Any]) -> RowText:
+def _read_row(settings: Mapping[str, Any]) -> RowText:
     """Return what a row says; SettingError if a setting is none."""
     return RowText(
         text_of(settings, "send", ""),
@@ -42,7 +41,7 @@ def read_row(settings: Mapping[str, Any]) -> RowText:
     )
 
 
-def row_settings(words: RowText) -> dict[str, Any]:
+def _row_settings(words: RowText) -> dict[str, Any]:
     """Return it as settings; what is empty is None, so that a workspace leaves it out."""
     return {
         "send": words.frame,
@@ -53,7 +52,7 @@ def row_settings(words: RowText) -> dict[str, Any]:
     }
 
 
-NOW: Final = 0
+_NOW: Final = 0
 """When frames are due that somebody sends by hand."""
 
 
@@ -79,7 +78,7 @@ class TransmitTask(Task):
     @property
     def due_us(self) -> int:
         """When it next wants to be called."""
-        return NOW if self._out else self.list.due_us
+        return _NOW if self._out else self.list.due_us
 
     def add(self, words: RowText) -> None:
         """Add a row at the end; ValueError if it cannot be sent."""
@@ -120,7 +119,7 @@ class TransmitTask(Task):
         self._out.clear()
 
 
-QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KIND] [--name NAME]"
+_QUESTION = "FRAME [--every TIME] [--counter BYTE:LOW..HIGH] [--checksum BYTE:KIND] [--name NAME]"
 
 
 class TransmitPanel(SendingPanel):
@@ -184,11 +183,11 @@ class TransmitPanel(SendingPanel):
         super().load(settings)
         for number, table in enumerate(tables(settings, "row")):
             with below("row", number):
-                self.transmit.add(read_row(table))
+                self.transmit.add(_read_row(table))
 
     def save(self) -> dict[str, Any]:
         """Return them."""
-        rows = [row_settings(words) for words in self.transmit.words]
+        rows = [_row_settings(words) for words in self.transmit.words]
         return {"bus": self.transmit.channel, "row": rows}
 
     def action_enable(self) -> None:
@@ -202,14 +201,14 @@ class TransmitPanel(SendingPanel):
 
     def action_add(self) -> None:
         """Write a new row."""
-        self.query_one(PromptLine).prompt(QUESTION, "", self._add)
+        self.query_one(PromptLine).prompt(_QUESTION, "", self._add)
 
     def action_edit(self) -> None:
         """Write the chosen row anew."""
         number = self.chosen
         if number < len(self.transmit.words):
             self.query_one(PromptLine).prompt(
-                QUESTION, str(self.transmit.words[number]), lambda text: self._change(number, text)
+                _QUESTION, str(self.transmit.words[number]), lambda text: self._change(number, text)
             )
 
     def action_remove(self) -> None:

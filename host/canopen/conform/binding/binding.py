@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
-from tickrig.host.canopen.conform.binding.absent_places import (
-    AbsentPlaces,
-    Place,
-    absent_places,
-)
-from tickrig.host.canopen.conform.binding.object_reader import ObjectReader, Upload
+from tickrig.host.canopen.conform.binding.object_reader import ObjectReader, Upload, probe_device
 from tickrig.host.canopen.conform.binding.pdo_binding import PDO_NAMES, BoundPdo, bind_pdos
-from tickrig.host.canopen.conform.binding.probing import probe_device
 from tickrig.host.canopen.conform.binding.wanted import (
     COMMUNICATION_AREA,
     GENERIC_IO,
@@ -23,13 +17,74 @@ from tickrig.host.canopen.conform.binding.wanted import (
     TEXTS,
     WANTED,
     Use,
-    Wanted,
+    WantedObject,
 )
 from tickrig.host.canopen.conform.check import Level
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_entry import standard_object
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
-DEVICE_TYPE: Final = 0x1000
+# Places in the dictionary of a node at which there is nothing.
+
+_ABSENT_OBJECTS: Final = range(0x5FFF, 0x5EFF, -1)
+_COUNTED: Final = (0x1018, 0x1016, 0x1010, 0x1200)
+"""Of these sub-index 0 tells which sub-index is the highest."""
+_GROWING: Final = (0x1003, *range(0x1200, 0x1C00))
+"""In these a node may have more than its EDS describes: errors, COB-IDs, mapped objects."""
+_LAST_SUB: Final = 0xFE
+
+_Place = tuple[int, int]
+"""Index and sub-index."""
+
+
+class AbsentPlaces(NamedTuple):
+    """Places of a kind, in the order in which they are tried.
+
+    Attributes:
+        name: in checks, after `$`.
+        what: what the node must have for it, for people.
+        certain: CiA 301 says that there can be nothing.
+        likely: nobody has described anything.
+    """
+
+    name: str
+    what: str
+    certain: tuple[_Place, ...]
+    likely: tuple[_Place, ...]
+
+
+def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[AbsentPlaces]:
+    """Yield an object, a sub-index behind a record, and one of a variable that are not there.
+
+    Args:
+        device: the objects that are there.
+        reader: reads how many sub-indices they have.
+
+    Raises:
+        SdoTimeout: the node does not answer.
+    """
+    highest: dict[int, int] = {}
+    for entry in device.entries:
+        highest[entry.index] = max(entry.sub, highest.get(entry.index, 0))
+    free = tuple((index, 0) for index in _ABSENT_OBJECTS if index not in highest)
+    yield AbsentPlaces("absent_object", "index free", (), free)
+    counted = ((i, max(highest[i], reader.number(i, 0) or 0) + 1) for i in _COUNTED if i in highest)
+    behind = ((i, last + 1) for i, last in highest.items() if last and i not in _GROWING)
+    certain, likely = ([at for at in places if at[1] <= _LAST_SUB] for places in (counted, behind))
+    what = "record with a sub-index free"
+    yield AbsentPlaces("absent_sub", what, tuple(certain), tuple(likely))
+    variables = [index for index, last in highest.items() if not last and not _is_composed(index)]
+    certain = [(index, 1) for index in variables if standard_object(index)]
+    likely = [(index, 1) for index in variables if not standard_object(index)]
+    yield AbsentPlaces("sub_of_variable", "variable", tuple(certain), tuple(likely))
+
+
+def _is_composed(index: int) -> bool:
+    known = standard_object(index)
+    return known is not None and known.composed
+
+
+_DEVICE_TYPE: Final = 0x1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +145,7 @@ class Binding:
     reasons: Mapping[str, str]
     findings: tuple[str, ...] = ()
     known: bool = True
-    entries: Mapping[Place, EntryDescription] = field(default_factory=dict)
+    entries: Mapping[_Place, EntryDescription] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -136,7 +191,7 @@ def bind(
     search = _Search(found, reader, allow, never, device is not None)
     for wanted in WANTED:
         _bind_object(search, wanted)
-    for places in absent_places(found, reader):
+    for places in _absent_places(found, reader):
         _bind_absent(search, places)
     pdos, missing = bind_pdos(found, reader, lambda index: _may_write(search, index))
     search.bound.update(pdos)
@@ -146,7 +201,7 @@ def bind(
     return Binding(found, search.bound, search.reasons, findings, search.known, entries)
 
 
-def _bind_object(search: _Search, wanted: Wanted) -> None:
+def _bind_object(search: _Search, wanted: WantedObject) -> None:
     """Take the best object that fits, may be used so and can be read."""
     fitting = [entry for entry in search.device.entries if wanted.fits(entry)]
     if not fitting:
@@ -169,14 +224,14 @@ def _bind_object(search: _Search, wanted: Wanted) -> None:
     search.reasons[wanted.name] = f"no {wanted.what}: what {first} and its like hold is none"
 
 
-def _unsafe(wanted: Wanted, entry: EntryDescription) -> str:
+def _unsafe(wanted: WantedObject, entry: EntryDescription) -> str:
     where = f"{entry.index:04X}h"
     if entry.index in PROFILE_AREA:
         return f"{where} is the only {wanted.what}; writing it may move something (--allow {where})"
     return f"{where} is the only {wanted.what}, and it must not be written"
 
 
-def _not_free(wanted: Wanted, fitting: list[EntryDescription]) -> str:
+def _not_free(wanted: WantedObject, fitting: list[EntryDescription]) -> str:
     where = f"{fitting[0].index:04X}h"
     return f"no {wanted.what} takes any value: what {where} and its like hold means something"
 
@@ -185,7 +240,7 @@ def _is_free(search: _Search, entry: EntryDescription) -> bool:
     """Say whether an object takes any value of its type: in the profile area few do."""
     if entry.index not in PROFILE_AREA:
         return True
-    profile = (search.reader.number(DEVICE_TYPE, 0) or 0) & 0xFFFF
+    profile = (search.reader.number(_DEVICE_TYPE, 0) or 0) & 0xFFFF
     return profile == GENERIC_IO and entry.index in PLAIN_OUTPUTS
 
 
@@ -196,7 +251,7 @@ def _may_write(search: _Search, index: int) -> bool:
     return index not in PROFILE_AREA or index in search.allow
 
 
-def _order(wanted: Wanted, entry: EntryDescription) -> tuple[bool | int, ...]:
+def _order(wanted: WantedObject, entry: EntryDescription) -> tuple[bool | int, ...]:
     """Sort: what does least harm, then what is simplest."""
     narrow = entry.low is not None or entry.high is not None
     if wanted.use is Use.WRITE and entry.index in HARMLESS:
@@ -205,7 +260,7 @@ def _order(wanted: Wanted, entry: EntryDescription) -> tuple[bool | int, ...]:
     return (area, narrow, entry.signed, -_room(wanted, entry), entry.key)
 
 
-def _room(wanted: Wanted, entry: EntryDescription) -> int:
+def _room(wanted: WantedObject, entry: EntryDescription) -> int:
     """Return how much a string that is written is known to hold."""
     return len(entry.default) if wanted.use is Use.WRITE and entry.data_type in TEXTS else 0
 
@@ -232,7 +287,7 @@ def _bind_absent(search: _Search, places: AbsentPlaces) -> None:
         search.reasons[places.name] = f"the node has no {places.what}"
 
 
-def _has_something(search: _Search, place: Place) -> bool:
+def _has_something(search: _Search, place: _Place) -> bool:
     """Read a place at which there should be nothing; what it has is a finding."""
     if not isinstance(search.reader.try_read(*place), bytes):
         return False
@@ -241,6 +296,6 @@ def _has_something(search: _Search, place: Place) -> bool:
     return True
 
 
-ABSENT_NAMES: Final = ("absent_object", "absent_sub", "sub_of_variable")
-NAMES: Final = frozenset({*(wanted.name for wanted in WANTED), *ABSENT_NAMES, *PDO_NAMES})
+_ABSENT_NAMES: Final = ("absent_object", "absent_sub", "sub_of_variable")
+NAMES: Final = frozenset({*(wanted.name for wanted in WANTED), *_ABSENT_NAMES, *PDO_NAMES})
 """All names that `bind` tells about."""

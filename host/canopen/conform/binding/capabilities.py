@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
-from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoMisnamed, SdoTimeout
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import Abort
-from tickrig.wire.canopen.sdo.sdo_block import (
+from tickrig.wire.canopen.sdo import Abort
+from tickrig.wire.canopen.sdo_frame import (
+    AbortCode,
     BlockUploadInitiateRequest,
     BlockUploadInitiateResponse,
 )
 
-OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
+_OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
     "heartbeat": ("heartbeat",),
     "hbcons": ("consumer_1",),
     "guarding": ("guard_time", "life_factor"),
@@ -45,22 +45,22 @@ OF_OBJECTS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Features that are there when the objects are to which these names are bound."""
 
-PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
+_PROFILES: Final[Mapping[str, tuple[int, tuple[int, ...]]]] = {
     "401": (401, (0x6000, 0x6200, 0x6400, 0x6401, 0x6411)),
     "402": (402, (0x6040, 0x6041)),
 }
 """The low word of 1000h, and objects of which there must be one."""
 
-LSS: Final = ("lss", "lssident", "unconfigured")
-IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
-DEVICE_TYPE: Final = 0x1000
-ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
+_LSS: Final = ("lss", "lssident", "unconfigured")
+_IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumber"))
+_DEVICE_TYPE: Final = 0x1000
+_ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
 """What a node need not do that has the object: bit 0 of its first sub-index tells."""
-LSS_ADDRESS: Final = 0x1018
+_LSS_ADDRESS: Final = 0x1018
 
 
 @dataclass(frozen=True, slots=True)
-class Features:
+class NodeFeatures:
     """What a node can do.
 
     Attributes:
@@ -74,7 +74,7 @@ class Features:
     findings: tuple[str, ...] = ()
 
 
-def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = None) -> Features:
+def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = None) -> NodeFeatures:
     """Find out what a node can do; the node is only read.
 
     Whether it has LSS can only be said by its EDS: to try it would change the state of all
@@ -90,7 +90,7 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
     reasons = dict(_missing(binding))
     if not any(_number(text) for text in dummies.values()):
         reasons["dummy"] = _unsaid(file, "DummyUsage", "dummy objects may be mapped")
-    for word, index in ON_COMMAND.items():
+    for word, index in _ON_COMMAND.items():
         said = client.number(index, 1)
         if said is not None and not said & 1:
             reasons[word] = f"{index:04X}h:01 says that the node does not do it on command (bit 0)"
@@ -98,19 +98,19 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
         reasons["guarding"] = "1017h is constant and not 0: heartbeat takes the place of guarding"
     findings = [*_profile(binding), *_identity(binding, info)]
     if _number(info.get("lss_supported", "")) and not _has_lss_address(binding):
-        reasons |= dict.fromkeys(LSS, "1018h has not the four numbers of an LSS address")
+        reasons |= dict.fromkeys(_LSS, "1018h has not the four numbers of an LSS address")
         findings.append(
             "the EDS says that it has LSS, and 1018h has not the numbers of its address"
         )
     if not _number(info.get("lss_supported", "")):
-        reasons |= dict.fromkeys(LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
-    if not has_block_upload(client):
+        reasons |= dict.fromkeys(_LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
+    if not _has_block_upload(client):
         reasons["block"] = "it refuses a block upload of 1000h"
-    words = {*OF_OBJECTS, *PROFILES, *LSS, "dummy", "block"} - reasons.keys()
-    return Features(frozenset(words), reasons, tuple(findings))
+    words = {*_OF_OBJECTS, *_PROFILES, *_LSS, "dummy", "block"} - reasons.keys()
+    return NodeFeatures(frozenset(words), reasons, tuple(findings))
 
 
-def has_block_upload(client: SdoClient) -> bool:
+def _has_block_upload(client: SdoClient) -> bool:
     """Return whether a node begins a block upload of 1000h, which is then aborted."""
     try:
         return client.run(_try_block_upload())
@@ -121,20 +121,20 @@ def has_block_upload(client: SdoClient) -> bool:
 
 
 def _try_block_upload() -> Script[bool]:
-    request = BlockUploadInitiateRequest(DEVICE_TYPE, 0, crc=True, block_size=1, threshold=0)
-    answer = yield SdoRequest(request.encode(), DEVICE_TYPE, 0)
+    request = BlockUploadInitiateRequest(_DEVICE_TYPE, 0, crc=True, block_size=1, threshold=0)
+    answer = yield SdoRequest(request.encode(), _DEVICE_TYPE, 0)
     if not isinstance(answer, BlockUploadInitiateResponse):
         return False
-    yield SdoFrame(Abort(DEVICE_TYPE, 0, AbortCode.GENERAL).encode())
+    yield SdoFrame(Abort(_DEVICE_TYPE, 0, AbortCode.GENERAL).encode())
     return True
 
 
 def _missing(binding: Binding) -> Iterator[tuple[str, str]]:
-    for word, names in OF_OBJECTS.items():
+    for word, names in _OF_OBJECTS.items():
         for name in names:
             if name in binding.reasons:
                 yield word, binding.reasons[name]
-    for word, (number, _) in PROFILES.items():
+    for word, (number, _) in _PROFILES.items():
         if _profile_number(binding) != number:
             yield word, f"1000h does not say that it is a device of CiA {number}"
 
@@ -155,7 +155,7 @@ def _number(text: str) -> int | None:
 def _has_lss_address(binding: Binding) -> bool:
     """Return whether 1018h has vendor, product, revision and serial number (CiA 305)."""
     present = {(entry.index, entry.sub) for entry in binding.device.entries}
-    return present.issuperset((LSS_ADDRESS, sub) for sub in range(1, 5))
+    return present.issuperset((_LSS_ADDRESS, sub) for sub in range(1, 5))
 
 
 def _has_constant_heartbeat(binding: Binding) -> bool:
@@ -176,7 +176,7 @@ def _profile(binding: Binding) -> Iterator[str]:
     """Compare 1000h with the objects of its profile."""
     number = _profile_number(binding)
     present = {entry.index for entry in binding.device.entries}
-    for wanted, objects in PROFILES.values():
+    for wanted, objects in _PROFILES.values():
         if number == wanted and binding.known and not present.intersection(objects):
             names = ", ".join(f"{index:04X}h" for index in objects)
             yield f"1000h says that it is a device of CiA {wanted}, and it has none of {names}"
@@ -184,7 +184,7 @@ def _profile(binding: Binding) -> Iterator[str]:
 
 def _identity(binding: Binding, info: Mapping[str, str]) -> Iterator[str]:
     """Compare 1018h with what the head of the EDS says."""
-    for sub, key in IDENTITY:
+    for sub, key in _IDENTITY:
         said, bound = _number(info.get(key.lower(), "")), binding.bound.get(f"identity_{sub}")
         if said is None or not isinstance(bound, BoundObject) or bound.value is None:
             continue

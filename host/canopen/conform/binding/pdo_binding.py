@@ -8,28 +8,28 @@ from functools import partial
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.object_reader import ObjectReader
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
 
 RPDOS: Final = range(0x1400, 0x1600)
-TPDOS: Final = range(0x1800, 0x1A00)
-MAPPING: Final = 0x200
+_TPDOS: Final = range(0x1800, 0x1A00)
+_MAPPING: Final = 0x200
 """A mapping parameter is so far behind its communication parameter."""
 
-LOOKED_AT: Final = 16
+_LOOKED_AT: Final = 16
 """PDOs of each direction that are read; a node may have 512."""
 
-MOST_MAPPED: Final = 64
+_MOST_MAPPED: Final = 64
 """More is said of multiplexed PDOs."""
 
-COB_ID: Final = 1
-TYPE: Final = 2
-INHIBIT: Final = 3
-EVENT_TIMER: Final = 5
-SYNC_START: Final = 6
+_COB_ID: Final = 1
+_TYPE: Final = 2
+_INHIBIT: Final = 3
+_EVENT_TIMER: Final = 5
+_SYNC_START: Final = 6
 
-EVENT_DRIVEN: Final = (254, 255)
-CYCLIC: Final = range(1, 241)
+_EVENT_DRIVEN: Final = (254, 255)
+_CYCLIC: Final = range(1, 241)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class BoundPdo:
     @property
     def mapping_index(self) -> int:
         """Index of its mapping parameter."""
-        return self.index + MAPPING
+        return self.index + _MAPPING
 
     @property
     def can_id(self) -> int:
@@ -108,20 +108,20 @@ def _kinds(way: str) -> Iterator[PdoKind]:
         lambda pdo: (
             pdo.enabled
             and bool(pdo.mapping)
-            and pdo.transmission_type in EVENT_DRIVEN
+            and pdo.transmission_type in _EVENT_DRIVEN
             and not pdo.restless
         ),
     )
     yield PdoKind(
         f"{way}_sync",
         f"{pdo} that is enabled, synchronous and has a mapping",
-        lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in CYCLIC,
+        lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in _CYCLIC,
     )
     yield PdoKind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
     yield PdoKind(
         f"{way}_event_timer",
         f"{pdo} with an event timer",
-        lambda pdo: pdo.remappable and EVENT_TIMER in pdo.subs,
+        lambda pdo: pdo.remappable and _EVENT_TIMER in pdo.subs,
     )
 
 
@@ -143,7 +143,7 @@ def _carrying(way: str) -> Iterator[PdoKind]:
 
 
 def _carries(address: tuple[int, int], pdo: BoundPdo) -> bool:
-    driven = pdo.enabled and pdo.transmission_type in EVENT_DRIVEN
+    driven = pdo.enabled and pdo.transmission_type in _EVENT_DRIVEN
     return driven and pdo.place(address) is not None
 
 
@@ -151,20 +151,20 @@ def _is_remappable(pdo: BoundPdo) -> bool:
     return pdo.remappable and not pdo.restless
 
 
-TPDO_KINDS: Final = (
+_TPDO_KINDS: Final = (
     *_kinds("tpdo"),
     *_carrying("tpdo"),
-    PdoKind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: INHIBIT in pdo.subs),
-    PdoKind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: SYNC_START in pdo.subs),
+    PdoKind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: _INHIBIT in pdo.subs),
+    PdoKind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: _SYNC_START in pdo.subs),
     PdoKind(
         "tpdo_rtr",
         "TPDO that may be fetched with a remote frame",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and not pdo.cob_id & FLAG_30,
     ),
 )
-RPDO_KINDS: Final = (*_kinds("rpdo"), *_carrying("rpdo"))
-MAPPED_RPDO: Final = "mapped_rpdo"
-PDO_NAMES: Final = (*(kind.name for kind in (*TPDO_KINDS, *RPDO_KINDS)), MAPPED_RPDO)
+_RPDO_KINDS: Final = (*_kinds("rpdo"), *_carrying("rpdo"))
+_MAPPED_RPDO: Final = "mapped_rpdo"
+PDO_NAMES: Final = (*(kind.name for kind in (*_TPDO_KINDS, *_RPDO_KINDS)), _MAPPED_RPDO)
 
 
 def bind_pdos(
@@ -185,8 +185,8 @@ def bind_pdos(
     """
     bound: dict[str, BoundPdo] = {}
     reasons: dict[str, str] = {}
-    tpdos, rpdos = list(_read(device, reader, TPDOS)), list(_read(device, reader, RPDOS))
-    for name, what, fits in (*TPDO_KINDS, *RPDO_KINDS, _harmless(may_write)):
+    tpdos, rpdos = list(_read(device, reader, _TPDOS)), list(_read(device, reader, RPDOS))
+    for name, what, fits in (*_TPDO_KINDS, *_RPDO_KINDS, _harmless(may_write)):
         pdo = next(filter(fits, tpdos if name.startswith("t") else rpdos), None)
         if pdo is None:
             reasons[name] = f"the node has no {what}"
@@ -197,7 +197,7 @@ def bind_pdos(
 
 def _harmless(may_write: Callable[[int], bool]) -> PdoKind:
     return PdoKind(
-        MAPPED_RPDO,
+        _MAPPED_RPDO,
         "RPDO that is enabled and whose objects may be written without moving anything",
         lambda pdo: (
             pdo.enabled
@@ -212,27 +212,27 @@ def _read(device: EdsDevice, reader: ObjectReader, area: range) -> Iterator[Boun
     subs: dict[int, dict[int, bool]] = {}
     for entry in device.entries:
         subs.setdefault(entry.index, {})[entry.sub] = entry.writable
-    for index in [index for index in subs if index in area][:LOOKED_AT]:
-        cob_id, kind = reader.number(index, COB_ID), reader.number(index, TYPE)
-        mapping = _mapping(reader, index + MAPPING)
+    for index in [index for index in subs if index in area][:_LOOKED_AT]:
+        cob_id, kind = reader.number(index, _COB_ID), reader.number(index, _TYPE)
+        mapping = _mapping(reader, index + _MAPPING)
         if cob_id is None or kind is None or mapping is None or cob_id & EXTENDED:
             continue
-        head, body = subs[index], dict(subs.get(index + MAPPING, {}))
-        changeable = body.pop(0, False) and any(body.values()) and head.get(COB_ID, False)
+        head, body = subs[index], dict(subs.get(index + _MAPPING, {}))
+        changeable = body.pop(0, False) and any(body.values()) and head.get(_COB_ID, False)
         yield BoundPdo(
             *(index, cob_id, kind, mapping, frozenset(head)),
             remappable=changeable,
             places=len(body),
             restless=any(
                 head.get(sub) is False and reader.number(index, sub)
-                for sub in (INHIBIT, EVENT_TIMER)
+                for sub in (_INHIBIT, _EVENT_TIMER)
             ),
         )
 
 
 def _mapping(reader: ObjectReader, index: int) -> tuple[int, ...] | None:
     count = reader.number(index, 0)
-    if count is None or count > MOST_MAPPED:
+    if count is None or count > _MOST_MAPPED:
         return None
     mapped = (reader.number(index, sub) for sub in range(1, count + 1))
     return tuple(number for number in mapped if number is not None)

@@ -22,11 +22,11 @@ HARMLESS: Final = (0x1015, 0x1007, 0x100D, 0x100C, 0x1017, 0x1006)
 """Communication objects that take any value, and that stand for others of their size."""
 
 TEXTS: Final = (DataType.VISIBLE_STRING, DataType.OCTET_STRING, DataType.UNICODE_STRING)
-EXPEDITED_BYTES: Final = 4
-SEGMENT_BYTES: Final = 7
-SIZES: Final = (8, 16, 32, 64)
+_EXPEDITED_BYTES: Final = 4
+_SEGMENT_BYTES: Final = 7
+_SIZES: Final = (8, 16, 32, 64)
 
-Fits = Callable[[EntryDescription], bool]
+_Fits = Callable[[EntryDescription], bool]
 
 
 class Use(Enum):
@@ -37,7 +37,7 @@ class Use(Enum):
     WRITE = "written, and restored"
 
 
-class Wanted(NamedTuple):
+class WantedObject(NamedTuple):
     """A name and what it stands for.
 
     Attributes:
@@ -51,7 +51,7 @@ class Wanted(NamedTuple):
     name: str
     what: str
     use: Use
-    fits: Fits
+    fits: _Fits
     suits: Callable[[bytes], bool] = bool
 
 
@@ -72,16 +72,16 @@ def _integer(entry: EntryDescription, bits: int) -> bool:
     return entry.data_type.is_integer and entry.data_type.bits == bits
 
 
-def _rw(bits: int) -> Wanted:
+def _rw(bits: int) -> WantedObject:
     what = f"integer of {bits} bits that may be read and written"
-    return Wanted(
+    return WantedObject(
         f"rw_u{bits}", what, Use.WRITE, lambda entry: _both(entry) and _integer(entry, bits)
     )
 
 
-def _ro(bits: int) -> Wanted:
+def _ro(bits: int) -> WantedObject:
     what = f"integer of {bits} bits that may only be read"
-    return Wanted(
+    return WantedObject(
         f"ro_u{bits}",
         what,
         Use.REFUSED,
@@ -89,9 +89,9 @@ def _ro(bits: int) -> Wanted:
     )
 
 
-def _mapped(way: str, access: Access, bits: int) -> Wanted:
+def _mapped(way: str, access: Access, bits: int) -> WantedObject:
     what = f"integer of {bits} bits that may be read, written and mapped into {way.upper()}s"
-    return Wanted(
+    return WantedObject(
         f"{way}_u{bits}",
         what,
         Use.WRITE,
@@ -112,17 +112,17 @@ def _mapping(entry: EntryDescription) -> Access:
     return entry.access & (Access.TPDO | Access.RPDO)
 
 
-def _fixed(name: str, index: int, sub: int, what: str, use: Use = Use.WRITE) -> Wanted:
+def _fixed(name: str, index: int, sub: int, what: str, use: Use = Use.WRITE) -> WantedObject:
     where = f"{index:04X}h:{sub:02X}, {what}"
-    return Wanted(name, where, use, lambda entry: (entry.index, entry.sub) == (index, sub))
+    return WantedObject(name, where, use, lambda entry: (entry.index, entry.sub) == (index, sub))
 
 
-WANTED: Final[tuple[Wanted, ...]] = (
-    *(_rw(bits) for bits in SIZES),
-    *(_ro(bits) for bits in SIZES),
-    *(_mapped("tpdo", Access.TPDO, bits) for bits in SIZES),
-    *(_mapped("rpdo", Access.RPDO, bits) for bits in SIZES),
-    Wanted(
+WANTED: Final[tuple[WantedObject, ...]] = (
+    *(_rw(bits) for bits in _SIZES),
+    *(_ro(bits) for bits in _SIZES),
+    *(_mapped("tpdo", Access.TPDO, bits) for bits in _SIZES),
+    *(_mapped("rpdo", Access.RPDO, bits) for bits in _SIZES),
+    WantedObject(
         "tpdo_bool",
         "BOOLEAN that may be read, written and mapped into TPDOs",
         Use.WRITE,
@@ -130,7 +130,7 @@ WANTED: Final[tuple[Wanted, ...]] = (
             _both(entry) and Access.TPDO in entry.access and entry.data_type is DataType.BOOLEAN
         ),
     ),
-    Wanted(
+    WantedObject(
         "rpdo_bool",
         "BOOLEAN that may be read, written and mapped into RPDOs",
         Use.WRITE,
@@ -138,76 +138,78 @@ WANTED: Final[tuple[Wanted, ...]] = (
             _both(entry) and Access.RPDO in entry.access and entry.data_type is DataType.BOOLEAN
         ),
     ),
-    Wanted(
+    WantedObject(
         "rw_bool",
         "BOOLEAN that may be read and written",
         Use.WRITE,
         lambda entry: _both(entry) and entry.data_type is DataType.BOOLEAN,
     ),
-    Wanted(
+    WantedObject(
         "rw_real32",
         "REAL32 that may be read and written",
         Use.WRITE,
         lambda entry: _both(entry) and entry.data_type is DataType.REAL32,
     ),
-    Wanted("limited", "writable integer with both limits inside its type", Use.WRITE, _limited),
-    Wanted("ro", "read-only object", Use.REFUSED, lambda e: e.readable and not e.writable),
-    Wanted(
+    WantedObject(
+        "limited", "writable integer with both limits inside its type", Use.WRITE, _limited
+    ),
+    WantedObject("ro", "read-only object", Use.REFUSED, lambda e: e.readable and not e.writable),
+    WantedObject(
         "wo",
         "write-only object",
         Use.REFUSED,
         lambda entry: entry.writable and not entry.readable,
         _any,
     ),
-    Wanted("const", "constant", Use.REFUSED, lambda entry: Access.CONST in entry.access),
-    Wanted(
+    WantedObject("const", "constant", Use.REFUSED, lambda entry: Access.CONST in entry.access),
+    WantedObject(
         "ro_string",
         "string that may only be read",
         Use.REFUSED,
         lambda entry: entry.readable and not entry.writable and entry.data_type in TEXTS,
     ),
-    Wanted(
+    WantedObject(
         "long_string",
         "readable string of more than 7 bytes, which has at least two segments",
         Use.READ,
         lambda entry: entry.readable and entry.data_type in TEXTS,
-        lambda value: len(value) > SEGMENT_BYTES,
+        lambda value: len(value) > _SEGMENT_BYTES,
     ),
-    Wanted(
+    WantedObject(
         "short_string",
         "readable string of 1 to 4 bytes",
         Use.READ,
         lambda entry: entry.readable and entry.data_type in TEXTS,
-        lambda value: 1 <= len(value) <= EXPEDITED_BYTES,
+        lambda value: 1 <= len(value) <= _EXPEDITED_BYTES,
     ),
-    Wanted(
+    WantedObject(
         "string",
         "string that may be read and written",
         Use.WRITE,
         lambda entry: _both(entry) and entry.data_type in TEXTS,
         _any,
     ),
-    Wanted(
+    WantedObject(
         "domain",
         "domain that may be read and written",
         Use.WRITE,
         lambda entry: _both(entry) and entry.data_type is DataType.DOMAIN,
         _any,
     ),
-    Wanted(
+    WantedObject(
         "tpdo_only",
         "readable object that may be mapped into TPDOs and not into RPDOs",
         Use.READ,
         lambda entry: entry.readable and not entry.writable and _mapping(entry) is Access.TPDO,
     ),
-    Wanted(
+    WantedObject(
         "rpdo_only",
         "write-only object that may be mapped into RPDOs",
         Use.REFUSED,
         lambda entry: not entry.readable and _mapping(entry) is Access.RPDO,
         _any,
     ),
-    Wanted(
+    WantedObject(
         "unmappable",
         "integer that may not be mapped",
         Use.READ,

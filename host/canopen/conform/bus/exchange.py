@@ -2,53 +2,261 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
-from collections.abc import Callable, Iterable
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Iterable, Sequence
+from enum import Enum
 from typing import Final
 
-from tickrig.host.canopen.conform.bus.evidence import Evidence
-from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches
-from tickrig.host.canopen.conform.bus.periods import MS_US, off_period
-from tickrig.host.canopen.conform.bus.presence import MULTIPLEXER, Answers, Presence
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed, StepFailed
-from tickrig.host.canopen.conform.bus.traffic import Allowance, ForeignLoad
-from tickrig.host.canopen.conform.bus.unlike import unlike, wanted_text
-from tickrig.host.canopen.conform.verdict import Direction
+from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches, unlike, wanted_text
+from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 from tickrig.host.links.link import StampedFrames, StampedLink
-from tickrig.wire.can import CanFrame
+from tickrig.wire.can import CanFrame, frame_bits
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
-from tickrig.wire.canopen.sdo.sdo_command import (
+from tickrig.wire.canopen.sdo_frame import (
     BLOCK_ENDED,
     REQUEST_COB_ID,
     RESPONSE_COB_ID,
     SPECIFIER,
     ClientCommand,
+    ServerCommand,
     index_sub,
 )
 from tickrig.wire.instant import NEVER
 
-SLICE_US: Final = 20_000
+# What ends a check before its end.
+#
+# StepFailed      the node did not do what the step says
+# NotAllowed      the level of the run does not allow what the step does
+# Disturbed       nothing can be said: the host, the bus or another node was in the way
+
+
+class StepFailed(Exception):  # noqa: N818 - what the step did
+    """The node did something else, or nothing; the text says what came and what was allowed.
+
+    Attributes:
+        got: the frame that came, as candump writes it; empty if none did.
+        wanted: patterns of the frame that should have come, one of them; none if none should.
+    """
+
+    def __init__(self, text: str, got: str = "", wanted: Iterable[str] = ()) -> None:
+        super().__init__(text)
+        self.got, self.wanted = got, tuple(wanted)
+
+
+class NotAllowed(Exception):  # noqa: N818 - what the step is
+    """A step would do what this run must not do; the text says what, and which level may."""
+
+
+class Disturbed(Exception):  # noqa: N818 - what the check was
+    """A check that cannot be judged; the text says why."""
+
+
+# The evidence of a check: what was on the bus, and when.
+
+FIRST_LINES: Final = 40
+LAST_LINES: Final = 160
+"""So many lines are kept of a long check."""
+LEFT_OUT: Final = "lines left out"
+"""Ends the remark in place of the others."""
+
+
+class Evidence:
+    """The lines of one go at a check: the first and the last of many."""
+
+    def __init__(self) -> None:
+        self._first: list[FrameLine] = []
+        self._last: deque[FrameLine] = deque(maxlen=LAST_LINES)
+        self._left_out = 0
+
+    def add(self, at_us: int, direction: Direction, text: str) -> None:
+        """Add a line."""
+        line = FrameLine(at_us, direction, text)
+        if len(self._first) < FIRST_LINES:
+            self._first.append(line)
+            return
+        self._left_out += len(self._last) == LAST_LINES
+        self._last.append(line)
+
+    def lines(self) -> tuple[FrameLine, ...]:
+        """Return them, with a remark where some were left out."""
+        if not self._left_out:
+            return (*self._first, *self._last)
+        remark = FrameLine(self._last[0].at_us, Direction.REMARK, f"{self._left_out} {LEFT_OUT}")
+        return (*self._first, remark, *self._last)
+
+
+# Whether frames come as often as they should.
+
+MS_US: Final = 1_000
+PERIOD_TOLERANCE: Final = 0.05
+"""By this share may the mean of periods be off: CiA 301 says nothing; crystals are far better."""
+
+
+def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: int) -> str:
+    """Say what is wrong with the mean of periods, or with their number; empty if nothing is.
+
+    Args:
+        stamps: when frames came, in microseconds; of more than are wanted the first count.
+        each_ms: the period that is wanted.
+        times: so many periods are wanted, between one frame more.
+        resolution_us: of the stamps.
+
+    >>> _off_period([0, 53_000, 106_000], 50, 2, 0)
+    'each 53.0 ms, want 50 ms, 5 % off at most'
+    >>> _off_period([0, 50_000], 50, 2, 0), _off_period([0, 50_000, 100_000], 50, 2, 0)
+    ('came 2 times, want 2 periods of 50 ms', '')
+    """
+    stamps = stamps[: times + 1]
+    seen = max(1, len(stamps) - 1)
+    mean_ms = (stamps[-1] - stamps[0]) / seen / MS_US if stamps[1:] else each_ms
+    if abs(mean_ms - each_ms) > each_ms * PERIOD_TOLERANCE + resolution_us / seen / MS_US:
+        tolerance = f"{PERIOD_TOLERANCE * 100:g} % off at most"
+        return f"each {mean_ms:.1f} ms, want {each_ms} ms, {tolerance}"
+    if len(stamps) <= times:
+        return f"came {len(stamps)} times, want {times} periods of {each_ms} ms"
+    return ""
+
+
+# How many nodes answer to one node-ID, by the answers to what they are asked.
+
+_LEAST: Final = 3
+"""So many objects that were asked for say something."""
+_ANSWERS: Final = (ServerCommand.UPLOAD, ServerCommand.ABORT)
+_MULTIPLEXER: Final = slice(1, 4)
+"""Of an SDO frame."""
+
+
+class Presence(Enum):
+    """How many nodes there are."""
+
+    NONE = 0
+    ONE = 1
+    TWO = 2
+
+
+class Answers:
+    """Counts uploads that begin, and answers to them, by object."""
+
+    def __init__(self) -> None:
+        self._uploads, self._answered = Counter[bytes](), Counter[bytes]()
+        self._silent = True
+
+    def count_request(self, data: bytes) -> None:
+        """Count a request."""
+        if data and data[0] & SPECIFIER == ClientCommand.UPLOAD:
+            self._uploads[data[_MULTIPLEXER]] += 1
+
+    def count_response(self, data: bytes) -> None:
+        """Count a response."""
+        self._silent = False
+        if data and data[0] & SPECIFIER in _ANSWERS:
+            self._answered[data[_MULTIPLEXER]] += 1
+
+    @property
+    def presence(self) -> Presence:
+        """How many nodes have answered: two, if most objects were told twice each time."""
+        if self._silent:
+            return Presence.NONE
+        twice = sum(self._answered[at] == 2 * times for at, times in self._uploads.items())
+        many = len(self._uploads) >= _LEAST and 2 * twice > len(self._uploads)
+        return Presence.TWO if many else Presence.ONE
+
+
+# How much of the bus the tester may use, and how much others use.
+
+ASSUMED_BIT_RATE: Final = 125_000
+"""In bit/s, where nobody says it: slow, so that the limit holds on any faster bus."""
+
+_WINDOW_US: Final = 100_000
+"""The load is limited over so long."""
+
+_LONGEST_WAIT_US: Final = 1_000_000
+"""A node that floods the bus with answers does not keep the tester from sending."""
+
+_PLENTY_BIT_S: Final = 12_500
+"""With less for the tester, in bit/s, all takes longer: so may a check."""
+
+_FOREIGN_LOAD: Final = 0.5
+"""With more of it by other nodes, a late or missing answer says nothing of the node."""
+
+
+class Allowance:
+    """What may be sent: a bucket that fills with the allowed share of the bit rate.
+
+    Args:
+        bit_rate: of the bus in bit/s.
+        max_load: share of it, above 0 to 1.
+
+    Attributes:
+        slowness: so many times as long as usual may all take.
+    """
+
+    def __init__(self, bit_rate: int, max_load: float) -> None:
+        self._bits_us = bit_rate * max_load / 1e6
+        self._most = self._left = self._bits_us * _WINDOW_US
+        self._at_us = 0
+        self.slowness = max(1.0, _PLENTY_BIT_S / (bit_rate * max_load))
+
+    def use(self, now_us: int, frame: CanFrame) -> None:
+        """Count a frame of the tester, or an answer to one."""
+        self._fill(now_us)
+        self._left -= frame_bits(frame)
+
+    def wait_us(self, now_us: int) -> int:
+        """Return how long nothing may be sent, at most `_LONGEST_WAIT_US`."""
+        self._fill(now_us)
+        if self._left >= 0:
+            return 0
+        return min(_LONGEST_WAIT_US, int(-self._left / self._bits_us) + 1)
+
+    def _fill(self, now_us: int) -> None:
+        if now_us > self._at_us:
+            self._left = min(self._most, self._left + (now_us - self._at_us) * self._bits_us)
+            self._at_us = now_us
+
+
+class ForeignLoad:
+    """The load by other nodes, in windows of `_WINDOW_US`.
+
+    Args:
+        bit_rate: of the bus in bit/s.
+    """
+
+    def __init__(self, bit_rate: int) -> None:
+        self._most_bits = bit_rate * _WINDOW_US * _FOREIGN_LOAD / 1e6
+        self._window = self._bits = 0
+
+    def add(self, at_us: int, frame: CanFrame) -> bool:
+        """Count a frame; True if the bus is loaded too much to judge."""
+        window = at_us // _WINDOW_US
+        if window != self._window:
+            self._window, self._bits = window, 0
+        self._bits += frame_bits(frame)
+        return self._bits > self._most_bits
+
+
+_SLICE_US: Final = 20_000
 """So long a wait at most: a host that was stopped meanwhile sees that it lasted longer."""
 
 HOST_GAP_US: Final = 10_000
 """By so much a wait, or what is between two waits, may last too long before the host is late."""
 
-HELD_US: Final = 20_000
+_HELD_US: Final = 20_000
 """A frame that is sent so much later than its check wants it may change what the node does."""
-PAUSE_US: Final = 10_000
+_PAUSE_US: Final = 10_000
 """So long nothing is asked behind an SDO request that has no answer: a server may take one frame
 at a time, and CiA 301 does not say how fast it is ready for the next one."""
-UNANSWERED: Final = (ClientCommand.ABORT, BLOCK_ENDED)
-TOO_LOW: Final = "your --max-load is too low for this check"
+_UNANSWERED: Final = (ClientCommand.ABORT, BLOCK_ENDED)
+_TOO_LOW: Final = "your --max-load is too low for this check"
 
-NODE_ID_MASK: Final = 0x7F
+_NODE_ID_MASK: Final = 0x7F
 """These bits of a CAN-ID are the node-ID, in the pre-defined connection set."""
 
-HEARTBEATS: Final[tuple[range, ...]] = (range(0x701, 0x780),)
-NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
+_HEARTBEATS: Final[tuple[range, ...]] = (range(0x701, 0x780),)
+_NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), range(0x701, 0x780))
 """CAN-IDs of the pre-defined connection set that belong to a node."""
 
-BEGINNING: Final = (
+_BEGINNING: Final = (
     ClientCommand.DOWNLOAD,
     ClientCommand.UPLOAD,
     ClientCommand.BLOCK_UPLOAD,
@@ -59,11 +267,11 @@ BEGINNING: Final = (
 NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
 """Commands of answers that name an object; segments of a block look like them, and do no harm."""
 
-UNREAD_FRAMES: Final = 2_000
+_UNREAD_FRAMES: Final = 2_000
 """So many frames of a CAN-ID are kept unread; a node that floods the bus loses the oldest."""
 
 
-class Exchange:
+class BusExchange:
     """The bus as a check sees it: frames are text, and stay unread, per CAN-ID, until taken.
 
     Args:
@@ -107,7 +315,7 @@ class Exchange:
         self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
         self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
         self.unanswered: list[tuple[int, int]] = []
-        self._answers, self._others_by = Answers(), NODES
+        self._answers, self._others_by = Answers(), _NODES
         self.played: int | None = None
         self._shared_host, self._late_us = shared_host, 0
         self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
@@ -142,7 +350,7 @@ class Exchange:
 
     def end_listening(self) -> None:
         """From now on the node may send anything anywhere: others are told by their heartbeat."""
-        self._others_by = HEARTBEATS
+        self._others_by = _HEARTBEATS
 
     def remark(self, text: str) -> None:
         """Add a line of our own to the evidence."""
@@ -171,16 +379,16 @@ class Exchange:
             self._listen_until(self._ready_us)
         held_us = self._allowance.wait_us(self._link.now_us)
         self._listen_until(self._link.now_us + held_us)
-        if held_us > HELD_US and self._allowance.slowness > 1:
-            self.disturb(TOO_LOW)
+        if held_us > _HELD_US and self._allowance.slowness > 1:
+            self.disturb(_TOO_LOW)
         self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
         self._allowance.use(self.now_us, frame)
         if is_request:
-            if frame.data[:1] and frame.data[0] in UNANSWERED:
-                self._ready_us = self.now_us + PAUSE_US
-            self._multiplexer = frame.data[MULTIPLEXER]
+            if frame.data[:1] and frame.data[0] in _UNANSWERED:
+                self._ready_us = self.now_us + _PAUSE_US
+            self._multiplexer = frame.data[_MULTIPLEXER]
             self._answers.count_request(frame.data)
-            if len(frame.data) >= MULTIPLEXER.stop and frame.data[0] & SPECIFIER in BEGINNING:
+            if len(frame.data) >= _MULTIPLEXER.stop and frame.data[0] & SPECIFIER in _BEGINNING:
                 self.unanswered.append(index_sub(frame.data))
         self._link.send((frame,))
 
@@ -231,7 +439,7 @@ class Exchange:
             times: how many periods are measured.
         """
         stamps = self.collect(pattern, each_ms * (times + 2))
-        if wrong := off_period(stamps, each_ms, times, self.resolution_us):
+        if wrong := _off_period(stamps, each_ms, times, self.resolution_us):
             late_us = (
                 (stamps[-1] - stamps[0]) // (len(stamps) - 1) - each_ms * MS_US if stamps[1:] else 0
             )
@@ -298,7 +506,7 @@ class Exchange:
         before_us = link.now_us
         if before_us > self.deadline_us:
             raise StepFailed("the node kept the check going beyond its time")
-        wait_us = max(0, min(until_us - before_us, SLICE_US))
+        wait_us = max(0, min(until_us - before_us, _SLICE_US))
         self._known_us, received = link.receive_stamped(wait_us)
         after_us = link.now_us
         first_us = received[0][0] if received else before_us + wait_us
@@ -314,7 +522,7 @@ class Exchange:
     def _take(self, at_us: int, frame: CanFrame) -> None:
         text = str(frame)
         can_id = can_id_of(text)
-        own = frame.can_id & NODE_ID_MASK == self._node_id and not frame.extended
+        own = frame.can_id & _NODE_ID_MASK == self._node_id and not frame.extended
         own = own and can_id not in self._reserved
         if own or can_id in self._watched:
             self._unread[can_id].append((at_us, text))
@@ -324,14 +532,14 @@ class Exchange:
                 self._allowance.use(at_us, frame)
                 self._answers.count_response(frame.data)
             self.boots += text == self._boot_up
-            answered = frame.can_id == self._response and len(frame.data) >= MULTIPLEXER.stop
-            if answered and frame.data[MULTIPLEXER] == self._multiplexer:
+            answered = frame.can_id == self._response and len(frame.data) >= _MULTIPLEXER.stop
+            if answered and frame.data[_MULTIPLEXER] == self._multiplexer:
                 self.transfer = index_sub(frame.data)
             if answered:
                 self._settle(frame.data)
             return
         if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
-            self.others.update({frame.can_id & NODE_ID_MASK} - {self.played})
+            self.others.update({frame.can_id & _NODE_ID_MASK} - {self.played})
         if can_id in self._reserved:
             self.disturb(f"somebody else sent {text}")
         if self._foreign.add(at_us, frame):
@@ -347,4 +555,4 @@ class Exchange:
 
 
 def _queue() -> deque[tuple[int, str]]:
-    return deque(maxlen=UNREAD_FRAMES)
+    return deque(maxlen=_UNREAD_FRAMES)

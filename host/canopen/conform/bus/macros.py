@@ -6,35 +6,84 @@ from binascii import crc_hqx
 from collections.abc import Callable, Iterator, Sized
 from typing import Final
 
+from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
-from tickrig.host.canopen.conform.bus.position import follow
-from tickrig.host.canopen.conform.bus.sdo_frames import ABORTED, SdoFrames, multiplexer
-from tickrig.host.canopen.conform.bus.step_failed import NotAllowed, StepFailed
-from tickrig.host.canopen.conform.notation.macro_words import TO_MAPPING
-from tickrig.host.canopen.conform.notation.names import Address
-from tickrig.host.canopen.conform.notation.step_text import ANSWER_MS
+from tickrig.host.canopen.conform.bus.sdo import ABORTED, SdoFrames, multiplexer
+from tickrig.host.canopen.conform.notation import ANSWER_MS, TO_MAPPING, Address
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo_command import SEGMENT_BYTES
+from tickrig.wire.canopen.sdo_frame import SEGMENT_BYTES, AbortCode
 
-MOST_BYTES: Final = 20_000
+# A drive that follows its target position, from where it is.
+
+_POLL_MS: Final = 20
+_NOISE: Final = 1
+"""By so many counts the position of a drive that stands may differ."""
+_POSITION_BYTES: Final = 4
+"""Positions are INTEGER32 (CiA 402-2, 607Ah and 6064h)."""
+
+
+def follow(  # noqa: PLR0913, PLR0917 - the words of the macro
+    sdo: SdoFrames, target: Address, actual: Address, step: str, tolerance: str, within_ms: str
+) -> None:
+    """Set a target beside the actual position, and wait until the drive is there.
+
+    Args:
+        sdo: the drive.
+        target: 607Ah.
+        actual: 6064h.
+        step: from the actual position, in counts; small, so that no drive sees a jump.
+        tolerance: by so many counts it may be beside the target.
+        within_ms: so long may it take, and so long may the drive turn before.
+
+    Raises:
+        StepFailed: it is not there in time.
+        Disturbed: it turns all the time, as something else moves it.
+    """
+    wanted = _rest(sdo, actual, int(within_ms)) + int(step)
+    sdo.write(target, (wanted & 0xFFFF_FFFF).to_bytes(_POSITION_BYTES, "little"))
+    for waited_ms in range(0, int(within_ms) + 1, _POLL_MS):
+        got = _position(sdo, actual)
+        if abs(got - wanted) <= int(tolerance):
+            return
+        if waited_ms + _POLL_MS <= int(within_ms):
+            sdo.exchange.wait(_POLL_MS)
+    raise StepFailed(f"at {got} after {within_ms} ms, want {wanted}, {tolerance} off at most")
+
+
+def _rest(sdo: SdoFrames, actual: Address, within_ms: int) -> int:
+    """Wait until the drive stands; return where."""
+    before = _position(sdo, actual)
+    for _ in range(0, within_ms, _POLL_MS):
+        sdo.exchange.wait(_POLL_MS)
+        now = _position(sdo, actual)
+        if abs(now - before) <= _NOISE:
+            return now
+        before = now
+    raise Disturbed(f"the drive does not come to rest within {within_ms} ms")
+
+
+def _position(sdo: SdoFrames, at: Address) -> int:
+    return int.from_bytes(sdo.read_data(at, _POSITION_BYTES), "little", signed=True)
+
+
+_MOST_BYTES: Final = 20_000
 """A transfer that brings more than this failed: a node that never ends one is found out."""
 
-STATE_MS: Final = 20
+_STATE_MS: Final = 20
 """So long after an NMT command a node is in its new state."""
 
-TOO_LONG: Final = ("12000706", "10000706", "05000405")
+_TOO_LONG: Final = ("12000706", "10000706", "05000405")
 """Codes with which a download is refused that is longer than the object can hold."""
 
-SCAN_MS: Final = 10
-FOUND: Final = "7E4#4F00000000000000"
-STORE_LSS: Final = "7E5#1700000000000000"
-LSS_STORED: Final = "7E4#1700000000000000"
-LSS_STORES_NOTHING: Final = "7E4#1701000000000000"
+_SCAN_MS: Final = 10
+_FOUND: Final = "7E4#4F00000000000000"
+_STORE_LSS: Final = "7E5#1700000000000000"
+_LSS_STORED: Final = "7E4#1700000000000000"
+_LSS_STORES_NOTHING: Final = "7E4#1701000000000000"
 """CiA 305, store configuration, error code 1: the device does not support it."""
 
 
-def pattern(size: int) -> bytes:
+def _pattern(size: int) -> bytes:
     """Return the bytes of a transfer: (7k + n) mod 256, 1 for 0."""
     return bytes((7 * k + size) % 256 or 1 for k in range(size))
 
@@ -46,12 +95,12 @@ def sync(sdo: SdoFrames, can_id: str, count: str) -> None:
         sdo.exchange.wait(1)
 
 
-def sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
+def _sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
     """SYNC until the first TPDO, then one TPDO must come with every n-th SYNC."""
     every, seen = int(period), sdo.exchange.unread(tpdo)
     for number in range(1, every + 1):
         _sync_and_wait(sdo, can_id)
-        if not seen and (every <= FEW or number == every):
+        if not seen and (every <= _FEW or number == every):
             _wait_for(sdo, seen)
         if seen:
             break
@@ -72,27 +121,27 @@ def sync_period(sdo: SdoFrames, can_id: str, tpdo: str, period: str) -> None:
 
 def _sync_and_wait(sdo: SdoFrames, can_id: str) -> None:
     sdo.exchange.send(CanFrame.parse(f"{can_id}#"))
-    sdo.exchange.wait(PDO_MS)
+    sdo.exchange.wait(_PDO_MS)
 
 
 def _wait_for(sdo: SdoFrames, seen: Sized) -> None:
     """Wait for a TPDO that is late: CiA 301 does not say how soon it has to follow the SYNC."""
-    for _ in range(LATE_MS // PDO_MS):
+    for _ in range(_LATE_MS // _PDO_MS):
         if not seen:
-            sdo.exchange.wait(PDO_MS)
+            sdo.exchange.wait(_PDO_MS)
 
 
-PDO_MS: Final = 5
+_PDO_MS: Final = 5
 """So long after a SYNC its TPDO is waited for, where none has to come."""
-LATE_MS: Final = 100
+_LATE_MS: Final = 100
 """So long, where one has to come."""
-FEW: Final = 10
+_FEW: Final = 10
 """Of so many SYNCs each is waited for: which of them brings the first TPDO is not known."""
 
 
-def download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
+def _download_segmented(sdo: SdoFrames, at: Address, size: str) -> None:
     """Write the pattern in segments."""
-    data = pattern(int(size))
+    data = _pattern(int(size))
     sdo.say(bytes([0x21, *_mux(at)]) + len(data).to_bytes(4, "little"))
     sdo.answer(f"60{multiplexer(at)}00000000")
     sdo.download_segments(data)
@@ -105,18 +154,18 @@ def room(sdo: SdoFrames, at: Address, size: str) -> None:
     """
     sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
     mux = multiplexer(at)
-    answer = sdo.answer(f"60{mux}00000000", *(f"80{mux}{code}" for code in TOO_LONG))
+    answer = sdo.answer(f"60{mux}00000000", *(f"80{mux}{code}" for code in _TOO_LONG))
     if answer[0] == ABORTED:
         raise NotAllowed(f"{at[0]:04X}h:{at[1]:02X} holds less than {size} bytes")
     sdo.say(bytes([ABORTED, *_mux(at)]) + AbortCode.GENERAL.to_bytes(4, "little"))
 
 
-def upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:
+def _upload_pattern(sdo: SdoFrames, at: Address, size: str) -> None:
     """Read in segments; it must be the pattern."""
-    _compare(upload_segmented(sdo, at), pattern(int(size)))
+    _compare(_upload_segmented(sdo, at), _pattern(int(size)))
 
 
-def upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
+def _upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
     """Read in segments whatever is there, with alternating toggle; return it."""
     sdo.say(bytes([0x40, *_mux(at), *bytes(4)]))
     size = int.from_bytes(sdo.answer(f"41{multiplexer(at)}........")[4:], "little")
@@ -127,16 +176,16 @@ def upload_segmented(sdo: SdoFrames, at: Address) -> bytes:
         last = bool(segment[0] & 1)
         data += segment[1 : 8 - (segment[0] >> 1 & 7)]
         toggle ^= 0x10
-        if len(data) > MOST_BYTES:
+        if len(data) > _MOST_BYTES:
             raise StepFailed(f"{len(data)} bytes, and still no last segment")
     if len(data) != size:
         raise StepFailed(f"{len(data)} bytes came, {size} were indicated")
     return data
 
 
-def download_block(sdo: SdoFrames, at: Address, size: str) -> None:
+def _download_block(sdo: SdoFrames, at: Address, size: str) -> None:
     """Write the pattern in blocks with CRC."""
-    data, done = pattern(int(size)), 0
+    data, done = _pattern(int(size)), 0
     sdo.say(bytes([0xC6, *_mux(at)]) + len(data).to_bytes(4, "little"))
     block = sdo.answer(f"A[04]{multiplexer(at)}..000000")[4]
     while done < len(data):
@@ -154,17 +203,17 @@ def download_block(sdo: SdoFrames, at: Address, size: str) -> None:
     sdo.answer("A100000000000000")
 
 
-def upload_block_pattern(sdo: SdoFrames, at: Address, size: str, block: str) -> None:
+def _upload_block_pattern(sdo: SdoFrames, at: Address, size: str, block: str) -> None:
     """Read in blocks with CRC; it must be the pattern."""
-    _compare(upload_block(sdo, at, block), pattern(int(size)))
+    _compare(_upload_block(sdo, at, block), _pattern(int(size)))
 
 
-def upload_same(sdo: SdoFrames, at: Address, block: str = "127", crc: str = "") -> None:
+def _upload_same(sdo: SdoFrames, at: Address, block: str = "127", crc: str = "") -> None:
     """Read in blocks, and in segments; it must be the same."""
-    _compare(upload_block(sdo, at, block, crc), upload_segmented(sdo, at))
+    _compare(_upload_block(sdo, at, block, crc), _upload_segmented(sdo, at))
 
 
-def upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> bytes:
+def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> bytes:
     """Read in blocks whatever is there; return it.
 
     Args:
@@ -185,7 +234,7 @@ def upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> byte
         segment = sdo.answer(f"[{number >> 4:X}{number >> 4 | 8:X}]{number & 15:X}..............")
         last = bool(segment[0] & 0x80)
         data += segment[1:]
-        if len(data) > MOST_BYTES:
+        if len(data) > _MOST_BYTES:
             raise StepFailed(f"{len(data)} bytes, and still no last segment")
         if last or number == most:
             sdo.say(bytes([0xA2, number, following, *bytes(5)]))
@@ -201,7 +250,7 @@ def upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> byte
     return data
 
 
-def remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> None:
+def _remap(sdo: SdoFrames, pdo: Address, on: str, kind: str, *entries: str) -> None:
     """Map objects by the procedure of CiA 301, and give the PDO its type and COB-ID."""
     head, body, cob_id = pdo[0], pdo[0] + TO_MAPPING, bytes.fromhex(on)
     off = cob_id[:3] + bytes([cob_id[3] | 0x80])
@@ -225,14 +274,14 @@ def enable(sdo: SdoFrames, pdo: Address, on: str, *entries: str) -> None:
     sdo.write((head, 1), cob_id)
 
 
-def refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> None:
+def _refuse_segments(sdo: SdoFrames, at: Address, size: str, *codes: str) -> None:
     """Write so many bytes in segments; it is refused at once, or when they have come."""
     mux = multiplexer(at)
     aborts = [f"80{mux}{bytes.fromhex(code)[::-1].hex().upper()}" for code in codes]
     sdo.say(bytes([0x21, *_mux(at)]) + int(size).to_bytes(4, "little"))
     if sdo.answer(f"60{mux}00000000", *aborts)[0] == ABORTED:
         return
-    data = pattern(int(size))
+    data = _pattern(int(size))
     sdo.say(bytes([(SEGMENT_BYTES - len(data)) << 1 | 1]) + data.ljust(SEGMENT_BYTES, b"\0"))
     sdo.answer(*aborts)
 
@@ -250,7 +299,7 @@ def guard(sdo: SdoFrames, can_id: str, *words: str) -> None:
     for word in words:
         if "#" in word:
             sdo.exchange.send(CanFrame.parse(word))
-            sdo.exchange.wait(STATE_MS)
+            sdo.exchange.wait(_STATE_MS)
             continue
         sdo.exchange.forget(can_id)
         sdo.exchange.send(CanFrame.parse(f"{can_id}#R1"))
@@ -280,13 +329,13 @@ def fastscan(sdo: SdoFrames, *address: str) -> None:
 def _scan(sdo: SdoFrames, number: int, bit: int, sub: int, following: int) -> bool:
     text = "7E5#51" + (number.to_bytes(4, "little") + bytes([bit, sub, following])).hex()
     sdo.exchange.send(CanFrame.parse(text))
-    sdo.exchange.wait(SCAN_MS)
-    answers = sdo.exchange.unread(FOUND[:3])
-    wrong = [text for _, text in answers if not matches(FOUND, text)]
+    sdo.exchange.wait(_SCAN_MS)
+    answers = sdo.exchange.unread(_FOUND[:3])
+    wrong = [text for _, text in answers if not matches(_FOUND, text)]
     answered = bool(answers)
     answers.clear()
     if wrong:
-        raise StepFailed(f"got {wrong[0]}, want {FOUND}")
+        raise StepFailed(f"got {wrong[0]}, want {_FOUND}")
     return answered
 
 
@@ -306,28 +355,28 @@ def _compare(got: bytes, wanted: bytes) -> None:
         raise StepFailed(f"{len(got)} bytes, not the {len(wanted)} that were wanted")
 
 
-def lss_store(sdo: SdoFrames) -> None:
+def _lss_store(sdo: SdoFrames) -> None:
     """Store the configuration of LSS; NotAllowed if the node answers that it stores none."""
-    sdo.exchange.send(CanFrame.parse(STORE_LSS))
-    if sdo.exchange.expect([LSS_STORED, LSS_STORES_NOTHING], ANSWER_MS) == LSS_STORES_NOTHING:
+    sdo.exchange.send(CanFrame.parse(_STORE_LSS))
+    if sdo.exchange.expect([_LSS_STORED, _LSS_STORES_NOTHING], ANSWER_MS) == _LSS_STORES_NOTHING:
         raise NotAllowed("the node stores no LSS configuration: error code 1")
 
 
 MACROS: Final[dict[str, Callable[..., object]]] = {
     "sync": sync,
-    "syncperiod": sync_period,
-    "segdn": download_segmented,
+    "syncperiod": _sync_period,
+    "segdn": _download_segmented,
     "room": room,
-    "segup": upload_pattern,
-    "blkdn": download_block,
-    "blkup": upload_block_pattern,
-    "upload": upload_segmented,
-    "blockup": upload_same,
-    "map": remap,
+    "segup": _upload_pattern,
+    "blkdn": _download_block,
+    "blkup": _upload_block_pattern,
+    "upload": _upload_segmented,
+    "blockup": _upload_same,
+    "map": _remap,
     "enable": enable,
-    "refusesegments": refuse_segments,
+    "refusesegments": _refuse_segments,
     "fastscan": fastscan,
-    "lssstore": lss_store,
+    "lssstore": _lss_store,
     "guard": guard,
     "follow": follow,
 }

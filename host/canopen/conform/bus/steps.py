@@ -6,21 +6,25 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from tickrig.host.canopen.conform.bus.exchange import Exchange
+from tickrig.host.canopen.conform.bus.exchange import (
+    MS_US,
+    BusExchange,
+    Disturbed,
+    NotAllowed,
+    StepFailed,
+)
 from tickrig.host.canopen.conform.bus.macros import MACROS
-from tickrig.host.canopen.conform.bus.periods import MS_US
-from tickrig.host.canopen.conform.bus.sdo_frames import SdoFrames
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed, StepFailed
+from tickrig.host.canopen.conform.bus.sdo import SdoFrames
 from tickrig.host.canopen.conform.check import Step
 from tickrig.wire.can import CanFrame
 
-Stimulus = Callable[..., str]
+_Stimulus = Callable[..., str]
 
-REMOTE: Final = re.compile(r"^(\w+?)R(?=\d$)")
-POWER_OFF_MS: Final = 200
+_REMOTE: Final = re.compile(r"^(\w+?)R(?=\d$)")
+_POWER_OFF_MS: Final = 200
 
 
-class Player:
+class StepPlayer:
     """Plays bound steps.
 
     Args:
@@ -32,9 +36,9 @@ class Player:
 
     def __init__(
         self,
-        exchange: Exchange,
+        exchange: BusExchange,
         node_id: int,
-        stimulus: Stimulus | None,
+        stimulus: _Stimulus | None,
         play_more: Callable[[Step], object],
     ) -> None:
         self._exchange, self._stimulus, self._play_more = exchange, stimulus, play_more
@@ -45,7 +49,7 @@ class Player:
         bus = self._exchange
         match step:
             case {"send": text}:
-                frame = CanFrame.parse(REMOTE.sub(r"\1#R", text))
+                frame = CanFrame.parse(_REMOTE.sub(r"\1#R", text))
                 bus.send(frame._replace(extended=frame.extended or step.get("ext", False)))
             case {"expect": patterns, "in": within_ms}:
                 bus.expect(patterns, within_ms)
@@ -99,7 +103,7 @@ class Player:
         """Let somebody move the inputs, or compare the outputs, of the device."""
         if verb == "power-cycle":
             self._act("power", "off")
-            self._exchange.wait(POWER_OFF_MS)
+            self._exchange.wait(_POWER_OFF_MS)
             self._exchange.forget_all()
             self._act("power", "on")
             return

@@ -16,15 +16,15 @@ from tickrig.host.canopen.conform.verdict import (
     INTERRUPTED,
     NOTHING_JUDGED,
     UNDECIDED,
+    CheckVerdict,
     Report,
     Result,
-    Verdict,
 )
 from tickrig.host.text.page_text import one_line
 
-HEAD: Final = "# known failures of a conformance run (canmon conform --baseline)"
-MOST_BYTES: Final = 10_000_000
-LONGEST: Final = 80
+_HEAD: Final = "# known failures of a conformance run (canmon conform --baseline)"
+_MOST_BYTES: Final = 10_000_000
+_LONGEST: Final = 80
 """Characters of an id; those of the suite have at most half of it."""
 
 
@@ -47,9 +47,9 @@ class Baseline:
             ValueError: it is no baseline; the text says which line and why.
         """
         with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-        if len(data) > MOST_BYTES:
-            raise ValueError(f"{path} has more than {MOST_BYTES} bytes: it is no baseline")
+            data = file.read(_MOST_BYTES + 1)
+        if len(data) > _MOST_BYTES:
+            raise ValueError(f"{path} has more than {_MOST_BYTES} bytes: it is no baseline")
         try:
             lines = data.decode("utf-8-sig").splitlines()
         except UnicodeDecodeError as error:
@@ -58,25 +58,37 @@ class Baseline:
 
     def knows(self, result: Result) -> bool:
         """Say whether it is a failure that is known."""
-        return result.outcome.verdict is Verdict.FAIL and result.check.id in self.known
+        return result.outcome.verdict is CheckVerdict.FAIL and result.check.id in self.known
 
     def new(self, report: Report) -> list[Result]:
         """Return the failures that are not known."""
-        failed = (result for result in report.results if result.outcome.verdict is Verdict.FAIL)
+        failed = (
+            result for result in report.results if result.outcome.verdict is CheckVerdict.FAIL
+        )
         return [result for result in failed if not self.knows(result)]
 
     def mended(self, report: Report) -> list[str]:
         """Return the ids that were known to fail and pass now."""
-        passed = {one.check.id for one in report.results if one.outcome.verdict is Verdict.PASS}
+        passed = {
+            one.check.id for one in report.results if one.outcome.verdict is CheckVerdict.PASS
+        }
         return sorted(self.known & passed)
 
     def exit_status(self, report: Report) -> int:
         """Return the exit status of a run: that of the report, where known failures are none."""
         if self.new(report):
             return FAILED
-        if report.aborted or report.count(Verdict.INCONCLUSIVE) or report.count(Verdict.BLOCKED):
+        if (
+            report.aborted
+            or report.count(CheckVerdict.INCONCLUSIVE)
+            or report.count(CheckVerdict.BLOCKED)
+        ):
             return UNDECIDED
-        return 0 if report.count(Verdict.PASS) or report.count(Verdict.FAIL) else NOTHING_JUDGED
+        return (
+            0
+            if report.count(CheckVerdict.PASS) or report.count(CheckVerdict.FAIL)
+            else NOTHING_JUDGED
+        )
 
     def ends_with(self, report: Report) -> int:
         """Return the exit status of the command: of a run that was ended, why it was."""
@@ -93,14 +105,14 @@ def baseline_text(report: Report) -> str:
     failed = {
         result.check.id: f"{result.check.id}  # {one_line(result.check.title)}"
         for result in report.results
-        if result.outcome.verdict is Verdict.FAIL
+        if result.outcome.verdict is CheckVerdict.FAIL
     }
-    return "\n".join([HEAD, *(failed[name] for name in sorted(failed)), ""])
+    return "\n".join([_HEAD, *(failed[name] for name in sorted(failed)), ""])
 
 
 def _id(path: Path, number: int, line: str) -> str:
     name = line.partition("#")[0].strip()
-    if len(name) > LONGEST or len(name.split()) > 1 or not name.isascii():
+    if len(name) > _LONGEST or len(name.split()) > 1 or not name.isascii():
         shown = one_line(name)
-        raise ValueError(f"{path}, line {number}: {shown[:LONGEST]!r} is no id of a check")
+        raise ValueError(f"{path}, line {number}: {shown[:_LONGEST]!r} is no id of a check")
     return name

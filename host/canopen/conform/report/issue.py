@@ -10,22 +10,28 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from tickrig.host.canopen.conform.notation.step_words import step_words
+from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
-from tickrig.host.canopen.conform.report.evidence import ShowFrames, plain_frames
-from tickrig.host.canopen.conform.verdict import Direction, Outcome, Report, Result, Verdict
+from tickrig.host.canopen.conform.report.overview import ShowFrames, plain_frames
+from tickrig.host.canopen.conform.verdict import (
+    CheckOutcome,
+    CheckVerdict,
+    Direction,
+    Report,
+    Result,
+)
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
-LEAST_WAIT_US: Final = 2_000
+_LEAST_WAIT_US: Final = 2_000
 """Frames that were sent with less between them follow each other at once."""
-MULTIPLEXER_END: Final = len("585#60171000")
+_MULTIPLEXER_END: Final = len("585#60171000")
 """Up to here an answer to an SDO request is compared: command, index and sub-index."""
-UNEXPECTED: Final = re.compile(r"unexpected (\S+),")
-CLASS: Final = re.compile(r"\[[0-9A-F]+\]")
-GROUP: Final = re.compile(r"\(.*\)")
+_UNEXPECTED: Final = re.compile(r"unexpected (\S+),")
+_CLASS: Final = re.compile(r"\[[0-9A-F]+\]")
+_GROUP: Final = re.compile(r"\(.*\)")
 
 
 def issue_text(
@@ -41,7 +47,7 @@ def issue_text(
     failed = [
         result
         for result in report.results
-        if result.outcome.verdict is Verdict.FAIL and not baseline.knows(result)
+        if result.outcome.verdict is CheckVerdict.FAIL and not baseline.knows(result)
     ]
     parts = ["\n".join(_head(report, len(failed)))]
     parts += ["\n".join(_failure(report, result, show)) for result in failed]
@@ -66,10 +72,10 @@ def _failure(report: Report, result: Result, show: ShowFrames) -> Iterator[str]:
         yield f"- Steps: {'; '.join(one_line(step_words(step)) for step in check.steps)}"
     yield from ("", "```text", *map(one_line, show(outcome.evidence)), "```", "")
     yield f"`canmon seq BUS {check.id}.toml`; exit status 1 shows the failure:"
-    yield from ("", "```toml", *sequence(outcome, report.node_id), "```")
+    yield from ("", "```toml", *_sequence(outcome, report.node_id), "```")
 
 
-def sequence(outcome: Outcome, node_id: int) -> list[str]:
+def _sequence(outcome: CheckOutcome, node_id: int) -> list[str]:
     """Return the lines of a sequence that does what a check did up to where it failed.
 
     Args:
@@ -86,12 +92,12 @@ def sequence(outcome: Outcome, node_id: int) -> list[str]:
     for line in evidence:
         match line.direction:
             case Direction.SENT:
-                if line.at_us - last_us >= LEAST_WAIT_US:
+                if line.at_us - last_us >= _LEAST_WAIT_US:
                     lines += _step("wait", f"{(line.at_us - last_us + 500) // 1_000}ms")
                 lines += _step("send", line.text)
                 last_us, asked = line.at_us, line.text.startswith(f"{request:03X}#")
             case Direction.RECEIVED if asked and line.text.startswith(response):
-                lines += _step("expect", f"{line.text[:MULTIPLEXER_END]}*", within="1s")
+                lines += _step("expect", f"{line.text[:_MULTIPLEXER_END]}*", within="1s")
                 last_us, asked = line.at_us, False
             case Direction.RECEIVED if line.text == boot_up:
                 lines += _step("expect", boot_up, within="5s")
@@ -103,23 +109,23 @@ def sequence(outcome: Outcome, node_id: int) -> list[str]:
     return lines + _end(outcome)
 
 
-def _end(outcome: Outcome) -> list[str]:
+def _end(outcome: CheckOutcome) -> list[str]:
     """Return the step that tells whether the failure is there."""
     if outcome.wanted:
-        return _step("expect", merged(outcome.wanted), within="1s")
+        return _step("expect", _merged(outcome.wanted), within="1s")
     reason = one_line(outcome.reason)
-    if match := UNEXPECTED.search(outcome.reason):
+    if match := _UNEXPECTED.search(outcome.reason):
         return [f"# The failure is there if this frame comes: {match[1]}"]
     return [f"# The frames that follow show the failure: {reason}"]
 
 
-def merged(patterns: Sequence[str]) -> str:
+def _merged(patterns: Sequence[str]) -> str:
     """Return one pattern of `canmon seq` for several of a check.
 
-    >>> merged(["585#80......01000405", "585#80......00000008"])
+    >>> _merged(["585#80......01000405", "585#80......00000008"])
     '585#80??????0?000?0?'
     """
-    plain = [GROUP.sub("..", CLASS.sub(".", pattern)).replace(".", "?") for pattern in patterns]
+    plain = [_GROUP.sub("..", _CLASS.sub(".", pattern)).replace(".", "?") for pattern in patterns]
     if len({len(each) for each in plain}) > 1 or any("*" in each for each in plain):
         return f"{plain[0].partition('#')[0]}#*" if plain[1:] else plain[0]
     return "".join(one[0] if len(set(one)) == 1 else "?" for one in zip(*plain, strict=True))

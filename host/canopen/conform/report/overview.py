@@ -1,20 +1,146 @@
-"""A report by groups and by clauses, and in what order people look at its checks."""
+"""A report by groups and by clauses, and in what order people look at its checks.
+
+The frames of a check, as `canmon dump` shows them.
+
+>>> from tickrig.host.canopen.conform.verdict import Direction
+>>> plain_frames([Line(1_250, Direction.SENT, "605#40"), Line(2_000, Direction.REMARK, "?")])
+[' (000.001250)  >  605   [1]  40', ' (000.002000)  #  ?']
+"""
 
 from __future__ import annotations
 
 import re
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.canopen.conform.verdict import (
+    CheckOutcome,
+    CheckVerdict,
+    Direction,
+    FrameLine,
+    Report,
+    Result,
+)
+from tickrig.host.text.page_text import one_line
+from tickrig.wire.can import CanFrame
+from tickrig.wire.errors import WireError
 
-UNWELL: Final = (Verdict.FAIL, Verdict.BLOCKED, Verdict.INCONCLUSIVE)
+# What to look at where a check failed: the place in a firmware where such a fault sits.
+
+_HINTS: Final[Mapping[str, str]] = {
+    "NMT": "the table of NMT states: which command leads where, and what it resets",
+    "HB": "objects 1016h and 1017h, and the timers behind them",
+    "NG": "objects 100Ch and 100Dh, the toggle bit, and the answer to the remote frame",
+    "UE": "the upload of the SDO server: its abort codes, and the size that it tells",
+    "DE": "the download of the SDO server: access, size and limits before a value is taken",
+    "US": "the segments of an upload: toggle bit, last segment, and when a transfer ends",
+    "DS": "the segments of a download: toggle bit, size told and size sent, refusal at once",
+    "BD": "the block download: sequence numbers, what is acknowledged, CRC, padding",
+    "BU": "the block upload: block size, what is sent again, CRC, end of transfer",
+    "SG": "what the SDO server does with requests that it does not know, and while it is busy",
+    "PC": "the order of the mapping procedure: PDO off, number 0, entries, number, PDO on",
+    "PR": "when a PDO is sent or taken over: transmission type, inhibit time, event timer",
+    "SY": "object 1005h, and what a SYNC counter does",
+    "EM": "objects 1001h, 1003h, 1014h and 1015h, and when an error counts as gone",
+    "EB": "object 1029h, and the state in which an error leaves the node",
+    "ST": "objects 1010h and 1011h: their signatures, and what is kept over power-off",
+    "LS": "the LSS states, and the identity (1018h) that is compared",
+    "IO": "the objects of CiA 401: polarity, filter, interrupts",
+    "D4": "the state machine of CiA 402: controlword, statusword, modes",
+    "OD": "this object in the EDS, and its row in the object dictionary of the firmware",
+}
+"""By group."""
+
+
+def hint(result: Result) -> str:
+    """Say where to look, without a full stop; empty where nothing is known."""
+    match result.outcome.verdict:
+        case CheckVerdict.BLOCKED:
+            return "the node: it did not come back; switch it off and on, then run the check alone"
+        case CheckVerdict.INCONCLUSIVE:
+            return "this host and the bus: load, adapter, other nodes; then run the check alone"
+        case _:
+            return _HINTS.get(result.check.group, "")
+
+
+ShowFrames = Callable[[Sequence[FrameLine]], list[str]]
+"""Writes the lines of a check, one each, for people."""
+
+
+_DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
+
+
+def plain_frames(lines: Sequence[FrameLine]) -> list[str]:
+    """Write lines with their bytes alone."""
+    return [plain_frame(line) for line in lines]
+
+
+def plain_frame(line: FrameLine, meaning: str = "") -> str:
+    """Write a line.
+
+    Args:
+        line: a frame, or a remark.
+        meaning: what stands behind a frame; empty where nobody knows.
+    """
+    seconds, micros = divmod(line.at_us, 1_000_000)
+    head = f" ({seconds:03}.{micros:06})  {line.direction}  "
+    if line.direction is Direction.REMARK or (frame := frame_of(line)) is None:
+        return head + one_line(line.text)
+    ident = f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
+    data = f" {frame.data.hex(' ').upper()}" if frame.data else ""
+    text = " remote request" if frame.remote else data
+    shown = f"[{frame.remote_length if frame.remote else len(frame.data)}] {text}".rstrip()
+    behind = f"{shown:<{_DATA_WIDTH}}   {one_line(meaning)}" if meaning else shown
+    return f"{head}{ident}   {behind}"
+
+
+def frame_of(line: FrameLine) -> CanFrame | None:
+    """Return the frame of a line; None if it is none."""
+    try:
+        return CanFrame.parse(line.text)
+    except (ValueError, WireError):
+        return None
+
+
+def cut(lines: list[str], most: int) -> list[str]:
+    """Return the first and the last lines where there are more than `most`, and how many are not.
+
+    >>> cut(["a", "b", "c", "d", "e"], 3)
+    ['a', '... 3 more lines ...', 'e']
+    """
+    if len(lines) <= most:
+        return lines
+    head, tail = most // 2, most - most // 2 - 1
+    left_out = f"... {len(lines) - head - tail} more lines ..."
+    return [*lines[:head], left_out, *lines[len(lines) - tail :]]
+
+
+def all_goes(outcome: CheckOutcome, first: CheckOutcome | None, show: ShowFrames) -> list[str]:
+    """Return the lines of a check, those of its first go before them if they differ."""
+    if first is None:
+        return show(outcome.evidence)
+    if same_go(first, outcome):
+        return [SAME, *show(outcome.evidence)]
+    again = f"first: {first.verdict}" + (f": {one_line(first.reason)}" if first.reason else "")
+    return [again, *show(first.evidence), "and again:", *show(outcome.evidence)]
+
+
+SAME: Final = "first: the same"
+
+
+def same_go(first: CheckOutcome, again: CheckOutcome) -> bool:
+    """Say whether two goes differ in nothing but their times."""
+    one, other = ([line[1:] for line in each.evidence] for each in (first, again))
+    return (first.verdict, first.reason, one) == (again.verdict, again.reason, other)
+
+
+UNWELL: Final = (CheckVerdict.FAIL, CheckVerdict.BLOCKED, CheckVerdict.INCONCLUSIVE)
 """What somebody has to look at, the worst first."""
 
 
-class Row(NamedTuple):
+class GroupRow(NamedTuple):
     """Checks that belong together.
 
     Attributes:
@@ -26,18 +152,18 @@ class Row(NamedTuple):
     results: tuple[Result, ...]
 
     @property
-    def counts(self) -> dict[Verdict, int]:
+    def counts(self) -> dict[CheckVerdict, int]:
         """How many gave which verdict; those that nobody gave are left out."""
         return verdict_counts(self.results)
 
 
-def verdict_counts(results: Iterable[Result]) -> dict[Verdict, int]:
+def verdict_counts(results: Iterable[Result]) -> dict[CheckVerdict, int]:
     """Count verdicts, in their own order; those that nobody gave are left out."""
     counts = Counter(result.outcome.verdict for result in results)
-    return {verdict: counts[verdict] for verdict in Verdict if counts[verdict]}
+    return {verdict: counts[verdict] for verdict in CheckVerdict if counts[verdict]}
 
 
-def counts_text(counts: dict[Verdict, int]) -> str:
+def counts_text(counts: dict[CheckVerdict, int]) -> str:
     """Write counts for people.
 
     >>> counts_text({Verdict.PASS: 3, Verdict.FAIL: 1})
@@ -46,12 +172,12 @@ def counts_text(counts: dict[Verdict, int]) -> str:
     return ", ".join(f"{number} {verdict}" for verdict, number in counts.items()) or "none"
 
 
-def by_group(report: Report) -> list[Row]:
+def by_group(report: Report) -> list[GroupRow]:
     """Return the groups, in the order in which they were met."""
     return _rows(report, lambda result: result.check.group)
 
 
-def by_clause(report: Report) -> list[Row]:
+def by_clause(report: Report) -> list[GroupRow]:
     """Return the clauses, by document and number."""
     rows = _rows(report, lambda result: result.check.source)
     return sorted(rows, key=lambda row: [_number(part) for part in re.split(r"(\d+)", row.name)])
@@ -67,15 +193,15 @@ def causes(results: Iterable[Result]) -> list[list[Result]]:
     """Put checks of objects together that fail alike: one of a kind stands for all."""
     found: dict[tuple[str, ...], list[Result]] = {}
     for number, each in enumerate(results):
-        kind = OF_OBJECT.fullmatch(each.check.id)
-        reason = PLACE.sub("", each.outcome.reason)
+        kind = _OF_OBJECT.fullmatch(each.check.id)
+        reason = _PLACE.sub("", each.outcome.reason)
         key = (each.outcome.verdict, kind[1], reason) if kind else (str(number),)
         found.setdefault(key, []).append(each)
     return list(found.values())
 
 
-OF_OBJECT: Final = re.compile(r"OD-.*-(\w+)")
-PLACE: Final = re.compile(r"step \d+|\b[0-9A-F]{4}h?:[0-9A-F]{2}\b|\b\d+ bytes")
+_OF_OBJECT: Final = re.compile(r"OD-.*-(\w+)")
+_PLACE: Final = re.compile(r"step \d+|\b[0-9A-F]{4}h?:[0-9A-F]{2}\b|\b\d+ bytes")
 """What differs in the reasons of objects that fail alike."""
 
 
@@ -85,11 +211,11 @@ def repair_commands(report: Report) -> tuple[str, ...]:
     return tuple(f"{head} {shlex.quote(words)} --yes" for words in report.repairs)
 
 
-def _rows(report: Report, name_of: Callable[[Result], str]) -> list[Row]:
+def _rows(report: Report, name_of: Callable[[Result], str]) -> list[GroupRow]:
     rows: dict[str, list[Result]] = {}
     for result in report.results:
         rows.setdefault(name_of(result), []).append(result)
-    return [Row(name, tuple(results)) for name, results in rows.items()]
+    return [GroupRow(name, tuple(results)) for name, results in rows.items()]
 
 
 def _number(part: str) -> tuple[int, str]:

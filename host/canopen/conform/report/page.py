@@ -15,35 +15,33 @@ from typing import Any, Final
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from tickrig.host.canopen.conform.notation.step_words import step_words
-from tickrig.host.canopen.conform.notation.suite import group_titles
+from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
-from tickrig.host.canopen.conform.report.evidence import (
-    SAME,
-    ShowFrames,
-    cut,
-    plain_frames,
-    same_go,
-)
-from tickrig.host.canopen.conform.report.hints import hint
 from tickrig.host.canopen.conform.report.overview import (
+    SAME,
     UNWELL,
+    ShowFrames,
     by_clause,
     by_group,
     counts_text,
+    cut,
+    hint,
+    plain_frames,
     repair_commands,
+    same_go,
     unwell,
     verdict_counts,
 )
-from tickrig.host.canopen.conform.verdict import Outcome, Report, Verdict
+from tickrig.host.canopen.conform.suite import group_titles
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report
 from tickrig.host.text import page_text
 from tickrig.host.text.values import counted
 
-PACKAGE: Final = __package__
-FOLDER: Final = "template"
-MOST_LINES: Final = 200
+_PACKAGE: Final = __package__
+_FOLDER: Final = "template"
+_MOST_LINES: Final = 200
 """Of frames of one go at a check."""
-MOST_OPEN: Final = 12
+_MOST_OPEN: Final = 12
 """Up to so many failures are unfolded at once."""
 
 
@@ -57,10 +55,10 @@ def html_page(
         baseline: failures that are known.
         show: writes frames.
     """
-    style = files(PACKAGE).joinpath(FOLDER, "page.css").read_text("utf-8")
+    style = files(_PACKAGE).joinpath(_FOLDER, "page.css").read_text("utf-8")
 
-    def frames(outcome: Outcome) -> str:
-        return "\n".join(cut(show(outcome.evidence), MOST_LINES))
+    def frames(outcome: CheckOutcome) -> str:
+        return "\n".join(cut(show(outcome.evidence), _MOST_LINES))
 
     found = unwell(report)
     template: Any = _environment().get_template("page.html")
@@ -74,7 +72,7 @@ def html_page(
         titles=group_titles(),
         clauses=by_clause(report),
         unwell=found,
-        opened=len(found) <= MOST_OPEN,
+        opened=len(found) <= _MOST_OPEN,
         frames=frames,
         style=Markup(style),
         policy=_policy(style),
@@ -86,7 +84,7 @@ def html_page(
 def _environment() -> Environment:
     """Return what has the template; it is compiled once."""
     environment = Environment(
-        loader=PackageLoader(PACKAGE, FOLDER),
+        loader=PackageLoader(_PACKAGE, _FOLDER),
         autoescape=True,
         finalize=page_text.harmless,
         undefined=StrictUndefined,
@@ -101,11 +99,16 @@ def _environment() -> Environment:
         "hint": hint,
         "words": step_words,
     }
-    environment.globals |= {"Verdict": Verdict, "UNWELL": UNWELL, "same_go": same_go, "SAME": SAME}
+    environment.globals |= {
+        "Verdict": CheckVerdict,
+        "UNWELL": UNWELL,
+        "same_go": same_go,
+        "SAME": SAME,
+    }
     return environment
 
 
-def _slug(verdict: Verdict) -> str:
+def _slug(verdict: CheckVerdict) -> str:
     return verdict.name.lower()
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 from typing import Final
 
-from tickrig.host.canopen.conform.notation.step_words import step_words
-from tickrig.host.canopen.conform.notation.suite import group_titles
+from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.overview import by_group, repair_commands
-from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
+from tickrig.host.canopen.conform.suite import group_titles
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
-VERSION: Final = 1
+_VERSION: Final = 1
 """It changes when a field changes its meaning or goes."""
 
-Object = dict[str, object]
+_Object = dict[str, object]
 
 
 def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
@@ -24,8 +24,8 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
         report: the run.
         baseline: failures that are known.
     """
-    said: Object = {
-        "v": VERSION,
+    said: _Object = {
+        "v": _VERSION,
         "source": report.source,
         "node": report.node_id,
         "level": report.level.word,
@@ -33,7 +33,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
         "aborted": report.aborted,
         "doubt": report.doubt,
         "duration_us": report.duration_us,
-        "counts": {str(verdict): report.count(verdict) for verdict in Verdict},
+        "counts": {str(verdict): report.count(verdict) for verdict in CheckVerdict},
         "groups": {row.name: group_titles().get(row.name, "") for row in by_group(report)},
         "device": dict(report.node),
         "settings": dict(report.settings),
@@ -45,7 +45,7 @@ def report_json(report: Report, baseline: Baseline = NONE_KNOWN) -> str:
     return json.dumps(said, indent=1) + "\n"
 
 
-def _check(result: Result, baseline: Baseline) -> Object:
+def _check(result: Result, baseline: Baseline) -> _Object:
     check = result.check
     return {
         "id": check.id,
@@ -62,7 +62,7 @@ def _check(result: Result, baseline: Baseline) -> Object:
     }
 
 
-def _outcome(outcome: Outcome) -> Object:
+def _outcome(outcome: CheckOutcome) -> _Object:
     return {
         "verdict": str(outcome.verdict),
         "reason": outcome.reason,

@@ -6,33 +6,31 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.canopen.conform.notation.suite import group_titles
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
-from tickrig.host.canopen.conform.report.evidence import (
+from tickrig.host.canopen.conform.report.overview import (
     ShowFrames,
     all_goes,
-    cut,
-    plain_frames,
-)
-from tickrig.host.canopen.conform.report.hints import hint
-from tickrig.host.canopen.conform.report.overview import (
     by_group,
     causes,
     counts_text,
+    cut,
+    hint,
+    plain_frames,
     repair_commands,
     unwell,
     verdict_counts,
 )
-from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.canopen.conform.suite import group_titles
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.text.page_text import duration, one_line
 from tickrig.host.text.values import counted
 
-MOST_SHOWN: Final = 20
+_MOST_SHOWN: Final = 20
 """So many failures are shown with their frames; the others without."""
-ELSEWHERE: Final = "more, without their frames, which --html FILE and --json have:"
-MOST_LINES: Final = 40
+_ELSEWHERE: Final = "more, without their frames, which --html FILE and --json have:"
+_MOST_LINES: Final = 40
 """Of frames of one failure."""
-MOST_REASONS: Final = 12
+_MOST_REASONS: Final = 12
 
 
 def text_report(
@@ -52,9 +50,9 @@ def text_report(
     parts = [_head(report), _groups(report), _not_applicable(report)]
     found = [result for result in unwell(report) if not baseline.knows(result)]
     begun = causes(result for result in found if _was_begun(result))
-    parts += [_failure(alike, show, again) for alike in begun[:MOST_SHOWN]]
-    if more := begun[MOST_SHOWN:]:
-        parts += [[f"{len(more)} {ELSEWHERE}"], *(_failure(alike, None, again) for alike in more)]
+    parts += [_failure(alike, show, again) for alike in begun[:_MOST_SHOWN]]
+    if more := begun[_MOST_SHOWN:]:
+        parts += [[f"{len(more)} {_ELSEWHERE}"], *(_failure(alike, None, again) for alike in more)]
     parts.append(_never_begun([result for result in found if not _was_begun(result)]))
     parts += [_list("findings", report.findings), _list("not restored", report.unrestored)]
     parts.append(_list("to restore it, in this order", repair_commands(report)))
@@ -88,19 +86,19 @@ def _not_applicable(report: Report) -> list[str]:
     reasons = Counter(
         one_line(result.outcome.reason)
         for result in report.results
-        if result.outcome.verdict is Verdict.NOT_APPLICABLE
+        if result.outcome.verdict is CheckVerdict.NOT_APPLICABLE
     )
     if not reasons:
         return []
     ranked = sorted(reasons.items(), key=lambda each: (-each[1], each[0]))
-    rows = [f"{number:5}  {reason}" for reason, number in ranked[:MOST_REASONS]]
-    more = len(ranked) - MOST_REASONS
+    rows = [f"{number:5}  {reason}" for reason, number in ranked[:_MOST_REASONS]]
+    more = len(ranked) - _MOST_REASONS
     return ["not applicable:", *rows, *([f"       and {more} reasons more"] if more > 0 else [])]
 
 
 def _was_begun(result: Result) -> bool:
     """Say whether a check has something of its own to tell."""
-    return result.outcome.verdict is Verdict.FAIL or bool(result.outcome.evidence)
+    return result.outcome.verdict is CheckVerdict.FAIL or bool(result.outcome.evidence)
 
 
 def _never_begun(results: list[Result]) -> list[str]:
@@ -119,7 +117,7 @@ def _failure(alike: list[Result], show: ShowFrames | None, again: str) -> list[s
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
     frames, next_to = list[str](), list[str]()
     if show is not None:
-        frames = cut(all_goes(result.outcome, result.first, show), MOST_LINES)
+        frames = cut(all_goes(result.outcome, result.first, show), _MOST_LINES)
         next_to = [f"  look at {text}"] if (text := hint(result)) else []
     alone = [f"  alone: {again} --only {result.check.id}"] if again else []
     return [_title(result), clause, *reason, *frames, *next_to, *alone, *_like(alike[1:])]
@@ -129,8 +127,8 @@ def _like(results: list[Result]) -> list[str]:
     """Name what failed likewise."""
     if not results:
         return []
-    names = [one_line(result.check.id) for result in results[:MOST_REASONS]]
-    more = [f"and {len(results) - MOST_REASONS} more"] if results[MOST_REASONS:] else []
+    names = [one_line(result.check.id) for result in results[:_MOST_REASONS]]
+    more = [f"and {len(results) - _MOST_REASONS} more"] if results[_MOST_REASONS:] else []
     return [f"  the same in {counted(len(results), 'other')}: {', '.join([*names, *more])}"]
 
 

@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.known_keys import (
     DEVICE_INFO,
     FILE_INFO,
@@ -19,28 +19,32 @@ from tickrig.host.canopen.data_sheet.rules.known_keys import (
 )
 from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_lines import object_section
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers, without_comment
+from tickrig.wire.canopen.eds.eds_value import (
+    object_section,
+    parse_number,
+    plain_numbers,
+    without_comment,
+)
 
-NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
-DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
-TIME: Final = re.compile(r"[0-9]{1,2}:[0-9]{2} ?[AP]M", re.ASCII | re.IGNORECASE)
-NUMBER: Final = re.compile(r"0|[1-9][0-9]*|0x[0-9a-f]+", re.ASCII | re.IGNORECASE)
-FORMS: Final = {
-    **dict.fromkeys(("CreationDate", "ModificationDate"), (DATE, "mm-dd-yyyy")),
-    **dict.fromkeys(("CreationTime", "ModificationTime"), (TIME, "hh:mmAM or hh:mmPM")),
-    **dict.fromkeys(("FileVersion", "FileRevision"), (NUMBER, "a number, as 1")),
+_NEEDED: Final = ("DeviceInfo", "MandatoryObjects")
+_DATE: Final = re.compile(r"[0-9]{2}-[0-9]{2}-[0-9]{4}", re.ASCII)
+_TIME: Final = re.compile(r"[0-9]{1,2}:[0-9]{2} ?[AP]M", re.ASCII | re.IGNORECASE)
+_NUMBER: Final = re.compile(r"0|[1-9][0-9]*|0x[0-9a-f]+", re.ASCII | re.IGNORECASE)
+_FORMS: Final = {
+    **dict.fromkeys(("CreationDate", "ModificationDate"), (_DATE, "mm-dd-yyyy")),
+    **dict.fromkeys(("CreationTime", "ModificationTime"), (_TIME, "hh:mmAM or hh:mmPM")),
+    **dict.fromkeys(("FileVersion", "FileRevision"), (_NUMBER, "a number, as 1")),
     "EDSVersion": (re.compile(r"[34]\.[0-9]"), "3.0 or 4.0"),
 }
-MOST_GRANULARITY: Final = 64
-WIDEST: Final = 32
-DUMMY: Final = re.compile(r"dummy([0-9a-f]{4})")
-DUMMY_TYPES: Final = range(1, 0x20)
-DUMMIES: Final = tuple(f"Dummy{kind:04d}" for kind in range(1, 8))
+_MOST_GRANULARITY: Final = 64
+_WIDEST: Final = 32
+_DUMMY: Final = re.compile(r"dummy([0-9a-f]{4})")
+_DUMMY_TYPES: Final = range(1, 0x20)
+_DUMMIES: Final = tuple(f"Dummy{kind:04d}" for kind in range(1, 8))
 """Those that CiA 306 lists."""
-PDO_AREAS: Final = (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00)))
-IDENTITY_OBJECT: Final = 0x1018
-IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3))
+_PDO_AREAS: Final = (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00)))
+_IDENTITY_OBJECT: Final = 0x1018
+_IDENTITY: Final = (("VendorNumber", 1), ("ProductNumber", 2), ("RevisionNumber", 3))
 
 
 def number(document: Document, section: str, key: str) -> int | None:
@@ -49,16 +53,16 @@ def number(document: Document, section: str, key: str) -> int | None:
         found = parse_number(plain_numbers(document.file.value(section, key)))
     except ValueError:
         return None
-    return found if found.bit_length() <= WIDEST else None
+    return found if found.bit_length() <= _WIDEST else None
 
 
 def sections(document: Document) -> Iterator[RuleFinding]:
     """Find sections that every tool wants, and that are not there."""
-    for title in NEEDED:
+    for title in _NEEDED:
         if title not in document.file.sections and not document.file.is_xml:
             last = len(document.texts)
             first = "SupportedObjects=0" if title == "MandatoryObjects" else f"{NAMES[0]}="
-            added = Edit(last, Place.AFTER, ("", f"[{title}]", first))
+            added = Edit(last, EditPlace.AFTER, ("", f"[{title}]", first))
             edits = () if document.head_is_lost else (added,)
             yield document.found("section-missing", f"[{title}] is missing", "", 0, *edits)
 
@@ -72,7 +76,7 @@ def file_info(document: Document) -> Iterator[RuleFinding]:
         if not file.has("FileInfo", key):
             what = f"{key} is missing"
             yield document.found("file-info-missing", what, "FileInfo", key)
-    for key, (form, wanted) in FORMS.items():
+    for key, (form, wanted) in _FORMS.items():
         text = without_comment(file.value("FileInfo", key))
         if text and not form.fullmatch(text):
             what = f"{key}={shorten(text)} is not {wanted}"
@@ -105,8 +109,8 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
             what = f"{key}={shorten(file.value(title, key))} is not 0 or 1"
             yield document.found("flag", what, title, key)
     granularity = number(document, title, "Granularity")
-    if granularity is not None and not 0 <= granularity <= MOST_GRANULARITY:
-        what = f"Granularity={granularity} is not in 0..{MOST_GRANULARITY}"
+    if granularity is not None and not 0 <= granularity <= _MOST_GRANULARITY:
+        what = f"Granularity={granularity} is not in 0..{_MOST_GRANULARITY}"
         yield document.found("granularity", what, title, "Granularity")
     if not document.device.info.bit_rates:
         yield document.found("bit-rate-none", "no BaudRate_... is 1", title)
@@ -114,8 +118,8 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
 
 def _missing(document: Document, key: str) -> str:
     """Return what a keyword of [DeviceInfo] stands for that is not there."""
-    row = document.rows.get((IDENTITY_OBJECT, dict(IDENTITY).get(key, 0)))
-    if key in dict(IDENTITY) and row is not None and row.has_default:
+    row = document.rows.get((_IDENTITY_OBJECT, dict(_IDENTITY).get(key, 0)))
+    if key in dict(_IDENTITY) and row is not None and row.has_default:
         return f"0x{int.from_bytes(row.default, 'little'):08X}"
     return "" if key in NAMES else "0"
 
@@ -123,7 +127,7 @@ def _missing(document: Document, key: str) -> str:
 def counts(document: Document) -> Iterator[RuleFinding]:
     """Hold the numbers of [DeviceInfo] against the objects."""
     title = "DeviceInfo"
-    for key, area in PDO_AREAS:
+    for key, area in _PDO_AREAS:
         present = sum(index in area for index in document.device.objects)
         said, line = number(document, title, key), document.keyword(title, key)
         if said is not None and line is not None and said != present:
@@ -133,8 +137,8 @@ def counts(document: Document) -> Iterator[RuleFinding]:
             sound = not document.file.is_xml and (said < present or whole)
             edits = (document.with_value(line, str(present)),) if sound else ()
             yield document.found("pdo-count", what, title, key, *edits)
-    for key, sub in IDENTITY:
-        row, said = document.rows.get((IDENTITY_OBJECT, sub)), number(document, title, key)
+    for key, sub in _IDENTITY:
+        row, said = document.rows.get((_IDENTITY_OBJECT, sub)), number(document, title, key)
         if row is None or not row.has_default or not said:
             continue
         value = int.from_bytes(row.default, "little")
@@ -163,13 +167,13 @@ def features(document: Document) -> Iterator[RuleFinding]:
 def dummy_usage(document: Document) -> Iterator[RuleFinding]:
     """Judge [DummyUsage]."""
     for line in document.lines_of("DummyUsage"):
-        match = DUMMY.fullmatch(line.key.lower())
+        match = _DUMMY.fullmatch(line.key.lower())
         said = without_comment(line.value)
-        if match is None or int(match[1], 16) not in DUMMY_TYPES or said not in ("0", "1"):
+        if match is None or int(match[1], 16) not in _DUMMY_TYPES or said not in ("0", "1"):
             what = f"{shorten(line.content)} is not Dummy0001=0 to Dummy001F=1"
             yield document.found("dummy-usage", what, "DummyUsage", line.number)
     file, title = document.file, "DummyUsage"
-    for key in DUMMIES if title in file.sections and not file.is_xml else ():
+    for key in _DUMMIES if title in file.sections and not file.is_xml else ():
         if not file.has(title, key):
             edit = document.add_to(title, [f"{key}=0"])
             what = f"{key} is missing: 0 is taken"

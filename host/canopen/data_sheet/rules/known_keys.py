@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Final
 
-from tickrig.wire.canopen.eds.eds_lines import is_module_object, object_section
+from tickrig.wire.canopen.eds.eds_value import is_module_object, object_section
 from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
 FILE_INFO: Final = (
@@ -22,23 +22,23 @@ NUMBERS: Final = (
 )
 NAMES: Final = ("VendorName", "ProductName", "OrderCode")
 DEVICE_INFO: Final = (*NAMES, *NUMBERS, *FLAGS)
-OPTIONAL_INFO: Final = ("CompactPDO", "NG_Slave", "NrOfNG_MonitoredNodes", "NG_Master")
-COMMISSIONING: Final = (
+_OPTIONAL_INFO: Final = ("CompactPDO", "NG_Slave", "NrOfNG_MonitoredNodes", "NG_Master")
+_COMMISSIONING: Final = (
     *("NodeID", "NodeName", "Baudrate", "NetNumber", "NetworkName", "CANopenManager"),
     *("LSS_SerialNumber", "NodeRefd", "NetRefd"),
 )
-ENTRY: Final = (
+_ENTRY: Final = (
     *("ParameterName", "ObjectType", "DataType", "AccessType", "PDOMapping", "DefaultValue"),
     *("LowLimit", "HighLimit", "SubNumber", "CompactSubObj", "ObjFlags", "SubExtObj"),
     *("InvertedSRAD", "UniqueID", "StorageLocation"),
 )
 OF_DCF: Final = ("ParameterValue", "Denotation", "UploadFile", "DownloadFile", "ParamRefd")
 OF_MODULE: Final = ("Count", "ObjExtend")
-OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
+_OURS: Final = ("MaxBytes", "DefaultBytes", "Unit", "Factor")
 """Not of CiA 306; our reader, and in part the canopen library, take them."""
 
 _LIST: Final = re.compile(r"SupportedObjects|NrOfEntries|[0-9]+", re.IGNORECASE)
-KEYS: Final = {
+_KEYS: Final = {
     "Comments": re.compile(r"Lines|Line[0-9]+", re.IGNORECASE),
     "DummyUsage": re.compile(r"Dummy[0-9A-F]{4}", re.IGNORECASE),
     **dict.fromkeys(("MandatoryObjects", "OptionalObjects", "ManufacturerObjects"), _LIST),
@@ -59,11 +59,11 @@ def _spelled(*names: str) -> dict[str, str]:
 
 _BY_SECTION: Final = {
     "FileInfo": _spelled(*FILE_INFO, "LastEDS"),
-    "DeviceInfo": _spelled(*DEVICE_INFO, *OPTIONAL_INFO),
-    "DeviceComissioning": _spelled(*COMMISSIONING),
-    **{section: _spelled("SupportedObjects", "Lines") for section in KEYS},
+    "DeviceInfo": _spelled(*DEVICE_INFO, *_OPTIONAL_INFO),
+    "DeviceComissioning": _spelled(*_COMMISSIONING),
+    **{section: _spelled("SupportedObjects", "Lines") for section in _KEYS},
 }
-_OBJECT: Final = _spelled(*ENTRY, *OF_DCF, *OURS)
+_OBJECT: Final = _spelled(*_ENTRY, *OF_DCF, *_OURS)
 _OF_MODULE: Final = {**_OBJECT, **_spelled(*OF_MODULE)}
 
 _OBJECT_NUMBERS: Final = frozenset(
@@ -74,7 +74,7 @@ _OBJECT_NUMBERS: Final = frozenset(
 )
 _NUMBERS: Final = {
     "FileInfo": r"FileVersion|FileRevision",
-    "DeviceInfo": "|".join((*NUMBERS, *FLAGS, *OPTIONAL_INFO)),
+    "DeviceInfo": "|".join((*NUMBERS, *FLAGS, *_OPTIONAL_INFO)),
     "DeviceComissioning": r"NodeID|Baudrate|NetNumber|CANopenManager|LSS_SerialNumber",
     "Comments": r"Lines",
     "DummyUsage": r"Dummy[0-9A-F]{4}",
@@ -124,7 +124,7 @@ def numbered(section: str, key: str) -> str | None:
     >>> numbered("Comments", "line5"), numbered("DummyUsage", "dummy001b"), numbered("Tools", "x")
     ('Line5', 'Dummy001B', None)
     """
-    pattern = KEYS.get(section)
+    pattern = _KEYS.get(section)
     if pattern is None or not pattern.fullmatch(key):
         return None
     return _LISTED.get(key.lower(), f"{key[:1].upper()}{key[1:5].lower()}{key[5:].upper()}")

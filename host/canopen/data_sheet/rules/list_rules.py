@@ -10,19 +10,18 @@ from collections.abc import Iterator
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_lines import EdsLine
-from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.eds_value import EdsLine, parse_number, plain_numbers
 
-MANDATORY: Final = "MandatoryObjects"
-OPTIONAL: Final = "OptionalObjects"
-MANUFACTURER: Final = "ManufacturerObjects"
-LISTS: Final = (MANDATORY, OPTIONAL, MANUFACTURER)
-ALWAYS_MANDATORY: Final = (0x1000, 0x1001, 0x1018)
-MANUFACTURER_AREA: Final = range(0x2000, 0x6000)
-NUMBER: Final = re.compile(r"[0-9]{1,5}", re.ASCII)
-INDICES: Final = range(0x1000, 0x10000)
+_MANDATORY: Final = "MandatoryObjects"
+_OPTIONAL: Final = "OptionalObjects"
+_MANUFACTURER: Final = "ManufacturerObjects"
+LISTS: Final = (_MANDATORY, _OPTIONAL, _MANUFACTURER)
+_ALWAYS_MANDATORY: Final = (0x1000, 0x1001, 0x1018)
+_MANUFACTURER_AREA: Final = range(0x2000, 0x6000)
+_NUMBER: Final = re.compile(r"[0-9]{1,5}", re.ASCII)
+_INDICES: Final = range(0x1000, 0x10000)
 
 
 class ObjectList:
@@ -37,7 +36,7 @@ class ObjectList:
         self.title = title
         self.entries: list[tuple[EdsLine, int | None]] = []
         for line in document.lines_of(title):
-            if NUMBER.fullmatch(line.key) and line.value:
+            if _NUMBER.fullmatch(line.key) and line.value:
                 self.entries.append((line, _index(line.value)))
 
     @property
@@ -54,25 +53,25 @@ def _index(text: str) -> int | None:
     return number if 0 <= number <= 0xFFFF else None
 
 
-def home(index: int) -> str:
+def _home(index: int) -> str:
     """Return the list that an object belongs to.
 
-    >>> home(0x1018), home(0x2000), home(0x6000)
+    >>> _home(0x1018), _home(0x2000), _home(0x6000)
     ('MandatoryObjects', 'ManufacturerObjects', 'OptionalObjects')
     """
-    if index in ALWAYS_MANDATORY:
-        return MANDATORY
-    return MANUFACTURER if index in MANUFACTURER_AREA else OPTIONAL
+    if index in _ALWAYS_MANDATORY:
+        return _MANDATORY
+    return _MANUFACTURER if index in _MANUFACTURER_AREA else _OPTIONAL
 
 
 def described(document: Document) -> set[int]:
     """Return the objects that have a section, and belong into a list."""
-    return {index for _, index, sub in document.file.objects() if sub is None and index in INDICES}
+    return {index for _, index, sub in document.file.objects() if sub is None and index in _INDICES}
 
 
 def are_whole(document: Document) -> bool:
     """Return whether the lists are there, as long as they say, and all that they name is there."""
-    if OPTIONAL not in document.file.sections:
+    if _OPTIONAL not in document.file.sections:
         return False
     found = [ObjectList(document, title) for title in LISTS if title in document.file.sections]
     listed = {index for each in found for index in each.indices}
@@ -90,7 +89,7 @@ def lists(document: Document) -> Iterator[RuleFinding]:
     present = described(document)
     listed = {index for each in found for index in each.indices}
     for index in sorted(present - listed):
-        title = home(index)
+        title = _home(index)
         what = f"{index:04X}h is in no list, {title} was expected"
         edits = _mended(document, found, title, present)
         yield document.found("list-missing", what, f"{index:04X}", "", *edits)
@@ -118,7 +117,7 @@ def _faults(
     if each.title not in document.file.sections:
         return
     for line, index in each.entries:
-        if index is None or index not in INDICES:
+        if index is None or index not in _INDICES:
             yield "list-entry", f"{shorten(line.content)} is no index", line.number
             continue
         if index not in present:
@@ -126,7 +125,7 @@ def _faults(
         elif index in seen:
             yield "list-doubled", f"{index:04X}h is listed twice", line.number
         elif _is_wrong(each.title, index):
-            what = f"{index:04X}h is in {each.title}, {home(index)} was expected"
+            what = f"{index:04X}h is in {each.title}, {_home(index)} was expected"
             yield "list-wrong", what, line.number
         seen.add(index)
     numbers = [int(line.key) for line, _ in each.entries]
@@ -140,9 +139,9 @@ def _faults(
 
 def _is_wrong(title: str, index: int) -> bool:
     """Return whether an object is in the wrong list; profiles have mandatory ones of their own."""
-    if title == MANDATORY:
-        return home(index) == MANUFACTURER
-    return title != home(index)
+    if title == _MANDATORY:
+        return _home(index) == _MANUFACTURER
+    return title != _home(index)
 
 
 def _mended(
@@ -151,18 +150,20 @@ def _mended(
     """Return the edits that make a list right; that of another list comes with its own finding."""
     each = next(one for one in found if one.title == title)
     if title not in document.file.sections:
-        return (Edit(len(document.texts), Place.AFTER, ("", f"[{title}]", "SupportedObjects=0")),)
+        return (
+            Edit(len(document.texts), EditPlace.AFTER, ("", f"[{title}]", "SupportedObjects=0")),
+        )
     listed = {index for one in found for index in one.indices if not _is_wrong(one.title, index)}
     wanted = list(
         dict.fromkeys(
             index
             for index in each.indices
-            if index in INDICES and not (index in present and _is_wrong(title, index))
+            if index in _INDICES and not (index in present and _is_wrong(title, index))
         )
     )
     earlier = {index for one in found[: found.index(each)] for index in one.indices}
-    wanted = [index for index in wanted if index not in earlier or home(index) == title]
-    wanted += sorted(index for index in present - listed if home(index) == title)
+    wanted = [index for index in wanted if index not in earlier or _home(index) == title]
+    wanted += sorted(index for index in present - listed if _home(index) == title)
     return tuple(_rewritten(document, each, wanted))
 
 

@@ -6,18 +6,18 @@ from collections.abc import Iterator
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_entry import COUNTS
-from tickrig.wire.canopen.eds.eds_lines import object_section
+from tickrig.wire.canopen.eds.eds_value import object_section
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES, entry_lines
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
-LONGEST_NAME: Final = 241
-STRUCTURE: Final = 0xFF
+_LONGEST_NAME: Final = 241
+_STRUCTURE: Final = 0xFF
 """The sub-index that tells the structure of an object (CiA 301, 7.4.3)."""
-OF_ELEMENTS: Final = (
+_OF_ELEMENTS: Final = (
     *("DataType", "AccessType", "PDOMapping", "DefaultValue", "LowLimit", "HighLimit"),
 )
 
@@ -26,8 +26,8 @@ def names(document: Document) -> Iterator[RuleFinding]:
     """Judge the names of objects and entries."""
     for section, _, _ in document.file.objects():
         name = document.file.value(section, "ParameterName")
-        if len(name) > LONGEST_NAME:
-            what = f"ParameterName has {len(name)} characters, {LONGEST_NAME} were allowed"
+        if len(name) > _LONGEST_NAME:
+            what = f"ParameterName has {len(name)} characters, {_LONGEST_NAME} were allowed"
             yield document.found("name-length", what, section, "ParameterName")
         elif not name and document.file.has(section, "ParameterName"):
             what = "ParameterName is empty"
@@ -100,7 +100,7 @@ def sub_zeros(document: Document) -> Iterator[RuleFinding]:
 
 
 def _highest(document: Document, index: int, section: str, said: int) -> Iterator[RuleFinding]:
-    subs = [row.sub for row in document.entries(index) if row.sub != STRUCTURE]
+    subs = [row.sub for row in document.entries(index) if row.sub != _STRUCTURE]
     line = document.keyword(section, "DefaultValue")
     if said == max(subs) or section not in document.file.sections:
         return
@@ -133,7 +133,7 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
         return ()
     edits = [
         Edit(line.number)
-        for key in (*OF_ELEMENTS, "SubNumber")
+        for key in (*_OF_ELEMENTS, "SubNumber")
         if (line := document.keyword(section, key)) is not None
     ]
     for beside in (f"{section}Name", f"{section}Value"):
@@ -145,4 +145,4 @@ def compact_edits(document: Document, section: str) -> tuple[Edit, ...]:
     if count is not None:
         edits.append(Edit(count.number, lines=(f"SubNumber={len(rows)}",)))
     after = document.add_to(section, texts)
-    return (*edits, Edit(after.line, Place.AFTER, after.lines))
+    return (*edits, Edit(after.line, EditPlace.AFTER, after.lines))

@@ -9,36 +9,36 @@ from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.compact_pdo import ELEMENTS, WAYS
+from tickrig.wire.canopen.eds.eds_device import ELEMENTS, WAYS
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 
-RPDO: Final = range(0x1400, 0x1600)
-TPDO: Final = range(0x1800, 0x1A00)
-MAPPING: Final = 0x200
-INVALID: Final = 1 << 31
-EXTENDED: Final = 1 << 29
-IDS: Final = 0x7FF
-UPPER_BITS: Final = 0x1FFF_F800
-MOST_BITS: Final = 64
-MOST_MAPPED: Final = 64
-LOWEST_NODE: Final = 1
-HIGHEST_NODE: Final = 127
-RESTRICTED: Final = (
+_RPDO: Final = range(0x1400, 0x1600)
+_TPDO: Final = range(0x1800, 0x1A00)
+_MAPPING: Final = 0x200
+_INVALID: Final = 1 << 31
+_EXTENDED: Final = 1 << 29
+_IDS: Final = 0x7FF
+_UPPER_BITS: Final = 0x1FFF_F800
+_MOST_BITS: Final = 64
+_MOST_MAPPED: Final = 64
+_LOWEST_NODE: Final = 1
+_HIGHEST_NODE: Final = 127
+_RESTRICTED: Final = (
     *(range(0x080), range(0x101, 0x181), range(0x581, 0x600), range(0x601, 0x680)),
     *(range(0x6E0, 0x700), range(0x701, 0x800)),
 )
-SYNC: Final = 0x1005
-EMCY: Final = 0x1014
-SDO: Final = range(0x1200, 0x1300)
+_SYNC: Final = 0x1005
+_EMCY: Final = 0x1014
+_SDO: Final = range(0x1200, 0x1300)
 """Servers, clients from 1280h on; sub-indices 1 and 2 are COB-IDs."""
-DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
+_DEFAULT_SERVER: Final = {(0x1200, 1): 0x600, (0x1200, 2): 0x580}
 """The lowest CAN-ID, which the node-ID is added to."""
-ALL_SUBS: Final = (1 << len(ELEMENTS)) - 1
-NEEDED_SUBS: Final = 0b11
+_ALL_SUBS: Final = (1 << len(ELEMENTS)) - 1
+_NEEDED_SUBS: Final = 0b11
 """COB-ID and transmission type."""
-RESERVED: Final = 4
-NODE: Final = 5
+_RESERVED: Final = 4
+_NODE: Final = 5
 """The node-ID for which CAN-IDs are compared."""
 
 
@@ -53,11 +53,11 @@ def cob_ids(document: Document) -> Iterator[RuleFinding]:
 def _is_cob_id(row: EntryDescription) -> bool:
     match row.sub:
         case 0:
-            return row.index in (SYNC, EMCY)
+            return row.index in (_SYNC, _EMCY)
         case 1:
-            return any(row.index in area for area in (RPDO, TPDO, SDO))
+            return any(row.index in area for area in (_RPDO, _TPDO, _SDO))
         case 2:
-            return row.index in SDO
+            return row.index in _SDO
     return False
 
 
@@ -66,28 +66,28 @@ def _cob_id(
 ) -> Iterator[RuleFinding]:
     place = _section(document, row)
     values = [
-        int.from_bytes(row.power_on_data(node), "little") for node in (LOWEST_NODE, HIGHEST_NODE)
+        int.from_bytes(row.power_on_data(node), "little") for node in (_LOWEST_NODE, _HIGHEST_NODE)
     ]
-    if values[0] & (EXTENDED | (0 if row.index == SYNC else INVALID)):
+    if values[0] & (_EXTENDED | (0 if row.index == _SYNC else _INVALID)):
         return
-    if values[1] & UPPER_BITS:
-        what = f"0x{values[1]:08X} of node {HIGHEST_NODE} has no CAN-ID of 11 bits"
+    if values[1] & _UPPER_BITS:
+        what = f"0x{values[1]:08X} of node {_HIGHEST_NODE} has no CAN-ID of 11 bits"
         yield document.found("cob-id-range", what, place, "DefaultValue")
         return
-    ids = [value & IDS for value in values]
-    base = DEFAULT_SERVER.get((row.index, row.sub))
+    ids = [value & _IDS for value in values]
+    base = _DEFAULT_SERVER.get((row.index, row.sub))
     if base is not None and not _is_of_server(document, row, base):
         said = shorten(document.file.value(place, "DefaultValue"))
         what = f"DefaultValue={said} is not $NODEID+0x{base:X}"
         yield document.found("sdo-server", what, place, "DefaultValue")
-    elif base is None and any(can_id in area for can_id in ids for area in RESTRICTED):
+    elif base is None and any(can_id in area for can_id in ids for area in _RESTRICTED):
         what = f"CAN-ID 0x{ids[0]:03X} to 0x{ids[1]:03X} of nodes 1 to 127 is restricted"
         yield document.found("cob-id-restricted", what, place, "DefaultValue")
         return
-    own = int.from_bytes(row.power_on_data(NODE), "little") & IDS
+    own = int.from_bytes(row.power_on_data(_NODE), "little") & _IDS
     who = f"{row.index:04X}h:{row.sub:02X}"
     if own in taken:
-        what = f"CAN-ID 0x{own:03X} of node {NODE} is that of {taken[own]}, too"
+        what = f"CAN-ID 0x{own:03X} of node {_NODE} is that of {taken[own]}, too"
         yield document.found("cob-id-unique", what, place, "DefaultValue")
     taken.setdefault(own, who)
 
@@ -96,7 +96,7 @@ def _is_of_server(document: Document, row: EntryDescription, base: int) -> bool:
     """Return whether a default is that of the first server; that of one node is, in a DCF."""
     default = int.from_bytes(row.default, "little")
     if document.file.is_dcf and not row.relative:
-        return default in range(base + LOWEST_NODE, base + HIGHEST_NODE + 1)
+        return default in range(base + _LOWEST_NODE, base + _HIGHEST_NODE + 1)
     return row.relative and default == base
 
 
@@ -106,10 +106,10 @@ def compact(document: Document) -> Iterator[RuleFinding]:
     mask = number(document, title, key)
     if not mask or document.file.is_xml:
         return
-    if mask & ~ALL_SUBS:
-        what = f"CompactPDO=0x{mask:X} has bits beyond 0x{ALL_SUBS:X}"
+    if mask & ~_ALL_SUBS:
+        what = f"CompactPDO=0x{mask:X} has bits beyond 0x{_ALL_SUBS:X}"
         yield document.found("compact-pdo", what, title, key)
-    if ~mask & NEEDED_SUBS:
+    if ~mask & _NEEDED_SUBS:
         what = f"CompactPDO=0x{mask:X} leaves out sub-index 1 or 2, which each PDO has"
         yield document.found("compact-pdo", what, title, key)
     if not any(number(document, title, way.key) for way in WAYS):
@@ -121,11 +121,11 @@ def halves(document: Document) -> Iterator[RuleFinding]:
     """Find PDOs that lack their parameter or their mapping."""
     objects = document.device.objects
     for index in objects:
-        if (index in RPDO or index in TPDO) and index + MAPPING not in objects:
-            what = f"there is no mapping {index + MAPPING:04X}h"
+        if (index in _RPDO or index in _TPDO) and index + _MAPPING not in objects:
+            what = f"there is no mapping {index + _MAPPING:04X}h"
             yield document.found("pdo-half", what, f"{index:04X}")
-        parameter = index - MAPPING
-        if (parameter in RPDO or parameter in TPDO) and parameter not in objects:
+        parameter = index - _MAPPING
+        if (parameter in _RPDO or parameter in _TPDO) and parameter not in objects:
             what = f"there is no communication parameter {parameter:04X}h"
             yield document.found("pdo-half", what, f"{index:04X}")
 
@@ -135,10 +135,10 @@ def reserved(document: Document) -> Iterator[RuleFinding]:
     described = set[int]()
     for section, index, sub in document.file.objects():
         described.add(index)
-        if sub == RESERVED and (index in RPDO or index in TPDO):
+        if sub == _RESERVED and (index in _RPDO or index in _TPDO):
             yield document.found("pdo-reserved", "sub-index 4 is reserved", section)
-    implied = {*RPDO, *TPDO} & document.device.objects.keys() - described
-    if any(row.sub == RESERVED for index in implied for row in document.entries(index)):
+    implied = {*_RPDO, *_TPDO} & document.device.objects.keys() - described
+    if any(row.sub == _RESERVED for index in implied for row in document.entries(index)):
         title, key = "DeviceInfo", "CompactPDO"
         what = f"CompactPDO=0x{number(document, title, key):X} implies the reserved sub-index 4"
         yield document.found("pdo-reserved", what, title, key)
@@ -147,9 +147,9 @@ def reserved(document: Document) -> Iterator[RuleFinding]:
 def mappings(document: Document) -> Iterator[RuleFinding]:
     """Judge what is mapped by default."""
     for index in document.device.objects:
-        if index - MAPPING in RPDO:
+        if index - _MAPPING in _RPDO:
             yield from _mapping(document, index, Access.RPDO)
-        elif index - MAPPING in TPDO:
+        elif index - _MAPPING in _TPDO:
             yield from _mapping(document, index, Access.TPDO)
 
 
@@ -160,9 +160,9 @@ def _mapping(document: Document, index: int, way: Access) -> Iterator[RuleFindin
     count = len(in_use)
     if head is not None and head.has_default and head.data_type.is_integer:
         count = int.from_bytes(head.default, "little")
-    if count > MOST_MAPPED:  # an MPDO, or none
+    if count > _MOST_MAPPED:  # an MPDO, or none
         if count not in (254, 255):
-            what = f"{count} objects are mapped, {MOST_MAPPED} were allowed"
+            what = f"{count} objects are mapped, {_MOST_MAPPED} were allowed"
             yield document.found("mapping-count", what, f"{index:04X}sub0", "DefaultValue")
         return
     if head is not None and count > len(rows):
@@ -174,8 +174,8 @@ def _mapping(document: Document, index: int, way: Access) -> Iterator[RuleFindin
         bits += value & 0xFF
         if row.has_default:
             yield from _mapped(document, row, value, way)
-    if bits > MOST_BITS:
-        what = f"{bits} bits are mapped, {MOST_BITS} were allowed"
+    if bits > _MOST_BITS:
+        what = f"{bits} bits are mapped, {_MOST_BITS} were allowed"
         yield document.found("pdo-length", what, f"{index:04X}")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import Edit, Place, RuleFinding
+from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.known_keys import (
     SECTION,
     is_number,
@@ -16,8 +16,7 @@ from tickrig.host.canopen.data_sheet.rules.known_keys import (
 )
 from tickrig.host.canopen.data_sheet.rules.value_rules import kind_of
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_lines import KNOWN_SECTIONS, EdsLine
-from tickrig.wire.canopen.eds.eds_value import without_comment
+from tickrig.wire.canopen.eds.eds_value import KNOWN_SECTIONS, EdsLine, without_comment
 
 _CONTROLS: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 _PLAIN: Final = re.compile(
@@ -30,7 +29,7 @@ _BEHIND_WORD: Final = re.compile(r"(?<!\s)\s*+(?:[#;]|//).*$")
 
 def encoding(document: Document) -> Iterator[RuleFinding]:
     """Find what the bytes of the file are not: ASCII without a mark."""
-    edit = Edit(0, Place.ENCODING)
+    edit = Edit(0, EditPlace.ENCODING)
     if document.encoding.startswith("utf-16"):
         yield document.found("utf-16", "the file is UTF-16, ASCII was allowed", "", 0, edit)
     elif document.has_bom and not document.file.is_xml:
@@ -58,7 +57,7 @@ def line_ends(document: Document) -> Iterator[RuleFinding]:
         return
     if "\r" in ends:
         first = document.ends.index("\r") + 1
-        edit = Edit(0, Place.LINE_ENDS)
+        edit = Edit(0, EditPlace.LINE_ENDS)
         yield document.found("line-ends", "the line ends with CR alone", "", first, edit)
     elif len(ends) > 1:
         other = document.ends.index("\n" if document.ends[0] == "\r\n" else "\r\n") + 1

@@ -10,9 +10,9 @@ from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.data_sheet.rules.head_rules import number
 from tickrig.host.canopen.data_sheet.rules.list_rules import LISTS, ObjectList, described
 from tickrig.wire.canopen.eds.eds_file import shorten
-from tickrig.wire.canopen.eds.eds_lines import object_section
+from tickrig.wire.canopen.eds.eds_value import object_section
 
-SIGNS: Final = 2
+_SIGNS: Final = 2
 """One alone may be a slip: a missing line end, one object that is only listed."""
 
 
@@ -24,7 +24,7 @@ def truncated(document: Document) -> Iterator[RuleFinding]:
     last = lines[-1].section
     lost = _listed_behind(document, last)
     signs = len(lost) + (document.texts[-1] != "") + _is_short(document, last)
-    if signs >= SIGNS and (lost or _is_short(document, last)):
+    if signs >= _SIGNS and (lost or _is_short(document, last)):
         rest = f"; {lost[0]:04X}h and {len(lost) - 1} more are listed" if lost else ""
         what = f"the file looks truncated: it ends in [{shorten(last)}]{rest}"
         yield document.found("truncated", what, "", lines[-1].number)

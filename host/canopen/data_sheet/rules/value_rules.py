@@ -8,36 +8,37 @@ from itertools import takewhile
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
-from tickrig.host.canopen.data_sheet.rule import Edit, RuleFinding
-from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.rule import RULES, Edit, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.known_keys import is_number
 from tickrig.host.canopen.data_sheet.rules.object_rules import compact_edits
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS
 from tickrig.wire.canopen.eds.eds_file import Finding, shorten
-from tickrig.wire.canopen.eds.eds_lines import EdsLine, describes_device, object_section
 from tickrig.wire.canopen.eds.eds_value import (
     FLOATS,
     NODE_IDS,
     TIMES,
+    EdsLine,
+    describes_device,
     is_hex_bytes,
+    object_section,
     parse_limit,
     plain_numbers,
     without_comment,
 )
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectCode
 
-OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
+_OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
 _CANDIDATE: Final = re.compile(r"\b0[0-9]|nodeid", re.IGNORECASE)
-NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
-NUMBERS: Final = frozenset(
+_NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
+_NUMBERS: Final = frozenset(
     kind for kind in DataType if kind.is_integer or kind in (*FLOATS, *TIMES)
 )
 """Data types that have a number for a value."""
-VALUES: Final = frozenset({"defaultvalue", "lowlimit", "highlimit", "parametervalue"})
-NUMBERED: Final = re.compile(r"(line)?0+([1-9][0-9]*)", re.IGNORECASE | re.ASCII)
+_VALUES: Final = frozenset({"defaultvalue", "lowlimit", "highlimit", "parametervalue"})
+_NUMBERED: Final = re.compile(r"(line)?0+([1-9][0-9]*)", re.IGNORECASE | re.ASCII)
 """Keywords of lists that are written with leading zeros."""
-OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
+_OF_ELEMENTS: Final = re.compile(r"([0-9A-F]{4})(Value|Name|Denotation)")
 
 
 def numbers(document: Document) -> Iterator[RuleFinding]:
@@ -53,7 +54,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
         if line.section == "FileInfo" or (document.file.is_xml and line.key == "ObjFlags"):
             continue  # `file_info` looks at the form of a version; flags of XML are hexadecimal
         terms = without_comment(line.value).replace(" ", "").split("+")
-        if any(OCTAL.fullmatch(term) for term in terms) and (kind is None or kind.is_integer):
+        if any(_OCTAL.fullmatch(term) for term in terms) and (kind is None or kind.is_integer):
             yield _leading_zero(document, line, terms)
         elif kind is not None and kind.is_integer and "nodeid" in line.value.lower():
             yield from _node_id(document, line.section, line)
@@ -62,7 +63,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
 def list_numbers(document: Document) -> Iterator[RuleFinding]:
     """Find keywords of lists whose own number has leading zeros: other readers do not find them."""
     for line in () if document.file.is_xml else document.file.lines:
-        zeros = NUMBERED.fullmatch(line.key) if line.is_keyword else None
+        zeros = _NUMBERED.fullmatch(line.key) if line.is_keyword else None
         if zeros is None or object_section(line.section) is not None:
             continue
         spelled = f"{zeros[1] or ''}{zeros[2]}"
@@ -74,22 +75,22 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
 
 def kind_of(document: Document, line: EdsLine) -> DataType | None:
     """Return the data type of the value that a line gives, None if it gives none, or no number."""
-    of_elements = OF_ELEMENTS.fullmatch(line.section)
+    of_elements = _OF_ELEMENTS.fullmatch(line.section)
     place = object_section(line.section)
     if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():
         at = int(of_elements[1], 16), int(line.key)
-    elif place is not None and line.key.lower() in VALUES:
+    elif place is not None and line.key.lower() in _VALUES:
         compact = place[1] is None and document.file.has(line.section, "CompactSubObj")
         at = place[0], int(compact) if place[1] is None else place[1]
     else:
         return None
     row = document.rows.get(at)
-    return row.data_type if row is not None and row.data_type in NUMBERS else None
+    return row.data_type if row is not None and row.data_type in _NUMBERS else None
 
 
 def _leading_zero(document: Document, line: EdsLine, terms: list[str]) -> RuleFinding:
     """Judge a number, or a sum with the node-ID; a value is mended that is one either way."""
-    octal = [term for term in terms if OCTAL.fullmatch(term)]
+    octal = [term for term in terms if _OCTAL.fullmatch(term)]
     first = octal[0]
     what = f"{shorten(line.content)} is {int(first, 8)} in octal, {int(first)} in decimal"
     if len(terms) > 1:
@@ -105,13 +106,13 @@ def _leading_zero(document: Document, line: EdsLine, terms: list[str]) -> RuleFi
 def _node_id(document: Document, section: str, line: EdsLine) -> Iterator[RuleFinding]:
     """Judge what the node-ID is added to; blanks are left to the author."""
     plain = line.value.replace(" ", "")
-    if NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
+    if _NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
         return
     terms = plain.upper().split("+")
     others = [plain_numbers(term.replace("0X", "0x")) for term in terms if term not in NODE_IDS]
     mended = "+".join(("$NODEID", *others))
     edits: tuple[Edit, ...] = ()
-    if len(others) == len(terms) - 1 and NODE_ID.fullmatch(mended) and not document.file.is_xml:
+    if len(others) == len(terms) - 1 and _NODE_ID.fullmatch(mended) and not document.file.is_xml:
         edits = (document.with_value(line, mended),)
     what = f"{shorten(line.content)} is not $NODEID or $NODEID+NUMBER"
     if edits:
@@ -168,7 +169,7 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
     file = document.file
     by_line = {line.number: line for line in file.lines}
     for finding in (*file.errors, *file.warnings):
-        if finding.rule in OF_LINES:
+        if finding.rule in _OF_LINES:
             continue
         line, mend = by_line.get(finding.line), _MENDS.get(finding.rule)
         edits: tuple[Edit, ...] = ()
@@ -179,7 +180,7 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
         text = finding.reason
         if finding.rule == "doubled-section" and line is not None:
             text = _doubled_text(document, line)
-        elif finding.rule in OF_ONE_ENTRY and _is_compact_record(document, finding.section):
+        elif finding.rule in _OF_ONE_ENTRY and _is_compact_record(document, finding.section):
             text += "; better than adding it, describe each entry of the RECORD"
         where = shorten(finding.section)
         yield RuleFinding(RULES[finding.rule], document.name, finding.line, where, text, edits)
@@ -331,9 +332,9 @@ _MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]
     "compact-record": _compact,
 }
 
-OF_LINES: Final = ("inline-comment", "sub0-missing")
+_OF_LINES: Final = ("inline-comment", "sub0-missing")
 """Rules of the reader that a rule over lines or objects tells of, too."""
-OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
+_OF_ONE_ENTRY: Final = ("data-type-missing", "access-missing")
 
 
 def stray_lines(document: Document) -> Iterator[RuleFinding]:

@@ -8,28 +8,32 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_file import BusFile
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusPdo, BusSlave
-from tickrig.host.canopen.bus_file.notes import Notes
+from tickrig.host.canopen.bus_file.notes import BusFileNotes
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
-from tickrig.host.canopen.master.cia402.drive_driver import AXIS, CONTROLWORD, READ
+from tickrig.host.canopen.master.cia402.drive_driver import (
+    AXIS,
+    CONTROLWORD,
+    READ,
+    is_drive,
+    period_us_of,
+)
 from tickrig.host.canopen.master.cia402.drive_mode import TARGETS, DriveObject
-from tickrig.host.canopen.master.cia402.drive_settings import is_drive, period_us_of
 from tickrig.host.canopen.master.process_image import EVENT_DRIVEN, Key, keys
 from tickrig.host.text.values import counted
-from tickrig.wire.can import data_frame
-from tickrig.wire.can_bits import frame_bits
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.can import data_frame, frame_bits
+from tickrig.wire.canopen.nmt import CAN_ID_MASK
+from tickrig.wire.canopen.sdo import (
     DownloadInitiateRequest,
     DownloadInitiateResponse,
     UploadInitiateRequest,
     UploadInitiateResponse,
 )
-from tickrig.wire.canopen.sdo.sdo_command import REQUEST_COB_ID, RESPONSE_COB_ID
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
-MOST: Final = 0.8
+_MOST: Final = 0.8
 """Part of a bus from which on periods are left out: what was asked is not answered in time."""
 
-Load = float
+_Load = float
 """Bits in a microsecond."""
 
 
@@ -38,29 +42,29 @@ def check_load(bus: BusFile) -> tuple[RuleFinding, ...]:
 
     Frames are counted to the bit, with values of 0.
     """
-    notes, master = Notes(), bus.master
+    notes, master = BusFileNotes(), bus.master
     if master is not None:
         polled = [load for slave in bus.slaves.values() if (load := polling_load(slave, master))]
         rate = master.baudrate / 1_000
         sdo = fsum(polled) / rate
         pdos = fsum(pdo_load(slave, master) for slave in bus.slaves.values()) / rate
-        if sdo + pdos > MOST:
+        if sdo + pdos > _MOST:
             text = _said(len(polled), sdo, pdos)
             notes.note("bus-load", master.place, "", f"{master.baudrate} kbit/s: {text}")
     return notes.all
 
 
-def _said(drives: int, sdo: Load, pdos: Load) -> str:
+def _said(drives: int, sdo: _Load, pdos: _Load) -> str:
     """Say what takes how much, and how many drives would not be too many."""
     text = f"{sdo + pdos:.0%} of the bus in each period"
     if not drives:
         return f"{text} for PDOs"
-    fitting = max(0, int(drives * (MOST - pdos) / sdo))
+    fitting = max(0, int(drives * (_MOST - pdos) / sdo))
     what = f"polling of {counted(drives, 'drive')} by SDO {sdo:.0%}, PDOs {pdos:.0%}"
-    return f"{text}: {what}; {MOST:.0%} would do for {fitting} of them"
+    return f"{text}: {what}; {_MOST:.0%} would do for {fitting} of them"
 
 
-def polling_load(slave: BusSlave, master: BusMaster) -> Load:
+def polling_load(slave: BusSlave, master: BusMaster) -> _Load:
     """Return what is asked of a drive, and told it, by SDO."""
     period_us = period_us_of(slave) or master.sync_period_us
     if not (is_drive(slave) and slave.boot and period_us):
@@ -99,13 +103,13 @@ def _bits(slave: BusSlave, request: bytes, response: bytes) -> int:
     return frame_bits(there) + frame_bits(back)
 
 
-def pdo_load(slave: BusSlave, master: BusMaster) -> Load:
+def pdo_load(slave: BusSlave, master: BusMaster) -> _Load:
     """Return what PDOs take that come in periods."""
     written_us = period_us_of(slave) or master.sync_period_us if is_drive(slave) else 0
     return fsum(_loads((pdo for pdo in slave.pdos if pdo.enabled), master, written_us))
 
 
-def _loads(pdos: Iterable[BusPdo], master: BusMaster, written_us: int) -> Iterator[Load]:
+def _loads(pdos: Iterable[BusPdo], master: BusMaster, written_us: int) -> Iterator[_Load]:
     for pdo in pdos:
         period_us = master.sync_period_us * max(1, pdo.transmission)
         if pdo.transmission >= EVENT_DRIVEN:

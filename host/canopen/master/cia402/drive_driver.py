@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Final, TypeVar
 
+from tickrig.host.canopen.bus_file.bus_values import BusSlave, DriveChannel
+from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.dialogue import QueuedScript, Script
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.canopen.master.cia402.drive_mode import (
@@ -17,40 +20,165 @@ from tickrig.host.canopen.master.cia402.drive_mode import (
     HomingMode,
     ModeNumber,
 )
-from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
 from tickrig.host.canopen.master.cia402.drive_state import (
     MODE_BITS,
     Controlword,
     DriveState,
+    Statusword,
     lead,
     next_state,
     state_of,
 )
-from tickrig.host.canopen.master.cia402.homing import home
+from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.process_image import Key, ProcessImage
-from tickrig.host.canopen.master.waiting import DriveFailed, Until
+from tickrig.host.canopen.master.waiting import DriveFailed, Operation, Until
+from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.wire.instant import NEVER
+
+# How a drive is driven, as its bus.yml says.
+
+_DRIVE_PROFILE: Final = 402
+_PERIOD_MS: Final = 10
+_HOMING_S: Final = 10
+_ENABLED: Final = 5
+
+_SWITCHING_STATES: Final = {
+    2: DriveState.SWITCH_ON_DISABLED,
+    3: DriveState.READY_TO_SWITCH_ON,
+    4: DriveState.SWITCHED_ON,
+    5: DriveState.OPERATION_ENABLED,
+    6: DriveState.QUICK_STOP_ACTIVE,
+}
+"""`switching_state` of a bus.yml, by its number."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSettings:
+    """How an axis is driven.
+
+    Attributes:
+        channel: its name, its scales and offsets.
+        axis: 0 for the first axis of the device.
+        switching_state: in this state the mode is changed.
+        homing_us: how long homing may take.
+    """
+
+    channel: DriveChannel
+    axis: int = 0
+    switching_state: DriveState = DriveState.OPERATION_ENABLED
+    homing_us: int = 1_000_000 * _HOMING_S
+
+
+def is_drive(slave: BusSlave) -> bool:
+    """Say whether a slave is driven as a drive: by its driver, or else its device type."""
+    if slave.driver:
+        return "402" in slave.driver
+    return slave.identity.device_type & 0xFFFF == _DRIVE_PROFILE
+
+
+def axes_of(slave: BusSlave) -> tuple[DriveSettings, ...]:
+    """Return how the axes of a drive are driven."""
+    state = _SWITCHING_STATES[_number(slave, "switching_state", _ENABLED)]
+    homing_us = 1_000_000 * _number(slave, "homing_timeout_seconds", _HOMING_S)
+    return tuple(
+        DriveSettings(channel, axis, state, homing_us)
+        for axis, channel in enumerate(slave.channels)
+    )
+
+
+def period_us_of(slave: BusSlave) -> int:
+    """Return the period in which ros2_canopen polls a node, 0 if it does with each SYNC."""
+    if not _number(slave, "polling", 1):
+        return 0
+    return 1_000 * _number(slave, "period", _PERIOD_MS)
+
+
+def _number(slave: BusSlave, key: str, default: int) -> int:
+    """Return a setting, the default where the driver does not take what is there."""
+    item = slave.settings.get(key)
+    value = None if item is None else SETTINGS[key].value_of(item)
+    return default if value is None else value
+
+
+# How homing goes, by bits 10, 12 and 13 of the statusword (CiA 402-2, homing mode).
+
+_START_US: Final = 1_000_000
+"""So soon the drive is at rest before homing, and homing has begun."""
+
+_SEEN_US: Final = 100_000
+"""By then a drive that has homed before shows that it homes again."""
+
+_REACHED: Final = Statusword.TARGET_REACHED
+_ATTAINED: Final = Statusword.MODE_12
+_ERROR: Final = Statusword.MODE_13
+
+
+async def home(
+    name: str, mode: HomingMode, within_us: int, caught_up: Callable[[], Operation]
+) -> None:
+    """Start homing in a drive that is in this mode, and wait for its end.
+
+    Args:
+        name: of the joint.
+        mode: what the drive is in.
+        within_us: how long homing may take.
+        caught_up: waits until the statusword is of after the controlword.
+
+    Raises:
+        DriveFailed: it does not start, does not end in time, or reports an error.
+    """
+    try:
+        await _home(name, mode, within_us, caught_up)
+    finally:
+        mode.runs = False
+
+
+async def _home(
+    name: str, mode: HomingMode, within_us: int, caught_up: Callable[[], Operation]
+) -> None:
+    await _await(name, mode, _ERROR | _REACHED, 0, _START_US, "is not at rest")
+    mode.runs = True
+    every = _ERROR | _ATTAINED | _REACHED
+    if mode.status & _ATTAINED:  # by the homing before: the bit may fall and rise unseen
+        await caught_up()
+        with suppress(DriveFailed):
+            await Until(lambda: not mode.status & _ATTAINED, _SEEN_US, "")
+    else:
+        await _await(name, mode, every, _REACHED, _START_US, "did not start")
+    await _await(name, mode, _ERROR | _ATTAINED, 0, within_us, "did not find home")
+    await _await(name, mode, _ERROR | _REACHED, 0, within_us, "did not come to rest")
+
+
+async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
+    name: str, mode: HomingMode, mask: int, before: int, within_us: int, complaint: str
+) -> None:
+    """Wait until some bits are no longer as before; raise DriveFailed where they say error."""
+    await Until(lambda: mode.status & mask != before, within_us, f"{name}: homing {complaint}")
+    if mode.status & _ERROR:
+        raise DriveFailed(f"{name}: homing error (bit 13 of the statusword)")
+
 
 CONTROLWORD: Final = DriveObject(0x6040, 2, signed=False)
-STATUSWORD: Final = DriveObject(0x6041, 2, signed=False)
-MODE: Final = DriveObject(0x6060, 1)
-MODE_DISPLAY: Final = DriveObject(0x6061, 1)
-POSITION: Final = DriveObject(0x6064, 4)
-VELOCITY: Final = DriveObject(0x606C, 4)
-TORQUE: Final = DriveObject(0x6077, 2)
-READ: Final = (STATUSWORD, MODE_DISPLAY, POSITION, VELOCITY, TORQUE)
+_STATUSWORD: Final = DriveObject(0x6041, 2, signed=False)
+_MODE: Final = DriveObject(0x6060, 1)
+_MODE_DISPLAY: Final = DriveObject(0x6061, 1)
+_POSITION: Final = DriveObject(0x6064, 4)
+_VELOCITY: Final = DriveObject(0x606C, 4)
+_TORQUE: Final = DriveObject(0x6077, 2)
+READ: Final = (_STATUSWORD, _MODE_DISPLAY, _POSITION, _VELOCITY, _TORQUE)
 """In each period."""
 
-HOMING_METHOD: Final = DriveObject(0x6098, 1)
-SUPPORTED: Final = DriveObject(0x6502, 4, signed=False)
+_HOMING_METHOD: Final = DriveObject(0x6098, 1)
+_SUPPORTED: Final = DriveObject(0x6502, 4, signed=False)
 
 AXIS: Final = 0x800
 """From the objects of an axis to those of the next."""
 
-CAUGHT_UP: Final = 3
+_CAUGHT_UP: Final = 3
 """So many statuswords after an answer, one is of after all that was sent before."""
 
-SWITCH_US: Final = 5_000_000
+_SWITCH_US: Final = 5_000_000
 """How long a change of state or of mode may take."""
 
 T = TypeVar("T")
@@ -100,23 +228,23 @@ class DriveDriver:
     def doubt(self) -> None:
         """Know nothing of the drive's state until its next statusword."""
         self._known = False
-        self._image.doubt(self._key(STATUSWORD))
+        self._image.doubt(self._key(_STATUSWORD))
 
     @property
     def position(self) -> float:
         """Where the joint is, in its user's units."""
         channel = self._channel
-        return self._value(POSITION) * channel.scale_pos_from_dev + channel.offset_pos_from_dev
+        return self._value(_POSITION) * channel.scale_pos_from_dev + channel.offset_pos_from_dev
 
     @property
     def velocity(self) -> float:
         """How fast it is."""
-        return self._value(VELOCITY) * self._channel.scale_vel_from_dev
+        return self._value(_VELOCITY) * self._channel.scale_vel_from_dev
 
     @property
     def effort(self) -> float:
         """The torque that it has, 0 if the drive cannot say."""
-        return self._value(TORQUE) * self._channel.scale_eff_from_dev
+        return self._value(_TORQUE) * self._channel.scale_eff_from_dev
 
     def set_target(self, target: float) -> None:
         """Take a set-point for the chosen mode, in the user's units; a torque in per mille.
@@ -140,8 +268,8 @@ class DriveDriver:
         """Read, then write, as is done in each period."""
         for item in READ:
             yield from self._read(item)
-        self.statusword, self.mode = self._value(STATUSWORD), self._value(MODE_DISPLAY)
-        key = self._key(STATUSWORD)
+        self.statusword, self.mode = self._value(_STATUSWORD), self._value(_MODE_DISPLAY)
+        key = self._key(_STATUSWORD)
         self._known = key in self._missing or self._image.is_fresh(key)
         if self.mode == self._chosen:
             self._mode.read(self.statusword)
@@ -171,7 +299,7 @@ class DriveDriver:
         Raises:
             DriveFailed: it does not get there in time.
         """
-        await Until(lambda: self.cycles > 0, SWITCH_US, f"{self.name}: the node has not booted")
+        await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault = 0, True
         await self.switch_to(DriveState.OPERATION_ENABLED)
         if await self._supports(ModeNumber.HOMING):
@@ -208,7 +336,7 @@ class DriveDriver:
         """
         goal = DriveState.of(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
-        await Until(lambda: self._known, SWITCH_US, silent)
+        await Until(lambda: self._known, _SWITCH_US, silent)
         while (state := self.state) is not goal:
             following = next_state(state, goal)
             word = lead(self.controlword, state, following)
@@ -218,7 +346,7 @@ class DriveDriver:
             await self._leave(state, f"{self.name}: {following.value} was not reached")
 
     async def _leave(self, state: DriveState, complaint: str) -> None:
-        await Until(lambda: self.state is not state, SWITCH_US, complaint)
+        await Until(lambda: self.state is not state, _SWITCH_US, complaint)
 
     async def choose(self, mode: int | str) -> None:
         """Change the mode of operation; the drive has no target then, and is halted.
@@ -234,7 +362,7 @@ class DriveDriver:
         number = ModeNumber.of(mode)
         if number is ModeNumber.NONE:
             self._chosen, self._mode = number, DriveMode()
-            await self._exchange(self._write(MODE, number))
+            await self._exchange(self._write(_MODE, number))
             return
         if not await self._supports(number):
             raise DriveFailed(f"{self.name}: the drive has no mode {number} (6502h)")
@@ -242,10 +370,10 @@ class DriveDriver:
         chosen.begin()
         self._chosen, self._mode = ModeNumber.NONE, DriveMode()
         await self.switch_to(self._settings.switching_state)
-        await self._exchange(self._write(MODE, number))
+        await self._exchange(self._write(_MODE, number))
         await Until(
             lambda: self.mode == number,
-            SWITCH_US,
+            _SWITCH_US,
             f"{self.name}: mode {number} is not shown in 6061h",
         )
         self._chosen, self._mode = number, chosen
@@ -253,12 +381,12 @@ class DriveDriver:
 
     async def _supports(self, number: ModeNumber) -> bool:
         """Say whether 6502h has a mode."""
-        modes = await self._exchange(self._read(SUPPORTED))
+        modes = await self._exchange(self._read(_SUPPORTED))
         return bool(modes >> number - 1 & 1)
 
     async def _home(self) -> None:
         """Home, unless the method is 0."""
-        method = await self._exchange(self._read(HOMING_METHOD))
+        method = await self._exchange(self._read(_HOMING_METHOD))
         if method and isinstance(self._mode, HomingMode):
             await home(self.name, self._mode, self._settings.homing_us, self._catch_up)
 
@@ -268,17 +396,17 @@ class DriveDriver:
         Who has answered an SDO has the RPDOs before it; which a SYNC may still have to bring into
         force, and then a TPDO has to come.
         """
-        key, late = self._key(STATUSWORD), f"{self.name}: no statusword"
+        key, late = self._key(_STATUSWORD), f"{self.name}: no statusword"
         await self._next_cycle()
         await self._exchange(self._request(key))
-        heard = self._image.count(key) + CAUGHT_UP
-        await Until(lambda: self._image.count(key) >= heard, SWITCH_US, late)
+        heard = self._image.count(key) + _CAUGHT_UP
+        await Until(lambda: self._image.count(key) >= heard, _SWITCH_US, late)
         await self._next_cycle()
 
     async def _next_cycle(self) -> None:
         """Wait until the drive was read and written."""
         cycles = self.cycles
-        await Until(lambda: self.cycles > cycles, SWITCH_US, f"{self.name}: the node was lost")
+        await Until(lambda: self.cycles > cycles, _SWITCH_US, f"{self.name}: the node was lost")
 
     def _request(self, key: Key) -> Script[None]:
         """Have the drive answer, whatever it says."""
@@ -290,7 +418,7 @@ class DriveDriver:
         ended: list[T | Exception] = []
         lost = DriveFailed(f"{self.name}: the node was lost")
         self._talk(QueuedScript("", script, ended.append, ended.append, lambda: ended.append(lost)))
-        await Until(lambda: bool(ended), SWITCH_US, f"{self.name}: no answer")
+        await Until(lambda: bool(ended), _SWITCH_US, f"{self.name}: no answer")
         if isinstance(ended[0], Exception):
             raise DriveFailed(f"{self.name}: {ended[0]}") from ended[0]
         return ended[0]
@@ -326,3 +454,83 @@ class DriveDriver:
 
     def _where(self) -> str:
         return f"{self.state.value} (statusword {self.statusword:04X}h)"
+
+
+# The axes of one node, driven in its period.
+
+_AWAITED_US: Final = 3_000_000
+"""How long a driver of ros2_canopen waits for the boot-up of its node: three times 1 s."""
+
+
+class DriveNode:
+    """Drives its axes, one after the other, in each period and while the node is booted.
+
+    A period in which the last one's SDO transfers still last is left out.
+
+    Args:
+        slave: the node.
+        image: what its PDOs carry.
+        axes: how each is driven.
+        period_us: 0 for once with each SYNC.
+
+    Attributes:
+        drivers: one for each axis.
+    """
+
+    def __init__(
+        self,
+        slave: NetworkSlave,
+        image: ProcessImage,
+        axes: tuple[DriveSettings, ...],
+        period_us: int,
+    ) -> None:
+        self._slave, self._period_us = slave, period_us
+        self._lost = slave.lost
+        self.drivers = tuple(DriveDriver(axis, image, self._talk) for axis in axes)
+        self._timer, self._busy, self._now_us = PeriodicTimer(period_us), False, 0
+
+    @property
+    def due_us(self) -> int:
+        """When `tick` has something to do."""
+        return self._timer.due_us if self._slave.good else NEVER
+
+    @property
+    def is_booted(self) -> bool:
+        """Whether its node has booted."""
+        return self._slave.good
+
+    def is_awaited(self, now_us: int) -> bool:
+        """Whether its node boots, and not for so long that nobody waits any more."""
+        return self._slave.booting and now_us - self._slave.began_us < _AWAITED_US
+
+    def tick(self, now_us: int, *, sync: bool) -> None:
+        """Begin a period, if one is due.
+
+        Args:
+            now_us: the time.
+            sync: a SYNC was sent just now.
+        """
+        self._now_us = now_us
+        if self._lost != self._slave.lost or not self._slave.good:
+            self._lost = self._slave.lost
+            for driver in self.drivers:
+                driver.doubt()
+        if not self._slave.good:
+            self._timer = PeriodicTimer(self._period_us)
+            return
+        if self._period_us and self._timer.due_us == NEVER:
+            self._timer.start(now_us)
+        due = self._timer.advance(now_us) if self._period_us else sync
+        if due and not self._busy:
+            self._busy = True
+            self._talk(QueuedScript("cycle", self._cycle(), self._end, self._end, self._end))
+
+    def _cycle(self) -> Script[None]:
+        for driver in self.drivers:
+            yield from driver.cycle()
+
+    def _talk(self, script: QueuedScript) -> None:
+        self._slave.dialogue.start(self._now_us, script)
+
+    def _end(self, _result: object = None) -> None:
+        self._busy = False

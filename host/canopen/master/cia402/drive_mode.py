@@ -12,10 +12,10 @@ from tickrig.host.canopen.dialogue import Script
 from tickrig.host.canopen.master.cia402.drive_state import Controlword, Statusword
 from tickrig.host.text.names import near
 
-START: Final = Controlword.MODE_4
+_START: Final = Controlword.MODE_4
 """New set-point, start homing, interpolate."""
 
-AT_ONCE: Final = Controlword.MODE_5
+_AT_ONCE: Final = Controlword.MODE_5
 
 
 class ModeNumber(IntEnum):
@@ -92,7 +92,7 @@ class DriveObject:
         return value & (1 << 8 * self.size) - 1
 
 
-Write = Callable[[DriveObject, int], Script[None]]
+_Write = Callable[[DriveObject, int], Script[None]]
 
 
 class DriveMode:
@@ -115,7 +115,7 @@ class DriveMode:
     def read(self, statusword: int) -> None:
         """Take the statusword of this period."""
 
-    def write(self, write: Write) -> Script[bool]:
+    def write(self, write: _Write) -> Script[bool]:
         """Write the set-point; return whether there is one: without, the drive is halted."""
         yield from ()
         return False
@@ -148,7 +148,7 @@ class TargetMode(DriveMode):
             raise ValueError(f"{value} is no target")
         self._target = max(self._object.lowest, min(int(value), self._object.highest))
 
-    def write(self, write: Write) -> Script[bool]:
+    def write(self, write: _Write) -> Script[bool]:
         """Write the target, if there is one."""
         if self._target is None:
             self.controlword &= ~self._bits
@@ -171,19 +171,19 @@ class ProfilePositionMode(TargetMode):
         """Look for the acknowledge."""
         self._acknowledged = bool(statusword & Statusword.MODE_12)
 
-    def write(self, write: Write) -> Script[bool]:
+    def write(self, write: _Write) -> Script[bool]:
         """Raise bit 4 for a new target, let it fall when it is acknowledged."""
-        self.controlword |= AT_ONCE
+        self.controlword |= _AT_ONCE
         if self._target is None:
             return False
         if self._acknowledged:
-            self.controlword &= ~START
+            self.controlword &= ~_START
         elif self._target != self._given:
-            if self.controlword & START:
-                self.controlword &= ~START
+            if self.controlword & _START:
+                self.controlword &= ~_START
             else:
                 yield from write(self._object, self._target)
-                self.controlword |= START
+                self.controlword |= _START
                 self._given = self._target
         return True
 
@@ -206,9 +206,9 @@ class HomingMode(DriveMode):
         """Take its bits."""
         self.status = statusword & self.MASK
 
-    def write(self, write: Write) -> Script[bool]:
+    def write(self, write: _Write) -> Script[bool]:
         """Set bit 4 while homing is to run."""
-        self.controlword = int(START) if self.runs else 0
+        self.controlword = int(_START) if self.runs else 0
         yield from ()
         return self.runs
 
@@ -228,7 +228,7 @@ MODES: Final[Mapping[ModeNumber, Callable[[], DriveMode]]] = {
     ModeNumber.PROFILE_VELOCITY: lambda: TargetMode(_SPEED),
     ModeNumber.PROFILE_TORQUE: lambda: TargetMode(_TORQUE),
     ModeNumber.HOMING: HomingMode,
-    ModeNumber.INTERPOLATED_POSITION: lambda: TargetMode(_INTERPOLATED, START),
+    ModeNumber.INTERPOLATED_POSITION: lambda: TargetMode(_INTERPOLATED, _START),
     ModeNumber.CYCLIC_POSITION: lambda: TargetMode(_POSITION),
     ModeNumber.CYCLIC_VELOCITY: lambda: TargetMode(_SPEED),
     ModeNumber.CYCLIC_TORQUE: lambda: TargetMode(_TORQUE),

@@ -111,7 +111,7 @@ TRANSITIONS: Final = {
     (DriveState.QUICK_STOP_ACTIVE, DriveState.OPERATION_ENABLED): _ENABLE_OPERATION,  # 16
 }
 
-ENABLING: Final = {
+_ENABLING: Final = {
     DriveState.FAULT_REACTION_ACTIVE: DriveState.FAULT,
     DriveState.FAULT: DriveState.SWITCH_ON_DISABLED,
     DriveState.NOT_READY_TO_SWITCH_ON: DriveState.SWITCH_ON_DISABLED,
@@ -133,7 +133,7 @@ def state_of(statusword: int) -> DriveState:
 
 def next_state(state: DriveState, goal: DriveState) -> DriveState:
     """Return the next state on the way to another: it itself, unless that is Operation enabled."""
-    return ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
+    return _ENABLING.get(state, goal) if goal is DriveState.OPERATION_ENABLED else goal
 
 
 def lead(controlword: int, state: DriveState, following: DriveState) -> int | None:

@@ -6,26 +6,23 @@ from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
 from tickrig.host.rtc.canopen.builder.c_header import write_header
-from tickrig.host.rtc.canopen.builder.names import check_identifiers, snake_name
-from tickrig.host.rtc.canopen.builder.profile_file import Project
+from tickrig.host.rtc.canopen.builder.profile_file import Project, check_identifiers, snake_name
 from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
-from tickrig.host.rtc.canopen.definition.definition import (
-    NodeEntry,
-    SdoPortEntry,
-    SystemDefinition,
-)
-from tickrig.host.rtc.canopen.definition.definition_writer import write_definition
+from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry, SystemDefinition
+from tickrig.host.rtc.canopen.definition_writer import write_definition
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.rtc_canopen.objects import device_info, object_table
-from tickrig.wire.rtc_canopen.port_types import INTEGER, CanopenPortType
-from tickrig.wire.rtc_canopen.profile import (
+from tickrig.wire.rtc_canopen import (
     FIRST_PORT,
+    INTEGER,
+    CanopenPortType,
     PlacedPort,
     PortDirection,
     PortTransport,
     RtcProfile,
+    device_info,
+    object_table,
 )
 
 
@@ -41,19 +38,19 @@ def build(project: Project) -> dict[str, str]:
     return {
         f"{stem}.eds": write_eds(object_table(profile), device_info(profile)),
         f"{stem}_od.h": write_header(profile),
-        f"{stem}.yaml": write_fragment(project),
+        f"{stem}.yaml": _write_fragment(project),
         f"{stem}{SKELETON_SUFFIX}": write_skeleton(project),
     }
 
 
-def write_fragment(project: Project) -> str:
+def _write_fragment(project: Project) -> str:
     """Return a System Definition that has this node alone; its ports keep their names."""
     profile = project.profile
     node = NodeEntry(
         project.node_id,
         f"{profile.type_name}0",
         f"{snake_name(profile.type_name)}.eds",
-        ports={pdo_name(port): port.profile.name for port in profile.placed() if port.number},
+        ports={_pdo_name(port): port.profile.name for port in profile.placed() if port.number},
         sdo_ports={
             port.profile.name: SdoPortEntry(
                 port.index, port.profile.direction, _sdo_type(port.profile.port_type)
@@ -70,7 +67,7 @@ def _sdo_type(kind: CanopenPortType[Any]) -> str | None:
     return None if kind.name == INTEGER else kind.name
 
 
-def pdo_name(port: PlacedPort) -> str:
+def _pdo_name(port: PlacedPort) -> str:
     """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`; else `sdo`."""
     if not port.number:
         return PortTransport.SDO.value
@@ -78,8 +75,8 @@ def pdo_name(port: PlacedPort) -> str:
     return f"{kind}{port.number}"
 
 
-OBJECT: Final = "{:<9} {:<36} {:<14} {:<6} {}"
-LETTERS: Final = {
+_OBJECT: Final = "{:<9} {:<36} {:<14} {:<6} {}"
+_LETTERS: Final = {
     Access.READ: "r",
     Access.WRITE: "w",
     Access.CONST: "c",
@@ -100,13 +97,13 @@ def summary(profile: RtcProfile, *, every: bool = False) -> Iterator[str]:
 
 
 def _objects(rows: Iterable[EntryDescription]) -> Iterator[str]:
-    yield OBJECT.format("object", "name", "type", "access", "default")
+    yield _OBJECT.format("object", "name", "type", "access", "default")
     for row in rows:
-        access = "".join(letter for flag, letter in LETTERS.items() if flag in row.access)
+        access = "".join(letter for flag, letter in _LETTERS.items() if flag in row.access)
         default = format_value(row.data_type, row.default, relative=row.relative)
         place = f"{row.index:04X}h:{row.sub:02X}"
         shown = default if default.isprintable() else row.default.hex()
-        yield OBJECT.format(place, row.name, row.data_type.name, access, shown).rstrip()
+        yield _OBJECT.format(place, row.name, row.data_type.name, access, shown).rstrip()
 
 
 def _pdo(port: PlacedPort) -> str:
@@ -118,4 +115,4 @@ def _pdo(port: PlacedPort) -> str:
         cob_id = "off"
     else:
         cob_id = f"{port.cob_id:03X}h{'+id' * port.relative}"
-    return PDO.format(pdo_name(port), cob_id, kind.bits or "-", f"{port.profile.name}: {what}")
+    return PDO.format(_pdo_name(port), cob_id, kind.bits or "-", f"{port.profile.name}: {what}")

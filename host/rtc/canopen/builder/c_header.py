@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from tickrig.host.rtc.canopen.builder.names import c_name, snake_name
+from tickrig.host.rtc.canopen.builder.profile_file import c_name, snake_name
 from tickrig.host.rtc.canopen.builder.skeleton import CALLBACKS
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-from tickrig.wire.rtc_canopen.objects import object_table
-from tickrig.wire.rtc_canopen.port_types import MAX_TEXT
-from tickrig.wire.rtc_canopen.profile import PlacedPort, RtcProfile
+from tickrig.wire.rtc_canopen import MAX_TEXT, PlacedPort, RtcProfile, object_table
 
-C_TYPES: Final = {
+_C_TYPES: Final = {
     DataType.BOOLEAN: "uint8_t",
     DataType.INTEGER8: "int8_t",
     DataType.INTEGER16: "int16_t",
@@ -34,7 +32,7 @@ C_TYPES: Final = {
 NODE_ID: Final = 0x80
 """Bit of `access` beside those of `Access`: the node-ID is added to the default."""
 
-HEAD: Final = """\
+_HEAD: Final = """\
 /* {type_name} {version}: object dictionary of a DeviceRTC, written by rtc-canopen-builder.
  *
  * Define {upper}_OD_DEFINE in one C file before this header; the table is put there.
@@ -66,7 +64,7 @@ extern "C" {{
 typedef enum {{ {upper}_RTC_OK = 0, {upper}_RTC_ERROR = 1 }} {lower}_result;
 """
 
-ENTRY: Final = """
+_ENTRY: Final = """
 typedef struct {{
     uint16_t index;
     uint8_t sub;
@@ -82,7 +80,7 @@ extern {lower}_ports {lower}_values;
 extern const {lower}_od_entry {lower}_od[{upper}_OD_COUNT];
 """
 
-FOOT: Final = """
+_FOOT: Final = """
 #ifdef __cplusplus
 }}
 #endif
@@ -106,12 +104,12 @@ def write_header(profile: RtcProfile) -> str:
     }
     return "\n".join(
         [
-            HEAD.format(**words),
+            _HEAD.format(**words),
             *_ports(profile, lower, lower.upper()),
-            ENTRY.format(**words),
+            _ENTRY.format(**words),
             *_prototypes(lower),
             *_table(profile, rows, lower),
-            FOOT.format(**words),
+            _FOOT.format(**words),
         ]
     )
 
@@ -125,7 +123,7 @@ def _ports(profile: RtcProfile, lower: str, upper: str) -> Iterator[str]:
         length += "" if kind.element_bits else f"[{upper}_TEXT + 1]"
         by_sdo = ", by SDO" if port.profile.by_sdo else ""
         place = f"{port.profile.direction.value}-port, {port.index:04X}h{by_sdo}"
-        member = f"{C_TYPES[kind.data_type]} {c_name(port.profile.name)}{length};"
+        member = f"{_C_TYPES[kind.data_type]} {c_name(port.profile.name)}{length};"
         yield f"    {member} /* {place} */"
     if not profile.ports:
         yield "    char none; /* a struct has a member */"

@@ -2,25 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import keyword
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Final, TypeVar
 
-from tickrig.wire.rtc_canopen.port_types import (
+from tickrig.wire.rtc_canopen import (
     INTEGER,
     PORT_TYPES,
-    CanopenPortType,
-    integer,
-)
-from tickrig.wire.rtc_canopen.profile import (
     CanopenPortProfile,
+    CanopenPortType,
     PortDirection,
     PortTransport,
     RtcProfile,
+    integer,
 )
 
-Table = Mapping[str, Any]
+# Names of a profile as identifiers of Python and C.
+
+_C_KEYWORDS: Final = frozenset(
+    (
+        *("auto", "bool", "break", "case", "char", "const", "continue", "default", "do", "double"),
+        *("else", "enum", "extern", "float", "for", "goto", "if", "inline", "int", "long"),
+        *("register", "restrict", "return", "short", "signed", "sizeof", "static", "struct"),
+        *("switch", "typedef", "union", "unsigned", "void", "volatile", "while"),
+        *("delete", "new", "operator", "private", "public", "template", "this", "throw", "virtual"),
+    )
+)
+"""Words that C keeps for itself, and those of C++ that somebody might call a port."""
+
+COMPONENT_NAMES: Final = frozenset(
+    (
+        *("category", "error_check", "inputs", "on_aborting", "on_activated", "on_deactivated"),
+        *("on_error", "on_execute", "on_finalize", "on_initialize", "on_reset", "physical"),
+        *("ports", "product_code", "profile", "rate_hz", "strict_cia301", "type_name"),
+        *("vendor", "version"),
+    )
+)
+"""What a component has beside its ports."""
+
+_IMPORTED: Final = frozenset(("CanopenInPort", "CanopenOutPort", "PortTransport", "integer"))
+"""What the skeleton uses while it declares ports, beside the types."""
+
+
+def python_name(name: str) -> str:
+    """Return an attribute of a component; a name that is taken, or a constant, gets an underscore.
+
+    >>> python_name("in"), python_name("target_um")
+    ('in_', 'target_um')
+    """
+    taken = keyword.iskeyword(name) or name in COMPONENT_NAMES | _IMPORTED or name.isupper()
+    return f"{name}_" if taken else name
+
+
+def c_name(name: str) -> str:
+    """Return a member of a struct in C."""
+    return f"{name}_" if name in _C_KEYWORDS else name
+
+
+def snake_name(name: str) -> str:
+    """Return a name in lower case, as files and constants want it.
+
+    >>> snake_name("UnsignedLongLong"), snake_name("Gripper2")
+    ('unsigned_long_long', 'gripper2')
+    """
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def check_identifiers(type_name: str, ports: Iterable[str]) -> None:
+    """Raise ValueError if a name cannot be written down in Python and C."""
+    if keyword.iskeyword(type_name):
+        raise ValueError(f"name {type_name!r} is a keyword of Python")
+    names = set(ports)
+    for name in sorted(names):
+        for other in (python_name(name), c_name(name)):
+            if other != name and other in names:
+                raise ValueError(f"port {name!r} becomes {other!r}, and so is another called")
+
+
+_Table = Mapping[str, Any]
 E = TypeVar("E", bound=Enum)
 
 EXAMPLE: Final = """\
@@ -45,14 +107,14 @@ type = "Short"
 length = 3              # more than 1: a sequence
 """
 
-TEXTS: Final = ("version", "vendor", "category")
-NUMBERS: Final = ("rate_hz", "product_code")
-KEYS: Final = ("name", *TEXTS, *NUMBERS, "node_id", "word_bits", "strict_cia301", "port")
-PORT_KEYS: Final = ("name", "direction", "type", "length", "cob_id", "transport")
+_TEXTS: Final = ("version", "vendor", "category")
+_NUMBERS: Final = ("rate_hz", "product_code")
+_KEYS: Final = ("name", *_TEXTS, *_NUMBERS, "node_id", "word_bits", "strict_cia301", "port")
+_PORT_KEYS: Final = ("name", "direction", "type", "length", "cob_id", "transport")
 _KINDS: Final = {str: "no text", int: "no whole number", bool: "neither true nor false"}
 
-DEFAULT_WORD_BITS: Final = 32
-DEFAULT_NODE_ID: Final = 16
+_DEFAULT_WORD_BITS: Final = 32
+_DEFAULT_NODE_ID: Final = 16
 
 
 class ProfileError(ValueError):
@@ -70,7 +132,7 @@ class Project:
     """
 
     profile: RtcProfile
-    node_id: int = DEFAULT_NODE_ID
+    node_id: int = _DEFAULT_NODE_ID
     strict_cia301: bool = False
 
 
@@ -85,16 +147,16 @@ def parse_project(text: str) -> Project:
 
     try:
         content = load_toml(text)
-        _check_keys(content, KEYS)
+        _check_keys(content, _KEYS)
         ports = _tables(content)
-        word_bits = _take(content, "word_bits", int, DEFAULT_WORD_BITS)
+        word_bits = _take(content, "word_bits", int, _DEFAULT_WORD_BITS)
         profile = RtcProfile(
             type_name=_take(content, "name", str),
-            **{key: _take(content, key, str) for key in TEXTS if key in content},
-            **{key: _take(content, key, int) for key in NUMBERS if key in content},
+            **{key: _take(content, key, str) for key in _TEXTS if key in content},
+            **{key: _take(content, key, int) for key in _NUMBERS if key in content},
             ports=tuple(_port(number, table, word_bits) for number, table in enumerate(ports, 1)),
         )
-        node_id = _take(content, "node_id", int, DEFAULT_NODE_ID)
+        node_id = _take(content, "node_id", int, _DEFAULT_NODE_ID)
         if not 1 <= node_id <= 127:
             raise ProfileError(f"node_id {node_id} is not in 1..127")
         return Project(profile, node_id, _take(content, "strict_cia301", bool, False))
@@ -102,17 +164,17 @@ def parse_project(text: str) -> Project:
         raise ProfileError(str(error)) from None
 
 
-def _tables(content: Table) -> list[Table]:
+def _tables(content: _Table) -> list[_Table]:
     tables = content.get("port", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
         raise ProfileError("port: ports are tables [[port]]")
     return tables
 
 
-def _port(number: int, table: Table, word_bits: int) -> CanopenPortProfile:
+def _port(number: int, table: _Table, word_bits: int) -> CanopenPortProfile:
     """Read a port; errors say which of them."""
     try:
-        _check_keys(table, PORT_KEYS)
+        _check_keys(table, _PORT_KEYS)
         direction = _member(table, "direction", PortDirection)
         return CanopenPortProfile(
             _take(table, "name", str),
@@ -125,7 +187,7 @@ def _port(number: int, table: Table, word_bits: int) -> CanopenPortProfile:
         raise ProfileError(f"port {number}: {error}") from None
 
 
-def _member(table: Table, key: str, kind: type[E]) -> E:
+def _member(table: _Table, key: str, kind: type[E]) -> E:
     """Return a member of an enumeration by its value."""
     value, known = _take(table, key, str), [str(item.value) for item in kind]
     if value not in known:
@@ -142,13 +204,13 @@ def _port_type(name: str, length: int, word_bits: int) -> CanopenPortType[Any]:
     return element if length == 1 else element.sequence(length)
 
 
-def _check_keys(table: Table, known: tuple[str, ...]) -> None:
+def _check_keys(table: _Table, known: tuple[str, ...]) -> None:
     for key in table:
         if key not in known:
             raise ProfileError(f"no key {key}; known: {', '.join(known)}")
 
 
-def _take(table: Table, key: str, kind: type[Any], default: Any = None) -> Any:
+def _take(table: _Table, key: str, kind: type[Any], default: Any = None) -> Any:
     value = table.get(key, default)
     if value is None:
         raise ProfileError(f"{key} is missing")

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final
 
-from tickrig.host.rtc.canopen.builder.names import python_name, snake_name
-from tickrig.host.rtc.canopen.builder.profile_file import Project
-from tickrig.wire.rtc_canopen.port_types import INTEGER, CanopenPortType
-from tickrig.wire.rtc_canopen.profile import CanopenPortProfile, PortDirection, RtcProfile
+from tickrig.host.rtc.canopen.builder.profile_file import Project, python_name, snake_name
+from tickrig.wire.rtc_canopen import (
+    INTEGER,
+    CanopenPortProfile,
+    CanopenPortType,
+    PortDirection,
+    RtcProfile,
+)
 
 SKELETON_SUFFIX: Final = ".py"
 
@@ -23,6 +27,9 @@ CALLBACKS: Final = (
     ("on_reset", "Result", "Leave Error; after an error it stays there."),
     ("on_finalize", "Result", "End, before Reset Node or when the device is shut down."),
 )
+
+_LONGEST: Final = 88
+"""Characters of a line, as formatters have it."""
 
 
 def write_skeleton(project: Project) -> str:
@@ -40,7 +47,6 @@ def _head(project: Project) -> Iterator[str]:
     yield ""
     yield "from __future__ import annotations"
     yield ""
-    yield "from tickrig.device.canopen.device_rtc.component import CanopenComponent"
     yield from _imports(profile)
     yield ""
     yield ""
@@ -53,13 +59,18 @@ def _imports(profile: RtcProfile) -> Iterator[str]:
     ports = sorted({_port_class(port) for port in profile.ports})
     told = any(port.transport for port in profile.ports)
     types = sorted({_constant(port.port_type) for port in profile.ports})
-    if ports:
-        yield f"from tickrig.device.canopen.device_rtc.ports import {', '.join(ports)}"
+    yield _import("tickrig.device.canopen.device_rtc", "CanopenComponent", *ports)
     yield "from tickrig.device.component import Result"
-    if ports:
-        yield f"from tickrig.wire.rtc_canopen.port_types import {', '.join(types)}"
-    if told:
-        yield "from tickrig.wire.rtc_canopen.profile import PortTransport"
+    names = [*types, "PortTransport"] if told else types
+    if names:
+        yield _import("tickrig.wire.rtc_canopen", *names)
+
+
+def _import(module: str, *names: str) -> str:
+    line = f"from {module} import {', '.join(names)}"
+    if len(line) <= _LONGEST:
+        return line
+    return "\n".join([f"from {module} import (", *(f"    {name}," for name in names), ")"])
 
 
 def _attributes(project: Project) -> Iterator[str]:

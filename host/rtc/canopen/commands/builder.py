@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
+from tickrig.host.cli.messages import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE, Project, parse_project
 from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX
 

@@ -11,10 +11,10 @@ from typing import Any
 import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.messages import BusFailed, Refused
 from tickrig.host.cli.options import PATH, version_option
-from tickrig.host.cli.refused import BusFailed, Refused
 from tickrig.host.cli.start import loading
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc.canopen.commands.opening import (
     STANDARD_OUTPUT,
     add_components,
@@ -24,7 +24,7 @@ from tickrig.host.rtc.canopen.commands.opening import (
     open_link,
     read_server,
 )
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState
 
 
 @click.command(cls=BusCommand)

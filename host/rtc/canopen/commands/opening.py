@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Final, TextIO
 import click
 
 from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.cli.messages import show_findings
+from tickrig.host.cli.messages import NEEDS_YAML, Refused, refuse_path, show_findings
 from tickrig.host.cli.options import Decorator
-from tickrig.host.cli.refused import NEEDS_YAML, Refused, refuse_path
 from tickrig.host.cli.start import loading
 from tickrig.host.links.link import StampedLink
 from tickrig.host.rtc.component import RtComponent
@@ -21,10 +20,10 @@ from tickrig.host.text.user_file import explain_error, find_class
 
 if TYPE_CHECKING:
     from tickrig.host.links.can_link import CanLink
-    from tickrig.host.rtc.canopen.definition.definition import BusEntry
+    from tickrig.host.rtc.canopen.definition import BusEntry
     from tickrig.host.rtc.canopen.events import EventListener, ServerEvent
     from tickrig.host.rtc.canopen.server import RtcCanopenServer
-    from tickrig.wire.can_error import ErrorState
+    from tickrig.wire.can import ErrorState
 
 STANDARD_OUTPUT: Final = Path("-")
 

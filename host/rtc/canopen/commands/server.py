@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.control import serving_control, stopped_by_signals
 from tickrig.host.cli.engine_options import (
     EngineOptions,
     openrtm_options,
     ros2_options,
     take_engines,
 )
-from tickrig.host.cli.messages import warnings_shown
+from tickrig.host.cli.messages import BusFailed, Refused, warnings_shown
 from tickrig.host.cli.options import PATH, version_option
-from tickrig.host.cli.refused import BusFailed, Refused
-from tickrig.host.cli.serving import serving_control, stopped_by_signals
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import StampedLink
+from tickrig.host.links.link import LinkClosed, StampedLink
 from tickrig.host.rtc.canopen.commands.opening import (
     bus_of,
     component_option,
@@ -35,9 +33,9 @@ from tickrig.wire.instant import NEVER
 if TYPE_CHECKING:
     from tickrig.host.rtc.canopen.serve import ServerRunner
     from tickrig.host.rtc.canopen.server import RtcCanopenServer
-    from tickrig.host.rtc.remote.call_queue import CallQueue
+    from tickrig.host.rtc.system.call_queue import CallQueue
 
-QUICK_US: Final = 2_000
+_QUICK_US: Final = 2_000
 """So long at most a call of an engine waits for the bus."""
 
 
@@ -142,7 +140,7 @@ class _Doors:
         from tickrig.host.rtc.engines.engines_joined import engines_joined  # noqa: PLC0415
 
         def attach(calls: CallQueue) -> None:
-            runner.pause_us = QUICK_US
+            runner.pause_us = _QUICK_US
             if self.control is None:
                 runner.serve = calls.serve
             else:

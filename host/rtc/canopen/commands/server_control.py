@@ -10,7 +10,7 @@ from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.canopen.view import NOT_HEARD, NodeView, ServerView
 from tickrig.host.rtc.commands.system_control import SystemControl
 
-NOT_HERE: Final = ("create", "delete", "save")
+_NOT_HERE: Final = ("create", "delete", "save")
 """Requests of a system that the server decides itself: its nodes come and go on the bus."""
 
 
@@ -27,7 +27,7 @@ class ServerControl(SystemControl):
         super().__init__(server.manager, runner)
         self._server, self._bus = server, bus
         self._verbs = {
-            **{name: verb for name, verb in self._verbs.items() if name not in NOT_HERE},
+            **{name: verb for name, verb in self._verbs.items() if name not in _NOT_HERE},
             "restart": (self._restart, ("node",)),
             "start": (self._start, ()),
         }

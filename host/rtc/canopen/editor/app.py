@@ -4,37 +4,79 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from itertools import chain, repeat
 from pathlib import Path
+from textwrap import wrap
 from typing import ClassVar, Final
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container
 
-from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
+from tickrig.host.canmon.model.decode.decoded import write_entry
+from tickrig.host.rtc.canopen.definition import ServerRefused
 from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
 from tickrig.host.rtc.canopen.editor.session import EditorSession
-from tickrig.host.rtc.canopen.editor.status import event_lines, status_line
 from tickrig.host.rtc.canopen.editor.system_pane import Item, SystemPane, connect, link, remove
 from tickrig.host.rtc.canopen.editor.widgets import CursorView, QuestionScreen
-from tickrig.host.rtc.canopen.errors import ServerRefused
-from tickrig.host.rtc.canopen.view import ServerView
+from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
+from tickrig.host.rtc.canopen.served_node import NodePhase
+from tickrig.host.rtc.canopen.view import NodeView, ServerView
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.tui.framed_app import FramedApp
-from tickrig.host.tui.key_footer import KeyFooter
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView
+
+# The line at the bottom, and lines of events.
+
+_DIM: Final = "bright_black"
+_MARK: Final = "bold yellow"
+_ALARM: Final = "bold red"
+
+_STAMP: Final = 12
+"""Columns of a time."""
+
+_GOOD: Final = (
+    ServerEventType.BOOT_UP,
+    ServerEventType.PROXY_MADE,
+    ServerEventType.STATE_CHANGED,
+    ServerEventType.CONNECTED,
+    ServerEventType.PDO_LINKED,
+    ServerEventType.PDO_UNLINKED,
+    ServerEventType.BUS_ON,
+)
+"""Events that are nothing to see to."""
+
+
+def _event_lines(event: ServerEvent, width: int) -> list[Line]:
+    """Return an event as lines of so many columns, which cut no word."""
+    at, _, rest = str(event).partition(" ")
+    style = "" if event.kind in _GOOD else _ALARM
+    stamps = chain([f"{at:>{_STAMP}} "], repeat(" " * (_STAMP + 1)))
+    parts = wrap(rest, max(1, width - _STAMP - 1)) or [""]
+    return [((stamp, _DIM), (part, style)) for stamp, part in zip(stamps, parts, strict=False)]
+
+
+def _status_line(nodes: tuple[NodeView, ...], file: str, bus: str, marked: str) -> Line:
+    """Return what is served, where, and what is to be connected."""
+    ready = sum(node.phase is NodePhase.READY for node in nodes)
+    active = sum(node.proxy_state == "ACTIVE" for node in nodes)
+    return (
+        (f" {file} ", "bold"),
+        (f" {bus}  {ready} of {len(nodes)} nodes ready, {active} active", ""),
+        (f"  marked: {marked.partition(' ')[2]}" if marked else "", _MARK),
+    )
+
 
 PAINT_S: Final = 0.1
-SWITCH_S: Final = 0.000_5
+_SWITCH_S: Final = 0.000_5
 """How long the screen may keep the server from running."""
 
-EVENTS_SHOWN: Final = 500
+_EVENTS_SHOWN: Final = 500
 
-Command = Callable[[ServerView], object]
-Join = Callable[[ServerView, Item, Item], None]
+_Command = Callable[[ServerView], object]
+_Join = Callable[[ServerView, Item, Item], None]
 
-JOIN: Final[dict[str, Join]] = {"connect": connect, "link": link}
-ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
+_JOIN: Final[dict[str, _Join]] = {"connect": connect, "link": link}
+_ASK: Final[dict[str, Callable[[ServerView, str], None]]] = {
     "activate": ServerView.activate,
     "deactivate": ServerView.deactivate,
     "reset": ServerView.reset,
@@ -110,7 +152,7 @@ class SystemEditor(FramedApp):
             LinkClosed: the bus is gone.
         """
         before_s = sys.getswitchinterval()
-        sys.setswitchinterval(SWITCH_S)
+        sys.setswitchinterval(_SWITCH_S)
         with self.ended_by_signals():
             self.session.start()
             try:
@@ -126,7 +168,7 @@ class SystemEditor(FramedApp):
             return
         with self.session.lock:
             view = self.session.view
-            system, events = view.system, view.events[-EVENTS_SHOWN:]
+            system, events = view.system, view.events[-_EVENTS_SHOWN:]
         self.system.look(system)
         self.objects.turn_to(self.system.node_id, self.session.eds_paths)
         with self.session.lock:
@@ -134,10 +176,10 @@ class SystemEditor(FramedApp):
         self.objects.paint_objects()
         marked = self.system.marked.key if self.system.marked else ""
         file = self.session.path.name
-        self.status.show([status_line(system.nodes, file, self._bus, marked)])
+        self.status.show([_status_line(system.nodes, file, self._bus, marked)])
         follows = self.events.at_end
         width = max(1, self.events.scrollable_content_region.width)
-        self.events.show([line for event in events for line in event_lines(event, width)])
+        self.events.show([line for event in events for line in _event_lines(event, width)])
         if follows:
             self.events.show_end()
 
@@ -154,7 +196,7 @@ class SystemEditor(FramedApp):
     def action_request(self, what: str) -> None:
         """Ask the proxy or component under the cursor for a state."""
         if (owner := self.system.owner) is not None:
-            self._command(lambda view: ASK[what](view, owner.name))
+            self._command(lambda view: _ASK[what](view, owner.name))
 
     def action_boot(self) -> None:
         """Set the node up again, also one that was refused."""
@@ -176,7 +218,7 @@ class SystemEditor(FramedApp):
         marked, row = self.system.marked, self.system.row
         if marked is None or row is None:
             self._refuse("mark a port or PDO first (m)")
-        elif self._command(lambda view: JOIN[how](view, marked.item, row.item)):
+        elif self._command(lambda view: _JOIN[how](view, marked.item, row.item)):
             self.system.marked = None
             self.look()
 
@@ -232,7 +274,7 @@ class SystemEditor(FramedApp):
 
         self.push_screen(QuestionScreen(text, str(self.session.path)), answered)
 
-    def _command(self, command: Command) -> bool:
+    def _command(self, command: _Command) -> bool:
         """Give the server a command; if it is refused, say why."""
 
         def give() -> None:

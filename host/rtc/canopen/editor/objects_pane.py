@@ -6,31 +6,31 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Final
 
+from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, Entry, read_eds_objects
 from tickrig.host.canmon.model.decode.object_text import ObjectText
-from tickrig.host.canmon.model.decode.sdo.transfer import write_entry
 from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import PendingTransfer, ServerView
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_file import EdsError
 from tickrig.wire.canopen.eds.eds_value import parse_value
 from tickrig.wire.errors import FieldError
 
-AT_ONCE: Final = 8
+_AT_ONCE: Final = 8
 """Transfers that are under way; a command to the node waits for as many."""
 
-FIRST_INDEX: Final = 0x1000
+_FIRST_INDEX: Final = 0x1000
 """Below are data types (CiA 301, object dictionary)."""
 
-NAME: Final = 30
+_NAME: Final = 30
 """Columns of a name."""
 
-DIM: Final = "bright_black"
-ALARM: Final = "bold red"
-CHANGED: Final = "bold yellow"
+_DIM: Final = "bright_black"
+_ALARM: Final = "bold red"
+_CHANGED: Final = "bold yellow"
 
-ObjectRow = CursorRow[Entry]
+_ObjectRow = CursorRow[Entry]
 
 
 class NodeObjects:
@@ -56,15 +56,15 @@ class NodeObjects:
         self._problems: dict[Entry, str] = {}
         self._reads, self._ages = 0, dict[Entry, int]()
         self._wanted: list[Entry] = []
-        self._rows: dict[Entry, tuple[object, ObjectRow]] = {}
+        self._rows: dict[Entry, tuple[object, _ObjectRow]] = {}
         self._reading: dict[Entry, PendingTransfer] = {}
         self._writing: list[tuple[Entry, PendingTransfer]] = []
 
     @property
-    def rows(self) -> list[ObjectRow]:
+    def rows(self) -> list[_ObjectRow]:
         """Its objects, by index."""
         texts = sorted(self._eds.texts.items())
-        return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= FIRST_INDEX]
+        return [self._kept_row(entry, text) for entry, text in texts if entry[0] >= _FIRST_INDEX]
 
     def look(self, view: ServerView, seen: Collection[Entry], *, answers: bool) -> None:
         """Take what has come, and ask for what is missing.
@@ -83,7 +83,7 @@ class NodeObjects:
             self._wanted.clear()
             return
         for entry in (*self._wanted, *self._due(seen)):
-            if len(self._reading) < AT_ONCE and entry not in self._reading:
+            if len(self._reading) < _AT_ONCE and entry not in self._reading:
                 self._wanted = [one for one in self._wanted if one != entry]
                 self._reading[entry] = view.read(self.node_id, *entry)
 
@@ -98,7 +98,7 @@ class NodeObjects:
         Raises:
             ValueError: no value of its type.
         """
-        data = encode_words(self._eds.texts[entry], words)
+        data = _encode_words(self._eds.texts[entry], words)
         self._writing.append((entry, view.write(self.node_id, *entry, data)))
 
     def text_of(self, entry: Entry) -> ObjectText:
@@ -108,7 +108,7 @@ class NodeObjects:
     def value_of(self, entry: Entry) -> str:
         """Return the value as it can be written, empty if it is not known."""
         data = self._values.get(entry)
-        return "" if data is None else words_of(self.text_of(entry), data)
+        return "" if data is None else _words_of(self.text_of(entry), data)
 
     def forget(self) -> None:
         """Forget all values: the node has begun anew."""
@@ -146,7 +146,7 @@ class NodeObjects:
             else:
                 self.read(entry)
 
-    def _kept_row(self, entry: Entry, text: ObjectText) -> ObjectRow:
+    def _kept_row(self, entry: Entry, text: ObjectText) -> _ObjectRow:
         """Return the row of an object, written anew if something changed."""
         known = self._values.get(entry), self._problems.get(entry), entry in self._changed
         kept = self._rows.get(entry)
@@ -154,13 +154,13 @@ class NodeObjects:
             kept = self._rows[entry] = known, self._row(entry, text)
         return kept[1]
 
-    def _row(self, entry: Entry, text: ObjectText) -> ObjectRow:
+    def _row(self, entry: Entry, text: ObjectText) -> _ObjectRow:
         data, problem = self._values.get(entry), self._problems.get(entry)
         kind = "" if text.kind is None else text.kind.name
         value = "" if data is None else f"{text.read(data)[1]} {text.unit}"
-        head = (f"{write_entry(entry)} ", DIM), (f"{_tail(text.name):<{NAME}} ", "")
-        style = CHANGED if entry in self._changed else "bold"
-        rest = ((problem, ALARM),) if problem else ((f"{kind:<14} ", DIM), (value, style))
+        head = (f"{write_entry(entry)} ", _DIM), (f"{_tail(text.name):<{_NAME}} ", "")
+        style = _CHANGED if entry in self._changed else "bold"
+        rest = ((problem, _ALARM),) if problem else ((f"{kind:<14} ", _DIM), (value, style))
         return CursorRow(write_entry(entry), (*head, *rest), entry)
 
 
@@ -171,13 +171,13 @@ def _reason(entry: Entry, transfer: PendingTransfer) -> str:
 
 def _tail(name: str) -> str:
     """Return the end of a long name: members of a record begin alike."""
-    return name if len(name) <= NAME else f"…{name[1 - NAME :]}"
+    return name if len(name) <= _NAME else f"…{name[1 - _NAME :]}"
 
 
-def encode_words(text: ObjectText, words: str) -> bytes:
+def _encode_words(text: ObjectText, words: str) -> bytes:
     """Return the bytes of a value as an EDS writes it; ValueError if it is none of its type.
 
-    >>> encode_words(ObjectText("mode", DataType.INTEGER8), "-2").hex()
+    >>> _encode_words(ObjectText("mode", DataType.INTEGER8), "-2").hex()
     'fe'
     """
     kind = text.kind or DataType.DOMAIN
@@ -187,10 +187,10 @@ def encode_words(text: ObjectText, words: str) -> bytes:
         raise ValueError(f"{words!r} is no {kind.name}") from None
 
 
-def words_of(text: ObjectText, data: bytes) -> str:
-    r"""Return the words that `encode_words` makes these bytes of.
+def _words_of(text: ObjectText, data: bytes) -> str:
+    r"""Return the words that `_encode_words` makes these bytes of.
 
-    >>> words_of(ObjectText("mode", DataType.INTEGER8), b"\xfe")
+    >>> _words_of(ObjectText("mode", DataType.INTEGER8), b"\xfe")
     '-2'
     """
     try:

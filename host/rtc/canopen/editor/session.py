@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.links.link import StampedLink
-from tickrig.host.rtc.canopen.definition.definition_writer import save_definition
+from tickrig.host.rtc.canopen.definition_writer import save_definition
 from tickrig.host.rtc.canopen.events import EventListener
 from tickrig.host.rtc.canopen.serve import open_server
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.canopen.view import ServerView
-from tickrig.wire.can import Frames
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState, Frames
 
-LONGEST_US: Final = 10_000
+_LONGEST_US: Final = 10_000
 """So soon is done what was asked for."""
 
 AddComponents = Callable[[RtcCanopenServer], None]
@@ -124,4 +123,4 @@ class EditorSession:
 
     def _run(self) -> None:
         while not self._stop.is_set():
-            self.turn(self._link.now_us + LONGEST_US)
+            self.turn(self._link.now_us + _LONGEST_US)

@@ -8,10 +8,9 @@ from typing import ClassVar, Final
 
 from textual.binding import Binding, BindingType
 
-from tickrig.host.rtc.canopen.definition.definition import PdoLink, PdoName, RtConnection
+from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, RtConnection, ServerRefused
 from tickrig.host.rtc.canopen.editor.widgets import CursorRow, CursorView
-from tickrig.host.rtc.canopen.errors import ServerRefused
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import (
     NOT_HEARD,
     ComponentView,
@@ -21,30 +20,30 @@ from tickrig.host.rtc.canopen.view import (
     ServerView,
     SystemView,
 )
-from tickrig.host.tui.line_view import Line
+from tickrig.host.tui import Line
 
 Item = NodeView | ComponentView | PdoView | PortView | PdoLink | RtConnection
-SystemRow = CursorRow[Item]
+_SystemRow = CursorRow[Item]
 
-STATES: Final = {
+_STATES: Final = {
     "ACTIVE": "bold green",
     "INACTIVE": "cyan",
     "ERROR": "bold white on red",
 }
-DIM: Final = "bright_black"
-ALARM: Final = "bold red"
-MARK: Final = "bold yellow"
+_DIM: Final = "bright_black"
+_ALARM: Final = "bold red"
+_MARK: Final = "bold yellow"
 
-KEPT_ROWS: Final = 4_096
+_KEPT_ROWS: Final = 4_096
 """More than 127 nodes have; a row that is the same is not written again."""
 
-FOLDED: Final = "▸ "
-OPEN: Final = "▾ "
+_FOLDED: Final = "▸ "
+_OPEN: Final = "▾ "
 
 
-def system_rows(
+def _system_rows(
     system: SystemView, folded: Collection[str] = (), marked: str = ""
-) -> list[SystemRow]:
+) -> list[_SystemRow]:
     """Return the rows.
 
     Args:
@@ -53,7 +52,7 @@ def system_rows(
         marked: key of the port or PDO that is to be connected.
     """
     sources = {link.target: link.source for link in system.links}
-    rows: list[SystemRow] = []
+    rows: list[_SystemRow] = []
     for node in system.nodes:
         rows.append(_node(node, folded))
         if rows[-1].key not in folded:
@@ -66,7 +65,7 @@ def system_rows(
     return [*rows, *_joints(system)]
 
 
-def _node(node: NodeView, folded: Collection[str]) -> SystemRow:
+def _node(node: NodeView, folded: Collection[str]) -> _SystemRow:
     key = f"node {node.node_id}"
     age = "" if node.heartbeat_age_us == NOT_HEARD else f"{node.heartbeat_age_us // 1_000} ms"
     nmt = node.nmt_state.replace("_", "-").capitalize()
@@ -75,7 +74,7 @@ def _node(node: NodeView, folded: Collection[str]) -> SystemRow:
         (f"{node.node_id:>3} {node.name:<12} ", "bold"),
         _state(node.proxy_state),
         (f" {nmt:<15} ", ""),
-        (f"{age:>8}", ALARM if node.late else ""),
+        (f"{age:>8}", _ALARM if node.late else ""),
         _phase(node),
     )
     return CursorRow(key, line, node)
@@ -85,63 +84,67 @@ def _phase(node: NodeView) -> tuple[str, str]:
     if node.phase is NodePhase.READY:
         return "", ""
     problem = f": {node.problem}" if node.problem else ""
-    return f"  {node.phase.value}{problem}", ALARM if problem else DIM
+    return f"  {node.phase.value}{problem}", _ALARM if problem else _DIM
 
 
-def _component(component: ComponentView, folded: Collection[str]) -> SystemRow:
+def _component(component: ComponentView, folded: Collection[str]) -> _SystemRow:
     key = f"component {component.name}"
     line = (
         (_fold(key, folded), ""),
         (f"    {component.name:<12} ", "bold"),
         _state(component.state),
-        (f" {component.type_name}", DIM),
+        (f" {component.type_name}", _DIM),
     )
     return CursorRow(key, line, component)
 
 
 def _fold(key: str, folded: Collection[str]) -> str:
-    return FOLDED if key in folded else OPEN
+    return _FOLDED if key in folded else _OPEN
 
 
 def _state(state: str) -> tuple[str, str]:
-    return f"{state.capitalize():<8}", STATES.get(state, DIM)
+    return f"{state.capitalize():<8}", _STATES.get(state, _DIM)
 
 
-@lru_cache(KEPT_ROWS)
-def _pdo(pdo: PdoView, source: PdoName | None, marked: str) -> SystemRow:
+@lru_cache(_KEPT_ROWS)
+def _pdo(pdo: PdoView, source: PdoName | None, marked: str) -> _SystemRow:
     key = f"pdo {pdo.name}"
     linked = f" ← {source}" if source else ""
     text = f"{pdo.cob_id:03X}h {pdo.bits:>2} bits  {pdo.index:04X}h ↔ {pdo.proxy_index:04X}h"
-    line: Line = ((f"      {pdo.name!s:<12} ", _style(key, marked)), (text, DIM), (linked, "green"))
+    line: Line = (
+        (f"      {pdo.name!s:<12} ", _style(key, marked)),
+        (text, _DIM),
+        (linked, "green"),
+    )
     return CursorRow(key, line, pdo)
 
 
-@lru_cache(KEPT_ROWS)
-def _port(port: PortView, marked: str) -> SystemRow:
+@lru_cache(_KEPT_ROWS)
+def _port(port: PortView, marked: str) -> _SystemRow:
     key = f"port {port.name}"
     way = "out" if port.out else "in "
     peers = f" {'→' if port.out else '←'} {', '.join(port.peers)}" if port.peers else ""
     line: Line = (
         (f"      {way} {port.name:<20} ", _style(key, marked)),
-        (port.data_type, DIM),
+        (port.data_type, _DIM),
         (peers, "green"),
     )
     return CursorRow(key, line, port)
 
 
 def _style(key: str, marked: str) -> str:
-    return MARK if key == marked else ""
+    return _MARK if key == marked else ""
 
 
-def _joints(system: SystemView) -> Iterator[SystemRow]:
+def _joints(system: SystemView) -> Iterator[_SystemRow]:
     for link in system.links:
         text = f"{link.source} → {link.target}"
-        yield CursorRow(f"link {text}", (("  PDO link   ", DIM), (text, "green")), link)
+        yield CursorRow(f"link {text}", (("  PDO link   ", _DIM), (text, "green")), link)
     for entry in system.connections:
         text = f"{entry.source} → {entry.target}"
-        waits = (("  waits for its ports", DIM),) if entry in system.waiting else ()
+        waits = (("  waits for its ports", _DIM),) if entry in system.waiting else ()
         yield CursorRow(
-            f"connection {text}", (("  through PC ", DIM), (text, "green"), *waits), entry
+            f"connection {text}", (("  through PC ", _DIM), (text, "green"), *waits), entry
         )
 
 
@@ -174,7 +177,7 @@ def remove(view: ServerView, item: Item) -> None:
             raise ServerRefused("links and connections are removed: they are at the end")
 
 
-Owner = NodeView | ComponentView
+_Owner = NodeView | ComponentView
 
 
 class SystemPane(CursorView[Item]):
@@ -209,20 +212,20 @@ class SystemPane(CursorView[Item]):
     def forget(self) -> None:
         """Begin anew, with another system."""
         self.folded: set[str] = set()
-        self.marked: SystemRow | None = None
+        self.marked: _SystemRow | None = None
         self.node_id, self.cursor = 0, 0
 
     @property
-    def owner(self) -> Owner | None:
+    def owner(self) -> _Owner | None:
         """The node or component in whose rows the cursor is; None among what joins them."""
         if self.row is None or isinstance(self.row.item, PdoLink | RtConnection):
             return None
         above = (row.item for row in reversed(self.rows_shown[: self.cursor + 1]))
-        return next(item for item in above if isinstance(item, Owner))
+        return next(item for item in above if isinstance(item, _Owner))
 
     def look(self, system: SystemView) -> None:
         """Show how things are now."""
-        self.offer(system_rows(system, self.folded, self.marked.key if self.marked else ""))
+        self.offer(_system_rows(system, self.folded, self.marked.key if self.marked else ""))
         match self.owner:
             case NodeView() as node:
                 self.node_id = node.node_id
@@ -244,6 +247,6 @@ class SystemPane(CursorView[Item]):
 
     def action_fold(self, folded: bool) -> None:
         """Show the node or component under the cursor without what it has, or with it."""
-        if self.row is not None and isinstance(self.row.item, Owner):
+        if self.row is not None and isinstance(self.row.item, _Owner):
             (self.folded.add if folded else self.folded.discard)(self.row.key)
             self.post_message(self.Entered(self))

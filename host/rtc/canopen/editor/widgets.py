@@ -14,7 +14,7 @@ from textual.message import Message
 from textual.screen import ModalScreen
 from textual.widgets import Input, Label
 
-from tickrig.host.tui.line_view import Line, LineView, line_width
+from tickrig.host.tui import Line, LineView, line_width
 
 T = TypeVar("T")
 
@@ -33,9 +33,9 @@ class CursorRow(NamedTuple, Generic[T]):
     item: T
 
 
-FOCUSED: Final = "reverse"
-ELSEWHERE: Final = "underline"
-MARGIN: Final = 2
+_FOCUSED: Final = "reverse"
+_ELSEWHERE: Final = "underline"
+_MARGIN: Final = 2
 """Columns at the left in which a click opens or folds."""
 
 
@@ -143,7 +143,7 @@ class CursorView(LineView, Generic[T]):
         at = event.get_content_offset(self)
         if at is not None and self.top + at.y < len(self.rows_shown):
             self.put_cursor(self.top + at.y)
-            if at.x < MARGIN or event.chain == 2:
+            if at.x < _MARGIN or event.chain == 2:
                 self.action_enter()
 
     def on_focus(self, event: Focus) -> None:
@@ -162,7 +162,7 @@ class CursorView(LineView, Generic[T]):
             self.border_subtitle = Content(below) if below else None
 
     def _under_cursor(self, line: Line) -> Line:
-        style = FOCUSED if self.has_focus else ELSEWHERE
+        style = _FOCUSED if self.has_focus else _ELSEWHERE
         rest = (" " * max(0, self.size.width - line_width(line)), "")
         return tuple((text, f"{own} {style}".strip()) for text, own in (*line, rest) if text)
 

@@ -8,18 +8,17 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from tickrig.host.cli.openrtm_options import OpenRtmOptions, format_name
+from tickrig.host.cli.engine_options import OpenRtmOptions, format_name
 from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.engines.openrtm import configuration, context, manager, rt_object
+from tickrig.host.rtc.engines.openrtm.context import AttachedContexts, ServantReferences
 from tickrig.host.rtc.engines.openrtm.names import NameServer
 from tickrig.host.rtc.engines.openrtm.orb import Orb
 from tickrig.host.rtc.engines.openrtm.peers import Peers, refuse_wrong_paths
-from tickrig.host.rtc.engines.openrtm.ports.component_ports import ComponentPorts, SystemPorts
-from tickrig.host.rtc.engines.openrtm.servants import configuration, context, manager, rt_object
-from tickrig.host.rtc.engines.openrtm.servants.attached_contexts import AttachedContexts
-from tickrig.host.rtc.engines.openrtm.servants.references import References
+from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.execution.execution_context import ExecutionContext
-from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
 
 
@@ -61,7 +60,7 @@ class OpenRtmEngine:
         refuse_wrong_paths(rtcs)  # before there is an ORB, which would have to be closed
         idl = stubs()
         self._orb = Orb(options.endpoint)
-        self._references = References(self._orb, idl, calls, fixed=fixed)
+        self._references = ServantReferences(self._orb, idl, calls, fixed=fixed)
         self._ports = SystemPorts(self._orb, calls, rtcs)
         self._names = NameServer(self._orb, options.name_server)
         servant = manager.ManagerServant(rtcs, self._references, stop)

@@ -10,15 +10,15 @@ from typing import Any, Final
 import CosNaming
 from omniORB import CORBA
 
-from tickrig.host.cli.openrtm_options import Endpoint
+from tickrig.host.cli.engine_options import Endpoint
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
-from tickrig.host.rtc.remote.peer_thread import PeerThread
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 
-RENEW_US: Final = 10_000_000
+_RENEW_US: Final = 10_000_000
 """OpenRTM's `naming.update.interval`: so soon a name server that was restarted is filled again."""
 
-LOOK_US: Final = 1_000_000
+_LOOK_US: Final = 1_000_000
 _CLOSE_US: Final = 2_500_000
 
 _LOG: Final = log_of(__name__)
@@ -41,7 +41,7 @@ class NameServer:
     """
 
     def __init__(
-        self, orb: Orb, address: Endpoint, renew_us: int = RENEW_US, look_us: int = LOOK_US
+        self, orb: Orb, address: Endpoint, renew_us: int = _RENEW_US, look_us: int = _LOOK_US
     ) -> None:
         self._orb, self._address, self._renew_s = orb, address, renew_us / 1e6
         self._lock, self._bound = Lock(), dict[str, Reference]()

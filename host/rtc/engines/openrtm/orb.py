@@ -13,15 +13,15 @@ import omniORB
 from omniORB import CORBA, PortableServer
 from omniORB import any as omni_any
 
-from tickrig.host.cli.openrtm_options import Endpoint
-from tickrig.host.rtc.remote.peer_thread import calls_run
+from tickrig.host.cli.engine_options import Endpoint
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
+from tickrig.host.rtc.system.peer_thread import calls_run
 from tickrig.host.text.log import log_of
 
 Reference = Any
 """A reference to a CORBA object, here or elsewhere."""
 
-CALL_TIMEOUT_MS: Final = 1_000
+_CALL_TIMEOUT_MS: Final = 1_000
 _CLOSE_S: Final = 2.0
 _POLL_S: Final = 0.005
 
@@ -38,7 +38,7 @@ _REFUSALS: Final = {
 
 _REASONS: Final = {
     "connectfailed": "nobody is there",
-    "timedout": f"no answer within {CALL_TIMEOUT_MS / 1_000:g} s",
+    "timedout": f"no answer within {_CALL_TIMEOUT_MS / 1_000:g} s",
     "comm_failure": "the connection broke",
     "object_not_exist": "it has ended",
     "nousableprofile": "no such address",
@@ -191,8 +191,8 @@ def explain(error: Exception) -> str:
 def _options(endpoint: Endpoint) -> dict[str, str]:
     return {
         "endPoint": endpoint.uri,
-        "clientCallTimeOutPeriod": str(CALL_TIMEOUT_MS),
-        "clientConnectTimeOutPeriod": str(CALL_TIMEOUT_MS),
+        "clientCallTimeOutPeriod": str(_CALL_TIMEOUT_MS),
+        "clientConnectTimeOutPeriod": str(_CALL_TIMEOUT_MS),
         "nativeCharCodeSet": "UTF-8",  # else only Latin-1 can be sent
         "traceLevel": "0",  # it would write to standard error
     }

@@ -8,26 +8,25 @@ from typing import Any, Final
 import CosNaming
 from omniORB import CORBA
 
-from tickrig.host.cli.openrtm_options import Endpoint, parse_endpoint
-from tickrig.host.rtc.engines.openrtm.names import name_of
-from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
-from tickrig.host.rtc.engines.openrtm.ports.component_ports import SystemPorts
-from tickrig.host.rtc.engines.openrtm.ports.properties import (
+from tickrig.host.cli.engine_options import Endpoint, parse_endpoint
+from tickrig.host.rtc.engines.openrtm.connector_ends import (
     CORBA_CDR,
     DATA_TYPE,
     INTERFACE,
     nvlist,
 )
+from tickrig.host.rtc.engines.openrtm.names import name_of
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
+from tickrig.host.rtc.engines.openrtm.port_service import SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.data_port import DataPort
 from tickrig.host.rtc.ports.port import AnyPort
-from tickrig.host.rtc.remote.peer_thread import PeerThread
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc.system.remotes import RemoteConnection
+from tickrig.host.rtc.system.manager import Manager, RemoteConnection
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
 
-LOOK_US: Final = 1_000_000
+_LOOK_US: Final = 1_000_000
 """So often a connector is looked at."""
 
 _LOG: Final = log_of(__name__)
@@ -55,7 +54,7 @@ class Peers:
         RtcRefused: a path that leads nowhere.
     """
 
-    def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = LOOK_US) -> None:
+    def __init__(self, ports: SystemPorts, manager: Manager, look_us: int = _LOOK_US) -> None:
         wanted = [_Kept(one, ports, manager) for one in manager.remotes.connections]
         self._threads = [PeerThread(f"keeper of {one.name}", look_us) for one in wanted]
         for one, thread in zip(wanted, self._threads, strict=True):

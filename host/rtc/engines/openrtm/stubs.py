@@ -18,14 +18,14 @@ from typing import Any, Final
 
 from tickrig.host.rtc.states import RtcRefused
 
-PACKAGE: Final = "tickrig_openrtm"
+_PACKAGE: Final = "tickrig_openrtm"
 """What the stubs are imported as: others may have some of the same IDL modules."""
 
 IDL: Final = Path(__file__).parent / "idl"
 DATA_TYPES: Final = "DataTypes.idl"
 """For peers; here the bytes of values are made without an ORB."""
 
-NEEDS_OMNIORB: Final = "OpenRTM needs omniORB: pip install 'tickrig[openrtm]'"
+_NEEDS_OMNIORB: Final = "OpenRTM needs omniORB: pip install 'tickrig[openrtm]'"
 
 _COMPILE: Final = "import sys; from omniidl.main import main; sys.exit(main())"
 _TIMEOUT_S: Final = 60.0
@@ -75,7 +75,7 @@ def stubs() -> Stubs:
     try:
         import omniORB  # noqa: PLC0415 - an extra
     except ImportError as error:
-        raise RtcRefused(NEEDS_OMNIORB) from error
+        raise RtcRefused(_NEEDS_OMNIORB) from error
     files = [path for path in sorted(IDL.glob("*.idl")) if path.name != DATA_TYPES]
     cached = _cache_folder() / f"openrtm-{_key(files, omniORB.coreVersion())}"
     try:
@@ -86,7 +86,7 @@ def stubs() -> Stubs:
     return _imported(_compiled(files, cached))
 
 
-def compile_idl(files: Iterable[Path], folder: Path, package: str = PACKAGE) -> None:
+def compile_idl(files: Iterable[Path], folder: Path, package: str = _PACKAGE) -> None:
     """Write stubs into a folder.
 
     Args:
@@ -126,7 +126,7 @@ def _cache_folder() -> Path:
 
 def _key(files: list[Path], version: str) -> str:
     """Return what the stubs depend on, in 16 digits."""
-    digest = hashlib.sha256(f"{version} {sys.version_info[:2]} {PACKAGE}".encode())
+    digest = hashlib.sha256(f"{version} {sys.version_info[:2]} {_PACKAGE}".encode())
     for path in files:
         digest.update(f"{path.name}\0".encode() + path.read_bytes())
     return digest.hexdigest()[:16]
@@ -166,16 +166,16 @@ def _temporary(files: list[Path]) -> Path:
 
 def _imported(folder: Path) -> Stubs:
     """Import the stubs from a folder; nothing is put on the path of modules."""
-    for name in [name for name in sys.modules if name.partition(".")[0] == PACKAGE]:
+    for name in [name for name in sys.modules if name.partition(".")[0] == _PACKAGE]:
         del sys.modules[name]
-    home = folder / PACKAGE
+    home = folder / _PACKAGE
     spec = importlib.util.spec_from_file_location(
-        PACKAGE, home / "__init__.py", submodule_search_locations=[str(home)]
+        _PACKAGE, home / "__init__.py", submodule_search_locations=[str(home)]
     )
     if spec is None or spec.loader is None:
         raise ImportError(f"no package in {folder}")
     package = importlib.util.module_from_spec(spec)
-    sys.modules[PACKAGE] = package
+    sys.modules[_PACKAGE] = package
     spec.loader.exec_module(package)
     names = [name + end for name in _MODULES for end in ("", "__POA")]
-    return Stubs({name: importlib.import_module(f"{PACKAGE}.{name}") for name in names})
+    return Stubs({name: importlib.import_module(f"{_PACKAGE}.{name}") for name in names})

@@ -6,16 +6,15 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from tickrig.host.rtc.engines.ros2 import robot_messages as robot
-from tickrig.host.rtc.engines.ros2.message_types import message_type
-from tickrig.host.rtc.engines.ros2.stamps import Stamps
+from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 from tickrig.wire.rtc_types import basic, extended_2d, iis
 from tickrig.wire.rtc_types.actuators import ActArrayState
 from tickrig.wire.rtc_types.idl import Struct
 from tickrig.wire.rtc_types.sensors import RangeData
 
-Conversion = Callable[[Any], Any]
-Maker = Callable[[TopicEntry, Stamps], Conversion]
+_Conversion = Callable[[Any], Any]
+_Maker = Callable[[TopicEntry, Stamps], _Conversion]
 """Makes what converts the values, or the messages, of one port."""
 
 _STD: Final[Mapping[str, tuple[type[Struct], ...]]] = {
@@ -41,40 +40,40 @@ _SPEEDS: Final = (iis.TimedVelocity2D, extended_2d.TimedVelocity2D)
 _ANGLES: Final = (basic.TimedDoubleSeq, basic.TimedFloatSeq, basic.TimedDouble, basic.TimedFloat)
 
 
-def _data_out(name: str) -> Maker:
+def _data_out(name: str) -> _Maker:
     """Return what makes a message of `data` alone."""
 
-    def maker(entry: TopicEntry, stamps: Stamps) -> Conversion:
+    def maker(entry: TopicEntry, stamps: Stamps) -> _Conversion:
         kind = message_type(name)
         return lambda value: kind(value.data)
 
     return maker
 
 
-def _array_out(name: str) -> Maker:
+def _array_out(name: str) -> _Maker:
     """Return what makes a message with a layout, which stays empty."""
 
-    def maker(entry: TopicEntry, stamps: Stamps) -> Conversion:
+    def maker(entry: TopicEntry, stamps: Stamps) -> _Conversion:
         kind, layout = message_type(name), message_type("std_msgs/msg/MultiArrayLayout")([], 0)
         return lambda value: kind(layout, list(value.data))
 
     return maker
 
 
-def _data_in(data_type: type[Struct]) -> Maker:
+def _data_in(data_type: type[Struct]) -> _Maker:
     """Return what makes a value of the `data` of a message."""
     make: Any = data_type
     return lambda entry, stamps: lambda message: make(stamps.to_system(), message.data)
 
 
-def _array_in(data_type: type[Struct]) -> Maker:
+def _array_in(data_type: type[Struct]) -> _Maker:
     make: Any = data_type
     whole: Callable[[Any], Any] = bytes if data_type is basic.TimedOctetSeq else tuple
     return lambda entry, stamps: lambda message: make(stamps.to_system(), whole(message.data))
 
 
-def _std() -> tuple[dict[tuple[str, type[Struct]], Maker], ...]:
-    out, into = dict[tuple[str, type[Struct]], Maker](), dict[tuple[str, type[Struct]], Maker]()
+def _std() -> tuple[dict[tuple[str, type[Struct]], _Maker], ...]:
+    out, into = dict[tuple[str, type[Struct]], _Maker](), dict[tuple[str, type[Struct]], _Maker]()
     for short, kinds in _STD.items():
         name, many = f"std_msgs/msg/{short}", short.endswith("MultiArray")
         for kind in kinds:
@@ -85,7 +84,7 @@ def _std() -> tuple[dict[tuple[str, type[Struct]], Maker], ...]:
 
 _STD_OUT, _STD_IN = _std()
 
-OUT: Final[Mapping[tuple[str, type[Struct]], Maker]] = {
+OUT: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
     **{("nav_msgs/msg/Odometry", kind): robot.odometry_out for kind in _POSES},
     ("nav_msgs/msg/Odometry", extended_2d.TimedPoseVel2D): robot.pose_vel_out,
     **{("tf2_msgs/msg/TFMessage", kind): robot.transform_out for kind in _POSES},
@@ -99,7 +98,7 @@ OUT: Final[Mapping[tuple[str, type[Struct]], Maker]] = {
 }
 """Of an OutPort; the first message that fits a type is the usual one."""
 
-IN: Final[Mapping[tuple[str, type[Struct]], Maker]] = {
+IN: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
     **{("geometry_msgs/msg/Twist", kind): robot.twist_in(kind) for kind in _SPEEDS},
     **{("geometry_msgs/msg/TwistStamped", kind): robot.twist_in(kind) for kind in _SPEEDS},
     **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_in(kind) for kind in _POSES},

@@ -2,34 +2,112 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final
 
 from tickrig.host.cli.ros2_options import Ros2Options
 from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.engines.in_port import InPortPushConnector
+from tickrig.host.rtc.engines.out_port import OutPortPushConnector
+from tickrig.host.rtc.engines.peer_end import Codec, PeerEnd
 from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
-from tickrig.host.rtc.engines.ros2.diagnostics import TYPE, Diagnostics
-from tickrig.host.rtc.engines.ros2.foreign_endpoints import ForeignEndpoints, OwnEndpoint
-from tickrig.host.rtc.engines.ros2.participant import Participant, dds_topic
-from tickrig.host.rtc.engines.ros2.stamps import Stamps
+from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
+from tickrig.host.rtc.engines.ros2.participant import (
+    DdsParticipant,
+    ForeignEndpoints,
+    OwnEndpoint,
+    dds_topic,
+)
 from tickrig.host.rtc.engines.ros2.table_reader import parse_table
-from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry, TopicTable
-from tickrig.host.rtc.engines.ros2.topic_reader import TopicReader
-from tickrig.host.rtc.engines.ros2.topic_writer import TopicWriter
-from tickrig.host.rtc.engines.ros2.usual_topics import usual_entries
+from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry, TopicTable, usual_entry
+from tickrig.host.rtc.engines.ros2.topics import TopicReader, TopicWriter
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
-from tickrig.host.rtc.remote.call_queue import CallQueue
-from tickrig.host.rtc.remote.in_port import InPortPushConnector
-from tickrig.host.rtc.remote.out_port import OutPortPushConnector
-from tickrig.host.rtc.remote.peer_end import Codec, PeerEnd
-from tickrig.host.rtc.remote.peer_thread import PeerThread
-from tickrig.host.rtc.states import RtcRefused
+from tickrig.host.rtc.states import LifeCycleState, RtcRefused
+from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
+from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types.basic import Time
 
-CLOSE_US: Final = 1_000_000
+# Topics of a component that no table names: those of all its ports that a message fits.
+
+
+def _usual_entries(component: RtComponent) -> tuple[TopicEntry, ...]:
+    """Return an entry for each port, with the first message that fits: `ConsoleIn0/out`."""
+    found = []
+    for port in component.ports.values():
+        if isinstance(port, InPort | OutPort):
+            makers = OUT if isinstance(port, OutPort) else IN
+            kinds = (name for name, kind in makers if kind is port.data_type)
+            if (kind := next(kinds, None)) is not None:
+                topic = f"{_token(component.instance_name)}/{_token(port.name)}"
+                found.append(usual_entry(port.full_name, topic, kind))
+    return tuple(found)
+
+
+def _token(name: str) -> str:
+    """Return a name as ROS 2 can have it in a topic."""
+    token = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
+    return token if token[:1].isalpha() else f"p{token}"
+
+
+# States of components as a DiagnosticArray of ROS 2.
+
+_TYPE: Final = "diagnostic_msgs/msg/DiagnosticArray"
+
+_WARN: Final = 1
+_LEVELS: Final = {LifeCycleState.ACTIVE: 0, LifeCycleState.ERROR: 2}
+"""OK and ERROR of DiagnosticStatus; whoever is neither Active nor in Error is WARN."""
+
+
+class Diagnostics:
+    """Tells the states of all components each period; the manager ticks it.
+
+    Args:
+        manager: has the components.
+        stamps: the time of the machine.
+        period_us: how often.
+        send: takes each message.
+    """
+
+    def __init__(
+        self, manager: Manager, stamps: Stamps, period_us: int, send: Callable[[Any], object]
+    ) -> None:
+        self._manager, self._stamps, self._send = manager, stamps, send
+        self._period_us, self.due_us = period_us, manager.now_us + period_us
+        self._array, self._status = message_type(_TYPE), message_type(_part("DiagnosticStatus"))
+        self._value = message_type(_part("KeyValue"))
+        self._header = message_type("std_msgs/msg/Header")
+        self._time = message_type("builtin_interfaces/msg/Time")
+
+    def tick(self, now_us: int) -> None:
+        """Tell them, if it is time to."""
+        if now_us < self.due_us:
+            return
+        self.due_us += self._period_us * (1 + (now_us - self.due_us) // self._period_us)
+        stamp = self._time(*self._stamps.to_ros(Time.from_us(now_us)))
+        statuses = [self._of(component) for component in self._manager.components]
+        self._send(self._array(self._header(stamp, ""), statuses))
+
+    def _of(self, component: RtComponent) -> Any:
+        name, spec = component.instance_name, component.spec
+        context = component.contexts[0] if component.contexts else None
+        state = context.state_of(component) if context else LifeCycleState.CREATED
+        rate = f"{context.rate_hz:g}" if context else "0"
+        pairs = {"type": spec.type_name, "rate_hz": rate, "version": spec.version}
+        values = [self._value(*pair) for pair in pairs.items()]
+        level = _LEVELS.get(state, _WARN)
+        return self._status(level, name, state.name.capitalize(), spec.vendor, values)
+
+
+def _part(name: str) -> str:
+    return f"diagnostic_msgs/msg/{name}"
+
+
+_CLOSE_US: Final = 1_000_000
 
 _LOG: Final = log_of(__name__)
 
@@ -43,8 +121,8 @@ def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Ite
         ValueError: the table, the domain or the interface cannot be; what the table says of
             components that are there.
     """
-    table = read_table(options)
-    refuse_mistakes(table, manager)
+    table = _read_table(options)
+    _refuse_mistakes(table, manager)
     engine = Ros2Engine(options, table, manager, calls)
     manager.on_added.append(engine.join)
     try:
@@ -54,7 +132,7 @@ def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Ite
         engine.close()
 
 
-def read_table(options: Ros2Options) -> TopicTable:
+def _read_table(options: Ros2Options) -> TopicTable:
     """Return the table that is given, else that of the command, else one of all ports.
 
     Raises:
@@ -66,13 +144,13 @@ def read_table(options: Ros2Options) -> TopicTable:
     return parse_table(options.topics, "topics") if options.topics else TopicTable()
 
 
-def refuse_mistakes(table: TopicTable, manager: Manager) -> None:
+def _refuse_mistakes(table: TopicTable, manager: Manager) -> None:
     """Raise ValueError with all that does not fit the components that are there, a line each."""
     components = {each.instance_name: each for each in manager.components}
     mistakes = []
     for entry in table.entries or ():
         if component := components.get(entry.port.partition(".")[0]):
-            mistakes += mistakes_of(entry, component)
+            mistakes += _mistakes_of(entry, component)
     if mistakes:
         raise ValueError("\n".join(mistakes))
     owners = {entry.port.partition(".")[0]: None for entry in table.entries or ()}
@@ -80,7 +158,7 @@ def refuse_mistakes(table: TopicTable, manager: Manager) -> None:
         _LOG.warning("ros2: no %s yet; topics come with the components", absent)
 
 
-def mistakes_of(entry: TopicEntry, component: RtComponent) -> list[str]:
+def _mistakes_of(entry: TopicEntry, component: RtComponent) -> list[str]:
     """Return why the port of an entry cannot have its topic, if it cannot."""
     name = entry.port.partition(".")[2]
     if (port := component.ports.get(name)) is None:
@@ -112,7 +190,7 @@ class Ros2Engine:
         self, options: Ros2Options, table: TopicTable, manager: Manager, calls: CallQueue
     ) -> None:
         self._table, self._manager, self._calls = table, manager, calls
-        self._participant = Participant(options.domain, options.interface)
+        self._participant = DdsParticipant(options.domain, options.interface)
         self._stamps = Stamps(lambda: manager.now_us)
         self._writing: dict[str, OwnEndpoint] = {}
         self._reading: dict[str, OwnEndpoint] = {}
@@ -130,11 +208,11 @@ class Ros2Engine:
         name = component.instance_name
         entries = self._table.entries
         if entries is None:
-            entries = usual_entries(component)
+            entries = _usual_entries(component)
         for entry in entries:
             if entry.port.partition(".")[0] != name:
                 continue
-            if mistakes := mistakes_of(entry, component):
+            if mistakes := _mistakes_of(entry, component):
                 _LOG.warning("%s", *mistakes)
                 continue
             try:
@@ -150,8 +228,8 @@ class Ros2Engine:
                 for connector in port.connectors:
                     if connector.profile.connector_id.startswith(_ID):
                         connector.end()
-        self._out.close(CLOSE_US)
-        self._in.close(CLOSE_US)
+        self._out.close(_CLOSE_US)
+        self._in.close(_CLOSE_US)
         for endpoint in self._endpoints:
             endpoint.close()
         self._foreign.close()
@@ -197,7 +275,7 @@ class Ros2Engine:
 
     def _add_diagnostics(self) -> Diagnostics:
         topic, period_us = self._table.diagnostics, self._table.period_us
-        entry = TopicEntry("diagnostics", topic, TYPE)
+        entry = TopicEntry("diagnostics", topic, _TYPE)
         writer = TopicWriter(self._participant, entry)
 
         def send(message: Any) -> None:

@@ -2,22 +2,88 @@
 
 from __future__ import annotations
 
+import os
+import re
 import socket
-from typing import Any, Final
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Protocol
 
-from cyclonedds.core import DDSException, Listener
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
+from cyclonedds.core import DDSException, InstanceState, Listener
 from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.internal import load_cyclonedds
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from tickrig.host.rtc.engines.ros2.dds_log import DdsLog
-from tickrig.host.rtc.engines.ros2.message_types import message_type
+from tickrig.host.rtc.engines.ros2.message_types import dds_name, message_type, ros_name
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
+from tickrig.host.text.log import log_of
 
-LOOPBACK: Final = "127.0.0.1"
-MOST_PARTICIPANTS: Final = 32
+# What Cyclone DDS has to say: it would write a line to standard error for each message.
+
+_FATAL: Final = 1
+"""Of the categories of its log (dds/ddsrt/log.h): what it writes to standard error."""
+
+_MOST_MESSAGES: Final = 100
+"""Kinds of lines that are known; of more nothing is said."""
+
+_DESCRIPTORS: Final = "/dev/fd"
+_DDS_LOG: Final = log_of(__name__)
+_NUMBER: Final = re.compile(r"(?<![0-9a-f])(?=[a-f]*+[0-9])[0-9a-f]++")
+_HEAD: Final = re.compile(r"^[\d.]+ \[[^]]*\] +\S* *")
+
+
+class DdsLog:
+    """Reads its lines from a pipe until it is closed, and logs each kind once.
+
+    Lines of a kind differ in numbers. What the pipe does not hold is lost: nothing waits.
+
+    Attributes:
+        configuration: has DDS write into the pipe; where pipes have no names, it says nothing.
+    """
+
+    def __init__(self) -> None:
+        reader, self._writer = os.pipe()
+        self.configuration = ""
+        if sys.platform != "win32" and Path(_DESCRIPTORS).is_dir():
+            os.set_blocking(self._writer, False)
+            place = f"{_DESCRIPTORS}/{self._writer}"
+            self.configuration = (
+                f"<Tracing><Category>warning</Category><OutputFile>{place}</OutputFile></Tracing>"
+            )
+        library: Any = load_cyclonedds()
+        library.dds_set_log_mask(_FATAL)
+        self._thread = threading.Thread(target=_read, args=(reader,), name="ros2 log", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """End, once DDS has left the pipe."""
+        os.close(self._writer)
+
+
+def _read(descriptor: int) -> None:
+    known = set[str]()
+    with open(descriptor, encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            text = _HEAD.sub("", line.strip())
+            kind = _NUMBER.sub("#", text)
+            if kind not in known and len(known) < _MOST_MESSAGES:
+                known.add(kind)
+                _DDS_LOG.warning("ros2: DDS says: %s", text)
+
+
+_LOOPBACK: Final = "127.0.0.1"
+_MOST_PARTICIPANTS: Final = 32
 """On loopback nobody can call all: so many are looked for, as ROS 2 does."""
 
 HISTORY: Final = 10
@@ -33,12 +99,12 @@ _CONFIGURATION: Final = """\
 
 _PEERS: Final = (
     "<ParticipantIndex>auto</ParticipantIndex>"
-    f"<MaxAutoParticipantIndex>{MOST_PARTICIPANTS}</MaxAutoParticipantIndex>"
-    f'<Peers><Peer Address="{LOOPBACK}"/></Peers>'
+    f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}</MaxAutoParticipantIndex>"
+    f'<Peers><Peer Address="{_LOOPBACK}"/></Peers>'
 )
 
 
-class Participant:
+class DdsParticipant:
     """Takes part in a domain until it is closed.
 
     Args:
@@ -66,12 +132,12 @@ class Participant:
 
     def writer(self, entry: TopicEntry) -> Any:
         """Return a new DataWriter of a topic; DDSException if there can be none."""
-        return DataWriter(self.entity, self._topic(entry), qos=qos_of(entry))
+        return DataWriter(self.entity, self._topic(entry), qos=_qos_of(entry))
 
     def reader(self, entry: TopicEntry, listener: Listener) -> Any:
         """Return a new DataReader of a topic; DDSException if there can be none."""
         topic = self._topic(entry)
-        return DataReader(self.entity, topic, qos=qos_of(entry), listener=listener)
+        return DataReader(self.entity, topic, qos=_qos_of(entry), listener=listener)
 
     def close(self) -> None:
         """Leave the domain; peers learn of it at once."""
@@ -91,7 +157,7 @@ def dds_topic(name: str) -> str:
     return f"rt/{name}"
 
 
-def qos_of(entry: TopicEntry) -> Qos:
+def _qos_of(entry: TopicEntry) -> Qos:
     """Return what is offered and asked for; a peer that takes nothing holds up nobody."""
     reliability = (
         Policy.Reliability.Reliable(0) if entry.reliable else Policy.Reliability.BestEffort
@@ -112,8 +178,144 @@ def reason_of(error: DDSException) -> str:
 def _place(interface: str) -> tuple[str, str]:
     """Return the interface and what is to be known of peers, as the configuration has them."""
     if not interface:
-        return f'address="{LOOPBACK}" multicast="false"', _PEERS
+        return f'address="{_LOOPBACK}" multicast="false"', _PEERS
     known = [name for _, name in socket.if_nameindex()]
     if interface not in known:
         raise ValueError(f"interface {interface!r} is none of this machine: {', '.join(known)}")
     return f'name="{interface}"', ""
+
+
+# Who else writes and reads our topics, and in a way that is not ours.
+
+_LOOK_S: Final = 0.5
+MATCH_S: Final = 5.0
+"""So long a peer that seems to fit may take until it is matched."""
+
+_MOST: Final = 1_000
+
+_INFINITE_NS: Final = 0x7FFF_FFFF_FFFF_FFFF
+
+_UNSIGNED: Final = 0xFFFF_FFFF_FFFF_FFFF
+"""Handles are 64 bits, which Cyclone DDS's Python has with a sign or without."""
+
+_LOG: Final = log_of(__name__)
+
+
+class OwnEndpoint(Protocol):
+    """What writes or reads one of our topics.
+
+    Attributes:
+        entry: port and topic.
+    """
+
+    @property
+    def entry(self) -> TopicEntry:
+        """Port and topic."""
+        ...
+
+    def matched(self) -> list[int]:
+        """Return the instance handles of the peers that it is joined with."""
+        ...
+
+
+_Endpoints = Mapping[str, OwnEndpoint]
+"""By topic, as DDS calls it."""
+
+
+class ForeignEndpoints:
+    """Says of each peer that cannot be joined with a topic of ours why, in a line.
+
+    Args:
+        participant: takes part in the domain.
+        writing: what we write; it may change.
+        reading: what we read.
+    """
+
+    def __init__(
+        self, participant: DdsParticipant, writing: _Endpoints, reading: _Endpoints
+    ) -> None:
+        self._sides: tuple[tuple[Any, _Endpoints, bool], ...] = (
+            (BuiltinDataReader(participant.entity, BuiltinTopicDcpsSubscription), writing, True),
+            (BuiltinDataReader(participant.entity, BuiltinTopicDcpsPublication), reading, False),
+        )
+        self._warned = set[str]()
+        self._awaited: dict[int, tuple[float, OwnEndpoint, str]] = {}
+
+    def look(self) -> float | None:
+        """Say what is new; return when to look again, in s."""
+        for reader, ours, reads in self._sides:
+            try:
+                endpoints = reader.take(_MOST)
+            except DDSException:  # the participant has gone
+                return None
+            for endpoint in endpoints:
+                handle = endpoint.sample_info.instance_handle
+                self._awaited.pop(handle, None)
+                alive = endpoint.sample_info.instance_state == InstanceState.Alive
+                if alive and (own := ours.get(endpoint.topic_name or "")):
+                    self._compare(handle, endpoint, own, reads=reads)
+        self._look_for_unmatched()
+        return _LOOK_S
+
+    def close(self) -> None:
+        """Look no more."""
+        self._sides = ()
+        self._awaited.clear()
+
+    def _compare(self, handle: int, endpoint: Any, own: OwnEndpoint, *, reads: bool) -> None:
+        entry, reliable = own.entry, _is_reliable(endpoint.qos)
+        does = f"a peer {'reads' if reads else 'writes'}"
+        if endpoint.type_name != dds_name(entry.type):
+            self._warn(f"{does} {ros_name(endpoint.type_name)} on {entry.topic}, not {entry.type}")
+        elif reads and Policy.Durability.TransientLocal in endpoint.qos:
+            self._warn(f"a reader of {entry.topic} wants what was sent before (transient local)")
+        elif reads and reliable and not entry.reliable:
+            self._warn(f"a reader of {entry.topic} wants it reliably: set reliable = true")
+        elif not reads and entry.reliable and not reliable:
+            self._warn(f"a writer of {entry.topic} does not send reliably: set reliable = false")
+        elif policy := _refused_policy(endpoint.qos, reads=reads):
+            does = f"a {'reader' if reads else 'writer'} of {entry.topic}"
+            self._warn(f"{does} has a QoS policy that does not fit ours: {policy}")
+        else:
+            text = f"{does} {entry.type} with other fields on {entry.topic}"
+            self._awaited[handle] = time.monotonic() + MATCH_S, own, text
+
+    def _look_for_unmatched(self) -> None:
+        """Say who has the right names, and was not joined in all that time."""
+        for handle, (until_s, own, text) in tuple(self._awaited.items()):
+            if time.monotonic() > until_s:
+                del self._awaited[handle]
+                if handle not in {matched & _UNSIGNED for matched in own.matched()}:
+                    self._warn(text)
+
+    def _warn(self, text: str) -> None:
+        if text not in self._warned:
+            self._warned.add(text)
+            _LOG.warning("ros2: %s; it is not joined", text)
+
+
+def _refused_policy(qos: Any, *, reads: bool) -> str:  # noqa: PLR0911 - a table
+    """Return which policy of a peer cannot be met, with its value; empty if all can.
+
+    Ours are the defaults of DDS: no deadline, automatic liveliness without a lease, shared
+    ownership, order by reception (DDS 1.4, 2.2.3: requested and offered must be compatible).
+    """
+    for policy in qos:
+        match policy:
+            case Policy.Ownership.Exclusive:
+                return "ownership exclusive"
+            case Policy.Deadline(deadline=ns) if reads and ns < _INFINITE_NS:
+                return f"deadline {ns / 1e6:g} ms"
+            case Policy.DestinationOrder.BySourceTimestamp if reads:
+                return "destination order by source timestamp"
+            case Policy.Liveliness.Automatic(lease_duration=ns) if reads and ns < _INFINITE_NS:
+                return f"liveliness automatic, lease {ns / 1e6:g} ms"
+            case Policy.Liveliness.ManualByParticipant() if reads:
+                return "liveliness manual by participant"
+            case Policy.Liveliness.ManualByTopic() if reads:
+                return "liveliness manual by topic"
+    return ""
+
+
+def _is_reliable(qos: Any) -> bool:
+    return any(isinstance(policy, Policy.Reliability.Reliable) for policy in qos)

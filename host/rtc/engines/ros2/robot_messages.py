@@ -10,8 +10,7 @@ from collections.abc import Callable
 from math import atan2, cos, inf, pi, sin, tau
 from typing import Any, Final
 
-from tickrig.host.rtc.engines.ros2.message_types import message_type
-from tickrig.host.rtc.engines.ros2.stamps import Stamps
+from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D

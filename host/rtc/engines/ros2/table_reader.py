@@ -27,18 +27,17 @@ from tickrig.host.rtc.engines.ros2.topic_entry import (
     TopicTable,
     usual_entry,
 )
-from tickrig.host.text.toml_document import BROKEN, TomlDocument
-from tickrig.host.text.toml_reader import read_toml
+from tickrig.host.text.toml_reader import BROKEN, TomlDocument, read_toml
 from tickrig.host.text.values import parse_time_with_unit_us
 
-OF_TYPES: Final = {
+_OF_TYPES: Final = {
     "frame": tuple(FRAMES),
     "child_frame": PLACED,
     "joints": ("sensor_msgs/msg/JointState",),
 }
 """Keys that only some messages have."""
 
-KEYS: Final = ("port", "topic", "type", *OF_TYPES, "stop_after", "reliable")
+_KEYS: Final = ("port", "topic", "type", *_OF_TYPES, "stop_after", "reliable")
 
 _TOPIC: Final = re.compile(r"/?[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
 _PORT: Final = re.compile(r"[^\s.]+\.[^\s.]+")
@@ -93,10 +92,10 @@ class _Table:
         if not isinstance(words, dict):
             self._wrong("an entry is a table with port, topic and type")
             return None
-        for key in words.keys() - {*KEYS}:
-            self._wrong(f"unknown key {key!r}; known: {', '.join(KEYS)}", key)
+        for key in words.keys() - {*_KEYS}:
+            self._wrong(f"unknown key {key!r}; known: {', '.join(_KEYS)}", key)
         kind = self._text(words, "type", MESSAGES.__contains__, f"one of {', '.join(MESSAGES)}")
-        for key, kinds in OF_TYPES.items():
+        for key, kinds in _OF_TYPES.items():
             if kind and key in words and kind not in kinds:
                 self._wrong(f"{kind} has no {key}; it is for {', '.join(kinds)}", key)
         port = self._text(words, "port", _PORT.fullmatch, "a port, as Odometry0.out")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
-STOP_AFTER_US: Final = 500_000
+_STOP_AFTER_US: Final = 500_000
 """Silence after which a velocity is taken back, if the table does not say otherwise."""
 
-VELOCITIES: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+_VELOCITIES: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
 PLACED: Final = ("nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage")
 FRAMES: Final = {
     **dict.fromkeys(PLACED, "odom"),
@@ -54,7 +54,7 @@ class TopicEntry:
 
 def usual_entry(port: str, topic: str, kind: str) -> TopicEntry:
     """Return an entry with the frames and the stop that hold where nobody names others."""
-    stop_after_us = STOP_AFTER_US * (kind in VELOCITIES)
+    stop_after_us = _STOP_AFTER_US * (kind in _VELOCITIES)
     child_frame = "base_link" if kind in PLACED else ""
     frame = FRAMES.get(kind, "")
     return TopicEntry(port, topic, kind, frame, child_frame, stop_after_us=stop_after_us)

@@ -12,9 +12,9 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedState
 from tickrig.wire.rtc_types.rh2 import NavigationState, Path, RunMode
 
-State = NavigationState
+_State = NavigationState
 
-TUNED = {
+_TUNED = {
     "align_angle": "0.01",
     "turn_angle": "0.01",
     "goal_angle": "0.003",
@@ -55,7 +55,7 @@ class Navigation(RtComponent):
         self.creep_vel = bind("creep_vel", 0.1, "x>0", unit="m/s")
         self.braking = bind("braking", 0.0, "x>=0", unit="m/s2")
         self.latency = bind("latency", 0.0, "x>=0", unit="s")
-        self.configuration.add_set("tuned", TUNED)
+        self.configuration.add_set("tuned", _TUNED)
         self.position = self.add_port(InPort("position", iis.TimedPose2D))
         self.min_path = self.add_port(InPort("min_path", iis.TimedPath2DSeq))
         self.path = self.add_port(OutPort("path", Path))
@@ -63,7 +63,7 @@ class Navigation(RtComponent):
         self._forget()
 
     def _forget(self) -> None:
-        self.state = State.FINISH
+        self.state = _State.FINISH
         self._relays: tuple[Pose, ...] = ()
         self._at, self._fresh, self._v = 0, False, 0.0
 
@@ -88,42 +88,42 @@ class Navigation(RtComponent):
             return
         self._relays = tuple(relay for relay in relays if relay is not None)
         self._at, self._fresh = 0, True
-        self.state = State.ANGLE_CHECK
+        self.state = _State.ANGLE_CHECK
         if not self._relays:
             self._stop(now)
-            self.state = State.FINISH
+            self.state = _State.FINISH
 
     def _judge(self, now: Time, pose: Pose) -> None:
         if self._fresh:
             self._relays, self._fresh = (pose, *self._relays[1:]), False
         relay = self._relays[self._at]
         match self.state:
-            case State.ANGLE_CHECK:
+            case _State.ANGLE_CHECK:
                 self._check_angle(now, relay, pose)
-            case State.TURNING:
+            case _State.TURNING:
                 if _off(relay, pose) < self.turn_angle.value:
-                    self.state = State.GOAL_CHECK
-            case State.TURNING2:
+                    self.state = _State.GOAL_CHECK
+            case _State.TURNING2:
                 if _off(relay, pose) < self.goal_angle.value:
                     self._stop(now)
-                    self.state, self._relays = State.FINISH, ()
-            case State.GOAL_CHECK:
+                    self.state, self._relays = _State.FINISH, ()
+            case _State.GOAL_CHECK:
                 self._check_goal(now, relay, pose)
-            case State.SPEED_DOWN | State.STOPPING:
+            case _State.SPEED_DOWN | _State.STOPPING:
                 self._approach(now, relay, pose)
 
     def _check_angle(self, now: Time, relay: Pose, pose: Pose) -> None:
         last = self._at == len(self._relays) - 1
         if last or _off(relay, pose) > self.align_angle.value:
             self._send(now, RunMode.SPIN, relay, w=1.0)
-            self.state = State.TURNING2 if last else State.TURNING
+            self.state = _State.TURNING2 if last else _State.TURNING
         else:
-            self.state = State.GOAL_CHECK
+            self.state = _State.GOAL_CHECK
 
     def _check_goal(self, now: Time, relay: Pose, pose: Pose) -> None:
         if pose.distance(relay) > self.goal_distance.value:
             self._drive(now, relay, pose, self.max_vel.value)
-            self.state = State.SPEED_DOWN
+            self.state = _State.SPEED_DOWN
         else:
             self._next(now)
 
@@ -135,11 +135,11 @@ class Navigation(RtComponent):
                 self._next(now)
             else:
                 self._drive(now, relay, pose, self.max_vel.value)
-        elif self.state is State.STOPPING:
+        elif self.state is _State.STOPPING:
             if over > 0:
                 self._next(now)
         elif over > -self.judge_radius.value:
-            self.state = State.STOPPING
+            self.state = _State.STOPPING
             self._drive(now, relay, pose, self.creep_vel.value)
 
     def _drive(self, now: Time, relay: Pose, pose: Pose, v: float) -> None:
@@ -152,9 +152,9 @@ class Navigation(RtComponent):
     def _next(self, now: Time) -> None:
         self._stop(now)
         self._at += 1
-        self.state = State.ANGLE_CHECK
+        self.state = _State.ANGLE_CHECK
         if self._at == len(self._relays):
-            self.state, self._relays = State.FINISH, ()
+            self.state, self._relays = _State.FINISH, ()
 
     def _stop(self, now: Time) -> None:
         self._send(now, RunMode.STOP, Pose())

@@ -18,7 +18,7 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedState
 from tickrig.wire.rtc_types.rh2 import NavigationState
 
-LEAST_WAY_M: Final = 1e-6
+_LEAST_WAY_M: Final = 1e-6
 """Metres that are no way: the heading of such a step would mean nothing."""
 
 _LOG: Final = log_of(__name__)
@@ -114,7 +114,7 @@ def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:
     """
     way, here = [start], start
     for point in points:
-        if here.distance(point) > LEAST_WAY_M:
+        if here.distance(point) > _LEAST_WAY_M:
             heading = here.bearing(point)
             way += [Pose(here.x, here.y, heading), Pose(point.x, point.y, heading)]
             here = point

@@ -19,9 +19,9 @@ from tickrig.host.rtc.motion.ports import plausible, read_newest_pose, write_vel
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rh2 import Path, RunMode
 
-Mode = Callable[[Path, Pose, Pose], Twist]
+_Mode = Callable[[Path, Pose, Pose], Twist]
 
-TUNED = {"line_K3": "40", "spin": "time-optimal", "latency": "0.08"}
+_TUNED = {"line_K3": "40", "spin": "time-optimal", "latency": "0.08"}
 """The set `tuned` (rh3-control, J)."""
 
 
@@ -64,12 +64,12 @@ class PathFollower(RtComponent):
         self.pose_timeout = bind("pose_timeout", 0.5, "x>0", unit="s")
         self.tread = bind("tread", 0.464, "x>0", unit="m")
         self.radius = bind("radius", 0.0995, "x>0", unit="m")
-        self.configuration.add_set("tuned", TUNED)
+        self.configuration.add_set("tuned", _TUNED)
         self.configuration.on_update.append(lambda set_id: self._configure())
         self.position = self.add_port(InPort("position", iis.TimedPose2D))
         self.target_path = self.add_port(InPort("target_path", Path))
         self.velocity = self.add_port(OutPort("velocity", iis.TimedVelocity2D))
-        self._modes: Mapping[int, Mode] = {
+        self._modes: Mapping[int, _Mode] = {
             RunMode.LINEFOLLOW: self._line,
             RunMode.TO_POINT: self._to_point,
             RunMode.CIRCLEFOLLOW: self._circle,

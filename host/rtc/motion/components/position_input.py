@@ -20,7 +20,7 @@ INTERMEDIATE_POINT: Final = 101
 END_POINT: Final = 102
 """`id[0]` of the points of a path; a goal has none."""
 
-DEFINED_PATH: Final = (Pose(1.0), Pose(1.0, 1.0), Pose(0.0, 1.0), Pose())
+_DEFINED_PATH: Final = (Pose(1.0), Pose(1.0, 1.0), Pose(0.0, 1.0), Pose())
 """The default of `PositionInput.defined_path`: a square of 1 m, back to the origin."""
 
 USAGE: Final = "goal X Y DEG; path FILE; path X Y, X Y DEG; path; end"
@@ -58,7 +58,7 @@ class PositionInput(RtComponent):
         self._commands: deque[tuple[iis.TimedPose2D, ...]] = deque()
         self._running = self._ending = self._prompted = False
         self.finished = 0
-        self.defined_path: Sequence[Pose] = DEFINED_PATH
+        self.defined_path: Sequence[Pose] = _DEFINED_PATH
         self.prompt: Callable[[str], None] | None = None
         self.report: Callable[[str], None] | None = None
 

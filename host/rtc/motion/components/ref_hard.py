@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from math import tau
 from typing import ClassVar, Final, Protocol
 
-from tickrig.host.links.errors import LinkError
-from tickrig.host.links.link import Link
+from tickrig.host.links.link import Link, LinkError
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import (
     ExecutionContext,
@@ -20,36 +19,40 @@ from tickrig.host.rtc import (
     RtComponent,
     ServicePort,
 )
+from tickrig.host.rtc.configuration import Parameter
 from tickrig.host.rtc.motion.geometry import Twist, wheel_speeds
 from tickrig.host.rtc.motion.modbus_master import ModbusAnswer, ModbusMaster
 from tickrig.host.rtc.motion.ports import plausible, read_newest
-from tickrig.host.rtc.parameter import Parameter
 from tickrig.host.text.log import log_of
-from tickrig.wire.modbus.requests import READ, READ_WRITE, WRITE, ExceptionCode, Request
-from tickrig.wire.modbus.rh3 import (
+from tickrig.wire.modbus import (
     DEVICE_ID,
+    READ,
+    READ_WRITE,
     REPORT,
+    WRITE,
     Address,
     Command,
+    ExceptionCode,
     Fault,
     Mode,
     Report,
+    Request,
     Status,
     wide,
 )
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
 
-MAX_MISSES: Final = 5
+_MAX_MISSES: Final = 5
 """Requests in a row, unanswered or refused, that are an error.
 
 rh3-control proposes 3; with a fifth of all exchanges lost they come once in ten minutes.
 """
 
-GAINS: Final[Mapping[str, int]] = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
+_GAINS: Final[Mapping[str, int]] = {"P": 10, "I": 0, "D": 0, "VP": 10, "VI": 0, "VD": 1}
 """Of position and of velocity."""
 
-WATCHDOG_MS: Final = 500
+_WATCHDOG_MS: Final = 500
 """Silence after which the base stops by itself."""
 
 _TURN: Final = 2**32  # counts after which a counter begins again
@@ -81,7 +84,7 @@ class RefHardRh3(RtComponent):
     on_state_update, when all others have executed, it sends the speeds of this period. So
     nothing waits, and a command is on the line in the period in which it was made.
 
-    It goes into Error when the base has a fault, refuses or leaves unanswered `MAX_MISSES`
+    It goes into Error when the base has a fault, refuses or leaves unanswered `_MAX_MISSES`
     requests in a row, or the line is gone; the base then stops by its own watchdog. While the
     bumper is pressed or after `Stop` it commands standstill. Where a wheel would have to be
     faster than Velocity_limit, both are slowed down alike.
@@ -121,7 +124,7 @@ class RefHardRh3(RtComponent):
         self.device = bind("DeviceFileName", "/dev/ttyUSB0")
         self.any_device = bind("AnyDevice", 0, "0<=x<=1")
         self.gains = tuple(
-            bind(f"gain_{name}", default, "0<=x<=32767") for name, default in GAINS.items()
+            bind(f"gain_{name}", default, "0<=x<=32767") for name, default in _GAINS.items()
         )
         self.velocity_limit = bind("Velocity_limit", 10.0, "x>0", unit="rad/s")
         self.acceleration_limit = bind("Acceleration_limit", 50.0, "x>0", unit="rad/s2")
@@ -169,7 +172,7 @@ class RefHardRh3(RtComponent):
             self._orders.append(_IDENTITY)
         self._orders.append(_MODE)
         self._orders.append(_write(Address.GAIN_P, *settings))
-        self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, WATCHDOG_MS))
+        self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, _WATCHDOG_MS))
         self._orders.append(_write(Address.COMMAND, Command.ENABLE))
         return ReturnCode.RTC_OK
 
@@ -195,8 +198,8 @@ class RefHardRh3(RtComponent):
             return self._failed(str(error))
         if answer is not None:
             return self._take(ec, answer)
-        if self._master.misses >= MAX_MISSES:
-            return self._failed(f"no answer to {MAX_MISSES} requests in a row")
+        if self._master.misses >= _MAX_MISSES:
+            return self._failed(f"no answer to {_MAX_MISSES} requests in a row")
         return ReturnCode.RTC_OK
 
     def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
@@ -235,8 +238,8 @@ class RefHardRh3(RtComponent):
     def _take(self, ec: ExecutionContext, answer: ModbusAnswer) -> ReturnCode:
         if answer.refusal is not None:
             self._refused += 1  # noise may have made another request of it
-            if self._refused >= MAX_MISSES:
-                refusal = refusal_text(answer.request, answer.refusal)
+            if self._refused >= _MAX_MISSES:
+                refusal = _refusal_text(answer.request, answer.refusal)
                 return self._failed(f"the base refuses {refusal}{self._stranger}")
             return ReturnCode.RTC_OK
         self._refused = 0
@@ -255,7 +258,7 @@ class RefHardRh3(RtComponent):
         now = Time.from_us(ec.now_us)
         self.angles.write(TimedDoubleSeq(now, tuple(self._angles)))
         if report.status & Status.FAULT:
-            faults = fault_text(report.fault_left, report.fault_right)
+            faults = _fault_text(report.fault_left, report.fault_right)
             return self._failed(f"fault of the base: {faults}")
         return ReturnCode.RTC_OK
 
@@ -284,12 +287,12 @@ def _write(address: Address, *values: int) -> Request:
     return Request(WRITE, write=(address, tuple(int(value) for value in values)))
 
 
-def fault_text(left: Fault, right: Fault) -> str:
+def _fault_text(left: Fault, right: Fault) -> str:
     """Return the faults of both wheels, each with the wheels that have it.
 
-    >>> fault_text(Fault.EMERGENCY_STOP | Fault.STALL, Fault.EMERGENCY_STOP)
+    >>> _fault_text(Fault.EMERGENCY_STOP | Fault.STALL, Fault.EMERGENCY_STOP)
     'stall (left), emergency stop (left, right)'
-    >>> fault_text(Fault(0x20), Fault(0))
+    >>> _fault_text(Fault(0x20), Fault(0))
     'fault 20h (left)'
     """
     sides = {"left": left, "right": right}
@@ -302,10 +305,10 @@ def _name(bit: int) -> str:
     return _words(Fault(bit).name or f"fault {bit:02X}h")
 
 
-def refusal_text(request: Request, code: ExceptionCode | int) -> str:
+def _refusal_text(request: Request, code: ExceptionCode | int) -> str:
     """Return which request was refused, and why.
 
-    >>> refusal_text(Request(3, (0x10, 1)), ExceptionCode.ILLEGAL_DATA_ADDRESS)
+    >>> _refusal_text(Request(3, (0x10, 1)), ExceptionCode.ILLEGAL_DATA_ADDRESS)
     'function 03h at 0010h: illegal data address'
     """
     first, _ = request.write or request.read or (0, 0)

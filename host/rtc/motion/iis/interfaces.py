@@ -14,7 +14,7 @@ from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 
-PERIOD_US: Final = 10_000
+_PERIOD_US: Final = 10_000
 """What IIS recommends at most."""
 
 _LOG: Final = log_of(__name__)
@@ -45,10 +45,10 @@ class RunningInformation(RtComponent):
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin at standstill."""
         self._forget()
-        if ec.period_us > PERIOD_US:
+        if ec.period_us > _PERIOD_US:
             _LOG.warning(
                 "%s: period %d us, IIS recommends %d us at most",
-                *(self.instance_name, ec.period_us, PERIOD_US),
+                *(self.instance_name, ec.period_us, _PERIOD_US),
             )
         return ReturnCode.RTC_OK
 

@@ -23,11 +23,11 @@ PASSED: Final = 0
 STOPPED: Final = 1
 """`id[0]` of a running state; IIS leaves open how the flag is carried."""
 
-LEAST_WAY_M: Final = 1e-3
+_LEAST_WAY_M: Final = 1e-3
 """Metres between way points that are no way."""
 
 
-class Stage(Enum):
+class PathStage(Enum):
     """What the cart does on its path."""
 
     IDLE = auto()
@@ -82,7 +82,7 @@ class PathInterface(RtComponent):
     def _forget(self) -> None:
         self._points: list[WayPoint] = []
         self._line, self._at, self._speed = Pose(), 0, 0.0
-        self._stage, self._fresh = Stage.IDLE, False
+        self._stage, self._fresh = PathStage.IDLE, False
         self._order: Path | None = None
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -121,16 +121,16 @@ class PathInterface(RtComponent):
             self._fresh = False
             self._next(now, pose)
         match self._stage:
-            case Stage.TURN:
+            case PathStage.TURN:
                 if _off(self._line, pose) < self.turn_angle.value:
-                    self._stage = Stage.LINE
+                    self._stage = PathStage.LINE
                     self._drive(now, pose)
-            case Stage.LINE:
+            case PathStage.LINE:
                 self._drive(now, pose)
-            case Stage.LAST_TURN:
+            case PathStage.LAST_TURN:
                 if _off(self._line, pose) < self.goal_angle.value:
                     self._finish(now)
-            case Stage.IDLE:
+            case PathStage.IDLE:
                 pass
 
     def _next(self, now: Time, pose: Pose) -> None:
@@ -138,15 +138,15 @@ class PathInterface(RtComponent):
         self._at += 1
         while self._at < len(self._points):
             target, speed = self._points[self._at]
-            if pose.distance(target) > max(LEAST_WAY_M, self.goal_distance.value):
+            if pose.distance(target) > max(_LEAST_WAY_M, self.goal_distance.value):
                 heading = pose.bearing(target) + (pi if speed < 0 else 0.0)
-                self._turn(now, Stage.TURN, target._replace(heading=wrap(heading)))
+                self._turn(now, PathStage.TURN, target._replace(heading=wrap(heading)))
                 return
             self._report(now, target, PASSED)
             self._at += 1
-        self._turn(now, Stage.LAST_TURN, self._points[-1].pose)
+        self._turn(now, PathStage.LAST_TURN, self._points[-1].pose)
 
-    def _turn(self, now: Time, stage: Stage, line: Pose) -> None:
+    def _turn(self, now: Time, stage: PathStage, line: Pose) -> None:
         self._stage, self._line, self._speed = stage, line, 0.0
         self._command(now, RunMode.SPIN, line, w=1.0)
 
@@ -166,7 +166,7 @@ class PathInterface(RtComponent):
         self._command(now, RunMode.LINEFOLLOW, self._line, v=way * self._speed)
 
     def _finish(self, now: Time) -> None:
-        self._stage = Stage.IDLE
+        self._stage = PathStage.IDLE
         self._command(now, RunMode.STOP, Pose())
         self._report(now, self._points[-1].pose, STOPPED)
 

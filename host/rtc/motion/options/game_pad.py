@@ -2,29 +2,164 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar, Final, NamedTuple, Protocol
 
-from tickrig.host.links.errors import LinkError
+from tickrig.host.links.link import LinkClosed, LinkError
+from tickrig.host.links.terminal import take_keys
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
-from tickrig.host.rtc.motion.options.game_pad_devices import (
-    EvdevPad,
-    GamePadDevice,
-    GamePadOpener,
-    KeyboardPad,
-    StickPosition,
-)
 from tickrig.host.rtc.motion.ports import write_velocity
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
 
-KEYBOARD: Final = "keyboard"
+# What `GamePad` reads: sticks of a game pad on Linux (extra `gamepad`), or keys of a terminal.
+
+EV_ABS: Final = 0x03
+ABS_X: Final = 0x00
+ABS_Y: Final = 0x01
+ABS_RX: Final = 0x03
+"""As in the kernel's input-event-codes: left stick across and along, right stick across."""
+
+_Range = tuple[int, int]
+
+
+class StickPosition(NamedTuple):
+    """Where a hand pushes, each -1..1: forward, to the left, turning to the left."""
+
+    forward: float = 0.0
+    left: float = 0.0
+    turn: float = 0.0
+
+
+class GamePadDevice(Protocol):
+    """A device with sticks or keys; reading it does not wait."""
+
+    def poll(self, now_us: int, /) -> StickPosition:
+        """Return where the hand pushes now; LinkClosed if the device is gone."""
+        ...
+
+    def close(self) -> None:
+        """Give the device back."""
+
+
+_GamePadOpener = Callable[[str], GamePadDevice]
+"""Opens the pad that DeviceFileName names; LinkClosed if it cannot."""
+
+
+_KEYS: Final[Mapping[str, StickPosition]] = {
+    "w": StickPosition(forward=1.0),
+    "s": StickPosition(forward=-1.0),
+    "a": StickPosition(turn=1.0),
+    "d": StickPosition(turn=-1.0),
+    "q": StickPosition(left=1.0),
+    "e": StickPosition(left=-1.0),
+    " ": StickPosition(),
+}
+
+_HOLD_US: Final = 300_000
+"""A key pushes so long after it came; terminals repeat it sooner than that."""
+
+
+class KeyboardPad:
+    """Reads keys of a terminal: w s forward and back, a d turn, q e sideways, space stop.
+
+    Args:
+        fd: of the terminal, standard input unless given.
+
+    Attributes:
+        close: lets the terminal be as it was.
+
+    Raises:
+        LinkClosed: it is no terminal.
+    """
+
+    def __init__(self, fd: int | None = None) -> None:
+        self._fd = sys.stdin.fileno() if fd is None else fd
+        try:
+            self.close = take_keys(self._fd)
+        except OSError as error:
+            raise LinkClosed(f"the keyboard is no terminal: {error.strerror}") from error
+        self._hand, self._until_us = StickPosition(), 0
+
+    def poll(self, now_us: int, /) -> StickPosition:
+        """Return where the latest key pushes."""
+        for key in os.read(self._fd, 256).decode("latin-1"):
+            if key in _KEYS:
+                self._hand, self._until_us = _KEYS[key], now_us + _HOLD_US
+        return self._hand if now_us < self._until_us else StickPosition()
+
+
+@dataclass(slots=True)
+class Axes:
+    """Where the sticks stand.
+
+    Attributes:
+        ranges: least and most value of each axis that the pad has.
+    """
+
+    ranges: Mapping[int, _Range]
+    _values: dict[int, float] = field(default_factory=dict, init=False)
+
+    def take(self, kind: int, code: int, value: int) -> None:
+        """Take an event."""
+        if kind == EV_ABS and code in self.ranges:
+            low, high = self.ranges[code]
+            middle, half = (low + high) / 2, max(1, high - low) / 2
+            self._values[code] = min(max((value - middle) / half, -1.0), 1.0)
+
+    @property
+    def hand(self) -> StickPosition:
+        """Left stick along is forward, across is turning; right stick across is sideways."""
+        across, along = self._values.get(ABS_X, 0.0), self._values.get(ABS_Y, 0.0)
+        return StickPosition(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
+
+
+class EvdevPad:
+    """Reads a pad such as `/dev/input/event5`.
+
+    Raises:
+        LinkClosed: evdev is not installed, or the pad cannot be opened.
+    """
+
+    def __init__(self, path: str) -> None:
+        try:
+            import evdev  # noqa: PLC0415 - the extra [gamepad]
+        except ImportError as error:
+            raise LinkClosed("a game pad needs evdev: pip install 'tickrig[gamepad]'") from error
+        self._path = path
+        try:
+            self._device = evdev.InputDevice(path)
+            codes = self._device.capabilities(absinfo=False).get(EV_ABS, ())
+            limits = {code: self._device.absinfo(code) for code in codes}
+        except OSError as error:
+            raise LinkClosed(f"cannot open game pad {path}: {error.strerror}") from error
+        self._axes = Axes({code: (info.min, info.max) for code, info in limits.items()})
+
+    def poll(self, now_us: int, /) -> StickPosition:
+        """Return where the sticks stand."""
+        try:
+            while (event := self._device.read_one()) is not None:
+                self._axes.take(event.type, event.code, event.value)
+        except OSError as error:
+            raise LinkClosed(f"game pad {self._path} is gone: {error.strerror}") from error
+        return self._axes.hand
+
+    def close(self) -> None:
+        """Close the device."""
+        self._device.close()
+
+
+_KEYBOARD: Final = "keyboard"
 
 _LOG: Final = log_of(__name__)
 
 
 def open_pad(name: str) -> GamePadDevice:
     """Open `keyboard`, or a device such as `/dev/input/event5`; LinkClosed if it cannot be."""
-    return KeyboardPad() if name == KEYBOARD else EvdevPad(name)
+    return KeyboardPad() if name == _KEYBOARD else EvdevPad(name)
 
 
 class GamePad(RtComponent):
@@ -39,10 +174,10 @@ class GamePad(RtComponent):
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("GamePad", "Velocities from a game pad or keyboard")
 
-    def __init__(self, instance_name: str, opener: GamePadOpener = open_pad) -> None:
+    def __init__(self, instance_name: str, opener: _GamePadOpener = open_pad) -> None:
         super().__init__(instance_name)
         bind = self.configuration.bind
-        self.device = bind("DeviceFileName", KEYBOARD)
+        self.device = bind("DeviceFileName", _KEYBOARD)
         self.max_v = bind("max_v", 0.3, "x>=0", unit="m/s")
         self.max_vy = bind("max_vy", 0.3, "x>=0", unit="m/s")
         self.max_w = bind("max_w", 0.3, "x>=0", unit="rad/s")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import tau
 from typing import ClassVar, Final
 
-from tickrig.host.links.errors import DeviceRefused, LinkError
+from tickrig.host.links.link import DeviceRefused, LinkError
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion.components.ref_hard import Opener
 from tickrig.host.text.log import log_of
-from tickrig.host.urg.client import UrgClient, UrgScan
+from tickrig.host.urg import UrgClient, UrgScan
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
 

@@ -11,15 +11,18 @@ from tickrig.host.rtc import (
     Consumer,
     ExecutionContext,
     InPort,
+    Manager,
     ModuleSpec,
     OutPort,
     ReturnCode,
     RtComponent,
     ServicePort,
 )
-from tickrig.host.rtc.motion.components.ref_hard import RefHard
+from tickrig.host.rtc.motion.chain import MotionChain
+from tickrig.host.rtc.motion.components.ref_hard import Opener, RefHard
 from tickrig.host.rtc.motion.control_laws import VelocityLimits
 from tickrig.host.rtc.motion.geometry import Twist
+from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.motion.ports import MOST, plausible, read_newest, write_velocity
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
@@ -27,7 +30,7 @@ from tickrig.wire.rtc_types.basic import TimedDouble
 from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
 from tickrig.wire.rtc_types.sensors import RangeData
 
-ANY: Final = 1e9
+_ANY: Final = 1e9
 """A limit that limits nothing."""
 
 _LOG: Final = log_of(__name__)
@@ -175,7 +178,7 @@ class ObstaclesAvoidance(RtComponent):
         if not free and wanted.v > 0:
             wanted = Twist()
         step = self.max_acc_v.value * ec.period_us / 1e6
-        self._before = VelocityLimits(ANY, ANY, step, ANY).smooth(wanted, self._before)
+        self._before = VelocityLimits(_ANY, _ANY, step, _ANY).smooth(wanted, self._before)
         write_velocity(self.leaving, ec, self._before.v, 0.0, self._before.w)
 
 
@@ -230,3 +233,52 @@ class CollisionDetection(RtComponent):
             self.ref_hard.service.Go()
         self._stopped = stop
         _LOG.info("%s: %s", self.instance_name, "Stop" if stop else "Go")
+
+
+# A motion chain that stops before obstacles, and goes on when they have gone.
+
+_LATEST: Final = {"dataport.buffer.length": "8"}
+
+
+class CollisionGuard:
+    """The components between a range finder and the base, in the context of a chain.
+
+    PathFollower is joined to ObstaclesAvoidance in the place of RefHardRh3.
+
+    Args:
+        manager: who runs the chain.
+        chain: of a cart.
+        open_urg: opens the line to its range finder.
+
+    Attributes:
+        monitor: its `distance` is what the others act on.
+    """
+
+    def __init__(self, manager: Manager, chain: MotionChain, open_urg: Opener) -> None:
+        self._manager = manager
+        number = chain.ref_hard.instance_name.removeprefix("RefHardRh3")
+        capture = LrfCaptureUrg(f"LRFCapture_URG{number}", open_urg)
+        points = UrgToObstacles(f"Urg_to_Obstacles{number}")
+        self.monitor = ObstacleMonitor(f"ObstacleMonitor{number}")
+        detection = CollisionDetection(f"CollisionDetection{number}")
+        avoidance = ObstaclesAvoidance(f"ObstaclesAvoidance{number}")
+        self.components = (capture, points, self.monitor, detection, avoidance)
+        for component in self.components:
+            manager.add(component, context=chain.context)
+        velocity = f"{chain.path_follower.instance_name}.velocity"
+        base = chain.ref_hard.instance_name
+        manager.disconnect(velocity, f"{base}.InTargetVelocity")
+        for first, second in (
+            (f"{capture.instance_name}.ranges", f"{points.instance_name}.ranges"),
+            (f"{points.instance_name}.obstacles", f"{self.monitor.instance_name}.obstacles"),
+            (f"{self.monitor.instance_name}.distance", f"{detection.instance_name}.distance"),
+            (f"{self.monitor.instance_name}.distance", f"{avoidance.instance_name}.distance"),
+            (velocity, f"{avoidance.instance_name}.InTargetVelocity"),
+            (f"{avoidance.instance_name}.OutTargetVelocity", f"{base}.InTargetVelocity"),
+        ):
+            manager.connect(first, second, _LATEST)
+        manager.connect(f"{detection.instance_name}.BumpRefHard", f"{base}.BumpRefHard")
+
+    def activate(self) -> None:
+        """Ask all for Active."""
+        self._manager.activate(*(component.instance_name for component in self.components))

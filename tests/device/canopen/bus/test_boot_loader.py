@@ -9,12 +9,11 @@ import pytest
 
 from tests.device.canopen.objects import read, write
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.bus.boot_loader import FLASHING_US, FlashError, ProgramCommand
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.models.f_palette_boot import PROGRAM, make_f_palette_boot
+from tickrig.device.canopen.parameter_store import FLASHING_US, FlashError, ProgramCommand
+from tickrig.device.canopen.slave import TICK_US, Nonvolatile
 from tickrig.wire.canopen.datatypes import Value
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 DATA, CONTROL, IDENTIFICATION, STATUS = 0x1F50, 0x1F51, 0x1F56, 0x1F57
 STOP, START, RESET, CLEAR = ProgramCommand

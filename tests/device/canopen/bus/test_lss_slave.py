@@ -6,8 +6,7 @@ import pytest
 
 from tests.device.canopen.objects import array, booted, make_bus, read, u32
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.canopen.slave import UNCONFIGURED, Nonvolatile
 from tickrig.wire.canopen.lss import FastScan, LssAddress
 from tickrig.wire.canopen.nmt import NmtState
 

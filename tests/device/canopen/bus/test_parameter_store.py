@@ -4,11 +4,11 @@ import pytest
 
 from tests.device.canopen.objects import RW, U8, U16, U32, array, make_bus, read, u16, write
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.bus.parameter_store import LOAD, SAVE, ParameterStore
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
+from tickrig.device.canopen.parameter_store import LOAD, SAVE, ParameterStore
+from tickrig.device.canopen.slave import Nonvolatile
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 STORE, RESTORE = 0x1010, 0x1011
 COMMUNICATION, MINE, PROFILE = 0x1017, 0x2001, 0x6005

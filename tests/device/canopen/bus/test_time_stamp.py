@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.objects import booted, u32, write
-from tickrig.device.canopen.bus.time_stamp import TimeStamp
+from tickrig.device.canopen.sync import TimeStamp
+from tickrig.wire.canopen.datatypes import TimeOfDay
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.time_of_day import TimeOfDay
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.errors import FieldError
 
 CONSUMER = 0x8000_0100

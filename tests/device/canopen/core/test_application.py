@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.models import f_palette
+from tickrig.device.canopen.slave import Application
 from tickrig.device.canopen.stack import make_slave
 
 

@@ -2,12 +2,10 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 
 def make(index: int, sub: int = 0) -> EntryDescription:

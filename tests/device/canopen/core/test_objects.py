@@ -6,25 +6,23 @@ import pytest
 
 from tests.device.canopen.objects import array, booted, errors, read, u8, u16, u32, write
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.communication_profile import (
-    OFF,
-    CommunicationProfile,
-    Pdo,
-    add_communication,
-)
 from tickrig.wire.canopen.eds.object_table import (
+    OFF,
     ROT,
     RW,
     RWW,
+    CommunicationProfile,
     EntryDescription,
     ObjectCode,
     ObjectTable,
+    Pdo,
+    add_communication,
 )
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 PROFILE = CommunicationProfile(
     device_type=0x0003_0191,

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.objects import array, booted, make_bus, u32, write
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import UNCONFIGURED, CanopenSlave
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.instant import NEVER
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.device_rtc import (
+    CanopenComponent,
+    CanopenInPort,
+    CanopenOutPort,
+    DeviceRtc,
+    make_device_rtc,
+)
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
 from tickrig.device.component import ERROR, Result
-from tickrig.wire.rtc_canopen.port_types import SHORT
+from tickrig.wire.rtc_canopen import SHORT
 
 COMMANDS = {
     "start": "000#0110",

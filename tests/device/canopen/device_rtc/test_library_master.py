@@ -10,14 +10,13 @@ import pytest
 from examples.device_rtc_gripper import Gripper
 
 from tests.device.canopen.device_rtc.test_ports import Wide
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
+from tickrig.device.canopen.device_rtc import CanopenComponent, DeviceRtc, make_device_rtc
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.wire.canopen.eds.eds_writer import write_eds
-from tickrig.wire.rtc_canopen.objects import object_table
+from tickrig.wire.rtc_canopen import object_table
 
 
 class Desk:

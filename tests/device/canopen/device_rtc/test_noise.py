@@ -8,13 +8,17 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.slave_bench import Bus
 from tests.soak import examples
-from tickrig.device.canopen.core.slave import TICK_US
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
+from tickrig.device.canopen.device_rtc import (
+    CanopenComponent,
+    CanopenInPort,
+    CanopenOutPort,
+    DeviceRtc,
+    make_device_rtc,
+)
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.component import ERROR, Result
 from tickrig.wire.can import CanFrame
-from tickrig.wire.rtc_canopen.port_types import OCTET, SHORT
+from tickrig.wire.rtc_canopen import OCTET, SHORT
 
 pytestmark = pytest.mark.unmeasured
 

@@ -10,12 +10,17 @@ import pytest
 from tests.device.canopen.device_rtc.bench import Recorder, RtcBench
 from tests.device.canopen.device_rtc.test_life_cycle import GOLDEN
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.device_rtc.component import CanopenComponent, CanopenEcho
-from tickrig.device.canopen.device_rtc.device import DeviceRtc, make_device_rtc
-from tickrig.device.canopen.device_rtc.ports import CanopenInPort, CanopenOutPort
+from tickrig.device.canopen.device_rtc import (
+    CanopenComponent,
+    CanopenEcho,
+    CanopenInPort,
+    CanopenOutPort,
+    DeviceRtc,
+    make_device_rtc,
+)
 from tickrig.device.physical import InputSignal
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_canopen.port_types import (
+from tickrig.wire.rtc_canopen import (
     BOOLEAN,
     CHARACTER,
     DOUBLE,
@@ -24,8 +29,8 @@ from tickrig.wire.rtc_canopen.port_types import (
     STRING,
     WIDE_CHARACTER,
     WIDE_STRING,
+    PortTransport,
 )
-from tickrig.wire.rtc_canopen.profile import PortTransport
 
 
 class Everything(CanopenComponent):

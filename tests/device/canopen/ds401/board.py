@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import ServiceMaker
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
+from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.canopen.eds.communication_profile import (
+from tickrig.wire.canopen.eds.object_table import (
+    RWRW,
     CommunicationProfile,
+    ObjectTable,
     Pdo,
     add_communication,
 )
-from tickrig.wire.canopen.eds.object_table import RWRW, ObjectTable
 
 Row = tuple[int, int, DataType, Value]
 """Index, number of elements, data type, default."""

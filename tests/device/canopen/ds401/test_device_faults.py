@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.ds401.board import I16, NODE_ID, U8, Board, Row, make_dictionary
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType

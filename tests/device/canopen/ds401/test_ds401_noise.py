@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.ds401.board import BOOL, NODE_ID, REAL, U8, Row, make_dictionary
 from tests.soak import examples
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import TICK_US
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.models import f_palette
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame

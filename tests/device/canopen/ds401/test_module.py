@@ -4,10 +4,10 @@ import pytest
 
 from tests.device.canopen.profile_objects import GENERIC_IO, make_dictionary
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds401.digital import FILTER_US
+from tickrig.device.canopen.slave import Application
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.instant import NEVER
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.ds402.objects.indices import POSITION_ACTUAL, STATUSWORD
+from tickrig.device.canopen.ds402.indices import POSITION_ACTUAL, STATUSWORD
 
 
 @pytest.fixture

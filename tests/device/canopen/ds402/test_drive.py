@@ -5,10 +5,9 @@ import pytest
 from tests.device.canopen.profile_objects import DRIVE, make_dictionary
 from tests.device.canopen.reference import I16, RW, U32
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary, SdoAbort
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.device.canopen.ds402.state.automaton import DriveState
+from tickrig.device.canopen.ds402.automaton import DriveState
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 from tickrig.wire.instant import NEVER

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.ds402.wheel import Wheel
 from tests.soak import examples
-from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.dictionary import SdoAbort
 from tickrig.device.canopen.models import epos
 
 pytestmark = pytest.mark.unmeasured

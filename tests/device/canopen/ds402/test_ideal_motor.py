@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.ds402.motion.motor import IdealMotor
+from tickrig.device.canopen.ds402.axis import IdealMotor
 
 
 def test_it_is_where_it_shall_be_at_once() -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.ds402.state.automaton import DriveState
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds402.automaton import DriveState
 from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
-from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.servo.parameters import EPOS_WHEEL
 from tickrig.device.servo.servo import Servo
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription

@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 from tests.device.canopen.objects import array, booted, write
-from tickrig.device.canopen.errors.emcy_consumer import EmcyConsumer
+from tickrig.device.canopen.errors import EmcyConsumer
 from tickrig.wire.canopen.emcy import Emcy
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 OFF = 0x8000_0000
 LOST = Emcy(0x8130, 0x11, b"\7\0\0\0\0")

@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.objects import array, booted, errors, make_bus, read, u8, u32, write
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 
 def test_an_error_is_told_once_and_again_when_it_is_gone() -> None:

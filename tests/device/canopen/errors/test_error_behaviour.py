@@ -4,9 +4,9 @@ import pytest
 
 from tests.device.canopen.objects import U8, array, booted, errors, write
 from tests.device.canopen.slave_bench import Bus
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState
 from tickrig.wire.canopen.nmt import NmtState
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 PASSIVE = "085#2081110000000000"
 RECOVERED = "085#4081110000000000"

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import epos
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.object_table import RO, ROT, RW, RWW

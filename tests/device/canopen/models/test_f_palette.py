@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.models import f_palette
+from tickrig.device.canopen.slave import Application
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.eds.object_table import Access
 

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.canopen.models.motor_core_unit import make_motor_core_unit
+from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 from tickrig.wire.can import CanFrame
 
 MAKERS: dict[int, Callable[..., CanopenSlave]] = {

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.models import motor_core_unit
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RO, ROT, RW, RWW, Access

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.slave import TICK_US
 from tickrig.device.canopen.models import motor_core_unit
-from tickrig.device.canopen.motor_core_unit.unit import MotorCoreUnit
+from tickrig.device.canopen.models.motor_core_unit import MotorCoreUnit
+from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.canopen.stack import make_slave
 
 FREE, CURRENT, VELOCITY, ANGLE = range(4)

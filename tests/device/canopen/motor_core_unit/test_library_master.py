@@ -9,8 +9,8 @@ import canopen
 import pytest
 
 from tests.device.canopen.fig120 import make_motor
-from tickrig.device.canopen.core.application import Application
 from tickrig.device.canopen.models import motor_core_unit
+from tickrig.device.canopen.slave import Application
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig

@@ -21,7 +21,7 @@ from tests.device.canopen.motor_core_unit.bench import (
     VELOCITY,
     UnitBench,
 )
-from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.dictionary import SdoAbort
 from tickrig.wire.instant import NEVER
 
 ENCODER_DEG = 360 / 409_600

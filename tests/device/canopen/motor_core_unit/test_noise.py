@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tests.device.canopen.motor_core_unit.bench import UnitBench
 from tests.soak import examples
-from tickrig.device.canopen.motor_core_unit.unit import INPUTS
+from tickrig.device.canopen.models.motor_core_unit import INPUTS
 from tickrig.device.physical import SignalType
 from tickrig.wire.can import CanFrame
 

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import pytest
 
 from tests.device.canopen.motor_core_unit.bench import CURRENT, FAULT, ON, UnitBench
-from tickrig.device.servo.presets import FTMD, MOTOR_CORE_UNIT
+from tickrig.device.servo.parameters import FTMD, MOTOR_CORE_UNIT
 
 pytestmark = pytest.mark.unmeasured
 

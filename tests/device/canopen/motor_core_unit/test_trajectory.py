@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.canopen.motor_core_unit.trajectory import (
+from tickrig.device.canopen.models.motor_core_motion import (
     CHANGE_UDEG_S,
     CONTROL_US,
     DEGREE,

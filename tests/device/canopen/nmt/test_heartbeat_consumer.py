@@ -3,9 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.objects import array, booted, errors, u16, write
-from tickrig.device.canopen.nmt.heartbeat_consumer import HeartbeatConsumer, Watch
+from tickrig.device.canopen.nmt import HeartbeatConsumer, Watch
 from tickrig.wire.canopen.nmt import NmtState
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 NODE_7_200_MS = 0x0007_00C8

@@ -4,7 +4,7 @@ import pytest
 
 from tests.device.canopen.pdo_bench import NO_RTR, OFF, RW, PdoBench, u8, u32, u64
 from tests.device.canopen.reference import RO, TPDO
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
 from tickrig.wire.canopen.pdo import Dispatched, Scanned
 from tickrig.wire.errors import FieldError
 

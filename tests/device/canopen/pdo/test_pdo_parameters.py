@@ -5,7 +5,7 @@ import pytest
 from tests.device.canopen.pdo_bench import OFF, RW, PdoBench, u8, u32
 from tests.device.canopen.reference import R32
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 RANGE = AbortCode.VALUE_RANGE
 

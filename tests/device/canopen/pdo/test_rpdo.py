@@ -4,12 +4,11 @@ import pytest
 
 from tests.device.canopen.pdo_bench import OFF, PdoBench, u8
 from tests.device.canopen.reference import RO, RPDO, RW, STR, U16
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
+from tickrig.device.canopen.dictionary import Entry, SdoAbort
+from tickrig.device.canopen.pdo.rpdo import PdoConsumer
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 

@@ -5,14 +5,13 @@ import pytest
 from tests.device.canopen.pdo_bench import NO_RTR, OFF, PdoBench
 from tests.device.canopen.reference import NODE_ID, R32, RO, TPDO, make_dictionary
 from tests.device.canopen.reference import STR as NAME
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.dictionary import Entry, SdoAbort
+from tickrig.device.canopen.nmt import NmtSlave
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.sync import Sync
 from tickrig.wire.canopen.eds.object_table import EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.canopen.sdo_client import Client, booted, offer_blocks_of, pattern
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import Abort
-from tickrig.wire.canopen.sdo.sdo_block import (
+from tickrig.wire.canopen.sdo import Abort
+from tickrig.wire.canopen.sdo_frame import (
+    AbortCode,
     BlockAcknowledge,
     BlockDownloadInitiateRequest,
     BlockDownloadInitiateResponse,

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.canopen.sdo_client import Client, booted, pattern
-from tickrig.wire.canopen.sdo.sdo_block import BlockUploadInitiateRequest
+from tickrig.wire.canopen.sdo_frame import BlockUploadInitiateRequest
 
 NAME_SEGMENTS = ["585#017265666572656E", "585#02636520736C6176", "585#8365000000000000"]
 BEGUN = ["585#C60810000F000000"]

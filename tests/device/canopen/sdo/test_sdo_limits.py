@@ -5,15 +5,14 @@ import pytest
 from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.sdo_client import Client
 from tests.device.canopen.slave_bench import Bus
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.sdo.sdo_server import USUAL, SdoLimits
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.sdo import USUAL, SdoLimits, SdoServers
 from tickrig.device.canopen.stack import make_slave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import Abort, DownloadInitiateRequest, Response
-from tickrig.wire.canopen.sdo.sdo_block import (
+from tickrig.wire.canopen.sdo import Abort, DownloadInitiateRequest, Response
+from tickrig.wire.canopen.sdo_frame import (
+    AbortCode,
     BlockDownloadInitiateRequest,
     BlockEnd,
     BlockEnded,

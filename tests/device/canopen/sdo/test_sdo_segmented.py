@@ -4,8 +4,8 @@ import pytest
 
 from tests.device.canopen.sdo_client import Client, booted, pattern
 from tests.device.canopen.slave_bench import Bus
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import Abort, DownloadSegmentResponse
+from tickrig.wire.canopen.sdo import Abort, DownloadSegmentResponse
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 READ_STATUS = "605#4001100000000000"
 STATUS = ["585#4F01100000000000"]

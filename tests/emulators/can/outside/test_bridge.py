@@ -14,7 +14,7 @@ from tickrig.emulators.can.outside.bus_port import FRAMES_A_POLL, CanBusPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_link import to_frame, to_message
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 

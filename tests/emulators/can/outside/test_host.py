@@ -9,8 +9,8 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import MOST_LOOKS
 from tickrig.emulators.rig.station import Station
-from tickrig.host.links.errors import LinkClosed, LinkError, LinkTimeout
-from tickrig.wire.can_bits import frame_bits
+from tickrig.host.links.link import LinkClosed, LinkError, LinkTimeout
+from tickrig.wire.can import frame_bits
 
 
 def hosted() -> tuple[CanHost, CanWire, Node]:

@@ -18,7 +18,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_waits import MOST_LOOKS
 from tickrig.emulators.rig.station import Station
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_link import to_frame, to_message
 
 
 @pytest.fixture

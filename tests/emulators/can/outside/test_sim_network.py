@@ -17,7 +17,7 @@ from tests.emulators.sim_bench import NODE_ID, SimBench
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
-from tickrig.host.links.errors import LinkClosed, LinkTimeout
+from tickrig.host.links.link import LinkClosed, LinkTimeout
 
 BLOB = bytes(index * 7 % 251 for index in range(5_000))
 

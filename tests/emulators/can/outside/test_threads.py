@@ -15,7 +15,7 @@ import pytest
 
 from tickrig import Bench
 from tickrig.device.canopen.models.epos import make_epos
-from tickrig.host.links.errors import LinkError
+from tickrig.host.links.link import LinkError
 
 TOLD = (
     "bus: a second thread cannot make virtual time pass; take bench.canopen_network() in place of"

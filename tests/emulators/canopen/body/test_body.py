@@ -11,13 +11,13 @@ from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.device.body.wheeled_body import BodyParameters, WheeledBody
+from tickrig.device.body import BodyParameters, WheeledBody
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body.body_on_drives import BodyOnDrives, Wheel
+from tickrig.emulators.canopen.body import BodyOnDrives, DrivenWheel
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
+from tickrig.emulators.canopen.choices import NodeSpec
 from tickrig.emulators.canopen.cli import main
-from tickrig.emulators.canopen.node.node_spec import NodeSpec
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
@@ -233,7 +233,7 @@ def test_a_run_does_not_depend_on_order_or_density(
         parameters = BodyParameters(
             kind="differential", wheel_radius_m=0.1, tread_m=0.4, mass_kg=8, friction=friction
         )
-        wheels = [Wheel("left", nodes[0]), Wheel("right", nodes[1])]
+        wheels = [DrivenWheel("left", nodes[0]), DrivenWheel("right", nodes[1])]
         body = BodyOnDrives(WheeledBody(parameters), wheels)
         stations = [Station(nodes[number], nodes[number].port) for number in order]
         host = wire.end()

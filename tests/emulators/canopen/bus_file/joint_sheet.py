@@ -10,23 +10,21 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.communication_profile import (
-    OFF,
-    CommunicationProfile,
-    Pdo,
-    add_communication,
-)
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import (
     BIT_RATES,
+    OFF,
     RO,
     ROT,
     RW,
     RWW,
+    CommunicationProfile,
     DeviceInfo,
     Element,
     ObjectCode,
     ObjectTable,
+    Pdo,
+    add_communication,
 )
 
 FOUR_MODES: Final = 0b1010_0101

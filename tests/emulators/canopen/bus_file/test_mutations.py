@@ -14,7 +14,7 @@ from tests.soak import SOAK
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import Described, make_nodes
 from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus
-from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError
+from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
 from tickrig.emulators.canopen.eds import EdsCache
 
 EXAMPLE = Path(__file__).parents[4] / "examples/ros2_canopen"

@@ -14,7 +14,7 @@ from tests.emulators.canopen.bus_file.system import ONE_JOINT, joints, write_sys
 from tests.soak import examples
 from tickrig import open_bench
 from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus
-from tickrig.emulators.canopen.bus_file.mistake import BusMistakesError
+from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
 from tickrig.emulators.canopen.bus_file.urdf import UrdfJoint, parse_urdf
 
 ARM = """\

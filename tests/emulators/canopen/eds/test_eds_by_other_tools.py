@@ -10,7 +10,7 @@ from dcf.lint import lint
 from dcf.parse import parse_file
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.build import describe_rtc
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.wire.canopen.datatypes import DataType

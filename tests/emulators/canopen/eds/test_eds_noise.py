@@ -10,8 +10,7 @@ from typing import Final
 import pytest
 
 from tickrig.device.canopen.stack import make_slave
-from tickrig.emulators.canopen.eds import describe
-from tickrig.emulators.canopen.profiles import application_of
+from tickrig.emulators.canopen.eds import application_of, describe
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile
 
 ROOT: Final = Path(__file__).parents[4]

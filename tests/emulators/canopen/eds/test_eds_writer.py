@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import describe, read_eds
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_file import EdsFile

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.device.canopen.runner import Pace, Runner
-from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.slave import TICK_US, CanopenSlave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station

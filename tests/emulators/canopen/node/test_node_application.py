@@ -17,8 +17,8 @@ from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import make_bench
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.scenario.scenario import ScenarioParser
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.scenario import ScenarioParser
 
 DESCRIPTION = read_eds(Path(__file__).parents[3] / "golden" / "canopen" / "r1.eds")
 

@@ -5,11 +5,9 @@ from typing import Any
 
 import pytest
 
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
+from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
 from tickrig.device.physical import SignalType
-from tickrig.emulators.canopen.node.signals import ObjectSignal, find_object, object_name
+from tickrig.emulators.canopen.signals import ObjectSignal, find_object, object_name
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import (
     Access,
@@ -17,7 +15,7 @@ from tickrig.wire.canopen.eds.object_table import (
     ObjectCode,
     ObjectDescription,
 )
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 RO, RW, CONST = Access.READ, Access.READ | Access.WRITE, Access.READ | Access.CONST
 D = DataType

@@ -14,11 +14,11 @@ from tests.device.canopen.profile_objects import make_dictionary
 from tests.device.canopen.reference import NODE_ID
 from tests.device.canopen.test_conformance import every_check, profile
 from tests.emulators.canopen.node.bus_runner import BusRunner, Unfiltered
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import TICK_US, CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import TICK_US, CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.wire.can import CanFrame, Frames

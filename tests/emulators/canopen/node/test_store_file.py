@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from tests.device.canopen.reference import make_dictionary
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.emulators.canopen.node.store_file import StoreError, StoreFile
+from tickrig.device.canopen.slave import Nonvolatile
+from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 
 HEARTBEAT = 0x1017 << 8
 NAME = 0x2007 << 8

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tickrig.emulators.serial.network.dismissed_host import LEAVING_US, DismissedHost
+from tickrig.emulators.serial.network import LEAVING_US, DismissedHost
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from tickrig.emulators.serial.network.host_connection import (
+from tickrig.emulators.serial.network import (
     LAST_WORDS_US,
     READ_BYTES,
     STUCK_US,

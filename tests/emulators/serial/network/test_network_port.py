@@ -13,10 +13,16 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 import pytest
 
 from tickrig.emulators.serial.bridge import Bridge
-from tickrig.emulators.serial.network.host_connection import LAST_WORDS_US, STUCK_US
-from tickrig.emulators.serial.network.network_port import MAX_DISMISSED, QUIET_US, NetworkPort
-from tickrig.emulators.serial.network.serve_url import ServeUrl, parse_serve_url
-from tickrig.emulators.serial.serial_hub import SerialHub
+from tickrig.emulators.serial.emulator import SerialHub
+from tickrig.emulators.serial.network import (
+    LAST_WORDS_US,
+    MAX_DISMISSED,
+    QUIET_US,
+    STUCK_US,
+    NetworkPort,
+    ServeUrl,
+    parse_serve_url,
+)
 from tickrig.emulators.serial.serial_line import SerialLine
 
 pytestmark = pytest.mark.realtime

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.emulators.serial.network.host_connection import READ_BYTES
-from tickrig.emulators.serial.network.rfc2217_connection import (
+from tickrig.emulators.serial.network import (
     MAX_SUBOPTION_BYTES,
     MAX_UNSENT_BYTES,
+    READ_BYTES,
     Rfc2217Connection,
 )
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.serial.network.serve_url import ServeUrl, parse_serve_url
+from tickrig.emulators.serial.network import ServeUrl, parse_serve_url
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.serial.serial_line import LineEnd, SerialLine
-from tickrig.wire.serial.uart import UartSetting
+from tickrig.wire.uart import UartSetting
 
 BAUD = 100_000
 """A byte takes 100 us."""

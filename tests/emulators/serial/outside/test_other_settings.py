@@ -15,11 +15,10 @@ from tests.emulators.echo import Echo
 from tests.emulators.serial.outside.lines import BAUD, SETTING, OpenLine, rig_of
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.serial_side import SerialSide, UartErrors
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
-from tickrig.emulators.serial.outside.uart_errors import UartErrors
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.wire.serial.uart import PS_PER_US, Character, Parity, UartSetting, sample
+from tickrig.wire.uart import PS_PER_US, Character, Parity, UartSetting, sample
 
 EVERY_BYTE = bytes(range(256))
 

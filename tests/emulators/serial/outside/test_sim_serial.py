@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from tests.emulators.serial.outside.lines import BAUD, OpenLine, echo, rig_of
 from tickrig.emulators.rig.sim_waits import MOST_LOOKS
-from tickrig.emulators.serial.outside.host_waits import LONGEST_US
+from tickrig.emulators.serial.outside.serial_side import LONGEST_US
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 
 FRAME_US = 10 * 1_000_000 // BAUD

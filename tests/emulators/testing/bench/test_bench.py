@@ -10,12 +10,12 @@ from click.testing import CliRunner
 
 from tickrig import Bench, BenchError, NotOnThisBench, open_bench
 from tickrig.device import Rrc, make_epos, make_f_palette
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.rrc.config import RrcConfig
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.testing.commands.replay_cli import replay_command
 from tickrig.host import RrcClient
-from tickrig.host.links.can_message import to_frame, to_message
+from tickrig.host.links.can_link import to_frame, to_message
 from tickrig.wire.can import CanFrame
 
 

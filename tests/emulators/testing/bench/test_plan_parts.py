@@ -17,9 +17,9 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
 )
 from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.wire.canopen.eds.eds_writer import write_eds
-from tickrig.wire.modbus.rtu import encode_frame, parse_frame
+from tickrig.wire.modbus import encode_frame, parse_frame
 
 
 def plan_of(*devices: DevicePlan, wires: tuple[WirePlan, ...] = (), **more: object) -> RigPlan:

@@ -7,9 +7,9 @@ from click.testing import CliRunner
 
 from tests.emulators.testing.bench.test_plan_parts import BUS, drive, plan_of
 from tickrig.device.canopen.models.epos import make_epos
-from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
-from tickrig.emulators.canopen.node.store_file import FORMAT
+from tickrig.device.rrc.settings import RrcConfig
+from tickrig.emulators.canopen.store_file import FORMAT
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan

@@ -4,7 +4,7 @@ import pytest
 
 from tickrig import Bench
 from tickrig.emulators.record.wire_log import WireLine
-from tickrig.emulators.testing.bench.triggers import LineTrigger, check_condition, text_of
+from tickrig.emulators.testing.bench.tasks import LineTrigger, check_condition, text_of
 from tickrig.host.text.trace import Mark
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.emulators.testing.campaign.conftest import ANSWERS, HEAD, TICKRIG, Campaign
-from tickrig.emulators.testing.campaign.order import Run, Verdict, verdicts_of
+from tickrig.emulators.testing.campaign.order import Run, RunVerdict, verdicts_of
 
 WHOLE = ("test_rrc.py", "--seeds", "0-29", "--param", "flip=0.0001,0.001")
 
@@ -33,17 +33,17 @@ def add_test(folder: Path, body: str) -> None:
 @pytest.mark.parametrize(
     ("answer", "said"),
     [
-        ([Verdict(1, "passed")], ""),
+        ([RunVerdict(1, "passed")], ""),
         ([(1, "failed", 5, "a.py:3", "why")], ""),
         ([], "0 items in place of 1 verdict"),
-        ([Verdict(1, "passed")] * 2, "2 items in place of 1 verdict"),
+        ([RunVerdict(1, "passed")] * 2, "2 items in place of 1 verdict"),
         (5, "int in place of 1 verdict"),
         (None, "NoneType in place of 1 verdict"),
         ([7], "7 in place of a verdict of run 1"),
         ([(1, 2)], "(1, 2) in place of a verdict of run 1"),
-        ([Verdict(2, "passed")], "Verdict(number=2, outcome='passed'"),
-        ([Verdict(1, "splendid")], "Verdict(number=1, outcome='splendid'"),
-        ([Verdict(1, "passed", -1)], "Verdict(number=1, outcome='passed', virtual_us=-1"),
+        ([RunVerdict(2, "passed")], "Verdict(number=2, outcome='passed'"),
+        ([RunVerdict(1, "splendid")], "Verdict(number=1, outcome='splendid'"),
+        ([RunVerdict(1, "passed", -1)], "Verdict(number=1, outcome='passed', virtual_us=-1"),
         ([(1, "failed", 5, None, "why")], "(1, 'failed', 5, None, 'why') in place of"),
     ],
 )

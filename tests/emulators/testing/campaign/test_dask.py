@@ -18,9 +18,8 @@ import pytest
 
 from tests.emulators.testing.campaign.conftest import TICKRIG, Campaign
 from tests.emulators.testing.campaign.test_campaign import add_test
-from tickrig.emulators.testing.campaign.order import Collected, Order, Refusal
-from tickrig.emulators.testing.campaign.plan import Plan, Shard
-from tickrig.emulators.testing.campaign.seeds import Seeds
+from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Collected
+from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds, Shard
 
 if "CI" not in os.environ:  # there it fails without them
     pytest.importorskip("distributed", reason="no Dask here: pip install 'tickrig[campaign]'")
@@ -156,11 +155,13 @@ def test_what_is_no_scheduler_is_told(
     from tickrig.emulators.testing.campaign import dask_workers  # noqa: PLC0415 - an extra
 
     monkeypatch.setattr(dask_workers, "CONNECT_S", 0.5)
-    plan = Plan(Order(tests=()), Collected((), (), ""), Seeds.parse("0"), Shard.parse("1/1"))
+    plan = CampaignPlan(
+        CampaignOrder(tests=()), Collected((), (), ""), Seeds.parse("0"), Shard.parse("1/1")
+    )
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
         threading.Thread(target=greet, args=(listener, greeting), daemon=True).start()
-        with pytest.raises(Refusal, match=f"--scheduler tcp://127.0.0.1:{port}: {said}"):
+        with pytest.raises(CampaignRefusal, match=f"--scheduler tcp://127.0.0.1:{port}: {said}"):
             dask_workers.DaskWorkers(f"tcp://127.0.0.1:{port}", plan)
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.testing.campaign.journal import CampaignJournal, JournalFullError
-from tickrig.emulators.testing.campaign.order import Refusal, Verdict
+from tickrig.emulators.testing.campaign.order import CampaignRefusal, RunVerdict
 
 HEAD = {"tests": ["t.py::test_a", "t.py::test_b"], "seeds": "0-9"}
 VERDICTS = [
-    Verdict(4, "passed", 1_000_000),
-    Verdict(0, "failed", 1_500_000, "t.py:7", "AssertionError: µ\n"),
-    Verdict(3, "hung", 0, "", "no verdict within 60 s"),
+    RunVerdict(4, "passed", 1_000_000),
+    RunVerdict(0, "failed", 1_500_000, "t.py:7", "AssertionError: µ\n"),
+    RunVerdict(3, "hung", 0, "", "no verdict within 60 s"),
 ]
 
 
@@ -24,7 +24,7 @@ def written(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def kept(path: Path) -> list[Verdict]:
+def kept(path: Path) -> list[RunVerdict]:
     journal = CampaignJournal(path, HEAD)
     journal.close()
     return list(journal.verdicts.values())
@@ -69,19 +69,19 @@ def test_a_line_whose_bits_are_wrong_is_no_line(tmp_path: Path) -> None:
 )
 def test_another_campaign_is_refused(tmp_path: Path, head: dict[str, object], said: str) -> None:
     whole = written(tmp_path / "j")
-    with pytest.raises(Refusal, match=said):
+    with pytest.raises(CampaignRefusal, match=said):
         CampaignJournal(tmp_path / "j", head)
     assert (tmp_path / "j").read_bytes() == whole
 
 
 def test_two_do_not_write_one_journal(tmp_path: Path) -> None:
     journal = CampaignJournal(tmp_path / "j", HEAD)
-    with pytest.raises(Refusal, match="another campaign runs that writes it"):
+    with pytest.raises(CampaignRefusal, match="another campaign runs that writes it"):
         CampaignJournal(tmp_path / "j", HEAD)
     (tmp_path / "j").write_bytes(b"torn")  # so that it is written anew
     journal.close()
     journal = CampaignJournal(tmp_path / "j", HEAD)
-    with pytest.raises(Refusal, match="another campaign runs that writes it"):
+    with pytest.raises(CampaignRefusal, match="another campaign runs that writes it"):
         CampaignJournal(tmp_path / "j", HEAD)
     journal.remove()
     assert not (tmp_path / "j").exists()

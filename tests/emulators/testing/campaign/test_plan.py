@@ -2,19 +2,23 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.emulators.testing.campaign.order import Collected, CollectedTest, Order, Refusal
-from tickrig.emulators.testing.campaign.plan import Plan, Shard
-from tickrig.emulators.testing.campaign.seeds import Seeds
+from tickrig.emulators.testing.campaign.order import (
+    CampaignOrder,
+    CampaignRefusal,
+    Collected,
+    CollectedTest,
+)
+from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds, Shard
 
 
-def plan(tests: int, seeds: str, shard: str = "1/1") -> Plan:
-    order = Order(tests=("t.py",), parameters=("flip=0.1,0.2",), bench="rig one.toml")
+def plan(tests: int, seeds: str, shard: str = "1/1") -> CampaignPlan:
+    order = CampaignOrder(tests=("t.py",), parameters=("flip=0.1,0.2",), bench="rig one.toml")
     found = [
         CollectedTest(f"t.py::test_{n}", {"flip": f"0.{n}"}, f"../t.py::test_{n}")
         for n in range(tests)
     ]
     collected = Collected(tuple(found), (), "digest")
-    return Plan(order, collected, Seeds.parse(seeds), Shard.parse(shard))
+    return CampaignPlan(order, collected, Seeds.parse(seeds), Shard.parse(shard))
 
 
 @pytest.mark.parametrize("parts", [1, 2, 3, 8, 50])
@@ -51,5 +55,5 @@ def test_what_is_no_shard_is_told(text: str) -> None:
 
 
 def test_more_runs_than_fit_are_refused() -> None:
-    with pytest.raises(Refusal, match="that makes 20000002 runs; 10000000 are the most"):
+    with pytest.raises(CampaignRefusal, match="that makes 20000002 runs; 10000000 are the most"):
         plan(2, "0-10000000")

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.emulators.testing.campaign.seeds import LARGEST, Seeds
+from tickrig.emulators.testing.campaign.plan import LARGEST, Seeds
 
 
 @pytest.mark.parametrize(

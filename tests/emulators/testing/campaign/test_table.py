@@ -4,22 +4,25 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.testing.campaign.order import Refusal
-from tickrig.emulators.testing.campaign.summary import missing_seeds, summary
+from tickrig.emulators.testing.campaign.order import CampaignRefusal
 from tickrig.emulators.testing.campaign.table import (
-    Row,
-    Table,
+    CampaignRow,
+    CampaignTable,
     merge_tables,
+    missing_seeds,
     read_table,
+    summary,
     write_table,
 )
 
 ROWS = [
-    Row("t.py::test_a[flip=0.1]", 2, ("0.1",), "passed", 1_000, "", "", ""),
-    Row("t.py::test_a[flip=0.1]", 10, ("0.1",), "failed", 7, "t.py:3", 'said "no", µ', "pytest x"),
-    Row("t.py::test_b", 2, ("",), "skipped", 0, "", "not virtual", ""),
+    CampaignRow("t.py::test_a[flip=0.1]", 2, ("0.1",), "passed", 1_000, "", "", ""),
+    CampaignRow(
+        "t.py::test_a[flip=0.1]", 10, ("0.1",), "failed", 7, "t.py:3", 'said "no", µ', "pytest x"
+    ),
+    CampaignRow("t.py::test_b", 2, ("",), "skipped", 0, "", "not virtual", ""),
 ]
-TABLE = Table(("flip",), ROWS)
+TABLE = CampaignTable(("flip",), ROWS)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
@@ -27,7 +30,7 @@ def test_what_was_written_is_read_back(tmp_path: Path, suffix: str) -> None:
     if suffix == ".parquet":
         pytest.importorskip("pyarrow")
     path = tmp_path / f"t{suffix}"
-    for table in (TABLE, Table((), [])):
+    for table in (TABLE, CampaignTable((), [])):
         write_table(table, path)
         assert read_table(path) == table
 
@@ -55,22 +58,26 @@ def test_csv_is_as_everybody_reads_it(tmp_path: Path) -> None:
 def test_what_is_no_table_is_told(tmp_path: Path, text: str, said: str) -> None:
     head = "test,seed,flip,outcome,virtual_us,where,reason,replay"
     (tmp_path / "t.csv").write_bytes(text.replace("HEAD", head).encode("latin-1"))
-    with pytest.raises(Refusal) as refusal:
+    with pytest.raises(CampaignRefusal) as refusal:
         read_table(tmp_path / "t.csv")
     assert said in str(refusal.value)
 
 
 def test_shards_are_joined_in_any_order() -> None:
-    parts = [(Path(name), Table(("flip",), [row])) for name, row in zip("cab", ROWS, strict=True)]
+    parts = [
+        (Path(name), CampaignTable(("flip",), [row])) for name, row in zip("cab", ROWS, strict=True)
+    ]
     assert merge_tables(parts) == merge_tables([*parts[::-1], *parts]) == TABLE
 
 
 def test_what_does_not_fit_together_is_told() -> None:
     other = TABLE._replace(rows=[ROWS[0]._replace(outcome="failed")])
-    with pytest.raises(Refusal, match=r"with seed 2 is not the same in two tables: passed in"):
+    with pytest.raises(
+        CampaignRefusal, match=r"with seed 2 is not the same in two tables: passed in"
+    ):
         merge_tables([(Path("a"), TABLE), (Path("b"), other)])
-    with pytest.raises(Refusal, match=r"b has the parameters none; a has flip"):
-        merge_tables([(Path("a"), TABLE), (Path("b"), Table((), ()))])
+    with pytest.raises(CampaignRefusal, match=r"b has the parameters none; a has flip"):
+        merge_tables([(Path("a"), TABLE), (Path("b"), CampaignTable((), ()))])
 
 
 def test_a_shard_that_was_forgotten_is_told() -> None:
@@ -98,6 +105,6 @@ def test_a_summary_has_each_way_to_fail_and_its_commands() -> None:
 
 def test_values_of_parameters_are_in_the_order_of_numbers() -> None:
     rates = ("0.003", "0.02", "0.1", "2", "10")
-    rows = [Row(f"t.py::test_a[flip={r}]", 1, (r,), "passed", 1, "", "", "") for r in rates]
-    parts = [(Path(row.values[0]), Table(("flip",), [row])) for row in reversed(rows)]
+    rows = [CampaignRow(f"t.py::test_a[flip={r}]", 1, (r,), "passed", 1, "", "", "") for r in rates]
+    parts = [(Path(row.values[0]), CampaignTable(("flip",), [row])) for row in reversed(rows)]
     assert [row.values[0] for row in merge_tables(parts).rows] == list(rates)

@@ -11,11 +11,11 @@ from tests.emulators.record.test_bench_replay import Bench
 from tests.mutated import mutated
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
-from tickrig.device.rrc.config import RrcConfig
 from tickrig.device.rrc.machine import Rrc
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.commands.device_config import configure
 from tickrig.emulators.rig.rig import Rig
@@ -27,7 +27,7 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.links.recording_link import RecordingLink
 from tickrig.host.text.byte_text import escape, unescape
 from tickrig.wire.can import CanFrame
-from tickrig.wire.modbus.rtu import encode_frame
+from tickrig.wire.modbus import encode_frame
 from tickrig.wire.rtc_lite.codes import LiteCommand
 from tickrig.wire.rtc_lite.frame import LiteFrame
 

@@ -15,9 +15,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.host.live import LiveRrc, live_rrc, pty, served
-from tickrig.device.rrc.config import RrcConfig
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.record.bench_replay import read_bench_recording
+from tickrig.emulators.record.replay import read_bench_recording
 from tickrig.emulators.serial.pty_port import PtyPort
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.text.trace import Mark

@@ -15,7 +15,7 @@ from tickrig.emulators.testing.commands.run_cli import run
 from tickrig.host.control.client import ControlClient
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc.replies import RrcEvent
+from tickrig.wire.rrc import RrcEvent
 
 RIG = """\
 [device.vr2]
@@ -140,7 +140,7 @@ def test_what_cannot_be_is_told(folder: Path, words: list[str], complaint: str) 
 
 def test_a_mistake_of_a_user_s_class_is_one_line(folder: Path) -> None:
     (folder / "mine.py").write_text(
-        "from tickrig.device.canopen.device_rtc.component import CanopenComponent\n"
+        "from tickrig.device.canopen.device_rtc import CanopenComponent\n"
         "class Mine(CanopenComponent):\n"
         "    type_name = 'Mine'\n"
         "    def on_initialize(self):\n"

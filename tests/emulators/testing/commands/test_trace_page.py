@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from tests.emulators.testing.commands.test_compare_cli import record_bus, record_rrc
 from tests.emulators.testing.commands.test_record_realtime import Recorder, answer
 from tests.host.live import live_rrc, pty
-from tickrig.device.rrc.config import RrcConfig
+from tickrig.device.rrc.settings import RrcConfig
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.rrc.cli import main as rrc_emu
 from tickrig.host.canmon.cli import main as canmon

@@ -18,13 +18,13 @@ from durand.node import NodeCapabilities
 
 from tests.device.canopen.reference import NODE_ID, make_dictionary
 from tests.environment import ROOT
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.testing.conformance.conformance import conformance
-from tickrig.emulators.testing.conformance.foreign.durand_slave import DurandSlave
-from tickrig.emulators.testing.conformance.foreign.local_node import LocalNodeSlave
-from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
+from tickrig.emulators.testing.conformance.durand_slave import DurandSlave
+from tickrig.emulators.testing.conformance.local_node import LocalNodeSlave
+from tickrig.host.canopen.conform.bus.exchange import NotAllowed
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_writer import write_eds

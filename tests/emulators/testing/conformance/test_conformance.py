@@ -11,16 +11,16 @@ import pytest
 
 from tests.emulators.testing.conformance.stacks import R1_EDS, durand, local_node, ours
 from tickrig.device import make_epos
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import SERVICES
 from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.conformance.bench_source import open_rig
 from tickrig.emulators.testing.conformance.conformance import conformance
-from tickrig.emulators.testing.conformance.rig_source import open_rig
 from tickrig.emulators.testing.conformance.slave import Slave, SlaveCall
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.report.report_json import report_json
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.wire.can import CanFrame, Frames
 
 NMT = "NMT-0[345]"
@@ -30,7 +30,7 @@ REASON = "your slave raised struct.error: unpack requires a buffer of 2 bytes"
 @pytest.mark.parametrize("make", [ours, local_node, durand])
 def test_any_stack_is_judged_in_virtual_time(make: Callable[[], Slave]) -> None:
     report = conformance(make(), node_id=5, eds=R1_EDS, only=NMT)
-    assert [result.outcome.verdict for result in report.results] == [Verdict.PASS] * 3
+    assert [result.outcome.verdict for result in report.results] == [CheckVerdict.PASS] * 3
 
 
 def test_a_slave_of_ours_tells_of_itself() -> None:
@@ -96,7 +96,7 @@ def test_a_node_has_not_failed_because_another_one_answers() -> None:
     with Bench(left=make_epos(1), right=make_epos(2)) as bench:
         report = conformance(bench["right"], only=("LS-02", "NMT-03"))
         verdicts = [result.outcome.verdict for result in report.results]
-        assert sorted(verdicts) == [Verdict.NOT_APPLICABLE, Verdict.PASS]
+        assert sorted(verdicts) == [CheckVerdict.NOT_APPLICABLE, CheckVerdict.PASS]
 
 
 def test_a_bare_callable_is_judged() -> None:
@@ -109,7 +109,7 @@ def test_a_bare_callable_is_judged() -> None:
         return call
 
     report = conformance(make, node_id=3, only="UE-01")
-    assert [result.outcome.verdict for result in report.results] == [Verdict.FAIL]
+    assert [result.outcome.verdict for result in report.results] == [CheckVerdict.FAIL]
 
 
 class Fragile:
@@ -136,15 +136,15 @@ class Fragile:
 def test_what_a_slave_raises_is_the_verdict_and_the_others_go_on() -> None:
     fragile = Fragile()
     report = conformance(fragile, node_id=5, eds=R1_EDS, only="NMT-*")
-    failed = [result for result in report.results if result.outcome.verdict is Verdict.FAIL]
+    failed = [result for result in report.results if result.outcome.verdict is CheckVerdict.FAIL]
     assert failed
     for result in failed:
         reason = rf"step \d+: {REASON}"
         assert re.fullmatch(reason, result.outcome.reason)
         remarks = [line.text for line in result.outcome.evidence if line.direction == "#"]
         assert any("in tick: struct.unpack" in text for text in remarks), remarks
-    assert report.count(Verdict.PASS) > len(failed)
-    assert report.count(Verdict.BLOCKED) == 0
+    assert report.count(CheckVerdict.PASS) > len(failed)
+    assert report.count(CheckVerdict.BLOCKED) == 0
     assert report.findings[0].startswith("your slave raised struct.error")
     assert fragile.resets >= 2 * len(failed), "each is tried again, and it begins anew"
     assert report.unrestored == ()
@@ -175,12 +175,12 @@ def test_what_a_slave_of_ours_raises_is_the_verdict_too() -> None:
     reasons = [result.outcome for result in report.results if result.check.id == "NMT-09"]
     assert [(each.verdict, each.reason) for each in reasons] == [
         (
-            Verdict.FAIL,
+            CheckVerdict.FAIL,
             "step 4: your slave raised struct.error: unpack requires a buffer of 2 bytes",
         )
     ]
     assert report.findings[0].startswith("your slave raised struct.error")
-    assert report.count(Verdict.PASS) > 3
+    assert report.count(CheckVerdict.PASS) > 3
     assert (report.exit_status, report.unrestored) == (1, ())
 
 
@@ -199,14 +199,14 @@ def test_what_the_hands_raise_is_no_failure_of_the_slave() -> None:
 
     report = conformance(Fragile(), node_id=5, eds=R1_EDS, only="PR-01", stimulus=hands)
     (result,) = report.results
-    assert result.outcome.verdict is Verdict.INCONCLUSIVE
+    assert result.outcome.verdict is CheckVerdict.INCONCLUSIVE
     assert result.outcome.reason == "the stimulus raised KeyError: 'input'"
 
 
 def test_another_device_of_a_bench_that_raises_accuses_nobody() -> None:
     with Bench(left=strict(1), right=make_epos(2)) as bench:
         report = conformance(bench["right"], only="NMT-0*")
-        assert report.count(Verdict.FAIL) == 0
+        assert report.count(CheckVerdict.FAIL) == 0
         disturbed = [line.text for each in report.results for line in each.outcome.evidence]
         assert any(text.startswith("left raised struct.error") for text in disturbed)
 

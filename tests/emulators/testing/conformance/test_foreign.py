@@ -7,9 +7,8 @@ import pytest
 from durand.scheduler import get_scheduler
 
 from tests.emulators.testing.conformance.stacks import durand, local_node, ours
-from tickrig.emulators.testing.conformance.called_slave import CalledSlave
-from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
-from tickrig.emulators.testing.conformance.slave import Slave
+from tickrig.emulators.testing.conformance.conformance import PoweredSlave
+from tickrig.emulators.testing.conformance.slave import CalledSlave, Slave
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

@@ -10,8 +10,8 @@ import pytest
 from tests.emulators.testing.conformance.stacks import judge_durand, judge_local_node, judge_ours
 from tests.emulators.testing.conformance.verdict_page import FOREIGN, PAGE
 from tests.emulators.testing.conformance.verdict_table import compare, read_table
-from tickrig.host.canopen.conform.notation.suite import suite_checks
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 pytestmark = pytest.mark.unmeasured
 
@@ -24,7 +24,9 @@ GROUPS = (
 
 def test_our_slave_has_no_failure() -> None:
     report = judge_ours()
-    assert [one.check.id for one in report.results if one.outcome.verdict is Verdict.FAIL] == []
+    assert [
+        one.check.id for one in report.results if one.outcome.verdict is CheckVerdict.FAIL
+    ] == []
     assert report.exit_status == 0
 
 
@@ -35,7 +37,7 @@ def test_the_verdicts_are_those_of_the_public_checks(
     stack: str, judge: Callable[[tuple[str, ...]], Report]
 ) -> None:
     report = judge(GROUPS)
-    assert report.count(Verdict.BLOCKED) == 0
+    assert report.count(CheckVerdict.BLOCKED) == 0
     found = compare(report, read_table(stack))
     assert found.both >= 75
     assert found.same >= LEAST * found.both

@@ -10,18 +10,18 @@ from tests.emulators.testing.conformance.stacks import judge_durand, judge_local
 from tests.emulators.testing.conformance.verdict_table import compare, read_table
 from tests.environment import ROOT
 from tickrig import Bench
-from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.testing import conformance
 
 PAGE: Final = ROOT / "docs" / "reference/canopen/conformance.md"
 OBJECTS: Final = "OD"
 SHOWN: Final = (
-    Verdict.PASS,
-    Verdict.FAIL,
-    Verdict.IMPLEMENTATION_DEFINED,
-    Verdict.INCONCLUSIVE,
-    Verdict.BLOCKED,
-    Verdict.NOT_APPLICABLE,
+    CheckVerdict.PASS,
+    CheckVerdict.FAIL,
+    CheckVerdict.IMPLEMENTATION_DEFINED,
+    CheckVerdict.INCONCLUSIVE,
+    CheckVerdict.BLOCKED,
+    CheckVerdict.NOT_APPLICABLE,
 )
 HEAD: Final = """# Verdicts on CANopen stacks
 
@@ -100,7 +100,7 @@ def _section(stack: str, name: str, report: Report) -> Iterator[str]:
     )
     for one in found.differences:
         yield f"{one.check_id} differs: {one.public} there, {one.here} here: {one.reason}."
-    failed = [one for one in report.results if one.outcome.verdict is Verdict.FAIL]
+    failed = [one for one in report.results if one.outcome.verdict is CheckVerdict.FAIL]
     yield "\n| check | clause | what came |\n|---|---|---|"
     for result in failed:
         if result.check.group != OBJECTS:

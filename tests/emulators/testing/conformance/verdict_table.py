@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 from tests.environment import ROOT
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 FILE: Final = ROOT / "tests" / "golden" / "canopen" / "foreign_verdicts.txt"
 COLUMNS: Final = ("LocalNode", "durand")
 WORDS: Final = {
-    Verdict.PASS: "ok",
-    Verdict.FAIL: "FAIL",
-    Verdict.IMPLEMENTATION_DEFINED: "FAIL",
+    CheckVerdict.PASS: "ok",
+    CheckVerdict.FAIL: "FAIL",
+    CheckVerdict.IMPLEMENTATION_DEFINED: "FAIL",
 }
 """What the public checks call a verdict; where the device decides they said FAIL, and (impl)."""
 

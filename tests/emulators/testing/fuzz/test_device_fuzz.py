@@ -11,7 +11,7 @@ import pytest
 import tickrig.testing
 from tests.emulators.echo import Echo
 from tickrig.device.canopen.models.epos import make_epos
-from tickrig.emulators.testing.fuzz.device_fuzz import DeviceFuzz, SilentDeviceError
+from tickrig.emulators.testing.fuzz import DeviceFuzz, SilentDeviceError
 from tickrig.testing import fuzz_one_input
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER

@@ -17,8 +17,8 @@ from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.testing.bench.modes.virtual_doors import RigPassing
 from tickrig.emulators.testing.host_clock.patched_time import patched_time
-from tickrig.emulators.testing.host_clock.rig_passing import RigPassing
 
 
 def test_sleeping_and_timeouts_are_those_of_the_rig() -> None:

@@ -17,9 +17,8 @@ from tests.emulators.testing.host_clock import user_host
 from tests.emulators.testing.host_clock.test_patched_time import RrcBench
 from tests.emulators.testing.host_clock.user_host import Host
 from tests.host.live import pty
-from tickrig.emulators.testing.host_clock.errors import UnpatchedTimeError
-from tickrig.emulators.testing.host_clock.patched_time import patched_time
-from tickrig.emulators.testing.host_clock.unpatched_time import unpatched_time_fails
+from tickrig.emulators.testing.host_clock.host_code import UnpatchedTimeError
+from tickrig.emulators.testing.host_clock.patched_time import patched_time, unpatched_time_fails
 from tickrig.host.control.clock import RealClock
 
 WHAT_TO_DO = (

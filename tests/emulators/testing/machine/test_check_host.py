@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from tickrig import Bench
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.testing.machine.step import HostStep
+from tickrig.emulators.testing.machine.host_runs import HostStep
 from tickrig.host.links.link import Link
 from tickrig.testing import (
     BenchMachine,

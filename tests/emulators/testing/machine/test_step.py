@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tickrig import Bench
 from tickrig.device import make_epos
-from tickrig.emulators.testing.machine.step import HostStep, parse_steps
+from tickrig.emulators.testing.machine.host_runs import HostStep, parse_steps
 
 PLAIN = st.one_of(st.integers(), st.text(), st.binary(), st.booleans(), st.none())
 CALLS = st.builds(

@@ -10,8 +10,7 @@ import canopen
 import pytest
 import serial
 
-from tickrig.emulators.testing.plugin import benched_test, pytest_plugin
-from tickrig.emulators.testing.plugin.evidence import journal_text
+from tickrig.emulators.testing.plugin import benched_test, journal_text, pytest_plugin
 from tickrig.host.canmon.model.decode import decoder
 
 Run = Callable[..., pytest.RunResult]

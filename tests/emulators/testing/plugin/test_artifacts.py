@@ -8,8 +8,8 @@ import pytest
 from tests.emulators.testing.plugin.conftest import Run
 from tests.emulators.testing.plugin.test_bench_fixture import RRC
 from tests.emulators.testing.plugin.test_verdicts import BUS
-from tickrig.emulators.testing.plugin.evidence.artifacts import stem_of
-from tickrig.wire.candump import parse_log
+from tickrig.emulators.testing.plugin.failure_report import stem_of
+from tickrig.wire.can import parse_log
 
 pytest_plugins = ("pytester",)
 

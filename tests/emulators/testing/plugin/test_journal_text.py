@@ -8,7 +8,7 @@ import pytest
 
 from tests.host.canopen.master.joints import cell
 from tickrig.emulators.testing.bench import journal
-from tickrig.emulators.testing.plugin.evidence.journal_text import last_lines
+from tickrig.emulators.testing.plugin.journal_text import last_lines
 
 
 def test_what_pdos_carry_is_known_after_their_mapping_is_dropped(

@@ -10,7 +10,7 @@ import pytest
 
 from tests.emulators.testing.plugin.conftest import Run, skip_if_too_slow
 from tickrig.emulators.testing.plugin import pytest_plugin
-from tickrig.emulators.testing.plugin.needs import ALLOWED, HAND, KINDS
+from tickrig.emulators.testing.plugin.bench_source import ALLOWED, HAND, KINDS
 from tickrig.emulators.testing.plugin.settings import MODES, OPTIONS
 
 pytest_plugins = ("pytester",)

@@ -28,27 +28,27 @@ def test_a_refusal_is_shown_in_the_line_of_the_caller(
     result.stdout.fnmatch_lines(
         ['>*bench.fault("ctu")', "E *ValueError: no fault 'ctu'; did you mean 'cut'?"]
     )
-    result.stdout.no_fnmatch_line("*bench_device.py*")
+    result.stdout.no_fnmatch_line("*bench.py*")
     result.stdout.no_fnmatch_line("*rig_thread.py*")
 
 
 def test_all_of_it_is_shown_to_who_asks(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makeconftest(RRC)
     pytester.makepyfile(MISSPELT)
-    run("--full-trace").stdout.fnmatch_lines(["*bench_device.py:*"])
+    run("--full-trace").stdout.fnmatch_lines(["*bench.py:*"])
 
 
 def test_what_is_no_refusal_is_shown_whole(pytester: pytest.Pytester, run: Run) -> None:
     pytester.makeconftest(RRC)
     pytester.makepyfile(
         """
-        from tickrig.emulators.testing.bench.bench_device import BenchDevice
+        from tickrig.emulators.testing.bench.bench import BenchDevice
 
         def test_one(bench):
             BenchDevice(None).press("power_button")
         """
     )
-    run().stdout.fnmatch_lines(["E *AttributeError: *", "*bench_device.py:*: AttributeError"])
+    run().stdout.fnmatch_lines(["E *AttributeError: *", "*bench.py:*: AttributeError"])
 
 
 def test_a_bench_that_is_not_there_needs_no_traceback(pytester: pytest.Pytester, run: Run) -> None:

@@ -8,25 +8,22 @@ from pathlib import Path
 
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.bench.transcript import Transcript
+from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
-from tickrig.emulators.canopen.node.node_spec import NodeSpec
+from tickrig.emulators.canopen.choices import NodeSpec
 from tickrig.emulators.canopen.run import parse_send
-from tickrig.emulators.record.candump_file import CandumpFile
-from tickrig.emulators.record.recorder import TraceFile
+from tickrig.emulators.record.recorder import CandumpFile, TraceFile
 from tickrig.emulators.rrc.device_type import RRC
-from tickrig.emulators.scenario.player import Player
-from tickrig.emulators.scenario.scenario import Clear, ScenarioParser, ScenarioStep
+from tickrig.emulators.scenario import Clear, ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.emulators.testing.plugin.bench_evidence import SignalSampler
 from tickrig.emulators.testing.report.bench_report import (
     JournalLine,
     Outcome,
     PlannedFault,
     TestRecord,
 )
-from tickrig.emulators.testing.report.signal_sampler import SignalSampler
 from tickrig.host.text.trace import Header
 from tickrig.host.text.values import parse_time_us
 from tickrig.wire.instant import NEVER
@@ -67,7 +64,7 @@ def play(
     lines: list[str] = []
     sampler = SignalSampler(emulator.device, signals)
     emulator.after_step.append(lambda _: sampler.take(emulator.rig.now_us))
-    player = Player(emulator, steps, Transcript(emulator, lines.append))
+    player = ScenarioPlayer(emulator, steps, Transcript(emulator, lines.append))
     while emulator.running:
         emulator.step()
     emulator.close()

@@ -9,7 +9,7 @@ from tickrig.emulators.testing.report.bench_report import (
     TestRecord,
 )
 from tickrig.emulators.testing.report.overview import (
-    Verdict,
+    OverallVerdict,
     by_file,
     counts,
     reported,
@@ -21,7 +21,7 @@ PASSED, FAILED, ERROR = Outcome.PASSED, Outcome.FAILED, Outcome.ERROR
 BLOCKED, SKIPPED = Outcome.BLOCKED, Outcome.SKIPPED
 
 
-def verdict_of(*outcomes: Outcome) -> Verdict:
+def verdict_of(*outcomes: Outcome) -> OverallVerdict:
     tests = [TestRecord("t.py::t", outcome, requirements=("R",)) for outcome in outcomes]
     report = BenchReport(requirements=(Requirement("R"),))
     (row,) = requirement_rows(report, reported(tests))
@@ -31,17 +31,17 @@ def verdict_of(*outcomes: Outcome) -> Verdict:
 @pytest.mark.parametrize(
     ("outcomes", "verdict"),
     [
-        ((), Verdict.NOT_SHOWN),
-        ((PASSED,), Verdict.SHOWN),
-        ((PASSED, BLOCKED), Verdict.SHOWN),
-        ((BLOCKED,), Verdict.NOT_SHOWN),
-        ((SKIPPED, BLOCKED), Verdict.NOT_SHOWN),
-        ((PASSED, FAILED), Verdict.FAILED),
-        ((ERROR, BLOCKED), Verdict.FAILED),
+        ((), OverallVerdict.NOT_SHOWN),
+        ((PASSED,), OverallVerdict.SHOWN),
+        ((PASSED, BLOCKED), OverallVerdict.SHOWN),
+        ((BLOCKED,), OverallVerdict.NOT_SHOWN),
+        ((SKIPPED, BLOCKED), OverallVerdict.NOT_SHOWN),
+        ((PASSED, FAILED), OverallVerdict.FAILED),
+        ((ERROR, BLOCKED), OverallVerdict.FAILED),
     ],
 )
 def test_a_blocked_test_says_nothing_about_a_requirement(
-    outcomes: tuple[Outcome, ...], verdict: Verdict
+    outcomes: tuple[Outcome, ...], verdict: OverallVerdict
 ) -> None:
     assert verdict_of(*outcomes) is verdict
 

@@ -26,7 +26,7 @@ from tickrig.emulators.testing.report.bench_report import (
     merge_reports,
 )
 from tickrig.emulators.testing.report.page import html_page
-from tickrig.emulators.testing.report.report_json import from_json, to_json
+from tickrig.emulators.testing.report.report_file import from_json, to_json
 
 RUN = RunEnvironment("2026-11-22 14:00", "virtual", 7, "rig.toml", "[device.rrc]\n")
 STOPS = "tests/test_chair.py::test_a_pulled_bus_stops_the_chair"

@@ -19,7 +19,7 @@ from tickrig.emulators.testing.report.bench_report import (
     merge_reports,
 )
 from tickrig.emulators.testing.report.page import html_page
-from tickrig.emulators.testing.report.report_json import (
+from tickrig.emulators.testing.report.report_file import (
     ReportError,
     from_data,
     from_json,

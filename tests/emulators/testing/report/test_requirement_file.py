@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.testing.report.bench_report import Requirement
-from tickrig.emulators.testing.report.requirement_file import parse_requirements, read_requirements
+from tickrig.emulators.testing.report.overview import parse_requirements, read_requirements
 
 
 def test_a_line_is_a_name_and_what_it_demands() -> None:

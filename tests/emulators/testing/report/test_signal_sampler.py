@@ -9,9 +9,8 @@ from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank
 from tickrig.device.rrc.machine import Rrc
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
-from tickrig.emulators.testing.report.bench_report import SignalSeries, Value
-from tickrig.emulators.testing.report.signal_sampler import SignalSampler
-from tickrig.emulators.testing.report.thinning import thinned
+from tickrig.emulators.testing.plugin.bench_evidence import SignalSampler
+from tickrig.emulators.testing.report.bench_report import SignalSeries, Value, thinned
 
 
 class Heater:

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.emulators.testing.report.axis import Axis, Span
 from tickrig.emulators.testing.report.bench_report import (
     JournalLine,
     Outcome,
@@ -15,8 +14,15 @@ from tickrig.emulators.testing.report.bench_report import (
     TestRecord,
     Value,
 )
-from tickrig.emulators.testing.report.lane import CURVE_PX, SWITCH_PX, Lane
-from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
+from tickrig.emulators.testing.report.timeline import (
+    CURVE_PX,
+    SWITCH_PX,
+    Lane,
+    TimeAxis,
+    Timeline,
+    TimeSpan,
+    timeline_of,
+)
 from tickrig.host.text.page_text import DASH
 
 
@@ -90,14 +96,14 @@ def test_words_that_change_for_ever_are_thinned() -> None:
 
 
 def test_the_axis_has_round_times() -> None:
-    assert Axis(0, 2_000_000).ticks == [
+    assert TimeAxis(0, 2_000_000).ticks == [
         (0, "0.0"),
         (25, "0.5"),
         (50, "1.0"),
         (75, "1.5"),
         (100, "2.0"),
     ]
-    assert Axis(1_000_000, 1_500_000).ticks[1:3] == [(20, "1.1"), (40, "1.2")]
+    assert TimeAxis(1_000_000, 1_500_000).ticks[1:3] == [(20, "1.1"), (40, "1.2")]
 
 
 @pytest.mark.parametrize(
@@ -112,18 +118,18 @@ def test_the_axis_has_round_times() -> None:
     ],
 )
 def test_the_name_of_a_fault_is_where_it_has_room(left: float, width: float, place: str) -> None:
-    assert Span(left, width, "cut").place == place
+    assert TimeSpan(left, width, "cut").place == place
 
 
 def test_words_stand_as_long_as_they_hold() -> None:
     drawn = lane((0, "Off"), (250_000, "On"), (300_000, "On"), (500_000, None), (750_000, "Off"))
-    assert drawn.words == (Span(0, 25, "Off"), Span(25, 25, "On"), Span(75, 25, "Off"))
+    assert drawn.words == (TimeSpan(0, 25, "Off"), TimeSpan(25, 25, "On"), TimeSpan(75, 25, "Off"))
     assert drawn.path == ""
 
 
 def test_a_number_that_never_changes_is_said_once() -> None:
     drawn = lane((0, 5), (900_000, 5))
-    assert (drawn.constant, drawn.words) == (True, (Span(0, 100, "5 V"),))
+    assert (drawn.constant, drawn.words) == (True, (TimeSpan(0, 100, "5 V"),))
 
 
 def test_zero_is_marked_where_a_curve_crosses_it() -> None:
@@ -138,7 +144,7 @@ def test_a_fault_lasts_from_when_it_came_to_when_it_went() -> None:
         PlannedFault("never", when="the 3rd OK"),
     )
     line = line_of(faults=faults)
-    assert line.faults == (Span(25, 25, "cut"), Span(90, 10, "stays"))
+    assert line.faults == (TimeSpan(25, 25, "cut"), TimeSpan(90, 10, "stays"))
     assert [span.place for span in line.faults] == ["inside", "before"]
 
 
@@ -153,7 +159,7 @@ def test_what_is_too_much_to_draw_is_counted() -> None:
 
 def test_a_fault_alone_makes_an_axis() -> None:
     line = line_of(faults=(PlannedFault("cut", 100, 300),), virtual_us=None)
-    assert (line.axis[:], line.faults) == ((0, 300), (Span(33.33, 66.67, "cut"),))
+    assert (line.axis[:], line.faults) == ((0, 300), (TimeSpan(33.33, 66.67, "cut"),))
 
 
 def test_actions_and_misses_are_on_the_axis() -> None:

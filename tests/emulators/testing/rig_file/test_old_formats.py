@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, RigPlan
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file, read_rig_file

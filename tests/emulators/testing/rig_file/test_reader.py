@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.device.canopen.core.slave import UNCONFIGURED
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.testing.rig_file.plan import (
     BodyPlan,
@@ -22,7 +22,7 @@ from tickrig.emulators.testing.rig_file.plan import (
 )
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file, read_rig_file
 from tickrig.emulators.testing.rig_file.section import RigFileError
-from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.emulators.testing.signals.sources import SignalSpec
 
 ROOT = Path(__file__).parents[4]
 HERE = Path("bench") / "rig.toml"

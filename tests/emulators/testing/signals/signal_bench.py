@@ -12,7 +12,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.signals.driver import SignalDriver
-from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
 from tickrig.wire.instant import NEVER
 

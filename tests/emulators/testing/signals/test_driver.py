@@ -10,8 +10,7 @@ import pytest
 from tests.emulators.testing.signals.signal_bench import Meter, SignalBench, signals_of
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.signals.driver import SignalDriver

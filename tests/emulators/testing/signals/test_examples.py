@@ -14,15 +14,14 @@ import pytest
 from tests.emulators.testing.bench.test_recorded_device import replayed
 from tests.emulators.testing.signals.signal_bench import signals_of
 from tickrig import open_bench
-from tickrig.device.canopen.core.slave import CanopenSlave
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.signals.driver import SignalDriver

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from tickrig.emulators.testing.signals.formula_parser import parse_formula
+from tickrig.emulators.testing.signals.formula import parse_formula
 
 VALUES = {"t": 1.5, "x": 3.0, "y": -2.0, "left.current_a": 0.5, "5/0x6064": 4096.0, "z": 0.0}
 

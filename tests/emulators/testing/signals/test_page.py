@@ -15,11 +15,10 @@ from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.emulators.canopen.node.node import Node
-from tickrig.emulators.canopen.node.nodes import Nodes
+from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.signals.driver import SignalDriver
-from tickrig.emulators.testing.signals.formula_parser import CALLED
+from tickrig.emulators.testing.signals.formula import CALLED
 from tickrig.emulators.testing.signals.spec_reader import FORMS
 
 ROOT = Path(__file__).parents[4]

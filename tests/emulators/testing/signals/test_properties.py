@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from tests.emulators.testing.signals.signal_bench import Meter, SignalBench, signals_of
 from tests.soak import examples
-from tickrig.emulators.testing.signals.mistake import Mistake
+from tickrig.emulators.testing.signals.fields import SignalMistake
 from tickrig.emulators.testing.signals.scope import check_signals
-from tickrig.emulators.testing.signals.signal_spec import SignalSpec
+from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec
 
 ROOT = Path(__file__).parents[4]
@@ -191,7 +191,7 @@ def test_anything_is_a_signal_or_has_mistakes_in_a_line_each(value: Any) -> None
         return
     assert found
     for mistake in found:
-        assert isinstance(mistake, Mistake)
+        assert isinstance(mistake, SignalMistake)
         assert mistake.keys[:2] == ("x", 0)
         assert mistake.reason
         assert "\n" not in str(mistake.reason)

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from tickrig.emulators.testing.signals.sources import (
     Constant,
     Noise,
-    Ramp,
-    Source,
-    Table,
+    RampSource,
+    SignalSource,
+    ValueTable,
     Wave,
 )
 from tickrig.wire.instant import NEVER
@@ -25,9 +25,9 @@ S = 1_000_000
     ("source", "values", "next_us"),
     [
         (Constant(3), {0: 3, 9 * S: 3}, {0: NEVER}),
-        (Ramp(0, 8, 4 * S), {0: 0, S: 2, 4 * S: 8, 9 * S: 8}, {0: 1, 4 * S: NEVER}),
-        (Ramp(5, 5, S), {S // 2: 5}, {0: NEVER}),
-        (Ramp(0, 8, 4 * S, repeat=True), {5 * S: 2, 8 * S: 0}, {8 * S: 8 * S + 1}),
+        (RampSource(0, 8, 4 * S), {0: 0, S: 2, 4 * S: 8, 9 * S: 8}, {0: 1, 4 * S: NEVER}),
+        (RampSource(5, 5, S), {S // 2: 5}, {0: NEVER}),
+        (RampSource(0, 8, 4 * S, repeat=True), {5 * S: 2, 8 * S: 0}, {8 * S: 8 * S + 1}),
         (Wave("triangle", 1, 3, 4 * S), {0: 1, S: 2, 2 * S: 3, 3 * S: 2, 4 * S: 1}, {5: 6}),
         (
             Wave("square", 1, 3, 4 * S, 0, 0.25),
@@ -36,26 +36,26 @@ S = 1_000_000
         ),
         (Wave("square", 1, 3, 4 * S, 2 * S), {0: 3, 2 * S: 1}, {0: 2 * S}),
         (
-            Table((S, 2 * S, 2 * S, 4 * S), (1, 3, 9, 9)),
+            ValueTable((S, 2 * S, 2 * S, 4 * S), (1, 3, 9, 9)),
             {0: 1, S: 1, 3 * S // 2: 2, 2 * S - 1: 3 - 2e-6, 2 * S: 9, 3 * S: 9, 8 * S: 9},
             {0: S, S: S + 1, 2 * S: 4 * S, 4 * S: NEVER},
         ),
-        (Table((S, 2 * S), (1, 3), linear=False), {0: 1, S: 1, 2 * S: 3}, {0: S, S: 2 * S}),
+        (ValueTable((S, 2 * S), (1, 3), linear=False), {0: 1, S: 1, 2 * S: 3}, {0: S, S: 2 * S}),
         (
-            Table((0, S, 2 * S), (1, 3, 1), repeat=True),
+            ValueTable((0, S, 2 * S), (1, 3, 1), repeat=True),
             {S: 3, 2 * S: 1, 5 * S // 2: 2, 3 * S: 3},
             {S: S + 1},
         ),
         (
-            Table((0, S, 2 * S), (1, 3, 1), linear=False, repeat=True),
+            ValueTable((0, S, 2 * S), (1, 3, 1), linear=False, repeat=True),
             {3 * S: 3, 4 * S: 1},
             {S: 2 * S, 7 * S // 2: 4 * S},
         ),
-        (Table((0,), (4,), repeat=True), {9: 4}, {9: NEVER}),
+        (ValueTable((0,), (4,), repeat=True), {9: 4}, {9: NEVER}),
     ],
 )
 def test_values_and_when_they_change(
-    source: Source, values: dict[int, float], next_us: dict[int, int]
+    source: SignalSource, values: dict[int, float], next_us: dict[int, int]
 ) -> None:
     for at_us, value in values.items():
         assert isclose(float(source.value(at_us)), value, rel_tol=1e-12)
@@ -73,13 +73,13 @@ numbers = st.floats(-1e6, 1e6)
 periods = st.integers(100, 5_000)
 sources = st.one_of(
     st.builds(Constant, numbers),
-    st.builds(Ramp, numbers, numbers, periods, st.booleans()),
+    st.builds(RampSource, numbers, numbers, periods, st.booleans()),
     st.builds(
         Wave, st.sampled_from(["sine", "square", "triangle"]), numbers, numbers, periods, periods
     ),
     st.builds(Noise, numbers, st.floats(0, 10), st.booleans(), periods, st.integers(0, 9)),
     st.builds(
-        lambda steps, values, linear, repeat: Table(
+        lambda steps, values, linear, repeat: ValueTable(
             tuple(sum(steps[: i + 1]) for i in range(len(steps))),
             values[: len(steps)],
             linear,
@@ -95,8 +95,8 @@ sources = st.one_of(
 
 @settings(max_examples=300)
 @given(sources, st.integers(0, 20_000))
-@example(Table((0, 375), (77.0, 77.0)), 0)
-def test_nothing_changes_before_it_says_so(source: Source, at_us: int) -> None:
+@example(ValueTable((0, 375), (77.0, 77.0)), 0)
+def test_nothing_changes_before_it_says_so(source: SignalSource, at_us: int) -> None:
     next_us = source.next_us(at_us)
     assert next_us > at_us
     value = source.value(at_us)
@@ -107,7 +107,7 @@ def test_nothing_changes_before_it_says_so(source: Source, at_us: int) -> None:
 
 @settings(max_examples=300)
 @given(sources, st.integers(0, 10**12))
-def test_values_stay_within_their_ends(source: Source, at_us: int) -> None:
+def test_values_stay_within_their_ends(source: SignalSource, at_us: int) -> None:
     if ends := source.ends:
         margin = 1e-9 * max(map(abs, ends))
         assert min(ends) - margin <= float(source.value(at_us)) <= max(ends) + margin

@@ -8,15 +8,22 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.emulators.testing.signals.mistake import Mistake
-from tickrig.emulators.testing.signals.signal_spec import Lag, SignalSpec
-from tickrig.emulators.testing.signals.sources import Constant, Noise, Ramp, Table, Wave
+from tickrig.emulators.testing.signals.fields import SignalMistake
+from tickrig.emulators.testing.signals.sources import (
+    Constant,
+    Lag,
+    Noise,
+    RampSource,
+    SignalSpec,
+    ValueTable,
+    Wave,
+)
 from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
 
 S = 1_000_000
 
 
-def read(toml: str, folder: Path | None = None) -> SignalSpec | list[Mistake]:
+def read(toml: str, folder: Path | None = None) -> SignalSpec | list[SignalMistake]:
     return read_signal_spec(tomllib.loads(f"x = {toml}")["x"], ("x",), folder)
 
 
@@ -33,18 +40,18 @@ def spec(toml: str, folder: Path | None = None) -> SignalSpec:
         ("7", Constant(7)),
         ("true", Constant(1)),
         ('"ready"', Constant("ready")),
-        ('{ramp = [12.0, 9.5], over = "10s"}', Ramp(12.0, 9.5, 10 * S)),
-        ('{ramp = [0, 360], over = "2s", repeat = true}', Ramp(0, 360, 2 * S, repeat=True)),
+        ('{ramp = [12.0, 9.5], over = "10s"}', RampSource(12.0, 9.5, 10 * S)),
+        ('{ramp = [0, 360], over = "2s", repeat = true}', RampSource(0, 360, 2 * S, repeat=True)),
         ('{sine = [11, 13], period = "2s"}', Wave("sine", 11, 13, 2 * S)),
         ('{sine = [11, 13], period = "2s", phase_deg = 90}', Wave("sine", 11, 13, 2 * S, S // 2)),
         ('{triangle = [0, 1], period = "8ms"}', Wave("triangle", 0, 1, 8_000)),
         ('{square = [0, 1], period = "1s", duty = 0.25}', Wave("square", 0, 1, S, 0, 0.25)),
         ("{noise = 0.1, mean = 12.0}", Noise(12.0, 0.1, False, 10_000)),
         ('{noise = [-1, 1], every = "1ms", seed = 3}', Noise(-1, 1, True, 1_000, 3)),
-        ('{table = [[0, 12.0], ["5s", 9.5]]}', Table((0, 5 * S), (12.0, 9.5))),
+        ('{table = [[0, 12.0], ["5s", 9.5]]}', ValueTable((0, 5 * S), (12.0, 9.5))),
         (
             '{table = [[0.5, 1]], interpolation = "hold", repeat = true}',
-            Table((S // 2,), (1,), False, True),
+            ValueTable((S // 2,), (1,), False, True),
         ),
     ],
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.emulators.testing.signals.test_spec_reader import read, spec
-from tickrig.emulators.testing.signals.sources import Table
+from tickrig.emulators.testing.signals.sources import ValueTable
 
 LOG = "(1000.0) can0 181#0000FEFF\n(1000.5) can0 182#00\n(1001.25) can0 181#0000E803\n"
 TRACE = """\
@@ -52,7 +52,7 @@ def test_a_column_of_a_file(
 ) -> None:
     (tmp_path / name).write_text(text, "utf-8")
     found = spec(f'{{table = "{name}"{", " if fields else ""}{fields}}}', tmp_path).source
-    assert isinstance(found, Table)
+    assert isinstance(found, ValueTable)
     assert (tuple(zip(found.times_us, found.values, strict=True)), found.linear) == wanted
 
 

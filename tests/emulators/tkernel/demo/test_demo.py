@@ -8,17 +8,15 @@ import pytest
 from click.testing import CliRunner
 
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.tkernel.demo.estimate import Estimate
-from tickrig.emulators.tkernel.demo.play import Moment, run_demo
-from tickrig.emulators.tkernel.demo.stage import Stage
-from tickrig.emulators.tkernel.node.applications import CONTENTS, SETTLEMENT
+from tickrig.emulators.tkernel.demo import CorridorStage, Estimate, Moment, run_demo
+from tickrig.emulators.tkernel.node.node_manager import CONTENTS, SETTLEMENT
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "tkernel_demo.txt"
 
 
 @pytest.fixture(scope="module")
-def played() -> tuple[Stage, list[Moment], str]:
-    stage, lines = Stage(), list[str]()
+def played() -> tuple[CorridorStage, list[Moment], str]:
+    stage, lines = CorridorStage(), list[str]()
     moments = run_demo(stage, lines.append)
     return stage, moments, "".join(f"{line}\n" for line in lines)
 
@@ -28,7 +26,7 @@ def worst_m(moments: list[Moment], *, outage: bool) -> float:
 
 
 def test_the_robot_keeps_its_position_through_the_outage(
-    played: tuple[Stage, list[Moment], str],
+    played: tuple[CorridorStage, list[Moment], str],
 ) -> None:
     _, moments, _ = played
     assert max(moment.odometry_error_m for moment in moments) > 0.9
@@ -37,14 +35,14 @@ def test_the_robot_keeps_its_position_through_the_outage(
     assert sum(moment.outage for moment in moments) > 200
 
 
-def test_it_is_the_caches_that_do_it(played: tuple[Stage, list[Moment], str]) -> None:
-    without = run_demo(Stage(caches=False), lambda line: None)
+def test_it_is_the_caches_that_do_it(played: tuple[CorridorStage, list[Moment], str]) -> None:
+    without = run_demo(CorridorStage(caches=False), lambda line: None)
     assert worst_m(without, outage=True) > 0.5
     _, moments, _ = played
     assert worst_m(without, outage=False) == worst_m(moments, outage=False)
 
 
-def test_the_outage_is_seen_in_the_caches(played: tuple[Stage, list[Moment], str]) -> None:
+def test_the_outage_is_seen_in_the_caches(played: tuple[CorridorStage, list[Moment], str]) -> None:
     stage, _, _ = played
     for name in (SETTLEMENT, CONTENTS):
         counts = stage.lookup(name).cache.counts
@@ -55,7 +53,7 @@ def test_the_outage_is_seen_in_the_caches(played: tuple[Stage, list[Moment], str
     assert sum(stage.board.read(x) for x in stage.board.outputs if x.startswith("refused")) == 0
 
 
-def test_its_lines_are_the_same_each_time(played: tuple[Stage, list[Moment], str]) -> None:
+def test_its_lines_are_the_same_each_time(played: tuple[CorridorStage, list[Moment], str]) -> None:
     assert played[2] == GOLDEN.read_text("utf-8")
 
 

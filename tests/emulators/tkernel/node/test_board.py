@@ -7,17 +7,17 @@ from contextlib import ExitStack
 import pytest
 
 from tests.host.rtc.ucode.bench import DOOR, UcodeBench
-from tickrig.emulators.tkernel.node.applications import (
+from tickrig.emulators.tkernel.node.board import Board
+from tickrig.emulators.tkernel.node.node_manager import (
     CONTENTS,
     SETTLEMENT,
     BoardLines,
+    NodeLimits,
+    NodeManager,
     add_position_detection,
 )
-from tickrig.emulators.tkernel.node.board import Board
-from tickrig.emulators.tkernel.node.limits import NodeLimits
-from tickrig.emulators.tkernel.node.node_manager import NodeManager
 from tickrig.emulators.tkernel.operated import Operated
-from tickrig.emulators.tkernel.resolution.sim_source import opener
+from tickrig.emulators.tkernel.resolution.service import opener
 from tickrig.host.control.requests import Object
 from tickrig.host.rtc.system.schedule import Schedule
 from tickrig.wire.instant import NEVER

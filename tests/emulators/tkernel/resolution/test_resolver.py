@@ -16,7 +16,7 @@ from tickrig.emulators.bench.child import Child, running
 from tickrig.emulators.commands.cli import main as tickrig
 from tickrig.emulators.tkernel.resolution.cli import main as resolver
 from tickrig.emulators.tkernel.resolution.table import EXAMPLE
-from tickrig.host.rtc.ucode.source import SourceStatus
+from tickrig.host.rtc.ucode.cache import SourceStatus
 
 MODULE = "tickrig.emulators.tkernel.resolution.cli"
 

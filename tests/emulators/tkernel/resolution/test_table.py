@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tickrig.emulators.tkernel.resolution.service import ResolutionService
-from tickrig.emulators.tkernel.resolution.table import EXAMPLE, Table, parse_table
+from tickrig.emulators.tkernel.resolution.table import EXAMPLE, UcodeTable, parse_table
 
 DOOR = "00001C00000000000001000000000001"
 BASE = "http://127.0.0.1:8640"
@@ -32,7 +32,7 @@ def test_a_table_that_cannot_be_is_told_in_a_line(text: str, told: str) -> None:
 
 
 def test_an_empty_table_knows_nothing() -> None:
-    assert parse_table("") == Table()
+    assert parse_table("") == UcodeTable()
 
 
 def test_a_ucode_may_have_an_address_elsewhere() -> None:

@@ -4,8 +4,8 @@ import pytest
 
 from tickrig.host.canmon.conform.consent import Consent
 from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.notation.bound_check import LSS_TO_ALL
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canopen.conform.notation import LSS_TO_ALL
+from tickrig.host.cli.messages import Refused
 
 
 def test_others_are_listed_and_a_pipe_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,10 +13,10 @@ from tickrig.device import make_f_palette
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import make_bench
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.host.canmon.conform.stimulus import open_stimulus
-from tickrig.host.canopen.conform.bus.step_failed import NotAllowed
-from tickrig.host.cli.refused import Refused
+from tickrig.host.canopen.conform.bus.exchange import NotAllowed
+from tickrig.host.cli.messages import Refused
 from tickrig.host.control.requests import Object, RequestDispatcher
 from tickrig.host.control.server import ControlServer
 

@@ -7,9 +7,13 @@ from pathlib import Path
 import pytest
 
 from tickrig.device.canopen.models.f_palette import ADC
-from tickrig.host.canmon.conform.signal_stimulus import SignalStimulus, Span
-from tickrig.host.canmon.conform.stimulus import CommandStimulus, open_stimulus
-from tickrig.host.canopen.conform.bus.step_failed import Disturbed, NotAllowed
+from tickrig.host.canmon.conform.stimulus import (
+    CommandStimulus,
+    LinearConverter,
+    SignalStimulus,
+    open_stimulus,
+)
+from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed
 from tickrig.host.control.client import ControlRefused
 from tickrig.host.text.values import Setting
 
@@ -74,8 +78,8 @@ class Board(SignalStimulus):
     def unit(self, name: str) -> str:
         return self.units.get(name, "")
 
-    def span(self, name: str) -> Span | None:
-        return Span(ADC.low, ADC.high, *ADC.span) if name == "ai1_v" else None
+    def span(self, name: str) -> LinearConverter | None:
+        return LinearConverter(ADC.low, ADC.high, *ADC.span) if name == "ai1_v" else None
 
     def switch(self, *, on: bool) -> None:
         self.on = on

@@ -7,7 +7,7 @@ from pathlib import Path
 from tests.emulators.testing.conformance.test_page import ThisEnvironment
 from tests.environment import ROOT
 from tests.page_runner import PageRunner
-from tickrig.host.canopen.gateway.lss_requests import LSS_VERBS
+from tickrig.host.canopen.gateway import LSS_VERBS
 
 PAGE = ROOT / "docs" / "reference/canmon/canmon-gateway.md"
 

@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.gateway.gateway_verb import parse_address
+from tickrig.host.canmon.gateway import parse_address
 
 RIG = '[device.drive]\ntype = "epos"\nnode_id = 5\n'
 PROGRAM = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()", "gateway")

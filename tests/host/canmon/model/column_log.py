@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, Rows
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 
 
 def blocks(records: list[Record], size: int) -> list[Columns]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.traffic import Snapshot, Traffic
-from tickrig.wire.candump import parse_line
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.traffic import Traffic, TrafficSnapshot
+from tickrig.wire.can import parse_line
 
 
 def hear(text: str, channel: str = "can0") -> list[Record]:
@@ -19,7 +19,7 @@ def _one(seconds: float, channel: str, frame: str) -> Record:
     )
 
 
-def snapshot(records: list[Record]) -> Snapshot:
+def snapshot(records: list[Record]) -> TrafficSnapshot:
     traffic = Traffic()
     for record in records:
         traffic.take(record)

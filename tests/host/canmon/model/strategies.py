@@ -6,9 +6,8 @@ from itertools import accumulate
 
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 IDS = st.sampled_from([0x000, 0x083, 0x181, 0x281, 0x583, 0x703, 0x7FF])
 DATA = st.one_of(

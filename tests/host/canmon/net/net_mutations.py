@@ -17,9 +17,9 @@ from click.testing import CliRunner
 from tests.mutated import mutated as spoilt
 from tickrig.device import make_epos
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
-from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
+from tickrig.emulators.testing.conformance.conformance import SlaveBench
+from tickrig.host.canmon import gateway as gateway_verb
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.gateway import gateway_verb
 from tickrig.host.canmon.net import session
 from tickrig.wire.canopen.eds.eds_writer import write_dcf
 

@@ -21,9 +21,9 @@ from tests.emulators.testing.conformance.stacks import (
 )
 from tests.host.canmon.net.test_net_verbs import net
 from tickrig.device import make_epos
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.emulators.testing.conformance.slave import Slave
-from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
 from tickrig.host.canmon.net import session
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.wire.canopen.eds.eds_writer import write_dcf, write_eds

@@ -12,10 +12,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.device import make_epos
-from tickrig.emulators.testing.conformance.slave_bench import SlaveBench
+from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.net import session, values
-from tickrig.host.canmon.net.node_objects import NodeObjects
+from tickrig.host.canmon.net.node_objects import NamedObjects
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 CANMON = "from tickrig.commands import canmon; canmon()"
@@ -263,4 +263,4 @@ def test_a_bus_may_stand_in_options() -> None:
 def test_a_value_that_is_longer_than_its_type_is_read(
     entry: tuple[int, int], data: str, said: str
 ) -> None:
-    assert values.shown(NodeObjects(5), entry, bytes.fromhex(data)) == said
+    assert values.shown(NamedObjects(5), entry, bytes.fromhex(data)) == said

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.output.clocks import Pace
+from tickrig.host.canmon.output.listening import Pace
 
 
 @pytest.mark.realtime

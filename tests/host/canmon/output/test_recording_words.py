@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tickrig.host.canmon.model.recorder.plan import AtLimit
 from tickrig.host.canmon.output.recording import read_recording
-from tickrig.host.cli.refused import Refused
+from tickrig.host.cli.messages import Refused
 
 OPTIONS = ("--rotate", "--disk", "--at-limit", "--trigger", "--pre", "--post", "--help", "-l", "--")
 VALUES = ("run.log", "100M", "0s", "1h", "9" * 30, "emcy", "(((", "x.toml", "end", "-1", "\\0", "ü")

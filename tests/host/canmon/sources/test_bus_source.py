@@ -13,18 +13,16 @@ from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.frames import AnyFrame, Record
+from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.sources.source import Source
-from tickrig.host.canmon.sources.source_spec import BusSpec
+from tickrig.host.canmon.sources.source import BusSpec, Source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.refused import Refused
-from tickrig.host.links.can_message import to_message
-from tickrig.host.links.errors import LinkClosed
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.cli.messages import Refused
+from tickrig.host.links.can_link import to_message
+from tickrig.host.links.link import LinkClosed
+from tickrig.wire.can import CanFrame, FdFrame
 
 PATIENCE_US = 10_000_000
 
@@ -35,7 +33,7 @@ class Fed:
     name, lost, stepped = "fed", 0, False
 
     def __init__(self, *batches: list[Record]) -> None:
-        self.tally, self._batches, self.closed = Tally(), iter(batches), False
+        self.tally, self._batches, self.closed = LogTally(), iter(batches), False
 
     def read(self, timeout_us: int, /) -> list[Record]:
         for batch in self._batches:

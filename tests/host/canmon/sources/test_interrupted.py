@@ -8,10 +8,10 @@ from queue import SimpleQueue
 from types import FrameType
 from typing import Any
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.sources.live_source import LiveSource
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 
 PATIENCE_S = 10.0
 
@@ -22,7 +22,7 @@ class Silent:
     name, lost, stepped = "silent", 0, False
 
     def __init__(self) -> None:
-        self.tally, self.unplugged = Tally(), SimpleQueue[None]()
+        self.tally, self.unplugged = LogTally(), SimpleQueue[None]()
 
     def read(self, timeout_us: int, /) -> list[Record]:
         self.unplugged.get()

@@ -16,14 +16,12 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.frames.ident import CandumpFilter
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import CandumpFilter, Record
 from tickrig.host.canmon.model.logs.can_log import channel_name
-from tickrig.host.canmon.model.logs.mark import BACK, GONE, Mark
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.logs.mark import BACK, GONE, LogTally, Mark
 from tickrig.host.canmon.sources.live_source import LiveSource
 from tickrig.host.canmon.sources.reopening_reader import REOPEN_US, ReopeningReader
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.wire.can import CanFrame
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
@@ -40,7 +38,7 @@ class Plugged:
     name, stepped = "bus", False
 
     def __init__(self, *numbers: int, lost: int = 0) -> None:
-        self.tally, self.lost = Tally(), lost
+        self.tally, self.lost = LogTally(), lost
         self._numbers, self.closed = list(numbers), False
 
     def read(self, timeout_us: int, /) -> list[Record]:
@@ -133,7 +131,7 @@ class Fed:
     name, lost, stepped = "bus", 0, False
 
     def __init__(self) -> None:
-        self.tally, self.queue = Tally(), SimpleQueue[Sequence[Record | Mark]]()
+        self.tally, self.queue = LogTally(), SimpleQueue[Sequence[Record | Mark]]()
 
     def read(self, timeout_us: int, /) -> Sequence[Record | Mark]:
         return self.queue.get()

@@ -9,11 +9,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.sources.socket_reader import SO_TIMESTAMPNS, SocketReader
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import BRS, ESI, FdFrame
+from tickrig.wire.can import BRS, ESI, CanFrame, ErrorFrame, FdFrame
 
 PATIENCE_US = 10_000_000
 MANY = 40_000

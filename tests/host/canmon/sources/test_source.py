@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.sources.file_source import StdinSource
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
-from tickrig.host.cli.refused import Refused
-from tickrig.wire.can import CanFrame
-from tickrig.wire.candump import parse_log
+from tickrig.host.cli.messages import Refused
+from tickrig.wire.can import CanFrame, parse_log
 
 LOG = """\
 (0000000000.010000) can0 705#7F

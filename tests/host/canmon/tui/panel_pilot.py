@@ -10,10 +10,10 @@ from textual.pilot import Pilot
 from textual.widgets import Input, Static
 
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.workspace import Workspace
-from tickrig.host.tui.line_view import LineView, line_text
+from tickrig.host.tui import LineView, line_text
 
 P = TypeVar("P", bound=Panel)
 SIZE = (90, 20)
@@ -27,7 +27,9 @@ class Desk(Generic[P]):
         session: what it is on.
     """
 
-    def __init__(self, monitor: Monitor, panel: P, session: RigSession, pilot: Pilot[None]) -> None:
+    def __init__(
+        self, monitor: MonitorApp, panel: P, session: RigSession, pilot: Pilot[None]
+    ) -> None:
         self._monitor, self._pilot = monitor, pilot
         self.panel, self.session = panel, session
 
@@ -80,7 +82,7 @@ def at_desk(
     async def main() -> P:
         panel = kind(found)
         panel.load(settings or {})
-        monitor = Monitor(found, [panel])
+        monitor = MonitorApp(found, [panel])
         async with monitor.run_test(size=SIZE) as pilot:
             await pilot.pause()
             await act(Desk(monitor, panel, found, pilot))

@@ -10,17 +10,17 @@ from typing import Any
 from textual.app import App
 
 from tests.host.canmon.wire import Wire
-from tickrig.host.canmon.monitor_setup import PanelSettings
 from tickrig.host.canmon.sources.file_source import FileSource
-from tickrig.host.canmon.sources.source_spec import FileSpec
-from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.sources.source import FileSpec
+from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.tasks.session import Model, Session, open_session
+from tickrig.host.canmon.tui.session import Model, Session, open_session
+from tickrig.host.canmon.workspace import PanelSettings
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.tui.line_view import LineView, line_text
+from tickrig.host.tui import LineView, line_text
 
 DRIVE = Path(__file__).parents[3] / "golden/canmon/drive.log"
 OURS = (TracePanel, NodesPanel, StatisticsPanel)
@@ -28,7 +28,7 @@ SIZE = (120, 30)
 PATIENCE_US = 10_000_000
 TRIES = 1_000
 
-Act = Callable[[Monitor, Any], Awaitable[None]]
+Act = Callable[[MonitorApp, Any], Awaitable[None]]
 
 
 def drive_session() -> Session:
@@ -62,12 +62,12 @@ def on_monitor(
     panels: Iterable[type[Panel]] = OURS,
     size: tuple[int, int] = SIZE,
     panel_settings: Callable[[list[Panel]], PanelSettings] | None = None,
-) -> Monitor:
+) -> MonitorApp:
     """Run a monitor while something is done with it."""
 
-    async def main() -> Monitor:
+    async def main() -> MonitorApp:
         made = [panel(session) for panel in panels]
-        monitor = Monitor(session, made, panel_settings(made) if panel_settings else None)
+        monitor = MonitorApp(session, made, panel_settings(made) if panel_settings else None)
         async with monitor.run_test(size=size) as pilot:
             await pilot.pause()
             await act(monitor, pilot)
@@ -80,7 +80,7 @@ def on_monitor(
         session.source.close()
 
 
-def shown(monitor: Monitor) -> list[str]:
+def shown(monitor: MonitorApp) -> list[str]:
     """Return the lines of the panel on the screen, as they are now."""
     monitor.refresh_view()
     return [line_text(line).rstrip() for line in monitor.shown.query_one(LineView).lines]

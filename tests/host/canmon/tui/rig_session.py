@@ -11,11 +11,10 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.tui.tasks.session import Model, Session
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.tui.session import Model, Session
+from tickrig.wire.can import CanFrame, FdFrame
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 NODE = 5

@@ -20,17 +20,13 @@ from tests.host.canmon.tui.pilot import (
     wire_session,
 )
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
-from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.panels.tabs import TABS
+from tickrig.host.canmon.tui.app import MonitorApp, StatusLine
+from tickrig.host.canmon.tui.panels.panel import TABS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, open_session
-from tickrig.host.canmon.workspace import Workspace
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, open_session
+from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.tui.framed_app import FramedApp
-from tickrig.host.tui.key_footer import KeyFooter
-from tickrig.host.tui.line_view import line_text
+from tickrig.host.tui import FramedApp, KeyFooter, line_text
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
@@ -43,13 +39,13 @@ def wire() -> Iterator[Wire]:
         yield wire
 
 
-def status(monitor: Monitor) -> str:
+def status(monitor: MonitorApp) -> str:
     monitor.refresh_view()
     return line_text(monitor.query_one(StatusLine).line)
 
 
 def test_number_keys_and_the_mouse_show_tabs() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         for number, panel in enumerate(OURS, 1):
             await pilot.press(str(number))
             assert isinstance(monitor.shown, panel)
@@ -67,7 +63,7 @@ def test_f1_tells_what_each_panel_shows_and_what_its_keys_do(panel: Any) -> None
     assert all(binding.description for binding in bindings)
     assert panel.HELP.split()[0] == "#"
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("f1")
         await until(pilot, lambda: panel.HELP.split()[1] in screen_text(monitor))
         await pilot.press("f1")
@@ -77,7 +73,7 @@ def test_f1_tells_what_each_panel_shows_and_what_its_keys_do(panel: Any) -> None
 
 
 def test_escape_hides_help_and_else_goes_to_the_panel() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("slash", "f1", "escape")
         assert not monitor.screen.query("HelpPanel")
         assert isinstance(monitor.focused, Input)
@@ -89,9 +85,9 @@ def test_escape_hides_help_and_else_goes_to_the_panel() -> None:
 
 @pytest.mark.parametrize("columns", [80, 100])
 def test_all_keys_and_tabs_are_on_the_screen(columns: int) -> None:
-    frame = [*Monitor.BINDINGS, *FramedApp.BINDINGS]
+    frame = [*MonitorApp.BINDINGS, *FramedApp.BINDINGS]
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         for number, panel in enumerate(PANELS, 1):
             await pilot.press(str(number))
             await pilot.pause()
@@ -104,7 +100,7 @@ def test_all_keys_and_tabs_are_on_the_screen(columns: int) -> None:
 
 
 def test_a_click_presses_a_key() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         footer = monitor.query_one(KeyFooter)
         row = screen_text(monitor).splitlines()[footer.region.y]
         await pilot.click(KeyFooter, offset=(row.index("o overwrite"), 0))
@@ -116,7 +112,7 @@ def test_a_click_presses_a_key() -> None:
 
 
 def test_all_keys_of_the_panel_are_commands_by_name() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("ctrl+p", *"overw")
         await until(pilot, lambda: "key o" in screen_text(monitor))
         await pilot.press("enter")
@@ -127,7 +123,7 @@ def test_all_keys_of_the_panel_are_commands_by_name() -> None:
     on_monitor(drive_session(), act)
 
 
-def said(monitor: Monitor) -> list[str]:
+def said(monitor: MonitorApp) -> list[str]:
     return [note.message for note in monitor._notifications]
 
 
@@ -152,7 +148,7 @@ def test_a_arms_and_f9_stops_all(wire: Wire) -> None:
     session.tasks.append(beacon)
     beacon.due_us = 0
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         session.step()
         assert "LISTEN-ONLY" in status(monitor)
         assert (session.withheld, wire.all()) == (1, [])
@@ -173,7 +169,7 @@ def test_a_arms_and_f9_stops_all(wire: Wire) -> None:
 def test_a_click_on_listen_only_arms(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         monitor.refresh_view()
         await pilot.click("#status", offset=(40, 0))
         assert not session.armed
@@ -184,7 +180,7 @@ def test_a_click_on_listen_only_arms(wire: Wire) -> None:
 
 
 def test_a_log_cannot_be_armed() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("A")
         assert not monitor.session.armed
         assert said(monitor) == ["nothing is sent into a log"]
@@ -194,7 +190,7 @@ def test_a_log_cannot_be_armed() -> None:
 
 @pytest.mark.parametrize("keys", [["q"], ["ctrl+q"], ["ctrl+c"], ["w", "ctrl+q"], ["w", "ctrl+c"]])
 def test_these_keys_leave(keys: list[str]) -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press(*keys)
         assert not monitor.is_running
 
@@ -206,7 +202,7 @@ def test_the_status_tells_load_controller_errors_and_rate(tmp_path: Path) -> Non
     log.write_text("(0.1) can0 181#01\n(0.2) can0 20000004#0010000000000000\n", "ascii")
     session = open_session([str(log)], BusOptions(), Model(bit_rate=500_000))
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         monitor.refresh_view()
         session.step()
         text = status(monitor)
@@ -220,7 +216,7 @@ def test_what_is_passed_over_is_told_while_it_comes(tmp_path: Path) -> None:
     log.write_text("(0.1) can0 181#01\n(0.2) can0 45123#81:00:12345678#1122\nwhat?\n", "ascii")
     session = open_session([str(log)], BusOptions(), Model())
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         session.step()
         assert "1 frames  1/s  lost 0  passed over 2" in status(monitor)
         await pilot.press("3")
@@ -233,7 +229,7 @@ def test_what_is_passed_over_is_told_while_it_comes(tmp_path: Path) -> None:
 def test_it_fits_into_any_window(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, *(f"181#{n:02X}" for n in range(50)))
         for size in ((40, 10), (200, 60), (10, 3), (80, 24)):
             await pilot.resize_terminal(*size)
@@ -248,7 +244,7 @@ def test_it_fits_into_any_window(wire: Wire) -> None:
 def test_w_keeps_all_settings_in_a_file(tmp_path: Path) -> None:
     path = tmp_path / "bench.toml"
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("w", "escape")
         assert not path.exists()
         await pilot.press("w")
@@ -271,7 +267,7 @@ def test_what_a_workspace_has_beside_is_told_and_a_foreign_change_too(tmp_path: 
     path = tmp_path / "bench.toml"
     path.write_text("[trace]\nshade = 3\n[radio]\n", "utf-8")
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         assert said(monitor) == ["not known here, and kept: radio, trace.shade"]
         path.write_text("[trace]\n", "utf-8")
         await pilot.press("o")
@@ -301,7 +297,7 @@ def test_what_ends_the_session_ends_the_monitor() -> None:
     session.tasks.append(Broken())
     session.start()
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         while monitor.is_running:
             await asyncio.sleep(0.01)
 

@@ -7,7 +7,7 @@ import pytest
 from tests.host.canmon.model.record_log import hear
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
-from tickrig.host.canmon.tui.node_lines import (
+from tickrig.host.canmon.tui.panels.nodes_panel import (
     BAD,
     GOOD,
     WARNING,
@@ -15,7 +15,7 @@ from tickrig.host.canmon.tui.node_lines import (
     card_lines,
     heartbeat_line,
 )
-from tickrig.host.tui.line_view import Line, line_text, line_width
+from tickrig.host.tui import Line, line_text, line_width
 
 EPOS = Path(__file__).parents[4] / "examples/eds/epos.eds"
 LOG = """

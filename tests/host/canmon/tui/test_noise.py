@@ -9,17 +9,16 @@ from tests.host.canmon.model.decode.test_noise import CAN_IDS, ERRORS, REMOTE, S
 from tests.host.canmon.model.strategies import data_frame
 from tickrig.host.canmon.model.check.alarms import render_alarms
 from tickrig.host.canmon.model.check.rules import parse_rules
-from tickrig.host.canmon.model.dictionary.node_dictionary import render_dictionary
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
+from tickrig.host.canmon.model.node_dictionary import render_dictionary
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmTask
+from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryTask
 from tickrig.host.canmon.tui.panels.graph_panel import GraphTask
-from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
-from tickrig.host.canmon.tui.tasks.sequence_task import SequenceTask
-from tickrig.host.canmon.tui.tasks.session import Model
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.tui.sequence_task import SequenceTask
+from tickrig.host.canmon.tui.session import Model
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 ANY = st.builds(data_frame, CAN_IDS, st.binary(max_size=8))
 FRAMES = st.lists(st.one_of(SDO, SDO, ANY, REMOTE, WIDE, ERRORS), max_size=60)

@@ -9,10 +9,10 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
-from tickrig.host.canmon.model.transmit.transmit_list import parse_row_text
+from tickrig.host.canmon.model.transmit import parse_row_text
+from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryTask
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
-from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
-from tickrig.host.canmon.tui.tasks.session import Model, Session, open_session
+from tickrig.host.canmon.tui.session import Model, Session, open_session
 from tickrig.host.cli.can_options import BusOptions
 
 STEPS = 1_000

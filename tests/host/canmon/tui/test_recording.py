@@ -10,17 +10,14 @@ import pytest
 
 from tests.host.canmon.tui.pilot import drive_session, on_monitor, wire_session
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.model.frames.record import AnyRecord
+from tickrig.host.canmon.model.frames import AnyRecord
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.mark import Mark, gone
-from tickrig.host.canmon.monitor_setup import MonitorSetup, PanelSettings
 from tickrig.host.canmon.sources.source import AnySource
-from tickrig.host.canmon.tui.app import Monitor
-from tickrig.host.canmon.tui.status_line import StatusLine
-from tickrig.host.canmon.tui.tasks.recorder_task import RecorderTask
-from tickrig.host.canmon.tui.tasks.session import Model, Session
-from tickrig.host.canmon.workspace import Workspace
-from tickrig.host.tui.line_view import line_text
+from tickrig.host.canmon.tui.app import MonitorApp, RecorderTask, StatusLine
+from tickrig.host.canmon.tui.session import Model, Session
+from tickrig.host.canmon.workspace import MonitorSetup, PanelSettings, Workspace
+from tickrig.host.tui import line_text
 from tickrig.wire.can import CanFrame
 
 TRIES = 200
@@ -32,16 +29,16 @@ def wire() -> Iterator[Wire]:
         yield wire
 
 
-def status(monitor: Monitor) -> str:
+def status(monitor: MonitorApp) -> str:
     monitor.refresh_view()
     return line_text(monitor.query_one(StatusLine).line)
 
 
-def said(monitor: Monitor) -> list[str]:
+def said(monitor: MonitorApp) -> list[str]:
     return [note.message for note in monitor._notifications]
 
 
-async def record(monitor: Monitor, pilot: Any, words: str) -> None:
+async def record(monitor: MonitorApp, pilot: Any, words: str) -> None:
     await pilot.press("f8")
     monitor.screen.query_one("Input").value = words  # type: ignore[attr-defined]
     await pilot.press("enter")
@@ -66,7 +63,7 @@ def frames(path: Path) -> list[str]:
 def test_f8_records_what_comes_until_it_is_pressed_again(wire: Wire, tmp_path: Path) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, "701#00")
         assert "REC" not in status(monitor)
         for name in ("run-00001.log", "run-00002.log"):
@@ -86,7 +83,7 @@ def test_f8_records_what_comes_until_it_is_pressed_again(wire: Wire, tmp_path: P
 def test_f4_triggers_a_recording_that_waits(wire: Wire, tmp_path: Path) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("f4")
         assert said(monitor)[-1].startswith("nothing waits for a trigger")
         await record(monitor, pilot, f"{tmp_path}/run.log --pre 1 --post 1 --trigger emcy")
@@ -107,7 +104,7 @@ def test_f4_triggers_a_recording_that_waits(wire: Wire, tmp_path: Path) -> None:
 def test_what_this_program_sends_is_recorded_too(wire: Wire, tmp_path: Path) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await record(monitor, pilot, f"{tmp_path}/run.log")
         session.arm()
         session._send("", CanFrame.parse("000#0105"))
@@ -133,7 +130,7 @@ def test_what_this_program_sends_is_recorded_too(wire: Wire, tmp_path: Path) -> 
 def test_a_mistake_is_told(wire: Wire, tmp_path: Path, words: str, text: str) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await record(monitor, pilot, words.replace("{folder}", str(tmp_path)))
         assert said(monitor)[-1].startswith(text.replace("{folder}", str(tmp_path)))
         assert not monitor.recorder.running
@@ -144,7 +141,7 @@ def test_a_mistake_is_told(wire: Wire, tmp_path: Path, words: str, text: str) ->
 
 
 def test_a_log_is_not_recorded(tmp_path: Path) -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("f8")
         assert said(monitor) == ["all of a log is there: canmon conv writes it into another"]
 
@@ -189,7 +186,7 @@ def test_a_bus_that_went_away_is_told_and_marked_once_it_is_recorded(tmp_path: P
     source = Gone()
     session = Session(source, Model())
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         session.step()
         assert "can0 is gone" in status(monitor)
         await record(monitor, pilot, f"{tmp_path}/run.jsonl")
@@ -207,7 +204,7 @@ def test_a_recording_that_fails_has_a_red_light_and_counts(wire: Wire, tmp_path:
     (tmp_path / "run-00001.log").symlink_to("/dev/full")
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await record(monitor, pilot, f"{tmp_path}/run.log")
         (tmp_path / "run-00002.log").symlink_to("/dev/full")
         hear(session, wire, "701#00", "702#00")

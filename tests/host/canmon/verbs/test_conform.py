@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from tickrig.device import make_epos
 from tickrig.host.canmon.cli import main
-from tickrig.host.canopen.conform.notation.suite import group_titles, read_suite
+from tickrig.host.canopen.conform.suite import group_titles, read_suite
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
 RIG = """\

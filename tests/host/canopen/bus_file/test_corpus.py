@@ -10,7 +10,7 @@ from tests.host.canopen.data_sheet.corpus import CORPUS as EDS_CORPUS
 from tests.host.canopen.data_sheet.corpus import Deviation
 from tickrig.host.canopen.bus_file.bus_checks import STOPS, check_sheets
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
-from tickrig.host.canopen.bus_file.bus_rules import RULES
+from tickrig.host.canopen.bus_file.notes import RULES
 
 BESIDE = {"bus-load", "eds-check", "joint", "tickrig"}
 """Rules of `tickrig check` alone."""

@@ -12,8 +12,8 @@ from click.testing import CliRunner
 from tests.host.canopen.bus_file.bench import NODE, ROOT, generate, write_bus
 from tickrig.emulators.commands.cli import main
 from tickrig.host.canopen.bus_file.bus_file import read_bus_file
-from tickrig.host.canopen.bus_file.bus_rules import RULES
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, PDO, ROS, SLAVE
+from tickrig.host.canopen.bus_file.notes import RULES
 
 PAGE: Final = (ROOT / "docs" / "reference/canopen/bus-file.md").read_text("utf-8")
 

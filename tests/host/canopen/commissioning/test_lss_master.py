@@ -11,10 +11,9 @@ from durand.network import NetworkABC
 from tests.emulators.testing.conformance.stacks import _durand_node
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tickrig.device import make_epos, make_f_palette
-from tickrig.device.canopen.core.nonvolatile import Nonvolatile
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
 from tickrig.emulators.can.outside.sim_network import SimNetwork
-from tickrig.emulators.testing.conformance.foreign.durand_slave import DurandSlave
+from tickrig.emulators.testing.conformance.durand_slave import DurandSlave
 from tickrig.emulators.testing.conformance.slave import Slave
 from tickrig.host.canopen.commissioning.lss_master import LssFailed, LssMaster
 from tickrig.wire.can import Frames

@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tickrig.device import make_epos, make_f_palette
-from tickrig.host.canopen.commissioning.network_scan import NetworkScan
+from tickrig.host.canopen.commissioning.node_bus import NetworkScan
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState

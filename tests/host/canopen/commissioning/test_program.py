@@ -13,12 +13,16 @@ from durand.network import NetworkABC
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
 from tickrig.emulators.can.outside.sim_network import SimNetwork
-from tickrig.emulators.testing.conformance.foreign.durand_slave import DurandSlave
-from tickrig.host.canopen.block_download import download_blocks
-from tickrig.host.canopen.commissioning.program import Program, ProgramFailed, ProgramStatus
+from tickrig.emulators.testing.conformance.durand_slave import DurandSlave
+from tickrig.host.canopen.commissioning.program import (
+    Program,
+    ProgramFailed,
+    ProgramStatus,
+    download_blocks,
+)
 from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
-from tickrig.wire.canopen.sdo.sdo import parse_response
-from tickrig.wire.canopen.sdo.sdo_block import BlockAcknowledge, BlockDownloadInitiateResponse
+from tickrig.wire.canopen.sdo import parse_response
+from tickrig.wire.canopen.sdo_frame import BlockAcknowledge, BlockDownloadInitiateResponse
 
 MEGABYTE = 1_048_576
 NODE = 5

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.canopen.conform.bus.exchange import Exchange
-from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+from tickrig.host.canopen.conform.bus.exchange import BusExchange
+from tickrig.host.canopen.conform.bus.sdo import SdoClient
 
 NODE_ID = 5
 
@@ -28,7 +28,7 @@ class Bench:
 
     @property
     def client(self) -> SdoClient:
-        exchange = Exchange(
+        exchange = BusExchange(
             self.link, NODE_ID, bit_rate=1_000_000, max_load=1, permit=lambda frame: None
         )
         return SdoClient(exchange, NODE_ID)

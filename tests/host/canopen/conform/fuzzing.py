@@ -11,12 +11,11 @@ from collections.abc import Iterator
 from random import Random
 from typing import Final
 
-from tickrig.host.canopen.conform.check import Check, Level
+from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.notation.suite import suite_checks
-from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
+from tickrig.host.canopen.conform.suite import suite_checks
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, data_frame
@@ -227,7 +226,9 @@ def converse(chance: Random) -> tuple[FuzzNode, Report]:
     node = FuzzNode(chance, device)
     level = chance.choice((Level.COMMUNICATION, Level.INTRUSIVE))
     only = (chance.choice((*CHECKS, "OD-1*-long")),)
-    plan = Plan(level, only, confirm=lambda question: True, bit_rate=1_000_000, max_load=1)
+    plan = ConformancePlan(
+        level, only, confirm=lambda question: True, bit_rate=1_000_000, max_load=1
+    )
     known = device if chance.random() < 0.98 else None
     return node, ConformRun(node, NODE_ID, plan, device=known).run()
 

@@ -9,18 +9,17 @@ from typing import Any, Final
 from tests.device.canopen.actions import SlaveActions
 from tests.device.canopen.profile_objects import make_dictionary
 from tests.device.canopen.reference import NODE_ID
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import SdoAbort
 from tickrig.device.canopen.ds401 import Ds401
+from tickrig.device.canopen.slave import Application, CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
+from tickrig.emulators.testing.conformance.conformance import PoweredSlave
+from tickrig.host.canopen.conform.check import ConformancePlan
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.verdict import Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
@@ -107,7 +106,7 @@ class R1:
             if e.index != HISTORY or not e.sub  # beyond 1003h:00 nothing can be read
         }
 
-    def judge(self, plan: Plan, **given: Any) -> Report:
+    def judge(self, plan: ConformancePlan, **given: Any) -> Report:
         """Run the tester against it."""
         link = given.pop("link", self.link)
         file = open_eds(EDS)

@@ -4,11 +4,10 @@ from pathlib import Path
 
 from tests.host.canopen.conform.r1 import R1
 from tests.host.canopen.conform.under_test import Judged
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.stack import make_slave
-from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RO, EntryDescription
 
@@ -16,15 +15,15 @@ R1_EDS = Path(__file__).parents[3] / "golden/canopen/r1.eds"
 
 
 def run(*only: str, level: Level = Level.COMMUNICATION) -> Report:
-    return R1().judge(Plan(level, only))
+    return R1().judge(ConformancePlan(level, only))
 
 
 def test_r1_starts_stops_and_enters_pre_operational() -> None:
     report = run("NMT-0[345]")
     assert [(r.check.id, r.outcome.verdict) for r in report.results] == [
-        ("NMT-03", Verdict.PASS),
-        ("NMT-04", Verdict.PASS),
-        ("NMT-05", Verdict.PASS),
+        ("NMT-03", CheckVerdict.PASS),
+        ("NMT-04", CheckVerdict.PASS),
+        ("NMT-05", CheckVerdict.PASS),
     ]
     assert report.unrestored == ()
 
@@ -34,7 +33,7 @@ def test_a_check_beyond_the_level_is_not_run() -> None:
 
 
 def reasons(check_id: str, eds: Path | None = None, device: Path | str = R1_EDS) -> list[str]:
-    report = Judged.of(device).judge(Plan(Level.COMMUNICATION, (check_id,)), eds)
+    report = Judged.of(device).judge(ConformancePlan(Level.COMMUNICATION, (check_id,)), eds)
     return [f"{r.outcome.verdict}: {r.outcome.reason}" for r in report.results]
 
 
@@ -60,7 +59,7 @@ def test_what_is_found_is_told_once() -> None:
     count = EntryDescription(0x1018, 0, "", DataType.UNSIGNED8, RO, default=4)
     kind = EntryDescription(0x1000, 0, "", DataType.UNSIGNED32, RO)
     slave = make_slave(Dictionary([kind, count, *identity]), 5)
-    found = Judged(slave).judge(Plan()).findings
+    found = Judged(slave).judge(ConformancePlan()).findings
     assert [text for text in found if "1018h:05" in text] == [
         "1018h:05 cannot be there, and the node has it"
     ]

@@ -18,11 +18,10 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
 from tickrig.host.canopen.conform.report.text import text_report
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import read_sound
 from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.canopen.datatypes import DataType
@@ -63,7 +62,7 @@ class Liar:
 def judge(
     liar: Liar, *only: str, longest_s: float = LONGEST_S, device: EdsDevice | None = None
 ) -> Report:
-    plan = Plan(Level.INTRUSIVE, only, confirm=yes, longest_s=longest_s)
+    plan = ConformancePlan(Level.INTRUSIVE, only, confirm=yes, longest_s=longest_s)
     wire = CanWire()
     rig = Rig(Station(liar, wire.end()))
     link = CanHost(rig, wire.end())
@@ -91,7 +90,7 @@ def settings(r1: R1) -> dict[tuple[int, int], bytes]:
 
 def test_a_node_that_never_answers_blocks_all_at_once() -> None:
     report = judge(Liar(lambda now_us, rx: ()))
-    assert {r.outcome.verdict for r in report.results} == {Verdict.BLOCKED}
+    assert {r.outcome.verdict for r in report.results} == {CheckVerdict.BLOCKED}
     assert report.duration_us < 10_000_000
     assert report.aborted == "node 5 does not answer; heard here: nobody"
     assert report.absent
@@ -113,8 +112,8 @@ def test_two_nodes_of_one_id_are_told_and_neither_has_failed(level: Level) -> No
     link = CanHost(rig, wire.end())
     rig.run_for(2_000_000)
     before = settings(first), settings(second)
-    report = ConformRun(link, 5, Plan(level, confirm=yes)).run()
-    assert {r.outcome.verdict for r in report.results} == {Verdict.INCONCLUSIVE}
+    report = ConformRun(link, 5, ConformancePlan(level, confirm=yes)).run()
+    assert {r.outcome.verdict for r in report.results} == {CheckVerdict.INCONCLUSIVE}
     assert report.aborted == "each request is answered twice: two nodes have ID 5?"
     assert report.exit_status == 4
     assert (settings(first), settings(second)) == before
@@ -128,12 +127,14 @@ def test_hands_that_are_slower_than_an_inhibit_time_accuse_nobody() -> None:
         r1.rig.run_for(120_000)
         return fast(verb, *words)
 
-    report = r1.judge(Plan(Level.INTRUSIVE, ("EM-08", "PR-03"), stimulus=slow, confirm=yes))
+    report = r1.judge(
+        ConformancePlan(Level.INTRUSIVE, ("EM-08", "PR-03"), stimulus=slow, confirm=yes)
+    )
     assert {r.check.id: r.outcome.reason for r in report.results} == {
         "EM-08": "emergency 3100 01 took 120 ms, which is more than 30 ms",
         "PR-03": "input 6000:01 02 took 120 ms, which is more than 20 ms",
     }
-    assert report.count(Verdict.INCONCLUSIVE) == 2
+    assert report.count(CheckVerdict.INCONCLUSIVE) == 2
 
 
 def test_a_tpdo_that_comes_late_after_its_sync_is_no_failure() -> None:
@@ -141,10 +142,10 @@ def test_a_tpdo_that_comes_late_after_its_sync_is_no_failure() -> None:
     rig = Rig(Station(late(r1, 15_000), wire.end()))
     link = CanHost(rig, wire.end())
     rig.run_for(100_000)
-    plan = Plan(Level.INTRUSIVE, ("PR-04", "PR-05", "PR-06"), confirm=yes)
+    plan = ConformancePlan(Level.INTRUSIVE, ("PR-04", "PR-05", "PR-06"), confirm=yes)
     report = r1.judge(plan, link=link)
     assert failing(report) == []
-    assert report.count(Verdict.PASS) == 3
+    assert report.count(CheckVerdict.PASS) == 3
 
 
 def test_a_node_that_answers_by_chance() -> None:
@@ -195,8 +196,8 @@ def test_a_silent_object_blocks_no_check_of_others() -> None:
 
     device = read_sound(EDS)[0]
     report = judge(Liar(lie, busy=True), "NMT", "DE-0*", "SY", "HB-01", "OD-1019*", device=device)
-    assert report.count(Verdict.BLOCKED) == 0
-    assert report.count(Verdict.PASS) > 20
+    assert report.count(CheckVerdict.BLOCKED) == 0
+    assert report.count(CheckVerdict.PASS) > 20
     assert report.findings == ("1019h:00 Synchronous counter overflow value was not answered",)
 
 
@@ -216,7 +217,7 @@ def test_a_cob_id_of_eight_bytes_is_written_back_as_it_was() -> None:
     node = FuzzNode(chance, device)
     node.wild = 0
     node.values[0x1005, 0] = node.before[0x1005, 0] = bytes.fromhex("8000004001020304")
-    plan = Plan(Level.INTRUSIVE, ("SY-0*", "UE-01"), confirm=yes)
+    plan = ConformancePlan(Level.INTRUSIVE, ("SY-0*", "UE-01"), confirm=yes)
     report = ConformRun(node, 5, plan, device=device).run()
     assert report.unrestored == ()
     assert node.values == node.before
@@ -230,7 +231,9 @@ def test_what_could_not_be_restored_is_told_with_the_commands_that_would() -> No
             spoilt.append(receives)
             r1.powered.switch(on=False)
 
-    report = r1.judge(Plan(Level.COMMUNICATION, ("HB-01",), confirm=yes), link=SpyLink(r1, refuse))
+    report = r1.judge(
+        ConformancePlan(Level.COMMUNICATION, ("HB-01",), confirm=yes), link=SpyLink(r1, refuse)
+    )
     assert report.unrestored == ("1017h:00 was 0000; not verified: the node was lost",)
     assert report.repairs == ("1017h:00=u16:0x0",)
     text = text_report(replace(report, source="can0"))
@@ -246,7 +249,7 @@ def test_a_node_that_resets_by_itself() -> None:
         return r1.slave.tick(now_us, rx)
 
     report = judge(Liar(lie, busy=True))
-    assert report.count(Verdict.PASS) > 50
+    assert report.count(CheckVerdict.PASS) > 50
 
 
 @pytest.mark.parametrize("stop_us", [15_000, 300_000])
@@ -256,10 +259,10 @@ def test_a_host_that_was_stopped_accuses_nobody(stop_us: int) -> None:
             r1.rig.run_for(stop_us)
 
     r1 = R1()
-    plan = Plan(Level.COMMUNICATION, ("[!O]*",), confirm=yes)
+    plan = ConformancePlan(Level.COMMUNICATION, ("[!O]*",), confirm=yes)
     report = r1.judge(plan, link=SpyLink(r1, sleep))
     assert failing(report) == []
-    assert report.count(Verdict.PASS) > 100
+    assert report.count(CheckVerdict.PASS) > 100
 
 
 def test_a_full_bus_accuses_nobody() -> None:
@@ -269,7 +272,9 @@ def test_a_full_bus_accuses_nobody() -> None:
 
     r1 = R1()
     others = CanHost(r1.rig, r1.wire.end())
-    plan = Plan(Level.COMMUNICATION, ("NMT", "HB", "UE", "PR"), confirm=yes, bit_rate=1_000_000)
+    plan = ConformancePlan(
+        Level.COMMUNICATION, ("NMT", "HB", "UE", "PR"), confirm=yes, bit_rate=1_000_000
+    )
     report = r1.judge(plan, link=SpyLink(r1, fill))
     assert failing(report) == []
     assert report.settings["other nodes"].startswith("16, 17, 18")
@@ -280,7 +285,7 @@ def test_a_pdo_of_the_node_on_another_can_id_is_no_other_node() -> None:
     r1.slave.dictionary[0x1800, 1].value = 0x0000_01A2
     r1.slave.dictionary[0x1800, 2].value = 255
     r1.slave.dictionary[0x1800, 5].value = 10
-    report = r1.judge(Plan(Level.COMMUNICATION, ("NMT",)))
+    report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("NMT",)))
     assert report.settings["other nodes"] == "none"
 
 
@@ -291,11 +296,11 @@ def test_a_node_that_comes_late_is_told_by_its_heartbeat() -> None:
 
     r1 = R1()
     other = CanHost(r1.rig, r1.wire.end())
-    report = r1.judge(Plan(Level.COMMUNICATION, ("NMT",)), link=SpyLink(r1, beat))
+    report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("NMT",)), link=SpyLink(r1, beat))
     assert report.settings["other nodes"] == "51"
 
 
 def test_another_server_of_the_node_is_no_other_node() -> None:
-    report = R1().judge(Plan(Level.COMMUNICATION, ("SG",)))
-    assert report.count(Verdict.PASS) > 5
+    report = R1().judge(ConformancePlan(Level.COMMUNICATION, ("SG",)))
+    assert report.count(CheckVerdict.PASS) > 5
     assert report.settings["other nodes"] == "none"

@@ -8,18 +8,16 @@ import pytest
 
 from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.under_test import Judged, not_harmless
-from tickrig.device.canopen.device_rtc.component import CanopenEcho
-from tickrig.device.canopen.device_rtc.device import make_device_rtc
-from tickrig.emulators.testing.conformance.slave_stimulus import SlaveStimulus
-from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Verdict
+from tickrig.device.canopen.device_rtc import CanopenEcho, make_device_rtc
+from tickrig.emulators.testing.conformance.bench_source import SlaveStimulus
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 
 EXAMPLES = Path(__file__).parents[4] / "examples"
 FILES = sorted(EXAMPLES.rglob("*.eds"))
 MODELS = ("f-palette", "motor-core-unit", "epos")
 PROFILE = frozenset(range(0x6000, 0xA000))
-ALL = Plan(Level.INTRUSIVE, confirm=yes)
+ALL = ConformancePlan(Level.INTRUSIVE, confirm=yes)
 MUST_PASS = {
     "f-palette": {"PR-01", "PR-11", *(f"IO-{number:02}" for number in (*range(2, 13), 15))},
     "epos": {"D4-11", "D4-13"},
@@ -43,7 +41,7 @@ def test_nothing_fails_at_a_model(model: str) -> None:
     before = judged.values()
     report = judged.judge(ALL, eds_of(model))
     assert not_harmless(report) == []
-    assert report.count(Verdict.PASS) > 500
+    assert report.count(CheckVerdict.PASS) > 500
     assert report.unrestored == ()
     assert judged.values() == before
 
@@ -61,9 +59,9 @@ def test_nothing_fails_at_a_device_of_an_example(path: Path) -> None:
 def test_nothing_fails_without_an_eds(model: str) -> None:
     judged = Judged.of(model)
     before = judged.values()
-    report = judged.judge(Plan(Level.COMMUNICATION))
+    report = judged.judge(ConformancePlan(Level.COMMUNICATION))
     assert not_harmless(report) == []
-    assert report.count(Verdict.PASS) > 100
+    assert report.count(CheckVerdict.PASS) > 100
     assert judged.values() == before
 
 
@@ -74,7 +72,7 @@ def test_a_component_that_keeps_to_cia_301_fails_nothing() -> None:
 
 def test_the_component_of_the_report_leaves_error_by_a_reset_alone() -> None:
     report = Judged.of("rtc-echo").judge(ALL, eds_of("rtc-echo"))
-    failed = [r.check.id for r in report.results if r.outcome.verdict is Verdict.FAIL]
+    failed = [r.check.id for r in report.results if r.outcome.verdict is CheckVerdict.FAIL]
     assert failed == ["NMT-13", "NMT-17"]
 
 
@@ -82,16 +80,18 @@ def test_the_component_of_the_report_leaves_error_by_a_reset_alone() -> None:
 def test_nothing_fails_with_all_allowed_and_hands_at_the_inputs(device: Path | str) -> None:
     judged = Judged.of(device)
     path = device if isinstance(device, Path) else eds_of(device)
-    plan = Plan(Level.INTRUSIVE, (), PROFILE, stimulus=SlaveStimulus(judged.slave), confirm=yes)
+    plan = ConformancePlan(
+        Level.INTRUSIVE, (), PROFILE, stimulus=SlaveStimulus(judged.slave), confirm=yes
+    )
     report = judged.judge(plan, path)
     assert not_harmless(report) == []
-    passed = {each.check.id for each in report.results if each.outcome.verdict is Verdict.PASS}
+    passed = {each.check.id for each in report.results if each.outcome.verdict is CheckVerdict.PASS}
     assert passed >= MUST_PASS.get(str(device), set())
 
 
 def test_what_the_tester_quiets_is_compared_with_what_was_there_before() -> None:
     report = Judged.of("epos").judge(
-        Plan(Level.INTRUSIVE, ("OD-1800*",), confirm=yes), eds_of("epos")
+        ConformancePlan(Level.INTRUSIVE, ("OD-1800*",), confirm=yes), eds_of("epos")
     )
-    assert report.count(Verdict.IMPLEMENTATION_DEFINED) == 0
-    assert report.count(Verdict.PASS) > 10
+    assert report.count(CheckVerdict.IMPLEMENTATION_DEFINED) == 0
+    assert report.count(CheckVerdict.PASS) > 10

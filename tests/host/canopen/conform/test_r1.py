@@ -10,10 +10,9 @@ from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO
 from tests.host.canopen.conform.r1 import R1, Stimulus, yes
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
-from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.notation.suite import ORDER, suite_checks
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.suite import ORDER, suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 PROFILE = frozenset(range(0x6000, 0xA000))
 OF_ANY_NODE = tuple(group for group in ORDER if group not in ("IO", "D4"))
@@ -21,7 +20,9 @@ OF_ANY_NODE = tuple(group for group in ORDER if group not in ("IO", "D4"))
 
 def judge(r1: R1, actions: type[SlaveActions], *only: str) -> Report:
     stimulus = Stimulus(r1, actions(r1.slave))
-    plan = Plan(Level.INTRUSIVE, only, PROFILE, stimulus=stimulus, confirm=yes, bit_rate=1_000_000)
+    plan = ConformancePlan(
+        Level.INTRUSIVE, only, PROFILE, stimulus=stimulus, confirm=yes, bit_rate=1_000_000
+    )
     return r1.judge(plan)
 
 
@@ -29,7 +30,7 @@ def not_passed(report: Report) -> list[str]:
     return [
         f"{result.check.id} {result.outcome.verdict}: {result.outcome.reason}"
         for result in report.results
-        if result.outcome.verdict is not Verdict.PASS
+        if result.outcome.verdict is not CheckVerdict.PASS
     ]
 
 
@@ -61,15 +62,15 @@ def test_a_drive_of_cia_402_passes_all() -> None:
 def test_without_a_hand_at_the_inputs_nothing_fails(level: Level) -> None:
     r1 = R1()
     before = r1.values()
-    report = r1.judge(Plan(level, confirm=yes))
-    assert report.count(Verdict.PASS) > 20
-    judged = {Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.IMPLEMENTATION_DEFINED}
+    report = r1.judge(ConformancePlan(level, confirm=yes))
+    assert report.count(CheckVerdict.PASS) > 20
+    judged = {CheckVerdict.PASS, CheckVerdict.NOT_APPLICABLE, CheckVerdict.IMPLEMENTATION_DEFINED}
     assert {result.outcome.verdict for result in report.results} <= judged
     assert r1.values() == before
 
 
 def test_objects_are_judged_in_any_order() -> None:
-    plans = [Plan(only=("OD",), seed=seed) for seed in (0, 7, 7, 8)]
+    plans = [ConformancePlan(only=("OD",), seed=seed) for seed in (0, 7, 7, 8)]
     told = [
         [(result.check.id, result.outcome.verdict) for result in R1().judge(plan).results]
         for plan in plans

@@ -9,18 +9,16 @@ import pytest
 
 from tests.device.canopen.actions import SlaveActions
 from tests.host.canopen.conform.r1 import R1, Stimulus, yes
-from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.safety.known_state import KnownState
-from tickrig.host.canopen.conform.verdict import Report, Result, Verdict
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
+from tickrig.host.canopen.conform.node_care import KnownState
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.links.link import StampedFrames
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can import CanFrame, Frames, frame_bits
 from tickrig.wire.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
-    from tickrig.host.canopen.conform.bus.exchange import Exchange
-    from tickrig.host.canopen.conform.bus.sdo_client import SdoClient
+    from tickrig.host.canopen.conform.bus.exchange import BusExchange
+    from tickrig.host.canopen.conform.bus.sdo import SdoClient
 
 HEARTBEAT = (0x1017, 0)
 
@@ -75,15 +73,15 @@ def failing(report: Report) -> list[str]:
     return [
         f"{r.check.id}: {r.outcome.reason}"
         for r in report.results
-        if r.outcome.verdict is Verdict.FAIL
+        if r.outcome.verdict is CheckVerdict.FAIL
     ]
 
 
 def test_read_only_sends_nothing_but_uploads() -> None:
     r1 = configured()
     before, link = r1.values(), SpyLink(r1)
-    report = r1.judge(Plan(), link=link)
-    assert report.count(Verdict.PASS) > 300
+    report = r1.judge(ConformancePlan(), link=link)
+    assert report.count(CheckVerdict.PASS) > 300
     assert {frame.can_id for frame in link.sent} == {0x605}
     assert {frame.data[0] & 0xE0 for frame in link.sent} == {0x40, 0x60, 0x80, 0xA0}
     assert r1.values() == before
@@ -93,7 +91,7 @@ def test_read_only_sends_nothing_but_uploads() -> None:
 def test_a_run_leaves_the_node_as_it_was(level: Level) -> None:
     r1 = configured()
     before = r1.values()
-    report = r1.judge(Plan(level, ("NMT", "HB", "PC", "PR", "SY", "DE"), confirm=yes))
+    report = r1.judge(ConformancePlan(level, ("NMT", "HB", "PC", "PR", "SY", "DE"), confirm=yes))
     assert report.unrestored == ()
     assert r1.values() == before
     assert r1.slave.state is NmtState.OPERATIONAL
@@ -104,7 +102,7 @@ def test_what_a_run_stored_is_what_was_there_before() -> None:
     before = r1.values()
     stimulus = Stimulus(r1, SlaveActions(r1.slave))
     groups = ("ST", "HB-05")
-    report = r1.judge(Plan(Level.INTRUSIVE, groups, stimulus=stimulus, confirm=yes))
+    report = r1.judge(ConformancePlan(Level.INTRUSIVE, groups, stimulus=stimulus, confirm=yes))
     assert failing(report) == []
     r1.power(on=False)
     r1.power(on=True)
@@ -120,7 +118,7 @@ def test_ctrl_c_leaves_the_node_as_it_was(number: int) -> None:
 
     r1 = configured()
     before = r1.values()
-    plan = Plan(Level.COMMUNICATION, ("NMT", "HB", "PC", "PR", "SY"), confirm=yes)
+    plan = ConformancePlan(Level.COMMUNICATION, ("NMT", "HB", "PC", "PR", "SY"), confirm=yes)
     report = r1.judge(plan, link=SpyLink(r1, act))
     assert report.aborted == "interrupted"
     assert report.unrestored == ()
@@ -134,7 +132,7 @@ def test_a_second_ctrl_c_leaves_the_node_and_tells_it() -> None:
             raise KeyboardInterrupt
 
     r1 = configured()
-    report = r1.judge(Plan(Level.COMMUNICATION, ("PC",)), link=SpyLink(r1, act))
+    report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("PC",)), link=SpyLink(r1, act))
     assert report.aborted == "interrupted"
     assert "1017h:00 was E803; not verified: the node was lost" in report.unrestored
 
@@ -147,7 +145,7 @@ def test_an_error_of_whoever_is_told_leaves_the_node_as_it_was() -> None:
     r1 = configured()
     before = r1.values()
     with pytest.raises(RuntimeError):
-        r1.judge(Plan(Level.COMMUNICATION, ("PC",)), on_result=fail)
+        r1.judge(ConformancePlan(Level.COMMUNICATION, ("PC",)), on_result=fail)
     assert r1.values() == before
 
 
@@ -159,9 +157,9 @@ def test_a_node_that_is_lost_blocks_the_rest_at_once() -> None:
 
     times: list[int] = []
     r1 = configured()
-    report = r1.judge(Plan(Level.COMMUNICATION, ("PC",)), on_result=pull_the_plug)
+    report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("PC",)), on_result=pull_the_plug)
     verdicts = {r.check.id: r.outcome.verdict for r in report.results}
-    assert verdicts["PC-06"] is verdicts["PC-29"] is Verdict.BLOCKED
+    assert verdicts["PC-06"] is verdicts["PC-29"] is CheckVerdict.BLOCKED
     assert r1.rig.now_us - times[0] < 30_000_000
     assert failing(report) == []
     assert "1017h:00 was E803; not verified: the node was lost" in report.unrestored
@@ -174,15 +172,15 @@ def test_of_a_lost_node_only_what_was_written_is_told() -> None:
 
     r1 = configured()
     link = SpyLink(r1, pull_the_plug)
-    report = r1.judge(Plan(Level.INTRUSIVE, ("NMT",), confirm=yes), link=link)
-    assert report.count(Verdict.BLOCKED)
+    report = r1.judge(ConformancePlan(Level.INTRUSIVE, ("NMT",), confirm=yes), link=link)
+    assert report.count(CheckVerdict.BLOCKED)
     assert "1017h:00 was E803; not verified: the node was lost" in report.unrestored
     untouched = ("1014h", "1029h", "2003h")
     assert not [line for line in report.unrestored if line.startswith(untouched)]
 
 
 def test_a_text_that_was_lost_is_told_as_text() -> None:
-    state = KnownState(cast("Exchange", None), cast("SdoClient", None))
+    state = KnownState(cast("BusExchange", None), cast("SdoClient", None))
     values = {(0x1008, 0): b"reference", (0x2005, 0): b"a longer text", (0x1014, 0): b"abcd"}
     state.original.update(values)
     state._begin.update(dict.fromkeys(values, b""))
@@ -204,8 +202,8 @@ def test_a_node_that_comes_back_is_restored_then() -> None:
 
     r1 = configured()
     before = r1.values()
-    report = r1.judge(Plan(Level.COMMUNICATION, ("PC-0*",)), on_result=pull_the_plug)
-    assert report.results[-1].outcome.verdict is Verdict.BLOCKED
+    report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("PC-0*",)), on_result=pull_the_plug)
+    assert report.results[-1].outcome.verdict is CheckVerdict.BLOCKED
     assert report.unrestored == ()
     lost = [at for at, value in r1.values().items() if value != before[at]]
     assert lost == [(0x2001, 0)]  # of the manufacturer: this level does not write it
@@ -226,7 +224,7 @@ def written_on(link: SpyLink) -> set[int]:
 def test_what_must_be_refused_is_written_to_objects_of_the_manufacturer_too() -> None:
     r1 = R1()
     link = SpyLink(r1)
-    report = r1.judge(Plan(Level.COMMUNICATION, ("DE", "OD-2*"), confirm=yes), link=link)
+    report = r1.judge(ConformancePlan(Level.COMMUNICATION, ("DE", "OD-2*"), confirm=yes), link=link)
     assert 0x2001 in written_on(link)
     reasons = {r.check.id: r.outcome.reason for r in report.results}
     assert reasons["DE-11"].endswith("h would be written with what it takes: --intrusive")
@@ -236,7 +234,9 @@ def test_what_must_never_be_written_never_is() -> None:
     r1 = configured()
     never = frozenset({0x1017, 0x1400, 0x1A00, *range(0x2000, 0x2010)})
     link = SpyLink(r1)
-    report = r1.judge(Plan(Level.INTRUSIVE, WRITING, confirm=yes, never=never), link=link)
+    report = r1.judge(
+        ConformancePlan(Level.INTRUSIVE, WRITING, confirm=yes, never=never), link=link
+    )
     assert not written_on(link) & never
     assert written_on(link) > {0x1006, 0x1014, 0x1800}
     assert failing(report) == []
@@ -251,7 +251,7 @@ def test_what_must_never_be_written_never_is() -> None:
 def test_objects_of_the_profile_are_not_written_unless_allowed() -> None:
     r1 = R1()
     link = SpyLink(r1)
-    r1.judge(Plan(Level.INTRUSIVE, WRITING, confirm=yes), link=link)
+    r1.judge(ConformancePlan(Level.INTRUSIVE, WRITING, confirm=yes), link=link)
     written = written_on(link)
     assert 0x1017 in written
     assert not [index for index in written if index >= 0x6000]
@@ -264,8 +264,8 @@ def test_what_concerns_other_nodes_is_asked_for() -> None:
         asked.append(question)
         return False
 
-    report = R1().judge(Plan(Level.INTRUSIVE, ("NMT-06", "LS-01", "ST-05"), confirm=no))
-    assert [r.outcome.verdict for r in report.results] == [Verdict.NOT_APPLICABLE] * 3
+    report = R1().judge(ConformancePlan(Level.INTRUSIVE, ("NMT-06", "LS-01", "ST-05"), confirm=no))
+    assert [r.outcome.verdict for r in report.results] == [CheckVerdict.NOT_APPLICABLE] * 3
     assert asked == [
         "send NMT commands to all nodes of the bus",
         "send LSS requests, which every node of the bus takes",
@@ -275,7 +275,7 @@ def test_what_concerns_other_nodes_is_asked_for() -> None:
 def test_the_bus_is_not_loaded_more_than_allowed() -> None:
     r1 = R1()
     link = SpyLink(r1)
-    plan = Plan(Level.INTRUSIVE, ("US", "BU", "BD", "OD"), confirm=yes, bit_rate=125_000)
+    plan = ConformancePlan(Level.INTRUSIVE, ("US", "BU", "BD", "OD"), confirm=yes, bit_rate=125_000)
     report = r1.judge(plan, link=link)
     sent_us = sum(frame_bits(frame) for frame in link.sent) * 8
     assert 0.05 < sent_us / report.duration_us < 0.3
@@ -283,12 +283,14 @@ def test_the_bus_is_not_loaded_more_than_allowed() -> None:
 
 @pytest.mark.parametrize("level", [Level.READ_ONLY, Level.COMMUNICATION])
 def test_a_load_that_is_too_low_accuses_nobody_and_blocks_nothing(level: Level) -> None:
-    plan = Plan(level, ("NMT", "HB", "UE", "US"), bit_rate=125_000, max_load=0.01, confirm=yes)
+    plan = ConformancePlan(
+        level, ("NMT", "HB", "UE", "US"), bit_rate=125_000, max_load=0.01, confirm=yes
+    )
     report = R1().judge(plan)
     assert failing(report) == []
-    assert report.count(Verdict.BLOCKED) == 0
-    assert report.count(Verdict.PASS) > 3
-    doubted = [r.outcome for r in report.results if r.outcome.verdict is Verdict.INCONCLUSIVE]
+    assert report.count(CheckVerdict.BLOCKED) == 0
+    assert report.count(CheckVerdict.PASS) > 3
+    doubted = [r.outcome for r in report.results if r.outcome.verdict is CheckVerdict.INCONCLUSIVE]
     assert all("your --max-load is too low for this check" in one.reason for one in doubted)
     assert report.unrestored == ()
 
@@ -301,11 +303,11 @@ class DeafLink(SpyLink):
 
 
 @pytest.mark.parametrize(
-    ("max_load", "verdict"), [(0.3, Verdict.FAIL), (0.01, Verdict.INCONCLUSIVE)]
+    ("max_load", "verdict"), [(0.3, CheckVerdict.FAIL), (0.01, CheckVerdict.INCONCLUSIVE)]
 )
-def test_a_failure_with_too_low_a_load_is_none(max_load: float, verdict: Verdict) -> None:
+def test_a_failure_with_too_low_a_load_is_none(max_load: float, verdict: CheckVerdict) -> None:
     r1 = R1()
-    plan = Plan(Level.COMMUNICATION, ("NMT-03",), bit_rate=125_000, max_load=max_load)
+    plan = ConformancePlan(Level.COMMUNICATION, ("NMT-03",), bit_rate=125_000, max_load=max_load)
     outcome = r1.judge(plan, link=DeafLink(r1)).results[0].outcome
     assert outcome.verdict is verdict
     assert ("your --max-load is too low for this check" in outcome.reason) == (max_load < 0.1)

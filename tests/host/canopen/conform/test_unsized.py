@@ -11,10 +11,9 @@ from tests.host.canopen.conform.defects.defect import Defect, says, together
 from tests.host.canopen.conform.defects.test_found import DefectiveR1
 from tests.host.canopen.conform.r1 import yes
 from tests.host.canopen.conform.under_test import not_harmless
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 
 SIZES: Final = {"4F": 1, "4B": 2, "47": 3, "43": 4}
 
@@ -29,7 +28,7 @@ def unsized() -> DefectiveR1:
 
 
 def judge(r1: DefectiveR1, level: Level) -> Report:
-    return r1.judge(Plan(level, confirm=yes))
+    return r1.judge(ConformancePlan(level, confirm=yes))
 
 
 @pytest.mark.parametrize("level", Level)
@@ -39,15 +38,15 @@ def test_the_sizes_of_the_eds_are_taken(level: Level) -> None:
     report = judge(r1, level)
     assert not_harmless(report) == []
     assert (report.findings, report.unrestored) == ((), ())
-    assert report.count(Verdict.PASS) > 300
+    assert report.count(CheckVerdict.PASS) > 300
     assert r1.values() == before
 
 
 def test_without_an_eds_the_sizes_of_cia_301_are_taken() -> None:
     r1 = unsized()
     before = r1.values()
-    report = ConformRun(r1.link, NODE_ID, Plan(Level.COMMUNICATION)).run()
+    report = ConformRun(r1.link, NODE_ID, ConformancePlan(Level.COMMUNICATION)).run()
     assert not_harmless(report) == []
     assert (report.findings, report.unrestored) == ((), ())
-    assert report.count(Verdict.PASS) > 100
+    assert report.count(CheckVerdict.PASS) > 100
     assert r1.values() == before

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
@@ -12,13 +12,13 @@ from tickrig.emulators.canopen.build import describe
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
+from tickrig.host.canopen.conform.check import ConformancePlan
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import read_device
 
-HARMLESS = {Verdict.PASS, Verdict.NOT_APPLICABLE, Verdict.IMPLEMENTATION_DEFINED}
+HARMLESS = {CheckVerdict.PASS, CheckVerdict.NOT_APPLICABLE, CheckVerdict.IMPLEMENTATION_DEFINED}
 
 
 class Judged:
@@ -39,7 +39,7 @@ class Judged:
         """Return what all its objects hold."""
         return {(e.index, e.sub): e.data for e in self.slave.dictionary}
 
-    def judge(self, plan: Plan, eds: Path | None = None) -> Report:
+    def judge(self, plan: ConformancePlan, eds: Path | None = None) -> Report:
         """Run the tester."""
         file = open_eds(eds) if eds else None
         device = read_device(file) if file else None

@@ -12,11 +12,10 @@ from tests.mutators import damaged, with_line, with_piece
 from tests.wire.canopen.eds.xdd_text import EDITOR, XDD
 from tickrig.emulators.canopen.eds import describe
 from tickrig.host.canopen.data_sheet.check import check, failing
-from tickrig.host.canopen.data_sheet.diff import diff
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.fix import fix
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
-from tickrig.host.canopen.data_sheet.show import entries, head, pdos
+from tickrig.host.canopen.data_sheet.show import diff, entries, head, pdos
 from tickrig.wire.canopen.eds.eds_file import EdsError
 
 HEAD: Final = (

@@ -17,12 +17,10 @@ from tests.host.canopen.data_sheet.corpus import (
     within,
 )
 from tickrig.host.canopen.data_sheet.check import check, failing
-from tickrig.host.canopen.data_sheet.diff import diff
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.fix import fix
-from tickrig.host.canopen.data_sheet.rule import Severity
-from tickrig.host.canopen.data_sheet.rule_table import RULES
-from tickrig.host.canopen.data_sheet.show import pdos
+from tickrig.host.canopen.data_sheet.rule import RULES, Severity
+from tickrig.host.canopen.data_sheet.show import diff, pdos
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
 FIELDS: Final = [name for name in EntryDescription.__slots__ if name != "key"]

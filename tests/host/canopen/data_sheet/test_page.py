@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from tests.host.canopen.data_sheet.corpus import ROOT
-from tickrig.host.canopen.data_sheet.rule_table import RULES
+from tickrig.host.canopen.data_sheet.rule import RULES
 
 PAGE: Final = (ROOT / "docs" / "reference/canmon/eds.md").read_text("utf-8")
 

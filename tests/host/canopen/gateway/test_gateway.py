@@ -7,8 +7,8 @@ import pytest
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tickrig.device import make_epos
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
-from tickrig.host.canopen.gateway.gateway import Gateway
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.canopen.gateway import Gateway
+from tickrig.host.links.link import LinkClosed
 
 
 @pytest.fixture

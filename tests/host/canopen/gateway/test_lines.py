@@ -8,9 +8,16 @@ from hypothesis import strategies as st
 
 from tests.host.canopen.commissioning.net_bench import NetBench
 from tickrig.device import make_epos
-from tickrig.host.canopen.gateway.data_types import BASE64, HEX, NUMBERS, REALS, decode, encode
-from tickrig.host.canopen.gateway.gateway import Gateway
-from tickrig.host.canopen.gateway.gateway_error import GatewayError
+from tickrig.host.canopen.gateway import (
+    BASE64,
+    HEX,
+    NUMBERS,
+    REALS,
+    Gateway,
+    GatewayError,
+    decode,
+    encode,
+)
 
 INTEGERS = [name for name in NUMBERS if name not in REALS]
 WORDS = st.sampled_from(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.device.canopen.dictionary import Entry, SdoAbort
+from tickrig.device.canopen.slave import Application, CanopenSlave
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 STOPPED, RUNS = 0, 1
 CLEAR = 3

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tickrig import Bench
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.slave import Application, CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
 from tickrig.host.canopen.master.assignment import MasterPlan, ObjectWrite, SlaveAssignment
 from tickrig.host.canopen.master.canopen_master import CanopenMaster

@@ -22,7 +22,7 @@ from tests.host.canopen.master.network import (
 )
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
-from tickrig.host.canopen.master.boot_status import BootStatus
+from tickrig.host.canopen.master.boot_slave import BootStatus
 from tickrig.host.canopen.master.canopen_master import BootFailed
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState

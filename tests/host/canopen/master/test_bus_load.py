@@ -11,8 +11,7 @@ from tickrig import open_bench
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.master.cia402.bus_load import check_load, pdo_load, polling_load
 from tickrig.testing import open_master
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import frame_bits
+from tickrig.wire.can import CanFrame, frame_bits
 
 SECOND_US = 1_000_000
 

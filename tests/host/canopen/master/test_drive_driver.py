@@ -8,15 +8,14 @@ import pytest
 
 from tests.host.canopen.master.joints import NO_PDOS, PDOS, Cell, cell
 from tests.host.canopen.master.network import NODE_ID, network
-from tickrig.host.canopen.bus_file.bus_values import Channel
+from tickrig.host.canopen.bus_file.bus_values import DriveChannel
 from tickrig.host.canopen.master.assignment import SlaveAssignment
-from tickrig.host.canopen.master.cia402.drive_node import DriveNode
-from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
+from tickrig.host.canopen.master.cia402.drive_driver import DriveNode, DriveSettings
 from tickrig.host.canopen.master.cia402.drive_state import DriveState
-from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.nmt_master import ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed
-from tickrig.host.links.errors import LinkClosed
+from tickrig.host.links.link import LinkClosed
 from tickrig.wire.canopen.nmt import NmtCommand
 
 HOMING_35 = "  sdo: [{index: 0x6098, value: 35}]\n"
@@ -349,7 +348,7 @@ def test_a_node_that_is_no_drive_says_so_by_what_it_refuses() -> None:
     with network(SlaveAssignment(NODE_ID)) as net:
         slave = net.master.slave(NODE_ID)
         image = ProcessImage((), net.master.nmt.send)
-        node = DriveNode(slave, image, (DriveSettings(Channel("none")),), 10_000)
+        node = DriveNode(slave, image, (DriveSettings(DriveChannel("none")),), 10_000)
         net.master.attach(ProcessData({NODE_ID: image}, (node,)))
         net.master.boot()
         joint = net.master.joints["none"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.ds402.state import automaton
+from tickrig.device.canopen.ds402 import automaton
 from tickrig.host.canopen.master.cia402.drive_state import (
     MODE_BITS,
     TRANSITIONS,

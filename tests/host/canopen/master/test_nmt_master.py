@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.nmt_master import NmtMaster
-from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.nmt_master import NmtMaster, ProcessData
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 from tickrig.wire.instant import NEVER

@@ -6,12 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canopen.master.network import HEARTBEAT, VENDOR
-from tickrig.host.canopen.bus_file.bus_values import BusPdo, Channel
+from tickrig.host.canopen.bus_file.bus_values import BusPdo, DriveChannel
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.cia402.drive_node import DriveNode
-from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
-from tickrig.host.canopen.master.nmt_master import NmtMaster
-from tickrig.host.canopen.master.process_data import ProcessData
+from tickrig.host.canopen.master.cia402.drive_driver import DriveNode, DriveSettings
+from tickrig.host.canopen.master.nmt_master import NmtMaster, ProcessData
 from tickrig.host.canopen.master.process_image import ProcessImage
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.pdo import MappedObject
@@ -43,7 +41,7 @@ FRAMES = st.builds(
 def master() -> NmtMaster:
     nmt = NmtMaster(MasterPlan(SLAVES, node_id=1, heartbeat_us=10_000, sync_us=4_000))
     image = ProcessImage(PDOS, nmt.send)
-    axes = (DriveSettings(Channel("one")), DriveSettings(Channel("two"), axis=1))
+    axes = (DriveSettings(DriveChannel("one")), DriveSettings(DriveChannel("two"), axis=1))
     nmt.process_data = ProcessData({2: image}, (DriveNode(nmt.slaves[2], image, axes, 10_000),))
     return nmt
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canopen.bus_file.bus_values import BusPdo, Channel
+from tickrig.host.canopen.bus_file.bus_values import BusPdo, DriveChannel
 from tickrig.host.canopen.dialogue import QueuedScript, SdoRequest
-from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver
-from tickrig.host.canopen.master.cia402.drive_settings import DriveSettings
+from tickrig.host.canopen.master.cia402.drive_driver import DriveDriver, DriveSettings
 from tickrig.host.canopen.master.process_image import ProcessImage
-from tickrig.wire.canopen.cob_id import INVALID
+from tickrig.wire.canopen.nmt import INVALID
 from tickrig.wire.canopen.pdo import MappedObject
 
 CONTROLWORD, TARGET, STATUSWORD = (0x6040, 0), (0x607A, 0), (0x6041, 0)
@@ -120,7 +119,7 @@ def test_a_tpdo_is_taken_and_one_that_is_too_short_is_not() -> None:
 
 def test_the_objects_of_a_further_axis_are_800h_above() -> None:
     scripts: list[QueuedScript] = []
-    settings = DriveSettings(Channel("second"), axis=1)
+    settings = DriveSettings(DriveChannel("second"), axis=1)
     driver = DriveDriver(settings, Slave(255).image, scripts.append)
     step = next(driver.cycle())
     assert isinstance(step, SdoRequest)

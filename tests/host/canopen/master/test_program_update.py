@@ -10,8 +10,7 @@ from tests.host.canopen.master.boot_loader import FLASHING_US, RUNS, BootLoader
 from tests.host.canopen.master.network import NODE_ID, network, plain_slave
 from tickrig.host.canopen.errors import SdoTimeout
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
-from tickrig.host.canopen.master.boot_status import BootStatus
-from tickrig.host.canopen.master.boot_talk import BootEnded, BootStep, BootTalk
+from tickrig.host.canopen.master.boot_slave import BootEnded, BootStatus, BootStep, BootTalk
 from tickrig.host.canopen.master.canopen_master import BootFailed
 from tickrig.wire.canopen.nmt import NmtState
 

@@ -9,14 +9,14 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc.canopen.definition.definition import SystemDefinition
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition import SystemDefinition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
-from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc.canopen.proxy import ProxyRtc
 from tickrig.host.rtc.canopen.serve import read_files, serve
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 

@@ -8,7 +8,7 @@ from tests.emulators.can.can_bench import frames
 from tests.host.rtc.canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.served_node import NodePhase
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 

@@ -8,13 +8,12 @@ from hypothesis import strategies as st
 
 from tests.host.rtc.canopen.bench import EDS, PALETTE_AND_MOTOR, Bench
 from tests.soak import examples
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.serve import read_files, serve
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.canopen.view import ServerView
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import CanFrame, ErrorState
 
 DEFINITION = parse_definition(PALETTE_AND_MOTOR + "start: {autoactivate: true}")
 FILES = read_files(DEFINITION, EDS)

@@ -6,8 +6,8 @@ import pytest
 
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR, Bench
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc.canopen.node.receiver import ServerObjects
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.server import ServerObjects
 
 DEFINITION = parse_definition(
     "nodes:\n- {id: 16, name: A, eds: a}\n- {id: 32, name: B, eds: a, heartbeat_ms: 30000}\n"

@@ -6,7 +6,7 @@ from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR, Bench
 from tests.host.rtc.canopen.components import add_logger
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.wire.rtc_types.basic import TimedOctet
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE

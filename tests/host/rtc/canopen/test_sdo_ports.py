@@ -12,28 +12,27 @@ from tests.device.canopen.device_rtc.test_ports import Wide
 from tests.emulators.can.can_bench import Log
 from tests.host.rtc.canopen.bench import Bench
 from tests.host.rtc.canopen.components import add_knob, add_logger
-from tickrig.device.canopen.device_rtc.device import make_device_rtc
+from tickrig.device.canopen.device_rtc import make_device_rtc
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc import LifeCycleState, ReturnCode
 from tickrig.host.rtc.canopen.connections import check_lengths
-from tickrig.host.rtc.canopen.definition.definition import PdoLink, PdoName
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc.canopen.errors import ServerRefused
+from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, ServerRefused
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.offline import check_offline
-from tickrig.host.rtc.canopen.proxy.pdo_layout import PdoLayout, lay_out
-from tickrig.host.rtc.canopen.proxy.proxy import ProxyRtc
+from tickrig.host.rtc.canopen.pdo_layout import PdoLayout, lay_out
+from tickrig.host.rtc.canopen.proxy import ProxyRtc
 from tickrig.host.rtc.canopen.serve import read_files, serve
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.pdo import MappedObject
-from tickrig.wire.rtc_canopen.objects import object_table
+from tickrig.wire.rtc_canopen import object_table
 from tickrig.wire.rtc_types.basic import (
     Time,
     TimedBooleanSeq,

@@ -106,7 +106,7 @@ def test_it_looks_for_its_nodes_on_the_bus_of_the_file(file: Path, tmp_path: Pat
 
 
 PARTS = """
-from tickrig.host.rtc.canopen.robots.joystick import Joystick as Stick
+from tickrig.host.rtc.canopen.robots import Joystick as Stick
 
 class Broken(Stick):
     def on_initialize(self):

@@ -12,8 +12,8 @@ from tests.host.rtc.canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.commands.server_control import ServerControl
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
 from tickrig.host.rtc.canopen.serve import ServerRunner
+from tickrig.host.rtc.canopen.served_node import NodePhase
 
 ACTIVE = LifeCycleState.ACTIVE
 

@@ -12,7 +12,7 @@ from tests.host.rtc.chain import Chain
 from tickrig.emulators.commands.cli import main
 from tickrig.host.control.server import ControlServer
 from tickrig.host.rtc.commands.system_control import SystemControl
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
 
 ROUND_US = 500
 

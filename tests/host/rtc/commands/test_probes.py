@@ -8,7 +8,7 @@ import pytest
 
 from tests.host.rtc.chain import PERIOD_US, Chain
 from tickrig.host.rtc import RtcRefused
-from tickrig.host.rtc.commands.probes import HELD, LEASE_US, Probes
+from tickrig.host.rtc.commands.system_control import HELD, LEASE_US, Probes
 from tickrig.host.rtc.system.system import describe
 from tickrig.wire.rtc_types.basic import Time, TimedLong
 

@@ -20,9 +20,9 @@ from tickrig.emulators.commands.cli import main
 from tickrig.host.control.client import ControlClient
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.commands.request import default_path
-from tickrig.host.rtc.component_types import COMPONENT_TYPES
 from tickrig.host.rtc.motion.chain import CONNECTIONS, MotionChain
-from tickrig.host.rtc.system.system_toml import parse_toml
+from tickrig.host.rtc.system.manager import COMPONENT_TYPES
+from tickrig.host.rtc.system.system_file import parse_toml
 
 EXAMPLE = Path(__file__).parents[4] / "examples" / "rtc_chain.toml"
 

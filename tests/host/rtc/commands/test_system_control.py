@@ -13,7 +13,7 @@ from tests.host.rtc.chain import Chain
 from tickrig.host.rtc import ModuleSpec, RtComponent
 from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.ports.port import ConnectorProfile
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
 
 
 class NoClock:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from tests.host.spy_link import SpyLink
 from tickrig.device.rtc_lite.component import LiteComponent
-from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import RtcLiteNode
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink

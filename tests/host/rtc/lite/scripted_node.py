@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from tests.device.rtc_lite.bench import Recorder
-from tickrig.device.rtc_lite.config import LiteConfig
 from tickrig.device.rtc_lite.node import TICK_US, RtcLiteNode
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_lite.decoder import LiteDecoder
-from tickrig.wire.rtc_lite.frame import LiteFrame
-from tickrig.wire.rtc_lite.layout import REQUESTS
+from tickrig.wire.rtc_lite.frame import REQUESTS, LiteDecoder, LiteFrame
 
 
 class ScriptedNode:

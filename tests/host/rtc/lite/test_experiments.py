@@ -13,7 +13,7 @@ from tests.wire.rtc_lite.vectors import raw
 from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.emulators.rtc_lite.line import RadioSettings, radio
 from tickrig.host.rtc.commands.system_control import describe_component
-from tickrig.host.rtc.commands.texts import component_lines
+from tickrig.host.rtc.commands.verbs import component_lines
 from tickrig.host.rtc.lite import ProxySettings
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
 

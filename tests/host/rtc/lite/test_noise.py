@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from tests.host.rtc.lite.bench import PERIOD_US, Bench
 from tickrig.device.chance import Chance
 from tickrig.device.rtc_lite.component import LiteEcho
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.rig.faults import Fault, FaultType
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc.lite import ProxySettings, RtcLiteProxy

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from tests.wire.rtc_lite.vectors import VECTORS
-from tickrig.host.links.errors import DeviceRefused
+from tickrig.host.links.link import DeviceRefused
 from tickrig.host.rtc import InPort, OutPort, connect
-from tickrig.host.rtc.lite.port_bridges import PortBridges
+from tickrig.host.rtc.lite.proxy import PortBridges
 from tickrig.wire.rtc_lite.messages import LitePortData, LitePortProfile
 from tickrig.wire.rtc_types.basic import Time
 

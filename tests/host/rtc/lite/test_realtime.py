@@ -12,12 +12,12 @@ from tests.host.rtc.lite.experiment import ALL, JOINTS
 from tickrig.emulators.bench.child import Child, running
 from tickrig.host.control.client import ControlClient
 from tickrig.host.control.clock import RealClock
-from tickrig.host.links.reopening_link import ReopeningLink
+from tickrig.host.links.link import ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, Manager
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
 from tickrig.host.rtc.lite import ProxyEvent, ProxySettings, attach
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
 
 EMULATOR = "tickrig.emulators.rtc_lite.cli"
 DEADLINE_S = 10.0

@@ -6,7 +6,7 @@ import pytest
 
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc.lite.bench import PERIOD_US, Bench
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc.lite import ProxySettings
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy

@@ -6,9 +6,8 @@ import pytest
 
 from tests.host.rtc.lite.bench import Bench
 from tests.host.rtc.lite.scripted_node import ScriptedNode
-from tickrig.device.rtc_lite.component import LiteComponent, LiteEcho
-from tickrig.device.rtc_lite.config import LiteConfig
-from tickrig.device.rtc_lite.ports import LiteInPort, LiteOutPort
+from tickrig.device.rtc_lite.component import LiteComponent, LiteEcho, LiteInPort, LiteOutPort
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.host.rtc import ExecutionContext, Manager, ReturnCode, RtcRefused
 from tickrig.host.rtc.lite import ProxySettings, RtcLiteProxy, attach
 from tickrig.wire.rtc_lite.codes import LiteCommand

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.device.rtc_lite.bench import Recorder
 from tests.host.rtc.lite.bench import PERIOD_US, Bench
-from tickrig.device.rtc_lite.config import LiteConfig
+from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.host.rtc import InPort, OutPort, ReturnCode, connect
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
 from tickrig.wire.rtc_lite.codes import LiteContextType

@@ -4,27 +4,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.modbus.registers import Register, Registers
-from tickrig.device.modbus.slave import ModbusSlave
+from tickrig.device.modbus import ModbusSlave, Register, Registers
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
 from tickrig.emulators.serial.rs485_line import Rs485Line
-from tickrig.host.links.errors import LinkClosed
+from tickrig.emulators.serial.serial_line import BYTE_FAULTS
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc.motion.modbus_master import ModbusAnswer, ModbusMaster
 from tickrig.wire.instant import NEVER
-from tickrig.wire.modbus.requests import (
+from tickrig.wire.modbus import (
     READ,
     READ_WRITE,
     WRITE,
     WRITE_ONE,
     ExceptionCode,
     Request,
+    encode_frame,
     encode_request,
 )
-from tickrig.wire.modbus.rtu import encode_frame
 
 READ_TWO = Request(READ, (0, 2))
 TABLE = (

@@ -12,7 +12,7 @@ from tickrig.host.rtc.motion.geometry import Pose, Twist
 from tickrig.host.rtc.motion.motion_run import (
     MotionLimits,
     MotionRun,
-    Sample,
+    TrackSample,
     least_time_s,
     way_time_s,
 )
@@ -21,16 +21,16 @@ LINE = Pose(2.0, 0.0, 0.0)
 LIMITS = VelocityLimits(0.3, 0.3, 0.006, 0.1)
 
 
-def run(*samples: Sample) -> MotionRun:
+def run(*samples: TrackSample) -> MotionRun:
     return MotionRun(Pose(2.0, 0.0, 0.1), list(samples))
 
 
-def on_line(x: float, y: float, line: Pose | None = LINE) -> Sample:
-    return Sample(x, Pose(x, y), Twist(), line)
+def on_line(x: float, y: float, line: Pose | None = LINE) -> TrackSample:
+    return TrackSample(x, Pose(x, y), Twist(), line)
 
 
 def test_errors_are_measured_at_the_end() -> None:
-    seen = run(on_line(0.0, 0.0), Sample(9.5, Pose(2.03, 0.04, -0.1), Twist(), None))
+    seen = run(on_line(0.0, 0.0), TrackSample(9.5, Pose(2.03, 0.04, -0.1), Twist(), None))
     assert (seen.error_m, seen.heading_error_rad) == pytest.approx((0.05, 0.2))
     assert (seen.duration_s, seen.end) == (9.5, Pose(2.03, 0.04, -0.1))
 
@@ -46,7 +46,7 @@ def test_a_short_leg_has_no_cross_track() -> None:
 
 def test_turning_adds_up_without_sign() -> None:
     twists = [Twist(0.0, w) for w in (0.0, 0.1, -0.1, 0.0)]
-    seen = run(*(Sample(0.0, Pose(), twist, None) for twist in twists))
+    seen = run(*(TrackSample(0.0, Pose(), twist, None) for twist in twists))
     assert seen.turning_rad_s == pytest.approx(0.4)
 
 
@@ -60,18 +60,18 @@ def test_turning_adds_up_without_sign() -> None:
     ],
 )
 def test_a_command_beyond_a_limit_is_counted(twist: Twist, count: int) -> None:
-    seen = run(Sample(0.0, Pose(), Twist(), None), Sample(0.02, Pose(), twist, None))
+    seen = run(TrackSample(0.0, Pose(), Twist(), None), TrackSample(0.02, Pose(), twist, None))
     assert seen.violations(LIMITS) == count
 
 
 @pytest.mark.parametrize("twist", [Twist(0.301, 0.0), Twist(0.0, 0.301)])
 def test_a_speed_that_stays_beyond_a_limit_is_counted(twist: Twist) -> None:
-    same = Sample(0.0, Pose(), twist, None)
+    same = TrackSample(0.0, Pose(), twist, None)
     assert run(same, same).violations(LIMITS) == 1
 
 
 def test_a_speed_at_the_limit_is_within_it() -> None:
-    same = Sample(0.0, Pose(), Twist(0.3, -0.3), None)
+    same = TrackSample(0.0, Pose(), Twist(0.3, -0.3), None)
     assert run(same, same).violations(LIMITS) == 0
 
 

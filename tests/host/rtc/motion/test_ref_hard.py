@@ -10,17 +10,15 @@ from hypothesis import strategies as st
 
 from tests.host.rtc.motion.base_bench import COUNTS_PER_RAD, COUNTS_PER_TURN, BaseBench
 from tests.host.rtc.motion.port_bench import PortBench
-from tickrig.device.modbus.registers import Register, Registers
-from tickrig.device.modbus.slave import ModbusSlave
+from tickrig.device.modbus import ModbusSlave, Register, Registers
 from tickrig.device.rh3.base import Rh3Base
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import Link
+from tickrig.host.links.link import Link, LinkClosed
 from tickrig.host.rtc.motion.components.ref_hard import RefHard, RefHardRh3
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.service_port import Consumer, ServicePort
-from tickrig.wire.modbus.rh3 import Status
+from tickrig.wire.modbus import Status
 
 
 def running(v: float = 0.0, w: float = 0.0, **configuration: str) -> BaseBench:

@@ -14,8 +14,8 @@ from tickrig.host.control.clock import ServingClock
 from tickrig.host.control.requests import RequestDispatcher
 from tickrig.host.control.server import ControlServer
 from tickrig.host.rtc import Manager, RtcRefused
-from tickrig.host.rtc.remote.call_queue import CallQueue
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.schedule import RealTime
 
 DEADLINE_US = 30_000_000
 

@@ -11,9 +11,9 @@ from click.testing import CliRunner
 
 from tickrig.emulators.commands.cli import main
 from tickrig.host.rtc import Manager, RtComponent, RtcRefused
-from tickrig.host.rtc.component_types import COMPONENT_TYPES
+from tickrig.host.rtc.system.manager import COMPONENT_TYPES
 from tickrig.host.rtc.system.system import describe
-from tickrig.host.rtc.system.system_toml import parse_toml, write_toml
+from tickrig.host.rtc.system.system_file import parse_toml, write_toml
 
 MODULE = """\
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, ReturnCode, RtComponent

@@ -6,7 +6,7 @@ import pytest
 
 from tickrig.host.rtc.components import ConsoleIn
 from tickrig.host.rtc.states import RtcRefused
-from tickrig.host.rtc.system.name_service import NameService
+from tickrig.host.rtc.system.manager import NameService
 
 
 def test_a_path_is_bound_once_and_may_be_deep() -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from tests.host.rtc.chain import PERIOD_US, Chain
 from tickrig.host.rtc import Manager
-from tickrig.host.rtc.system.real_time import PAUSE_US, RealTime
+from tickrig.host.rtc.system.schedule import PAUSE_US, RealTime
 
 
 class ScriptedClock:

@@ -31,7 +31,7 @@ from tickrig.host.rtc.system.system import (
     restore,
     with_remotes,
 )
-from tickrig.host.rtc.system.system_toml import parse_toml, write_toml
+from tickrig.host.rtc.system.system_file import parse_toml, write_toml
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "rtc_chain.xml"
 

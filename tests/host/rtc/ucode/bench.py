@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.device.ucode_reader.reader import UcodeReader
+from tickrig.device.ucode_reader import Marker, UcodeReader
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
-from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.tkernel.resolution.service import ResolutionService
-from tickrig.emulators.tkernel.resolution.sim_source import SimSource, opener
+from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.emulators.tkernel.resolution.service import ResolutionService, SimSource, opener
 from tickrig.emulators.tkernel.resolution.table import EXAMPLE, parse_table
 from tickrig.host.rtc import InPort, Manager
 from tickrig.host.rtc.ports.connect import connect
@@ -20,7 +17,7 @@ from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
 from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
 from tickrig.wire.rtc_types.basic import TimedLongSeq, TimedStringSeq
 from tickrig.wire.rtc_types.extended_2d import TimedPoint2D
-from tickrig.wire.sensors.ucode import BAUD
+from tickrig.wire.ucode import BAUD
 
 BASE = "http://127.0.0.1:8640"
 DOOR = "00001C00000000000001000000000001"

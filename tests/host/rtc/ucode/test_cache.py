@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from tickrig.emulators.tkernel.resolution.service import ResolutionService
-from tickrig.emulators.tkernel.resolution.sim_source import SimSource
-from tickrig.emulators.tkernel.resolution.table import Table
-from tickrig.host.rtc.ucode.cache import Cache, CacheLimits
+from tickrig.emulators.tkernel.resolution.service import ResolutionService, SimSource
+from tickrig.emulators.tkernel.resolution.table import UcodeTable
+from tickrig.host.rtc.ucode.cache import CacheLimits, LookupCache
 
 SECOND_US = 1_000_000
 BASE = "http://127.0.0.1:8640"
@@ -21,8 +20,8 @@ class CacheBench:
     """A cache of texts before a service that knows a, b and c."""
 
     def __init__(self) -> None:
-        self.service = ResolutionService(Table(contents=PLACES), BASE)
-        self.source, self.cache, self.now_us = SimSource(self.service), Cache(str), 0
+        self.service = ResolutionService(UcodeTable(contents=PLACES), BASE)
+        self.source, self.cache, self.now_us = SimSource(self.service), LookupCache(str), 0
 
     def look_up(self, name: str, limits: CacheLimits = LIMITS) -> str | None:
         address = f"{BASE}/contents/{name}"
@@ -71,7 +70,7 @@ def test_an_old_one_serves_while_it_is_asked_for_again(bench: CacheBench) -> Non
     bench.look_up("a")
     bench.run(1)
     bench.run(11)
-    bench.service.table = Table(contents={"a": '{"x_m": 9, "y_m": 0}'})
+    bench.service.table = UcodeTable(contents={"a": '{"x_m": 9, "y_m": 0}'})
     assert bench.look_up("a") == PLACES["a"]
     assert (bench.cache.counts.stale, bench.cache.counts.age_us) == (1, 11 * SECOND_US)
     bench.run(1)

@@ -7,8 +7,8 @@ import logging
 import pytest
 
 from tests.host.rtc.ucode.bench import DOOR, LIFT, NOBODY, SECOND_US, UcodeBench, values
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.host.links.errors import LinkClosed
+from tickrig.device.ucode_reader import Marker
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
 from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement

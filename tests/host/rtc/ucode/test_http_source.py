@@ -15,8 +15,8 @@ from tests.host.rtc.ucode.bench import DOOR, NOBODY
 from tickrig.emulators.tkernel.resolution.http_service import HttpService
 from tickrig.emulators.tkernel.resolution.service import ResolutionService
 from tickrig.emulators.tkernel.resolution.table import EXAMPLE, parse_table
+from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
 from tickrig.host.rtc.ucode.http_source import MOST_OCTETS, HttpSource
-from tickrig.host.rtc.ucode.source import Fetched, SourceStatus
 
 pytestmark = pytest.mark.realtime
 

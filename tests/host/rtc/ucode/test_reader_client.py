@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from tests.host.rtc.ucode.bench import DOOR
-from tickrig.device.ucode_reader.markers import Marker
-from tickrig.device.ucode_reader.reader import UcodeReader
+from tickrig.device.ucode_reader import Marker, UcodeReader
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.serial.byte_faults import BYTE_FAULTS
-from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.host.rtc.ucode.reader_client import Round, UcodeReaderClient
+from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
+from tickrig.host.rtc.ucode.infrared_rays_reader import Round, UcodeReaderClient
 
 
 class ReaderBench:

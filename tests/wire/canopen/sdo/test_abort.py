@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.wire.canopen.sdo.abort import AbortCode, describe_abort
+from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
 
 
 @pytest.mark.parametrize("code", AbortCode)

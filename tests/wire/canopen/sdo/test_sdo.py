@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.wire.canopen.sdo.abort import AbortCode
-from tickrig.wire.canopen.sdo.sdo import (
+from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateRequest,
     DownloadInitiateResponse,
@@ -21,7 +20,8 @@ from tickrig.wire.canopen.sdo.sdo import (
     parse_request,
     parse_response,
 )
-from tickrig.wire.canopen.sdo.sdo_block import (
+from tickrig.wire.canopen.sdo_frame import (
+    AbortCode,
     BlockAcknowledge,
     BlockDownloadInitiateRequest,
     BlockDownloadInitiateResponse,

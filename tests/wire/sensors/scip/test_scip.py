@@ -7,18 +7,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireError
-from tickrig.wire.sensors.scip.command import SIZES, Command
-from tickrig.wire.sensors.scip.description import Specification, encode_lines, parse_lines
-from tickrig.wire.sensors.scip.encoding import (
+from tickrig.wire.scip import (
+    MOST_BYTES,
+    SIZES,
+    Command,
+    Reply,
+    ReplySplitter,
+    Specification,
+    encode_lines,
     encode_number,
     encode_numbers,
+    encode_scan,
+    parse_lines,
     parse_number,
     parse_numbers,
+    parse_scan,
     with_sum,
     without_sum,
 )
-from tickrig.wire.sensors.scip.reply import MOST_BYTES, Reply, ReplySplitter
-from tickrig.wire.sensors.scip.scan import encode_scan, parse_scan
 
 SPECIFIED = [(1_234, b"CB"), (5_432, b"1Dh"), (16_000_000, b"m2@0")]
 """SCIP 2.0 (C-42-03320B), data encoding and decoding."""

@@ -8,7 +8,7 @@ from math import cos, pi
 import pytest
 
 from tests.device.canopen.ds402.wheel import BIT_12, INTERNAL_LIMIT, RPM, TURN, Wheel
-from tickrig.device.servo.presets import EPOS_WHEEL
+from tickrig.device.servo.parameters import EPOS_WHEEL
 
 MOTOR, GEAR = EPOS_WHEEL.motor, EPOS_WHEEL.gear
 INERTIA = MOTOR.inertia_kg_m2 + GEAR.inertia_kg_m2 / GEAR.ratio**2

@@ -16,9 +16,8 @@ from tests.device.canopen.ds402.wheel import (
     TURN,
     Wheel,
 )
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.ds402.modes.homing import index_pulse
-from tickrig.device.canopen.ds402.modes.homing_search import METHODS
+from tickrig.device.canopen.dictionary import SdoAbort
+from tickrig.device.canopen.ds402.modes.homing import METHODS, index_pulse
 from tickrig.wire.instant import NEVER
 
 START, READY, HALT = 0x1F, 0x0F, 0x11F

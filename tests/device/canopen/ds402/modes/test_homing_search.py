@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.canopen.ds402.modes.homing_search import (
+from tickrig.device.canopen.ds402.modes.homing import (
     METHODS,
     HomingMethod,
     HomingSearch,
     Phase,
     Switch,
 )
-from tickrig.device.canopen.ds402.motion.trapezoid import Motion, PathLimits, to_velocity
+from tickrig.device.canopen.ds402.trapezoid import Motion, PathLimits, to_velocity
 
 FAST, SLOW, ACCELERATION = 2_000.0, 100.0, 20_000.0
 TICK_WAY = SLOW / 1_000

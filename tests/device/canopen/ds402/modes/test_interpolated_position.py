@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import BIT_12, REACHED, RPM, Wheel
-from tickrig.device.canopen.core.abort import SdoAbort
+from tickrig.device.canopen.dictionary import SdoAbort
 
 ENABLE, DISABLE, HALT = 0x1F, 0x0F, 0x11F
 PERIOD_MS = 10

@@ -16,10 +16,10 @@ from tests.device.canopen.ds402.wheel import (
     make_lenient,
 )
 from tests.soak import examples
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.slave import ServiceMaker
-from tickrig.device.canopen.ds402.motion.trapezoid import PathLimits
+from tickrig.device.canopen.dictionary import SdoAbort
+from tickrig.device.canopen.ds402.trapezoid import PathLimits
 from tickrig.device.canopen.models import epos
+from tickrig.device.canopen.slave import ServiceMaker
 from tickrig.wire.instant import NEVER
 
 VELOCITY, ACCELERATION, DECELERATION = 3_000, 20_000, 10_000

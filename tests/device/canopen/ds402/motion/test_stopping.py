@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.ds402.state.automaton import DriveState
+from tickrig.device.canopen.dictionary import SdoAbort
+from tickrig.device.canopen.ds402.automaton import DriveState
 
 SOD = DriveState.SWITCH_ON_DISABLED
 QUICK_STOP = DriveState.QUICK_STOP_ACTIVE

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.device.canopen.ds402.motion.trapezoid import (
+from tickrig.device.canopen.ds402.trapezoid import (
     Motion,
     Path,
     PathLimits,

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.ds402.objects.parameters import Parameters
-from tickrig.device.canopen.ds402.objects.settings import Units, read_settings
+from tickrig.device.canopen.dictionary import Dictionary
+from tickrig.device.canopen.ds402.settings import Parameters, Units, read_settings
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 

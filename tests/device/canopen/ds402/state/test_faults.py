@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.device.canopen.ds402.wheel import Wheel
-from tickrig.device.canopen.ds402.objects.error_codes import register_of
-from tickrig.device.canopen.ds402.state.automaton import DriveState
-from tickrig.device.canopen.ds402.state.supervision import Bounds
+from tickrig.device.canopen.ds402.automaton import Bounds, DriveState
+from tickrig.device.canopen.ds402.settings import register_of
 
 FAULT = DriveState.FAULT
 SOD = DriveState.SWITCH_ON_DISABLED

@@ -10,11 +10,11 @@ from tests.host.canmon.model.check.expression.held import MAPPED
 from tests.host.canmon.model.record_log import hear
 from tests.mutated import mutated as spoilt
 from tickrig.host.canmon.model.check.checker import Checker
-from tickrig.host.canmon.model.check.expression.parse_rule import DEMANDS
+from tickrig.host.canmon.model.check.decoded_check import Surroundings
+from tickrig.host.canmon.model.check.rule_parser import DEMANDS
 from tickrig.host.canmon.model.check.rules import RuleValues, parse_rules
-from tickrig.host.canmon.model.check.surroundings import Surroundings
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.output.verdict import finding_json
+from tickrig.host.canmon.verbs.check import finding_json
 
 RULES: Final = (
     *("node 3 operational within 2s", "node 3-5 operational within 1s after boot-up of 3-5"),

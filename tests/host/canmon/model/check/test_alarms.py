@@ -9,7 +9,7 @@ from tickrig.host.canmon.model.check.alarms import (
     LATE_US,
     RECENT_US,
     Alarms,
-    State,
+    AlarmState,
     render_alarms,
 )
 from tickrig.host.canmon.model.check.rules import parse_rules
@@ -31,18 +31,18 @@ def taken(made: Alarms, text: str) -> Alarms:
     return made
 
 
-def states(made: Alarms, now_us: int) -> list[State]:
+def states(made: Alarms, now_us: int) -> list[AlarmState]:
     made.check_missing(now_us)
     return [alarm.state(now_us) for alarm in made.rows()]
 
 
 def test_a_rule_is_broken_for_a_while_and_then_was_until_it_is_acknowledged() -> None:
     made = taken(alarms(no_emcy=True), "1.0 083#3081110000000000")
-    assert states(made, S + RECENT_US - 1) == [State.BROKEN]
+    assert states(made, S + RECENT_US - 1) == [AlarmState.BROKEN]
     assert made.broken(S) == 1
-    assert states(made, S + RECENT_US) == [State.WAS_BROKEN]
+    assert states(made, S + RECENT_US) == [AlarmState.WAS_BROKEN]
     made.acknowledge()
-    assert states(made, S + RECENT_US) == [State.HOLDS]
+    assert states(made, S + RECENT_US) == [AlarmState.HOLDS]
     assert [alarm.count for alarm in made.rows()] == [1]
 
 
@@ -55,9 +55,9 @@ def test_before_any_frame_no_rule_is_said_to_hold() -> None:
 
 def test_a_heartbeat_that_stops_is_one_finding_however_long_it_lasts() -> None:
     made = taken(alarms(heartbeat="5=100ms±20%"), "2.9 705#05\n3.0 705#05")
-    assert states(made, 3 * S + 120_000) == [State.HOLDS]
+    assert states(made, 3 * S + 120_000) == [AlarmState.HOLDS]
     for now_us in range(3_200_000, 9_000_000, 100_000):
-        assert states(made, now_us) == [State.BROKEN]
+        assert states(made, now_us) == [AlarmState.BROKEN]
     (alarm,) = made.rows()
     assert (alarm.count, len(made.findings)) == (1, 1)
     assert alarm.finding is not None
@@ -69,21 +69,21 @@ def test_a_heartbeat_that_is_back_was_broken() -> None:
     made.check_missing(5 * S)
     for now_us in range(50, 80):
         taken(made, f"{now_us / 10} 705#05")
-    assert states(made, 7_950_000) == [State.WAS_BROKEN]
+    assert states(made, 7_950_000) == [AlarmState.WAS_BROKEN]
 
 
 def test_what_has_never_come_is_missed_after_a_time_of_grace() -> None:
     made = alarms(nodes="3,4")
-    assert states(made, GRACE_US - 1) == [State.HOLDS]
-    assert states(made, GRACE_US) == [State.BROKEN]
+    assert states(made, GRACE_US - 1) == [AlarmState.HOLDS]
+    assert states(made, GRACE_US) == [AlarmState.BROKEN]
     assert made.findings[0].text == "node 3 was never heard; node 4 was never heard"
 
 
 def test_the_grace_begins_with_the_time_of_the_source() -> None:
     made = Alarms(parse_rules({"nodes": 3}))
     made.check_missing(1_700_000_000 * S)
-    assert states(made, 5 * S) == [State.HOLDS]
-    assert states(made, 5 * S + GRACE_US) == [State.BROKEN]
+    assert states(made, 5 * S) == [AlarmState.HOLDS]
+    assert states(made, 5 * S + GRACE_US) == [AlarmState.BROKEN]
 
 
 def test_frames_that_get_lost_are_found_as_they_do() -> None:
@@ -102,7 +102,7 @@ def test_a_loss_before_the_rules_is_none_of_theirs() -> None:
 def test_clearing_begins_anew() -> None:
     made = taken(alarms(no_emcy=True), "1.0 083#3081110000000000")
     made.clear()
-    assert (states(made, S), list(made.findings)) == ([State.HOLDS], [])
+    assert (states(made, S), list(made.findings)) == ([AlarmState.HOLDS], [])
 
 
 def test_only_the_latest_findings_are_kept_and_all_are_counted() -> None:
@@ -140,23 +140,23 @@ def written(rule: str, text: str, now_us: int) -> Alarms:
 
 def test_a_written_rule_is_an_alarm() -> None:
     made = written("emcy at most 1", "1 083#3081110000000000\n1.5 083#3081110000000000", 2 * S)
-    assert states(made, 2 * S) == [State.BROKEN]
+    assert states(made, 2 * S) == [AlarmState.BROKEN]
     assert [str(one)[:26] for one in made.findings] == ["(1.500000) emcy at most 1:"]
     made.clear()
-    assert states(made, 2 * S) == [State.HOLDS]
+    assert states(made, 2 * S) == [AlarmState.HOLDS]
 
 
 def test_what_a_written_rule_waits_for_is_missed_on_a_silent_bus() -> None:
     made = written("node 3 operational within 2s", "1 703#00", 3 * S)
-    assert states(made, 3 * S + LATE_US) == [State.HOLDS]
-    assert states(made, 3 * S + LATE_US + 1) == [State.BROKEN]
+    assert states(made, 3 * S + LATE_US) == [AlarmState.HOLDS]
+    assert states(made, 3 * S + LATE_US + 1) == [AlarmState.BROKEN]
     assert [one.at_us for one in made.findings] == [3 * S]
 
 
 def test_a_period_that_is_not_kept_is_one_finding_however_long_it_lasts() -> None:
     made = written("heartbeat of 3 every 100ms ±10%", "1 703#05\n1.1 703#05", S)
     for now_us in range(3 * S, 6 * S, 100_000):
-        assert states(made, now_us) == [State.BROKEN]
+        assert states(made, now_us) == [AlarmState.BROKEN]
     assert len(made.findings) == 1
 
 

@@ -8,10 +8,10 @@ from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.strategies import traffic
 from tickrig.host.canmon.model.check.checker import Checker, Unjudged
 from tickrig.host.canmon.model.check.column_check import ColumnChecker
-from tickrig.host.canmon.model.check.rule import Finding
+from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import Rules
 from tickrig.host.canmon.model.check.time_rules import HeartbeatTimes
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 
 BIT_RATE = 1_000
@@ -32,7 +32,7 @@ ALL = Rules(
 )
 
 
-Judged = tuple[list[Finding], Unjudged]
+Judged = tuple[list[TrafficFinding], Unjudged]
 
 
 def one_by_one(records: list[Record], rules: Rules) -> Judged:

@@ -8,15 +8,12 @@ import pytest
 
 from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.record_log import hear
-from tickrig.emulators.fig120.demo import run_demo
-from tickrig.emulators.fig120.set_up import LINK, MOTOR, PALETTE
-from tickrig.emulators.fig120.stage import BIT_RATE, VirtualStage
+from tickrig.emulators.fig120 import BIT_RATE, LINK, MOTOR, PALETTE, VirtualStage, run_demo
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.column_check import ColumnChecker
-from tickrig.host.canmon.model.check.rule import Finding, Rule
+from tickrig.host.canmon.model.check.rule import Rule, TrafficFinding
 from tickrig.host.canmon.model.check.rules import parse_rules
-from tickrig.host.canmon.model.frames.ident import EXTENDED
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import EXTENDED, Record
 from tickrig.wire.can import CanFrame
 
 
@@ -61,7 +58,7 @@ def trace() -> list[Record]:
     return record
 
 
-def findings(records: list[Record], lost: tuple[str, ...] = ()) -> list[Finding]:
+def findings(records: list[Record], lost: tuple[str, ...] = ()) -> list[TrafficFinding]:
     checker = Checker(RULES, BIT_RATE)
     found = [finding for record in records for finding in checker.take(record)]
     found += checker.end(records[-1].at_us, lost)

@@ -19,7 +19,7 @@ from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.rules import parse_rules
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 
 NODES = {5: MODELS["epos"], 16: MODELS["f-palette"]}

@@ -9,15 +9,18 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.decode.drive_trace import record as drive_trace
 from tests.host.canmon.model.decode.test_noise import FRAMES
-from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes
-from tickrig.host.canmon.model.decode.board_text import board_json, render_board
+from tickrig.host.canmon.model.columns.column_traffic import ColumnNodes
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_board import NodeBoard, NodeStatus
+from tickrig.host.canmon.model.decode.node_board import (
+    NodeBoard,
+    NodeStatus,
+    board_json,
+    render_board,
+)
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 MAPPED = {
     5: EdsObjects(values={(0x1A00, 0): b"\2", (0x1A00, 1): bytes.fromhex("10004160"),

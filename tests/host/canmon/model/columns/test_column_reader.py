@@ -12,17 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canmon.model.columns import column_reader
-from tickrig.host.canmon.model.columns.candump_block import CandumpBlock
-from tickrig.host.canmon.model.columns.column_reader import ColumnReader, read_columns
+from tickrig.host.canmon.model.columns.column_reader import CandumpBlock, ColumnReader, read_columns
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, NoColumnsError, Rows
-from tickrig.host.canmon.model.frames.ident import flagged_id
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record, flagged_id
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogLines, LogReader, read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.logs.tally import Tally
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.model.logs.mark import LogTally
+from tickrig.wire.can import CanFrame, FdFrame
 
 HEX = "0123456789abcdefABCDEF"
 
@@ -74,7 +71,7 @@ def _rows(columns: Columns) -> list[tuple[object, ...]]:
     return [(*row, columns.channels[place]) for *row, place in rows]
 
 
-def rows_by_line(path: Path) -> tuple[list[tuple[object, ...]], Tally]:
+def rows_by_line(path: Path) -> tuple[list[tuple[object, ...]], LogTally]:
     reader = read_log(path)
     return rows_of_records(reader), reader.tally
 

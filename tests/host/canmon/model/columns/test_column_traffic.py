@@ -11,15 +11,14 @@ from tests.host.canmon.model.strategies import traffic
 from tickrig.host.canmon.model.columns.column_gaps import column_buckets
 from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic
 from tickrig.host.canmon.model.columns.columns import records as rows_of
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.gaps import bucket_of
-from tickrig.host.canmon.model.traffic.traffic import Snapshot
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.traffic import TrafficSnapshot, bucket_of
 from tickrig.wire.can import CanFrame
 
 SIZES = (1, 7, 100)
 
 
-def counted(records: list[Record], size: int) -> Snapshot:
+def counted(records: list[Record], size: int) -> TrafficSnapshot:
     traffic = ColumnTraffic()
     for block in blocks(records, size):
         traffic.take(block)

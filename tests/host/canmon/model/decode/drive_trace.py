@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.candump import parse_log
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import parse_log
 
 GOLDEN = Path(__file__).parents[4] / "golden" / "canmon"
 TRACE = GOLDEN / "drive.log"

@@ -6,11 +6,15 @@ import pytest
 
 from tests.host.canmon.model.decode import drive_trace
 from tests.host.canmon.model.decode.traces import STEP_US, trace
-from tickrig.host.canmon.model.decode.board_text import board_json, render_board
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_board import NodeBoard, NodeStatus
+from tickrig.host.canmon.model.decode.node_board import (
+    NodeBoard,
+    NodeStatus,
+    board_json,
+    render_board,
+)
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 
 WIDE = 300

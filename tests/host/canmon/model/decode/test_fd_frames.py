@@ -8,7 +8,7 @@ import pytest
 
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.filter import parse_filter
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.notation import parse_frame
 
 FRAMES = "705##105 705#05 123##0 00000123##3" + "11" * 64 + " 081##28130 123#11"

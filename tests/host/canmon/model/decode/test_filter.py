@@ -10,8 +10,8 @@ from tests.host.canmon.model.decode.test_pdos import WRITTEN
 from tests.host.canmon.model.decode.traces import trace
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import ErrorFrame
 
 TRAFFIC = (
     f"{WRITTEN} 000#0105 080# 085#3081110700000000 705#05 706#7F 185#3702D2040000"

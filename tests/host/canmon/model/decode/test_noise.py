@@ -6,14 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canmon.model.decode.drive_trace import record
-from tickrig.host.canmon.model.decode.board_text import board_json, render_board
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_board import NodeBoard
-from tickrig.host.canmon.model.decode.serial.rrc_lines import RrcLines
-from tickrig.host.canmon.model.decode.serial.rtc_lite_lines import RtcLiteLine
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
+from tickrig.host.canmon.model.decode.rtc_lite_lines import RtcLiteLine
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.sources.line_source import RrcLines
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 CAN_IDS = st.sampled_from((0x000, 0x080, 0x085, 0x100, 0x185, 0x205, 0x585, 0x605, 0x705, 0x7E4))
 COMMANDS = st.sampled_from(range(0x100))

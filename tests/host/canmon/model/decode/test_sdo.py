@@ -7,11 +7,15 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from tests.emulators.sim_bench import SimBench
 from tests.host.canmon.model.decode.traces import decode, last, transfers
+from tickrig.host.canmon.model.decode.decoded import (
+    Transfer,
+    TransferDirection,
+    TransferMode,
+    TransferOutcome,
+)
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.sdo.transfer import Direction, Mode, Outcome, Transfer
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 BLOB = bytes(index * 7 % 251 for index in range(2_000))
 STRING = b"a text of some length, in segments"
@@ -45,9 +49,12 @@ def test_an_expedited_transfer_is_one_value(listener: Listener) -> None:
     listener.node.sdo[0x2002].raw = 0x1234_5678
     assert listener.node.sdo[0x2002].raw == 0x1234_5678
     written, read = listener.found
-    assert (written.direction, read.direction) == (Direction.DOWNLOAD, Direction.UPLOAD)
+    assert (written.direction, read.direction) == (
+        TransferDirection.DOWNLOAD,
+        TransferDirection.UPLOAD,
+    )
     assert (written.mode, written.entry, written.value) == (
-        Mode.EXPEDITED,
+        TransferMode.EXPEDITED,
         (0x2002, 0),
         0x1234_5678,
     )
@@ -58,7 +65,7 @@ def test_an_expedited_transfer_is_one_value(listener: Listener) -> None:
 def test_a_segmented_transfer_is_one_value(listener: Listener) -> None:
     listener.node.sdo.download(0x2007, 0, STRING)
     assert listener.node.sdo.upload(0x2007, 0) == STRING
-    assert [t.mode for t in listener.found] == [Mode.SEGMENTED, Mode.SEGMENTED]
+    assert [t.mode for t in listener.found] == [TransferMode.SEGMENTED, TransferMode.SEGMENTED]
     assert [t.data for t in listener.found] == [STRING, STRING]
 
 
@@ -73,7 +80,7 @@ def test_a_block_transfer_is_one_value(listener: Listener, crc: bool) -> None:
     ) as stream:
         assert stream.read() == BLOB
     listener.bench.network.run_for(5_000)
-    assert [t.mode for t in listener.found] == [Mode.BLOCK, Mode.BLOCK]
+    assert [t.mode for t in listener.found] == [TransferMode.BLOCK, TransferMode.BLOCK]
     assert [t.data for t in listener.found] == [BLOB, BLOB]
     assert [t.flaws for t in listener.found] == [(), ()]
 
@@ -88,7 +95,11 @@ def test_a_block_transfer_over_a_bad_line_is_one_value_with_segments_sent_again(
     listener.bench.wire.faults.clear("drop")
     listener.bench.network.run_for(5_000)
     found = listener.found[-1]
-    assert (found.mode, found.data, found.outcome) == (Mode.BLOCK, BLOB, Outcome.DONE)
+    assert (found.mode, found.data, found.outcome) == (
+        TransferMode.BLOCK,
+        BLOB,
+        TransferOutcome.DONE,
+    )
     assert found.retries > 0
 
 
@@ -105,28 +116,34 @@ def test_a_refusal_carries_its_abort_code(listener: Listener) -> None:
     with pytest.raises(SdoAbortedError):
         listener.node.sdo.upload(0x5000, 0)
     (found,) = listener.found
-    assert (found.outcome, found.abort_code) == (Outcome.ABORTED, 0x0602_0000)
+    assert (found.outcome, found.abort_code) == (TransferOutcome.ABORTED, 0x0602_0000)
     assert not found.by_client
     assert "aborted by server: object does not exist (06020000h)" in str(found)
 
 
 def test_an_abort_of_the_client_is_told_as_such() -> None:
     (found,) = transfers("605#4000100000000000 605#8000100000000405")
-    assert (found.outcome, found.by_client) == (Outcome.ABORTED, True)
+    assert (found.outcome, found.by_client) == (TransferOutcome.ABORTED, True)
 
 
 @pytest.mark.parametrize(
     ("begun", "mode"),
     [
-        ("605#2B171000C8000000", Mode.EXPEDITED),
-        ("605#2117100014000000 585#6017100000000000 605#0001020304050607", Mode.SEGMENTED),
-        ("605#C217100014000000 585#A01710000A000000 605#0101020304050607", Mode.BLOCK),
+        ("605#2B171000C8000000", TransferMode.EXPEDITED),
+        ("605#2117100014000000 585#6017100000000000 605#0001020304050607", TransferMode.SEGMENTED),
+        ("605#C217100014000000 585#A01710000A000000 605#0101020304050607", TransferMode.BLOCK),
     ],
 )
-def test_an_abort_that_names_no_object_ends_the_transfer_that_runs(begun: str, mode: Mode) -> None:
+def test_an_abort_that_names_no_object_ends_the_transfer_that_runs(
+    begun: str, mode: TransferMode
+) -> None:
     (found,) = transfers(f"{begun} 605#8000000000000405")
-    assert (found.direction, found.entry, found.mode) == (Direction.DOWNLOAD, (0x1017, 0), mode)
-    assert (found.outcome, found.by_client, found.partial) == (Outcome.ABORTED, True, False)
+    assert (found.direction, found.entry, found.mode) == (
+        TransferDirection.DOWNLOAD,
+        (0x1017, 0),
+        mode,
+    )
+    assert (found.outcome, found.by_client, found.partial) == (TransferOutcome.ABORTED, True, False)
     assert last(f"{begun} 605#8000000000000405").entry == (0x1017, 0)
 
 
@@ -136,7 +153,7 @@ def test_a_time_out_of_the_canopen_library_ends_its_transfer(listener: Listener)
         silent.sdo.download(0x2002, 0, bytes(4))
     listener.bench.network.run_for(1_000)
     (found,) = listener.found
-    assert (found.direction, found.entry) == (Direction.DOWNLOAD, (0x2002, 0))
+    assert (found.direction, found.entry) == (TransferDirection.DOWNLOAD, (0x2002, 0))
     assert "aborted by client: SDO protocol timed out" in str(found)
 
 
@@ -148,9 +165,13 @@ def test_an_abort_of_nothing_that_was_heard_is_of_an_unknown_object() -> None:
 
 def test_an_abort_of_another_object_leaves_the_transfer_that_runs() -> None:
     other, done = transfers("605#4000100000000000 585#8001100000000206 585#4300100092010200")
-    assert (other.entry, other.outcome, other.partial) == ((0x1001, 0), Outcome.ABORTED, True)
+    assert (other.entry, other.outcome, other.partial) == (
+        (0x1001, 0),
+        TransferOutcome.ABORTED,
+        True,
+    )
     assert str(other).startswith("transfer of 1001h:00 ")
-    assert (done.entry, done.outcome, done.partial) == ((0x1000, 0), Outcome.DONE, False)
+    assert (done.entry, done.outcome, done.partial) == ((0x1000, 0), TransferOutcome.DONE, False)
 
 
 def test_a_request_that_is_sent_again_is_one_transfer() -> None:
@@ -162,15 +183,15 @@ def test_a_request_that_is_sent_again_is_one_transfer() -> None:
 
 def test_a_request_without_answer_is_unanswered_when_the_next_one_comes() -> None:
     unanswered, done = transfers("605#4000100000000000 605#4001100000000000 585#4F01100000000000")
-    assert (unanswered.outcome, unanswered.entry) == (Outcome.UNANSWERED, (0x1000, 0))
-    assert done.outcome is Outcome.DONE
+    assert (unanswered.outcome, unanswered.entry) == (TransferOutcome.UNANSWERED, (0x1000, 0))
+    assert done.outcome is TransferOutcome.DONE
 
 
 def test_a_transfer_that_runs_at_the_end_is_pending() -> None:
     decoder = Decoder()
     decoder.take(Record(1_000, "can0", CanFrame.parse("605#4000100000000000")))
     (pending,) = decoder.pending(501_000)
-    assert (pending.outcome, pending.duration_us) == (Outcome.UNANSWERED, 500_000)
+    assert (pending.outcome, pending.duration_us) == (TransferOutcome.UNANSWERED, 500_000)
     assert pending.name == "device_type"
 
 
@@ -178,7 +199,7 @@ def test_a_transfer_that_the_client_leaves_is_broken_off() -> None:
     broken, _ = transfers(
         "605#4008100000000000 585#410810000F000000 605#4001100000000000 585#4F01100000000000"
     )
-    assert broken.outcome is Outcome.BROKEN
+    assert broken.outcome is TransferOutcome.BROKEN
 
 
 def test_an_answer_whose_request_was_not_heard_still_has_its_value() -> None:
@@ -190,7 +211,7 @@ def test_a_late_answer_leaves_the_next_transfer_alone() -> None:
     asked, late, done = transfers(
         "605#4000100000000000 605#4001100000000000 585#4300100092010200 585#4F01100007000000"
     )
-    assert asked.outcome is Outcome.UNANSWERED
+    assert asked.outcome is TransferOutcome.UNANSWERED
     assert (late.partial, late.entry) == (True, (0x1000, 0))
     assert (done.partial, done.entry, done.value) == (False, (0x1001, 0), 7)
 
@@ -236,7 +257,7 @@ def test_a_size_that_does_not_fit_is_a_flaw() -> None:
     (found,) = transfers(
         "605#4007200000000000 585#4107200009000000 605#6000000000000000 585#0B73000000000000"
     )
-    assert (found.outcome, found.flaws) == (Outcome.DONE, ("size 9 was said",))
+    assert (found.outcome, found.flaws) == (TransferOutcome.DONE, ("size 9 was said",))
 
 
 def test_blocks_without_beginning_end_in_no_transfer() -> None:
@@ -247,7 +268,7 @@ def test_blocks_without_beginning_end_in_no_transfer() -> None:
 
 def test_a_block_upload_may_be_switched_to_a_short_one() -> None:
     (found,) = transfers("605#A40010007F040000 585#4300100092010200")
-    assert (found.mode, found.value) == (Mode.EXPEDITED, 0x0002_0192)
+    assert (found.mode, found.value) == (TransferMode.EXPEDITED, 0x0002_0192)
 
 
 def test_a_wrong_crc_is_a_flaw() -> None:

@@ -5,8 +5,8 @@ import pytest
 from tests.host.canmon.model.decode.traces import decode, last
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can_error import BIT_ERROR, NO_ACK, ErrorFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import BIT_ERROR, NO_ACK, ErrorFrame
 
 
 @pytest.mark.parametrize(

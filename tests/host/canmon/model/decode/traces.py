@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.decode.sdo.transfer import Transfer
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 
 STEP_US = 1_000

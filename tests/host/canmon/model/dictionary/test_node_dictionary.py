@@ -8,7 +8,7 @@ import pytest
 from tests.host.canmon.model.record_log import hear
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
-from tickrig.host.canmon.model.dictionary.node_dictionary import (
+from tickrig.host.canmon.model.node_dictionary import (
     NodeDictionary,
     ObjectRow,
     Origin,

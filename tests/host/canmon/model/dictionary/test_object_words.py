@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canmon.model.decode.object_text import ObjectText
-from tickrig.host.canmon.model.dictionary.node_dictionary import encode_value
+from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.wire.canopen.datatypes import DataType
 
 

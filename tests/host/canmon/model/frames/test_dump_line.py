@@ -5,8 +5,7 @@ import time
 import pytest
 
 from tests.host.canmon.model.logs.test_log_lines import read
-from tickrig.host.canmon.model.frames.dump_line import DumpLines, Stamp
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp
 from tickrig.wire.can import CanFrame
 
 

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.model.columns.column_reader import read_columns
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.graph.collector import Collector
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.graph.series import Collector
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import NO_ACK
+from tickrig.wire.can import NO_ACK, CanFrame
 
 DBC = GOLDEN / "engine.dbc"
 EPOS = Path(__file__).parents[5] / "examples/eds/epos.eds"

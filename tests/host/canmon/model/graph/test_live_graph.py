@@ -5,7 +5,7 @@ import re
 import pytest
 
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
 from tickrig.wire.can import CanFrame

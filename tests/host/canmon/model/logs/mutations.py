@@ -18,19 +18,15 @@ from tickrig.host.canmon.model.check.rules import Rules
 from tickrig.host.canmon.model.columns.column_reader import read_columns
 from tickrig.host.canmon.model.columns.columns import Columns, NoColumnsError
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.frames.dump_line import DumpLines, Stamp
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.frames import AnyFrame, DumpLines, Record, Stamp
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.traffic.bit_rates import BitRates
-from tickrig.host.canmon.model.traffic.traffic import Traffic
-from tickrig.host.canmon.model.views.statistics import by_id, by_node
-from tickrig.host.canmon.model.views.trace import Trace
-from tickrig.host.canmon.output.printer import Output, printer_of
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FD_LENGTHS, FdFrame
+from tickrig.host.canmon.model.statistics import by_id, by_node
+from tickrig.host.canmon.model.trace import FrameTrace
+from tickrig.host.canmon.model.traffic import BitRates, Traffic
+from tickrig.host.canmon.output.printer import DumpFormat, printer_of
+from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
 
 NAMES: Final = (
     *("run.log", "run.jsonl", "run.csv", "run.asc", "run.trc", "run.blf", "run.pcapng"),
@@ -159,9 +155,9 @@ def read(path: Path) -> tuple[list[Record], str]:
 
 def show(records: list[Record]) -> None:
     """Do with frames what verbs do."""
-    traffic, trace, decoder = Traffic(BitRates(500_000, 2_000_000)), Trace(), Decoder()
+    traffic, trace, decoder = Traffic(BitRates(500_000, 2_000_000)), FrameTrace(), Decoder()
     checker = Checker(Rules(no_emcy=True, no_sdo_abort=True, max_load=50.0), 500_000)
-    printers = [printer_of(output, Stamp.DATE, True, raw=False) for output in Output]
+    printers = [printer_of(output, Stamp.DATE, True, raw=False) for output in DumpFormat]
     for record in records:
         decoded = decoder.take(record)
         traffic.take(record)

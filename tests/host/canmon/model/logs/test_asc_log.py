@@ -10,7 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_reader import read_log
 
 DATE = "date Fri Jul 10 06:17:32.249 AM 2015\n"

@@ -15,13 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canmon.model.logs.test_log_lines import FRAMES
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, log_format
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
 from tickrig.host.canmon.model.logs.notation import parse_frame
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 START_US = 1_436_509_052_249_713
 ASAMMDF = find_spec("asammdf") is not None

@@ -10,17 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canmon.model.logs.test_log_lines import FRAMES
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.can_record import to_record
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.can_log import to_record
 from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
 from tickrig.host.canmon.model.logs.log_writer import log_line, write_log
-from tickrig.host.canmon.model.logs.mark import dropped
+from tickrig.host.canmon.model.logs.mark import LogTally, dropped
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER
-from tickrig.host.canmon.model.logs.tally import Tally
 from tickrig.host.canmon.output.printer import csv_printer
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FdFrame
+from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 
 HEARDS = st.lists(
     st.builds(Record, st.integers(0, 4 * 10**15), st.just("can0"), FRAMES, st.booleans())
@@ -35,9 +32,9 @@ def test_csv_holds_a_bus_with_who_sent_and_python_can_reads_it(records: list[Rec
             writer.write(record)
         writer.close()
         reader = read_log(path)
-        assert (list(reader), reader.tally) == (records, Tally())
+        assert (list(reader), reader.tally) == (records, LogTally())
         with can.CSVReader(path) as foreign:
-            theirs = [to_record(message, "can0", Tally()) for message in foreign]
+            theirs = [to_record(message, "can0", LogTally()) for message in foreign]
     assert len(theirs) == len(records)
     for their, ours in zip(theirs, records, strict=True):
         if not isinstance(ours.frame, FdFrame):  # which python-can's rows do not tell
@@ -49,7 +46,7 @@ def test_what_dump_prints_as_csv_is_read_again(records: list[Record]) -> None:
     rows = [DUMP_HEADER, *(csv_printer(record, None) for record in records)]
     lines = LogLines()
     assert lines.push("".join(f"{row}\n" for row in rows).encode()) == records
-    assert lines.tally == Tally()
+    assert lines.tally == LogTally()
 
 
 def test_buses_that_become_one_are_said(tmp_path: Path) -> None:
@@ -63,7 +60,7 @@ def test_buses_that_become_one_are_said(tmp_path: Path) -> None:
 def test_lines_of_a_serial_port_are_counted() -> None:
     lines = LogLines()
     assert not lines.push(b'1.500000,ttyS0,,rx,2,5341,rrc,,"SA, 64"\n')
-    assert lines.tally == Tally(passed_over=lines.tally.passed_over)
+    assert lines.tally == LogTally(passed_over=lines.tally.passed_over)
     assert lines.tally.passed_over == {"lines of a serial port": 1}
 
 
@@ -97,7 +94,7 @@ Time Stamp,ID,Extended,Bus,LEN,D1,D2,D3,D4,D5,D6,D7,D8
 """
 
 
-def read_csv(folder: Path, text: str, name: str = "run.csv") -> tuple[list[str], Tally]:
+def read_csv(folder: Path, text: str, name: str = "run.csv") -> tuple[list[str], LogTally]:
     (folder / name).write_text(text, "ascii")
     reader = read_log(folder / name)
     return [log_line(record) for record in reader], reader.tally

@@ -9,13 +9,12 @@ from pathlib import Path
 import can
 import pytest
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.logs.can_record import to_can
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs.can_log import to_can
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.links.can_message import to_fd_frame, to_frame
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_fd import FD_LENGTHS, FdFrame
+from tickrig.host.links.can_link import to_fd_frame, to_frame
+from tickrig.wire.can import FD_LENGTHS, CanFrame, FdFrame
 
 START_US = 1_700_000_000_000_000
 READERS: dict[str, Callable[[Path], can.io.generic.MessageReader]] = {

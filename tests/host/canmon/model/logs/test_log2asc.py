@@ -9,12 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.frames import AnyFrame, Record
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FD_LENGTHS, FdFrame
+from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
 
 BUS_ERROR = ErrorFrame(0x80)
 START_US = 1_500_000_000_000_000

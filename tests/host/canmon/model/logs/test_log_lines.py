@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_reader import (
     LONGEST,
     LogLines,
@@ -12,11 +12,9 @@ from tickrig.host.canmon.model.logs.log_reader import (
     parse_log_line,
 )
 from tickrig.host.canmon.model.logs.log_writer import log_line
+from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.model.logs.notation import json_line
-from tickrig.host.canmon.model.logs.tally import Tally
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FD_LENGTHS, FdFrame
+from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
 
 NO, YES = st.just(False), st.just(True)
 DATA = st.binary(max_size=8)
@@ -40,8 +38,8 @@ HEARDS = st.builds(
 )
 
 
-def read(line: str) -> tuple[Record | None, Tally]:
-    tally = Tally()
+def read(line: str) -> tuple[Record | None, LogTally]:
+    tally = LogTally()
     return parse_log_line(line, 1, tally), tally
 
 
@@ -51,7 +49,7 @@ def test_what_is_written_is_read_again(records: list[Record], as_json: bool) -> 
     lines = LogLines()
     text = "".join(f"{write(record)}\n" for record in records)
     assert lines.push(text.encode()) == records
-    assert lines.tally == Tally()
+    assert lines.tally == LogTally()
 
 
 @given(st.lists(st.binary(max_size=40)))
@@ -82,12 +80,12 @@ def test_noise_in_pieces_is_counted_as_in_one(pieces: list[bytes]) -> None:
 def test_lines_of_other_programs_are_read(line: str, at_us: int, frame: str) -> None:
     record, tally = read(line)
     assert record is not None
-    assert (record.at_us, str(record.frame), tally) == (at_us, frame, Tally())
+    assert (record.at_us, str(record.frame), tally) == (at_us, frame, LogTally())
 
 
 @pytest.mark.parametrize("line", ["", "  ", "# made by hand", "; note", "// note", "\r"])
 def test_empty_lines_and_comments_are_no_fault(line: str) -> None:
-    assert read(line) == (None, Tally())
+    assert read(line) == (None, LogTally())
 
 
 def test_frames_of_can_xl_are_passed_over_and_counted() -> None:
@@ -135,7 +133,7 @@ def test_the_first_bad_lines_are_kept_and_all_are_counted() -> None:
 
 
 def test_an_unknown_event_in_json_is_no_fault() -> None:
-    assert read('{"v":1,"ev":"hello"}') == (None, Tally())
+    assert read('{"v":1,"ev":"hello"}') == (None, LogTally())
 
 
 def test_a_text_without_a_line_end_is_held_only_up_to_a_limit() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import can
 import pytest
 
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.logs.log_writer import LogWriter, in_blocks, write_log

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.columns.test_column_reader import rows_by_line, rows_of
 from tests.host.canmon.model.logs.test_log_lines import FRAMES
 from tickrig.host.canmon.model.columns.column_reader import read_columns
-from tickrig.host.canmon.model.frames.dump_line import DumpLines, Stamp
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.frames import AnyFrame, DumpLines, Record, Stamp
 from tickrig.host.canmon.model.logs.log_reader import LogLines, parse_log_line, read_log
-from tickrig.host.canmon.model.logs.tally import Tally
+from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.verbs.info import read_head
 
 CANDUMP = """\
@@ -39,13 +38,13 @@ READ = [
 GAPS = st.lists(st.tuples(st.integers(0, 5_000_000), FRAMES, st.booleans()), min_size=1, max_size=9)
 
 
-def read(text: str) -> tuple[list[Record], Tally]:
+def read(text: str) -> tuple[list[Record], LogTally]:
     lines = LogLines()
     return lines.push(text.encode()) + lines.finish(), lines.tally
 
 
 def records(text: list[str]) -> list[Record]:
-    found = [parse_log_line(line, 1, Tally()) for line in text]
+    found = [parse_log_line(line, 1, LogTally()) for line in text]
     return [record for record in found if record]
 
 

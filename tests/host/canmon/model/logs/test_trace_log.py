@@ -8,12 +8,11 @@ import pytest
 
 from tests.emulators.record.test_bench_replay import Bench
 from tests.mutated import mutated
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import NO_ACK
+from tickrig.wire.can import NO_ACK, CanFrame
 
 
 def record(at_us: int, channel: str, text: str, *, sent: bool = False) -> Record:

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.mark import Mark
-from tickrig.host.canmon.model.recorder.plan import Plan
+from tickrig.host.canmon.model.recorder.plan import RecordingPlan
 from tickrig.host.canmon.model.recorder.recorder import Recorder
 from tickrig.wire.can import CanFrame
 
@@ -42,17 +42,17 @@ def feed(
         recorder.take([(one, decoder.take(one)) for one in some], lost, now_us, marks)
 
 
-def parts(plan: Plan) -> list[Path]:
+def parts(plan: RecordingPlan) -> list[Path]:
     return sorted(path for path in plan.path.parent.iterdir() if plan.number(path.name))
 
 
-def frames_of(plan: Plan) -> list[int]:
+def frames_of(plan: RecordingPlan) -> list[int]:
     return [number for path in parts(plan) for number in numbers(read_log(path))]
 
 
-def index_of(plan: Plan) -> list[dict[str, Any]]:
+def index_of(plan: RecordingPlan) -> list[dict[str, Any]]:
     return [json.loads(line) for line in plan.index.read_text("utf-8").splitlines()]
 
 
-def events(plan: Plan, event: str) -> list[dict[str, Any]]:
+def events(plan: RecordingPlan, event: str) -> list[dict[str, Any]]:
     return [said for said in index_of(plan) if said["ev"] == event]

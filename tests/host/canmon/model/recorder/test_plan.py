@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from tickrig.host.canmon.model.recorder.plan import AtLimit, Span, read_plan
+from tickrig.host.canmon.model.recorder.plan import AtLimit, TriggerSpan, read_plan
 
 RUN = Path("run.log")
 
@@ -50,8 +50,11 @@ def test_a_file_is_no_larger_than_a_quarter_of_the_disk_space() -> None:
 
 
 def test_a_recording_that_waits_keeps_5_s() -> None:
-    assert read_plan(RUN, waits=True).around == (Span(None, 5_000_000), Span(None, 5_000_000))
-    assert read_plan(RUN, pre="0").around == (Span(0, None), Span(None, 5_000_000))
+    assert read_plan(RUN, waits=True).around == (
+        TriggerSpan(None, 5_000_000),
+        TriggerSpan(None, 5_000_000),
+    )
+    assert read_plan(RUN, pre="0").around == (TriggerSpan(0, None), TriggerSpan(None, 5_000_000))
     assert read_plan(RUN).around is None
 
 

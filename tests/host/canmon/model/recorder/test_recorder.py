@@ -25,8 +25,8 @@ from tests.host.canmon.model.recorder.bench import (
 )
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.mark import back, gone
-from tickrig.host.canmon.model.recorder.plan import Plan, read_plan
-from tickrig.host.canmon.model.recorder.recorder import Recorder, State
+from tickrig.host.canmon.model.recorder.plan import RecordingPlan, read_plan
+from tickrig.host.canmon.model.recorder.recorder import Recorder, RecorderState
 
 FORMATS = [
     "run.pcapng",
@@ -41,13 +41,13 @@ FORMATS = [
 
 
 def test_one_file_has_no_index(tmp_path: Path) -> None:
-    recorder = Recorder(Plan(path=tmp_path / "run.log"))
+    recorder = Recorder(RecordingPlan(path=tmp_path / "run.log"))
     feed(recorder, [record(number) for number in range(300)])
     recorder.close()
     recorder.close()
     assert [path.name for path in tmp_path.iterdir()] == ["run.log"]
     assert numbers(read_log(tmp_path / "run.log")) == list(range(300))
-    assert (recorder.messages(), recorder.state) == ([], State.ENDED)
+    assert (recorder.messages(), recorder.state) == ([], RecorderState.ENDED)
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -110,7 +110,7 @@ def test_a_recording_ends_where_that_is_wanted_at_the_limit(tmp_path: Path) -> N
     plan = read_plan(tmp_path / "run.log", disk="1M", at_limit="end")
     recorder = Recorder(plan)
     feed(recorder, [record(number) for number in range(60_000)])
-    assert (recorder.state, recorder.failed) == (State.ENDED, "")
+    assert (recorder.state, recorder.failed) == (RecorderState.ENDED, "")
     recorder.close()
     kept = frames_of(plan)
     assert kept == list(range(len(kept)))
@@ -188,7 +188,7 @@ def test_an_empty_file_that_was_not_ended_is_told(tmp_path: Path) -> None:
     assert recorder.messages()[0].endswith(": 0 frames can be read; what came behind is missing")
 
 
-def _sound(plan: Plan) -> list[dict[str, Any]]:
+def _sound(plan: RecordingPlan) -> list[dict[str, Any]]:
     lines = plan.index.read_text("utf-8").splitlines()
     return [json.loads(line) for line in lines if line.endswith("}")]
 
@@ -238,7 +238,7 @@ def test_after_an_error_what_is_whole_stays_and_the_rest_is_counted(tmp_path: Pa
     assert recorder.failed == f"{plan.part(1)}: File too large"
     feed(recorder, [record(1_100)])
     recorder.close()
-    assert (recorder.state, recorder.frames, recorder.missing) == (State.FAILED, 1_000, 101)
+    assert (recorder.state, recorder.frames, recorder.missing) == (RecorderState.FAILED, 1_000, 101)
     assert numbers(reader := read_log(plan.part(1))) == list(range(1_000))
     assert reader.tally.unread == 0
     assert recorder.messages() == [

@@ -18,19 +18,23 @@ from tests.host.canmon.model.recorder.bench import (
 from tickrig.host.canmon.model.check.alarms import Alarms
 from tickrig.host.canmon.model.check.rules import parse_rules
 from tickrig.host.canmon.model.decode.filter import parse_filter
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.mark import gone
-from tickrig.host.canmon.model.recorder.plan import MAX_PRE_FRAMES, Plan, Span, read_plan
-from tickrig.host.canmon.model.recorder.recorder import Recorder, State
-from tickrig.host.canmon.model.recorder.ring import PreTrigger
+from tickrig.host.canmon.model.recorder.plan import (
+    MAX_PRE_FRAMES,
+    RecordingPlan,
+    TriggerSpan,
+    read_plan,
+)
+from tickrig.host.canmon.model.recorder.recorder import PreTrigger, Recorder, RecorderState
 from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, RuleTrigger, Trigger
 from tickrig.wire.can import CanFrame
 
 EMCY = 0x085
 
 
-def plan_of(folder: Path, pre: str, post: str, **more: object) -> Plan:
+def plan_of(folder: Path, pre: str, post: str, **more: object) -> RecordingPlan:
     return read_plan(folder / "run.log", pre=pre, post=post, waits=True, **more)  # type: ignore[arg-type]
 
 
@@ -38,7 +42,7 @@ def trigger(text: str) -> FilterTrigger:
     return FilterTrigger(text, parse_filter(text))
 
 
-def state(recorder: Recorder) -> State:
+def state(recorder: Recorder) -> RecorderState:
     return recorder.state
 
 
@@ -46,7 +50,9 @@ def traffic(count: int, *emcys: int) -> list[Record]:
     return [record(number, EMCY if number in emcys else 0x181) for number in range(count)]
 
 
-def recorded(plan: Plan, records: list[Record], *triggers: Trigger, batch: int = 100) -> Recorder:
+def recorded(
+    plan: RecordingPlan, records: list[Record], *triggers: Trigger, batch: int = 100
+) -> Recorder:
     recorder = Recorder(plan, 0, triggers)
     feed(recorder, records, batch=batch)
     recorder.close()
@@ -101,12 +107,12 @@ def test_nothing_before_and_nothing_behind_is_the_frame_alone(tmp_path: Path) ->
 def test_a_key_is_a_trigger_too(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, "5", "5")
     recorder = Recorder(plan)
-    assert state(recorder) is State.WAITING
+    assert state(recorder) is RecorderState.WAITING
     feed(recorder, traffic(100))
     recorder.trigger("key", 99 * GAP_US)
-    assert state(recorder) is State.RECORDING
+    assert state(recorder) is RecorderState.RECORDING
     feed(recorder, [record(number) for number in range(100, 200)])
-    assert state(recorder) is State.WAITING
+    assert state(recorder) is RecorderState.WAITING
     recorder.close()
     assert frames_of(plan) == list(range(94, 105))
     assert "# trigger: key" in parts(plan)[0].read_text().splitlines()
@@ -117,9 +123,9 @@ def test_time_alone_ends_what_comes_behind_a_trigger(tmp_path: Path) -> None:
     recorder = Recorder(plan)
     recorder.trigger("key", 1_000_000)
     recorder.take([], 0, 2_500_000)
-    assert state(recorder) is State.RECORDING  # a frame may be late
+    assert state(recorder) is RecorderState.RECORDING  # a frame may be late
     recorder.take([], 0, 3_000_001)
-    assert state(recorder) is State.WAITING
+    assert state(recorder) is RecorderState.WAITING
     recorder.close()
 
 
@@ -158,7 +164,7 @@ def test_a_trigger_sees_frames_that_are_not_recorded(tmp_path: Path) -> None:
 
 
 def test_only_what_is_wanted_is_recorded(tmp_path: Path) -> None:
-    recorder = Recorder(Plan(path=tmp_path / "run.log"), 0, [], trigger("emcy"))
+    recorder = Recorder(RecordingPlan(path=tmp_path / "run.log"), 0, [], trigger("emcy"))
     feed(recorder, traffic(100, 50, 60))
     recorder.close()
     assert numbers(read_log(tmp_path / "run.log")) == [50, 60]
@@ -182,7 +188,7 @@ def test_a_signal_that_never_came_is_told(tmp_path: Path) -> None:
 
 
 def test_a_long_time_before_a_trigger_is_cut_where_too_many_frames_come() -> None:
-    before = PreTrigger(Span(None, 3_600_000_000))
+    before = PreTrigger(TriggerSpan(None, 3_600_000_000))
     for number in range(MAX_PRE_FRAMES + 2):
         before.add(record(number))
     assert before.short

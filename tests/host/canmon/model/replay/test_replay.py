@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.replay.replay_plan import Lateness, ReplayPlan
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import NO_ACK
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.verbs.play import Lateness, ReplayPlan
+from tickrig.wire.can import NO_ACK, CanFrame
 
 SYNC = CanFrame(0x080)
 LOG = [Record(5_000_000 + n * 10_000, "can0", CanFrame(0x100 + n)) for n in range(5)]

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.canmon.model.sequence.sequence_run import outline, parse_pattern
-from tickrig.host.canmon.model.sequence.variables import evaluate, fill_in, parse_variable
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.sequence import TomlSequence, outline, parse_lines, parse_pattern
+from tickrig.host.canmon.model.sequence_variables import evaluate, fill_in, parse_variable
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import CanFrame
 

@@ -9,8 +9,7 @@ from typing import Any
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.canmon.model.sequence.sequence_run import SequenceRun, outline
+from tickrig.host.canmon.model.sequence import SequenceRun, TomlSequence, outline, parse_lines
 from tickrig.host.text.steps import StepError
 
 WORDS = ["080#", "{id}", "705#{id:9}", "stop", "go-on", "forever", "10ms", "0s", "", "5.rpdo1 a=1"]

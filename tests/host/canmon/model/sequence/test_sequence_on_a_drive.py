@@ -8,11 +8,10 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence
-from tickrig.host.canmon.model.sequence.sequence_run import EventType, SequenceRun
-from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
-from tickrig.host.canmon.verbs.seq import Watch
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.sequence import EventType, SequenceRun, TomlSequence
+from tickrig.host.canmon.model.transmit import PdoFrames
+from tickrig.host.canmon.verbs.seq import ConditionDecoder
 from tickrig.wire.can import Frames
 
 EXAMPLES = Path(__file__).parents[5] / "examples"
@@ -25,7 +24,7 @@ def carried_out(text: str) -> tuple[SequenceRun, epos.Epos]:
     slave = epos.make_epos(5)
     drive = epos.Epos.of(slave)
     host = CanHost(Rig(Station(slave, wire.end())), wire.end())
-    watch = Watch({5: read_eds_objects(EXAMPLES / "eds/epos.eds", 5)})
+    watch = ConditionDecoder({5: read_eds_objects(EXAMPLES / "eds/epos.eds", 5)})
     resolve = PdoFrames(watch.eds).frame
     sequence = TomlSequence(text, START.name, resolve=resolve, condition=watch.condition).parse()
     run = SequenceRun(sequence)

@@ -3,9 +3,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence, parse_lines
-from tickrig.host.canmon.model.sequence.sequence_run import EventType, SequenceRun
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.sequence import EventType, SequenceRun, TomlSequence, parse_lines
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 

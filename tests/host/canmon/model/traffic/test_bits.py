@@ -5,7 +5,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.traffic.tally import BitMemory
+from tickrig.host.canmon.model.traffic import BitMemory
 
 PAYLOADS = st.lists(st.integers(0, (1 << 64) - 1), min_size=1)
 

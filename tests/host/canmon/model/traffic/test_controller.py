@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canmon.model.traffic.controller import ErrorStatistics
-from tickrig.wire.can_error import ErrorFrame, ErrorState
+from tickrig.host.canmon.model.traffic import ErrorStatistics
+from tickrig.wire.can import ErrorFrame, ErrorState
 
 
 def controller(*frames: str) -> ErrorStatistics:

@@ -6,14 +6,11 @@ import json
 
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.rules import Rules
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.traffic.bit_rates import BitRates
-from tickrig.host.canmon.model.traffic.traffic import Traffic
-from tickrig.host.canmon.model.views.statistics import bus_json, bus_lines, id_json
-from tickrig.host.canmon.model.views.top_model import TopModel
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import frame_bits
-from tickrig.wire.can_fd import BRS, FdFrame, fd_bits
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.statistics import bus_json, bus_lines, id_json
+from tickrig.host.canmon.model.top_model import TopModel
+from tickrig.host.canmon.model.traffic import BitRates, Traffic
+from tickrig.wire.can import BRS, CanFrame, FdFrame, fd_bits, frame_bits
 
 WIDE = FdFrame(0x123, bytes(63) + b"\x80", flags=BRS)
 SLOW = FdFrame(0x123, bytes(8))

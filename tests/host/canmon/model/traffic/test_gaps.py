@@ -3,7 +3,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.traffic.gaps import GapRow, Gaps, bucket_of, bucket_range, quantile
+from tickrig.host.canmon.model.traffic import GapRow, Gaps, bucket_of, bucket_range, quantile
 
 TIMES = st.integers(0, 1 << 52)
 

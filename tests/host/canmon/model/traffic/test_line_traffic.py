@@ -1,9 +1,8 @@
 from __future__ import annotations
 
-from tickrig.host.canmon.model.decode.serial.rrc_lines import RrcLines
-from tickrig.host.canmon.model.frames.record import LineRecord, Record
-from tickrig.host.canmon.model.traffic.line_traffic import LineTraffic, line_table
-from tickrig.host.canmon.model.views.top_model import TopModel
+from tickrig.host.canmon.model.frames import LineRecord, Record
+from tickrig.host.canmon.model.top_model import LineTraffic, TopModel, line_table
+from tickrig.host.canmon.sources.line_source import RrcLines
 from tickrig.wire.can import CanFrame
 
 TALK = (

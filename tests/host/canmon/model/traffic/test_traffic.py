@@ -3,10 +3,9 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.model.record_log import hear, snapshot
-from tickrig.host.canmon.model.frames.ident import EXTENDED, REMOTE, ident_text, parse_ident
-from tickrig.host.canmon.model.traffic.traffic import Snapshot, Traffic
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_bits import frame_bits
+from tickrig.host.canmon.model.frames import EXTENDED, REMOTE, ident_text, parse_ident
+from tickrig.host.canmon.model.traffic import Traffic, TrafficSnapshot
+from tickrig.wire.can import CanFrame, frame_bits
 
 
 def test_an_identifier_has_a_row_with_its_latest_frame() -> None:
@@ -89,4 +88,4 @@ def test_a_notch_is_for_all_rows() -> None:
 
 
 def test_without_frames_a_snapshot_is_empty() -> None:
-    assert Traffic().snapshot() == Snapshot()
+    assert Traffic().snapshot() == TrafficSnapshot()

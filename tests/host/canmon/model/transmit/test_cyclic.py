@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.transmit.frame_fields import FrameFields, parse_counter
-from tickrig.host.canmon.model.transmit.transmit_list import TransmitRow
+from tickrig.host.canmon.model.transmit import FrameFields, TransmitRow, parse_counter
 from tickrig.wire.can import CanFrame
 from tickrig.wire.instant import NEVER
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.canmon.model.transmit.frame_fields import (
+from tickrig.host.canmon.model.transmit import (
     ALGORITHMS,
     FrameFields,
     parse_checksum,

@@ -8,8 +8,8 @@ import pytest
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects, read_eds_objects
 from tickrig.host.canmon.model.decode.object_text import ObjectText
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.transmit import PdoFrames
 from tickrig.wire.canopen.datatypes import DataType
 
 EPOS = Path(__file__).parents[5] / "examples/eds/epos.eds"

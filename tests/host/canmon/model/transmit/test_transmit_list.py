@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canmon.model.transmit.frame_fields import FrameFields, parse_counter
-from tickrig.host.canmon.model.transmit.transmit_list import TransmitList, TransmitRow
+from tickrig.host.canmon.model.transmit import FrameFields, TransmitList, TransmitRow, parse_counter
 from tickrig.wire.can import CanFrame
 from tickrig.wire.instant import NEVER
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canmon.model.decode.node_memory import read_eds_objects
-from tickrig.host.canmon.model.transmit.pdo_frames import PdoFrames
-from tickrig.host.canmon.model.transmit.transmit_list import (
+from tickrig.host.canmon.model.transmit import (
+    PdoFrames,
     RowText,
     TransmitRow,
     parse_row_text,

@@ -2,17 +2,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.host.canmon.model.views.conform_frames import decoded_frames
-from tickrig.host.canopen.conform.bus.evidence import FIRST_LINES, LAST_LINES, Evidence
-from tickrig.host.canopen.conform.verdict import Direction, Line
+from tickrig.host.canmon.conform.report_files import decoded_frames
+from tickrig.host.canopen.conform.bus.exchange import FIRST_LINES, LAST_LINES, Evidence
+from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 
 EDS = Path("examples/io_module.eds")
 
 
-def lines(*frames: str) -> list[Line]:
+def lines(*frames: str) -> list[FrameLine]:
     """Return frames, those to the node and those from it in turn."""
     ways = (Direction.SENT, Direction.RECEIVED)
-    return [Line(1_000 * at, ways[at % 2], text) for at, text in enumerate(frames)]
+    return [FrameLine(1_000 * at, ways[at % 2], text) for at, text in enumerate(frames)]
 
 
 OPEN = lines("605#4008100000000000", "585#410810000A000000")
@@ -42,7 +42,7 @@ def test_values_of_a_check_are_none_of_the_next() -> None:
         *("605#2F001A0001000000", "585#60001A0000000000"),
         *("605#2300180185010000", "585#6000180100000000"),
     )
-    pdo = [Line(0, Direction.RECEIVED, "185#01")]
+    pdo = [FrameLine(0, Direction.RECEIVED, "185#01")]
     alone = decoded_frames({5: EDS})(pdo)
     show = decoded_frames({5: EDS})
     show(remapped)

@@ -3,12 +3,12 @@ from __future__ import annotations
 from tests.host.canmon.model.record_log import hear
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.filter import parse_filter
-from tickrig.host.canmon.model.views.trace import DisplayFilter, Trace
+from tickrig.host.canmon.model.trace import DisplayFilter, FrameTrace
 
 TEXT = "1 181#01\n2 705#7F\n3 181#02\n4 20000020#0000000000000000\n5 705#05"
 
 
-def feed(trace: Trace, text: str) -> None:
+def feed(trace: FrameTrace, text: str) -> None:
     decoder = Decoder()
     for record in hear(text):
         trace.take(record, decoder.take(record))
@@ -19,7 +19,7 @@ def latest(sieve: DisplayFilter) -> list[tuple[str, int]]:
 
 
 def test_without_a_filter_all_rows_pass() -> None:
-    trace = Trace()
+    trace = FrameTrace()
     feed(trace, TEXT)
     sieve = DisplayFilter(trace)
     assert sieve.passed is trace
@@ -28,7 +28,7 @@ def test_without_a_filter_all_rows_pass() -> None:
 
 
 def test_a_filter_counts_what_came_before_and_after_it() -> None:
-    trace = Trace()
+    trace = FrameTrace()
     feed(trace, TEXT)
     sieve = DisplayFilter(trace, parse_filter("heartbeat"))
     feed(trace, "6 705#04\n7 181#03")
@@ -39,13 +39,13 @@ def test_a_filter_counts_what_came_before_and_after_it() -> None:
 
 
 def test_rows_without_a_meaning_pass_no_filter() -> None:
-    trace = Trace()
+    trace = FrameTrace()
     trace.take(hear("1 181#01")[0])
     assert latest(DisplayFilter(trace, parse_filter("181"))) == []
 
 
 def test_a_copy_stays_as_it_is() -> None:
-    trace = Trace(capacity=3)
+    trace = FrameTrace(capacity=3)
     feed(trace, TEXT)
     held = trace.copy()
     feed(trace, "6 705#04")
@@ -53,7 +53,7 @@ def test_a_copy_stays_as_it_is() -> None:
 
 
 def test_a_cleared_sieve_begins_anew_with_its_trace() -> None:
-    trace = Trace()
+    trace = FrameTrace()
     feed(trace, TEXT)
     sieve = DisplayFilter(trace, parse_filter("181"))
     sieve.clear()

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.views.top_model import Order, TopModel
+from tickrig.host.canmon.model.top_model import RowOrder, TopModel
 
 
 def top(text: str) -> TopModel:
@@ -51,10 +51,10 @@ def test_n_hides_what_has_changed() -> None:
 def test_s_goes_round_the_orders() -> None:
     model = top("0 181#00")
     seen = []
-    for _ in range(len(Order) + 1):
+    for _ in range(len(RowOrder) + 1):
         seen.append(model.view.order)
         press(model, "s")
-    assert seen == [*Order, Order.ID]
+    assert seen == [*RowOrder, RowOrder.ID]
 
 
 def test_c_begins_anew() -> None:

@@ -4,11 +4,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.views.trace import Trace
+from tickrig.host.canmon.model.trace import FrameTrace
 
 
-def trace(text: str, capacity: int = 100) -> Trace:
-    found = Trace(capacity)
+def trace(text: str, capacity: int = 100) -> FrameTrace:
+    found = FrameTrace(capacity)
     for record in hear(text):
         found.take(record)
     return found

@@ -8,14 +8,14 @@ from tests.host.canmon.tui.panel_pilot import Desk, at_desk
 from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, shown, wire_session
 from tests.host.canmon.tui.rig_session import NODE, RigSession
 from tests.host.canmon.wire import new_wire
-from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
 from tickrig.host.canmon.tui.panels.nodes_panel import NodesPanel
-from tickrig.host.tui.line_view import LineView, line_text
+from tickrig.host.tui import LineView, line_text
 
 
 def test_nodes_and_their_emcys_are_shown() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("2")
         assert shown(monitor)[0].split()[:5] == ["5", "EPOS", "pre-operational", "->", "stopped"]
         card = [line_text(line) for line in monitor.shown.query_one("#card", LineView).lines]
@@ -29,7 +29,7 @@ def test_a_node_that_fell_silent_is_red() -> None:
     with new_wire() as wire:
         session = wire_session(wire)
 
-        async def act(monitor: Monitor, pilot: Any) -> None:
+        async def act(monitor: MonitorApp, pilot: Any) -> None:
             await pilot.press("2")
             hear(session, wire, "605#2B17100001000000", "585#6017100000000000", "705#05")
             while "LATE" not in "".join(shown(monitor)):  # 1.5 ms of the wall clock
@@ -148,7 +148,7 @@ def test_arrows_choose_a_node_and_enter_shows_its_objects() -> None:
     with new_wire() as wire:
         session = wire_session(wire)
 
-        async def act(monitor: Monitor, pilot: Any) -> None:
+        async def act(monitor: MonitorApp, pilot: Any) -> None:
             await pilot.press("1")
             hear(session, wire, "705#05", "708#05")
             monitor.refresh_view()
@@ -179,7 +179,7 @@ def test_where_there_is_no_node_or_no_objects_tab_enter_does_nothing() -> None:
 
 @pytest.mark.parametrize("width", [80, 120, 200])
 def test_titles_stand_over_their_columns(width: int) -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("2")
         row = shown(monitor)[0]
         head = str(monitor.shown.query_one("#head").render())

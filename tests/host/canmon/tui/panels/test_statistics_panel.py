@@ -7,14 +7,14 @@ import pytest
 
 from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, wire_session
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.tui.line_view import LineView, line_text
+from tickrig.host.tui import LineView, line_text
 
 
-def shown(monitor: Monitor) -> list[str]:
+def shown(monitor: MonitorApp) -> list[str]:
     """Return heads and rows as they are now."""
     monitor.refresh_view()
     views = monitor.shown.query(LineView)
@@ -28,7 +28,7 @@ def wire() -> Iterator[Wire]:
 
 
 def test_it_is_the_table_of_top_and_its_keys() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("3")
         await pilot.pause()  # now it has a size
         lines = shown(monitor)
@@ -52,7 +52,7 @@ def test_it_is_the_table_of_top_and_its_keys() -> None:
 def test_space_holds_it(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("3")
         await pilot.pause()  # now it has a size
         hear(session, wire, "181#01")
@@ -70,7 +70,7 @@ def test_space_holds_it(wire: Wire) -> None:
 
 
 def test_a_narrow_window_has_fewer_columns() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("3")
         await pilot.pause()  # now it has a size
         assert "jitter" in shown(monitor)[2]
@@ -91,7 +91,7 @@ def test_its_settings_come_back() -> None:
 
 
 def test_heads_stay_when_rows_are_scrolled() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("3")
         await pilot.pause()
         shown(monitor)

@@ -18,11 +18,11 @@ from tests.host.canmon.tui.pilot import (
 )
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.tui.app import Monitor
+from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
-from tickrig.host.tui.line_view import LineView
+from tickrig.host.tui import LineView
 
 
 @pytest.fixture
@@ -31,14 +31,14 @@ def wire() -> Iterator[Wire]:
         yield wire
 
 
-def panel_of(monitor: Monitor) -> TracePanel:
+def panel_of(monitor: MonitorApp) -> TracePanel:
     return monitor.query_one(TracePanel)
 
 
 def test_frames_are_shown_decoded_as_they_come(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, "705#7F", "185#0102")
         lines = shown(monitor)
         assert "705       [1] 7F" in lines[0]
@@ -51,7 +51,7 @@ def test_frames_are_shown_decoded_as_they_come(wire: Wire) -> None:
 def test_bytes_that_changed_have_a_colour(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, "185#0102", "185#0182")
         shown(monitor)
         line = panel_of(monitor).query_one(LineView).lines[1]
@@ -68,7 +68,7 @@ def test_bytes_that_changed_have_a_colour(wire: Wire) -> None:
 def test_the_latest_frame_is_in_view_until_somebody_scrolls_up(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, *(f"181#{n:02X}" for n in range(100)))
         assert "[1] 63" in shown(monitor)[-1]
         view = monitor.shown.query_one(LineView)
@@ -86,7 +86,7 @@ def test_the_latest_frame_is_in_view_until_somebody_scrolls_up(wire: Wire) -> No
 def test_space_holds_the_picture_and_frames_are_taken_meanwhile(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, "181#01")
         await pilot.press("space")
         hear(session, wire, "181#02")
@@ -99,7 +99,7 @@ def test_space_holds_the_picture_and_frames_are_taken_meanwhile(wire: Wire) -> N
 
 
 def test_o_shows_the_latest_frame_of_each_identifier_and_how_many_came() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("o")
         lines = shown(monitor)
         assert len(lines) == 14
@@ -112,7 +112,7 @@ def test_o_shows_the_latest_frame_of_each_identifier_and_how_many_came() -> None
 
 
 def test_a_filter_is_written_behind_a_slash() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("slash", *"emcy", "enter")
         assert [line.split()[2] for line in shown(monitor)] == ["085"]
         assert "[filter emcy]" in screen_text(monitor)
@@ -125,7 +125,7 @@ def test_a_filter_is_written_behind_a_slash() -> None:
 
 
 def test_keys_are_text_while_a_filter_is_written_and_escape_gives_it_up() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         before = shown(monitor)
         await pilot.press("slash", *"qA2 ", "escape")
         shown(monitor)
@@ -138,7 +138,7 @@ def test_keys_are_text_while_a_filter_is_written_and_escape_gives_it_up() -> Non
 
 
 def test_a_wrong_filter_is_told_with_its_column() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("slash", *"3 an", "enter")
         await pilot.pause()
         assert "column" in screen_text(monitor)
@@ -151,7 +151,7 @@ def test_a_wrong_filter_is_told_with_its_column() -> None:
 
 
 def test_d_hides_what_frames_mean() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         assert "sync" in "".join(shown(monitor))
         await pilot.press("d")
         assert "sync" not in "".join(shown(monitor))
@@ -160,7 +160,7 @@ def test_d_hides_what_frames_mean() -> None:
 
 
 def test_t_goes_round_the_times() -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         found = []
         for _ in range(4):
             found.append(shown(monitor)[-1].split()[0])
@@ -177,7 +177,7 @@ def test_t_goes_round_the_times() -> None:
 def test_c_begins_anew(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, "181#01", "182#01")
         await pilot.press("c")
         assert shown(monitor) == []
@@ -192,7 +192,7 @@ def test_c_begins_anew(wire: Wire) -> None:
 def test_a_hidden_trace_misses_nothing(wire: Wire) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.press("slash", *"181", "enter", "2")
         hear(session, wire, "181#01", "182#01", "181#02")
         await pilot.press("1", "o")
@@ -226,7 +226,7 @@ def test_a_wrong_setting_is_told(settings: dict[str, object], reason: str) -> No
     session.close()
 
 
-async def save_as(monitor: Monitor, pilot: Any, name: Path) -> None:
+async def save_as(monitor: MonitorApp, pilot: Any, name: Path) -> None:
     await pilot.press("s")
     monitor.query_one("#answer", Input).value = str(name)
     await pilot.press("enter")
@@ -236,7 +236,7 @@ async def save_as(monitor: Monitor, pilot: Any, name: Path) -> None:
 def test_what_passes_the_filter_is_saved_as_a_log(wire: Wire, tmp_path: Path) -> None:
     session = wire_session(wire)
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         hear(session, wire, "701#00", "181#01", "702#00")
         await save_as(monitor, pilot, tmp_path / "all.log")
         panel_of(monitor).apply_filter("heartbeat or boot-up")
@@ -260,7 +260,7 @@ def test_a_trace_is_saved_over_nothing_and_a_mistake_is_told(wire: Wire, tmp_pat
     session = wire_session(wire)
     mistakes = {"kept.log": "is there already", "a.xyz": "name ends in", "no/a.log": "No such file"}
 
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         for name, text in mistakes.items():
             await save_as(monitor, pilot, tmp_path / name)
             assert text in str(monitor.query_one("#ask #wrong", Static).content)
@@ -272,7 +272,7 @@ def test_a_trace_is_saved_over_nothing_and_a_mistake_is_told(wire: Wire, tmp_pat
 
 @pytest.mark.parametrize(("width", "gaps"), [(80, False), (120, True)])
 def test_a_narrow_window_has_meanings_in_the_place_of_gaps(width: int, gaps: bool) -> None:
-    async def act(monitor: Monitor, pilot: Any) -> None:
+    async def act(monitor: MonitorApp, pilot: Any) -> None:
         await pilot.pause()
         lines = shown(monitor)
         head = str(monitor.shown.query_one("#head", Static).content)

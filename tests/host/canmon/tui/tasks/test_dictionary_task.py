@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.tui.rig_session import BUS, NODE, RigSession
-from tickrig.host.canmon.model.dictionary.node_dictionary import ObjectRow, Origin
-from tickrig.host.canmon.tui.tasks.dictionary_task import DictionaryTask
+from tickrig.host.canmon.model.node_dictionary import ObjectRow, Origin
+from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryTask
 from tickrig.wire.can import CanFrame
 
 NAME, HEARTBEAT, STATUSWORD = (0x1008, 0), (0x1017, 0), (0x6041, 0)

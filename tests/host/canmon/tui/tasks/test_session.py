@@ -8,11 +8,10 @@ import pytest
 from tests.host.canmon.tui.pilot import PATIENCE_US, drive_session, hear, wire_session
 from tests.host.canmon.wire import Wire, new_wire
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.tui.tasks.session import DecodedFrame, Model, Session, open_session
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, open_session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.refused import Refused
-from tickrig.wire.can import CanFrame, Frames
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.cli.messages import Refused
+from tickrig.wire.can import CanFrame, FdFrame, Frames
 from tickrig.wire.instant import NEVER
 
 

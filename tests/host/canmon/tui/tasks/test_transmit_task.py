@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.model.transmit.transmit_list import parse_row_text
+from tickrig.host.canmon.model.transmit import parse_row_text
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
 
 

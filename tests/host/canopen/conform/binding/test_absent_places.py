@@ -8,13 +8,13 @@ from tests.host.canopen.conform.r1 import EDS
 from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.bench_source import eds_of
 from tickrig.host.canopen.conform.binding.binding import BoundPlace, bind
-from tickrig.host.canopen.conform.verdict import Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.testing import conformance
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 NO_SUBINDEX = bytes.fromhex("11000906")
 NAMES = ("absent_object", "absent_sub", "sub_of_variable")
@@ -86,7 +86,7 @@ def test_a_node_that_has_every_sub_index_fails(known: bool, anywhere: bool) -> N
     slave = Slave(anywhere)
     eds = eds_of(slave.slave, "epos.eds") if known else None
     report = conformance(slave, node_id=5, eds=eds, only=("UE-07", "UE-08", "DE-10"))
-    verdict = Verdict.FAIL if anywhere else Verdict.PASS
+    verdict = CheckVerdict.FAIL if anywhere else CheckVerdict.PASS
     assert [result.outcome.verdict for result in report.results] == [verdict] * 3
     why = "is not described" if known else "cannot be there"
     assert (f"1000h:01 {why}, and the node has it" in report.findings) == anywhere

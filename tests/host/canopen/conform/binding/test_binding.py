@@ -7,7 +7,7 @@ import pytest
 
 from tests.device.canopen.reference import make_dictionary
 from tests.host.canopen.conform.bench import Bench, make_bench
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.binding.binding import (
     NAMES,

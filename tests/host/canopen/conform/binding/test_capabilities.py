@@ -6,10 +6,10 @@ import pytest
 
 from tests.device.canopen.reference import make_dictionary
 from tests.host.canopen.conform.bench import Bench, make_bench
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.binding.binding import bind
-from tickrig.host.canopen.conform.binding.capabilities import Features, find_features
+from tickrig.host.canopen.conform.binding.capabilities import NodeFeatures, find_features
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
@@ -27,7 +27,7 @@ WITHOUT_EDS = {
 OF_R1 = {*WITHOUT_EDS, "dummy", "bits", "lss", "lssident", "unconfigured"}
 
 
-def features(bench: Bench, file: EdsFile | None) -> Features:
+def features(bench: Bench, file: EdsFile | None) -> NodeFeatures:
     binding = bind(read_device(file) if file else None, bench.upload)
     return find_features(binding, bench.client, file)
 

@@ -9,10 +9,10 @@ from tests.host.canopen.conform.defects.defect import Defect
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.defects.test_found import judge
 from tickrig.host.canopen.conform.check import Check
-from tickrig.host.canopen.conform.notation.suite import suite_checks
-from tickrig.host.canopen.conform.verdict import Verdict
+from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.verdict import CheckVerdict
 
-SEEN: Final = (Verdict.FAIL, Verdict.IMPLEMENTATION_DEFINED)
+SEEN: Final = (CheckVerdict.FAIL, CheckVerdict.IMPLEMENTATION_DEFINED)
 
 CANNOT_FAIL: Final = {
     "IO-01": "1000h decides whether it is asked at all; OD-1000.00-type compares it with the EDS",

@@ -9,19 +9,16 @@ from typing import Final, NamedTuple
 
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.canopen.reference import NODE_ID
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.application import Application
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
+from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
 from tickrig.device.canopen.ds401 import Ds401
 from tickrig.device.canopen.ds402 import Ds402
+from tickrig.device.canopen.slave import Application, CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import SERVICES
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.nmt import NmtState
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 Bend = Callable[[str], Iterable[str]]
 """Makes frames of a frame, in candump's notation; none lets it vanish."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from tests.host.canopen.conform.defects.defect import Bends, Defect, hears, says, together
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 
 
 class Blocks:

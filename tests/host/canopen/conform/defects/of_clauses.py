@@ -15,13 +15,13 @@ from tests.host.canopen.conform.defects.defect import (
     together,
 )
 from tests.host.canopen.conform.defects.of_pdo import all_act_as
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.dictionary import Entry
+from tickrig.device.canopen.errors import EmcyProducer
+from tickrig.device.canopen.nmt import NmtSlave
+from tickrig.device.canopen.pdo.rpdo import PdoConsumer
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.sync import Sync
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtState
 

@@ -13,15 +13,13 @@ from tests.host.canopen.conform.defects.defect import (
     says,
     tolerant,
 )
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.errors.error_behaviour import ErrorBehaviour
-from tickrig.device.canopen.nmt.error_control import HeartbeatProducer, NodeGuarding
-from tickrig.device.canopen.nmt.heartbeat_consumer import HeartbeatConsumer
+from tickrig.device.canopen.dictionary import Entry, SdoAbort
+from tickrig.device.canopen.errors import ErrorBehaviour
+from tickrig.device.canopen.nmt import HeartbeatConsumer, HeartbeatProducer, NodeGuarding
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.nmt import NmtState
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 

@@ -12,10 +12,10 @@ from tests.host.canopen.conform.defects.defect import (
     hears,
     says,
 )
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.nmt import NmtSlave
+from tickrig.device.canopen.pdo.rpdo import PdoConsumer
+from tickrig.device.canopen.sdo import SdoServers
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import NmtState
 

@@ -16,39 +16,36 @@ from tests.host.canopen.conform.defects.defect import (
     together,
 )
 from tests.host.canopen.conform.defects.of_clauses import keeping, loses
-from tickrig.device.canopen.bus.lss_slave import SELECTIVE, FastScanner, LssSlave, MessageSequence
-from tickrig.device.canopen.bus.parameter_store import STORE_PARAMETERS, ParameterStore
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.bus.time_stamp import TimeStamp
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.service import ALIVE, Handler
-from tickrig.device.canopen.core.slave import UNCONFIGURED, CanopenSlave
-from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
-from tickrig.device.canopen.errors.error_behaviour import ErrorBehaviour
-from tickrig.device.canopen.nmt.error_control import HeartbeatProducer, NodeGuarding
-from tickrig.device.canopen.nmt.heartbeat_consumer import HeartbeatConsumer, Monitor
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
-from tickrig.device.canopen.pdo.pdo_consumer import PdoConsumer
-from tickrig.device.canopen.pdo.pdo_packing import Pack, total_bits
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
-from tickrig.device.canopen.pdo.tpdo import Tpdo
-from tickrig.device.canopen.pdo.tpdo_modes import (
+from tickrig.device.canopen.dictionary import Entry, SdoAbort
+from tickrig.device.canopen.errors import EmcyProducer, ErrorBehaviour
+from tickrig.device.canopen.lss import SELECTIVE, FastScanner, LssSlave, MessageSequence
+from tickrig.device.canopen.nmt import (
+    HeartbeatConsumer,
+    HeartbeatProducer,
+    Monitor,
+    NmtSlave,
+    NodeGuarding,
+)
+from tickrig.device.canopen.parameter_store import STORE_PARAMETERS, ParameterStore
+from tickrig.device.canopen.pdo.pdo_mapping import Pack, total_bits
+from tickrig.device.canopen.pdo.pdo_parameters import (
     EventDriven,
     PdoSender,
     SynchronousAcyclic,
     SynchronousCyclic,
     TpdoMode,
 )
-from tickrig.device.canopen.sdo.sdo_segmented import SegmentedDownload
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.pdo.rpdo import PdoConsumer
+from tickrig.device.canopen.pdo.tpdo import PdoProducer, Tpdo
+from tickrig.device.canopen.sdo import SdoServers, SegmentedDownload
+from tickrig.device.canopen.slave import ALIVE, UNCONFIGURED, CanopenSlave, Handler
+from tickrig.device.canopen.sync import Sync, TimeStamp
 from tickrig.wire.can import CanFrame
-from tickrig.wire.canopen.cob_id import CAN_ID_MASK
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.lss import FastScan, LssAddress, LssMode
-from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
-from tickrig.wire.canopen.sdo.sdo_block import crc16
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.canopen.sdo_frame import crc16
 from tickrig.wire.instant import NEVER
 
 TOGGLE: Final = 0x10

@@ -17,13 +17,13 @@ from tests.host.canopen.conform.defects.defect import (
     tolerant,
     unguarded,
 )
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.pdo.pdo_producer import PdoProducer
+from tickrig.device.canopen.dictionary import Entry
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RW, Access, EntryDescription
 from tickrig.wire.canopen.nmt import NmtState
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 BOTH: Final = Access.TPDO | Access.RPDO
 INVALID: Final = 1 << 31

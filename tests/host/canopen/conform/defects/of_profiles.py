@@ -14,7 +14,7 @@ from tests.host.canopen.conform.defects.defect import (
     hears,
     says,
 )
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RW, EntryDescription
 

@@ -14,14 +14,13 @@ from tests.host.canopen.conform.defects.defect import (
     says,
     unguarded,
 )
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.sdo.sdo_server import SdoLimits
-from tickrig.device.canopen.sdo.sdo_servers import SdoServers
+from tickrig.device.canopen.dictionary import Entry
+from tickrig.device.canopen.sdo import SdoLimits, SdoServers
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import RO, RW, Access, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 U8, U32 = DataType.UNSIGNED8, DataType.UNSIGNED32
 TEXT, DOMAIN = DataType.VISIBLE_STRING, DataType.DOMAIN

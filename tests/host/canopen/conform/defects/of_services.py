@@ -15,12 +15,12 @@ from tests.host.canopen.conform.defects.defect import (
     together,
     unguarded,
 )
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
-from tickrig.device.canopen.errors.emcy_producer import EmcyProducer
+from tickrig.device.canopen.dictionary import Entry
+from tickrig.device.canopen.errors import EmcyProducer
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.device.canopen.sync import Sync
 from tickrig.wire.canopen.nmt import NmtState
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 

@@ -21,16 +21,15 @@ from tests.host.canopen.conform.defects.defect import (
 )
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.emulators.testing.conformance.powered_slave import PoweredSlave
-from tickrig.host.canopen.conform.check import Level
+from tickrig.emulators.testing.conformance.conformance import PoweredSlave
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import DeviceInfo
@@ -53,7 +52,7 @@ class DefectiveR1(R1):
             self.slave.dictionary[0x1000, 0].value = 402
         self._eds = EdsDevice(DeviceInfo(), tuple(sound.description), sound.objects)
 
-    def judge(self, plan: Plan, **given: Any) -> Report:
+    def judge(self, plan: ConformancePlan, **given: Any) -> Report:
         """Run the tester against it."""
         file = open_eds(EDS)
         return ConformRun(self.link, NODE_ID, plan, device=self._eds, eds=file, **given).run()
@@ -64,12 +63,12 @@ def judge(defect: Defect, *only: str) -> Report:
     r1 = DefectiveR1(defect)
     actions = next((ACTIONS[need] for need in ACTIONS if need in defect.needs), SlaveActions)
     stimulus = Stimulus(r1, actions(r1.slave))
-    return r1.judge(Plan(Level.INTRUSIVE, only, PROFILE, stimulus=stimulus, confirm=yes))
+    return r1.judge(ConformancePlan(Level.INTRUSIVE, only, PROFILE, stimulus=stimulus, confirm=yes))
 
 
 def finds(defect: Defect, check: str) -> bool:
     """Say whether a check fails, or tells where it is left to the device."""
-    verdict = Verdict.IMPLEMENTATION_DEFINED if defect.left else Verdict.FAIL
+    verdict = CheckVerdict.IMPLEMENTATION_DEFINED if defect.left else CheckVerdict.FAIL
     return any(result.outcome.verdict is verdict for result in judge(defect, check).results)
 
 
@@ -133,9 +132,11 @@ def test_a_node_that_names_other_objects_is_judged_and_restored(name: str) -> No
     before = {at: value for at, value in r1.values().items() if at[0] != 0x1003}
     stimulus = Stimulus(r1, SlaveActions(r1.slave))
     only = ("UE", "DE", "BU-01", "BD-01", "NMT-01")
-    report = r1.judge(Plan(Level.INTRUSIVE, only, PROFILE, stimulus=stimulus, confirm=yes))
-    assert report.count(Verdict.BLOCKED) == 0
-    failed = {r.check.id: r for r in report.results if r.outcome.verdict is Verdict.FAIL}
+    report = r1.judge(
+        ConformancePlan(Level.INTRUSIVE, only, PROFILE, stimulus=stimulus, confirm=yes)
+    )
+    assert report.count(CheckVerdict.BLOCKED) == 0
+    failed = {r.check.id: r for r in report.results if r.outcome.verdict is CheckVerdict.FAIL}
     assert set(breaks) <= failed.keys()
     for check in breaks:
         assert any(line.text.startswith("585#") for line in failed[check].outcome.evidence)
@@ -148,7 +149,7 @@ def test_the_report_tells_which_answers_name_other_objects() -> None:
         each for each in of_others.DEFECTS if each.plant is of_others.abort_names_the_one_before
     )
     report = judge(defect, "UE-06")
-    assert [r.outcome.verdict for r in report.results] == [Verdict.FAIL]
+    assert [r.outcome.verdict for r in report.results] == [CheckVerdict.FAIL]
     assert "of 5FFFh" in report.results[0].outcome.reason
     assert any(
         "was answered with 585#80" in text and "which names" in text for text in report.findings

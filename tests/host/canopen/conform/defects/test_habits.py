@@ -28,25 +28,21 @@ from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
 from tests.host.canopen.conform.test_safety import SpyLink
 from tests.host.canopen.conform.under_test import Judged, not_harmless
-from tickrig.device.canopen.bus.sync import Sync
-from tickrig.device.canopen.core.abort import SdoAbort
-from tickrig.device.canopen.core.dictionary import Dictionary
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave, ServiceMaker
-from tickrig.device.canopen.nmt.error_control import HeartbeatProducer
-from tickrig.device.canopen.nmt.nmt_slave import NmtSlave
+from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
+from tickrig.device.canopen.nmt import HeartbeatProducer, NmtSlave
+from tickrig.device.canopen.slave import CanopenSlave, ServiceMaker
 from tickrig.device.canopen.stack import make_slave
+from tickrig.device.canopen.sync import Sync
 from tickrig.emulators.can.outside.host import CanHost
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.object_table import RW, Access, DeviceInfo, EntryDescription
-from tickrig.wire.canopen.sdo.abort import AbortCode
+from tickrig.wire.canopen.sdo_frame import AbortCode
 
 SHORT: Final = row(0x2007, 0, TEXT, RW, "abc", 3)
 LONG: Final = row(0x200E, 0, TEXT, RW, "a text that is longer than thirty bytes", 100)
@@ -131,29 +127,29 @@ def test_a_string_that_is_too_short_is_told() -> None:
     report = judge(Defect("a string of three bytes", (), rows=(SHORT,)), *SIZED, *BLOCKS)
     reasons = {result.check.id: result.outcome.reason for result in report.results}
     assert reasons["BD-03"] == "2007h:00 holds less than 30 bytes"
-    assert report.count(Verdict.NOT_APPLICABLE) == len(SIZED + BLOCKS)
+    assert report.count(CheckVerdict.NOT_APPLICABLE) == len(SIZED + BLOCKS)
 
 
 def test_the_string_that_holds_most_is_taken() -> None:
     slave = make_defective(Defect("two strings", (), rows=(SHORT, LONG))).slave
     device = EdsDevice(DeviceInfo(), tuple(slave.dictionary.description), slave.dictionary.objects)
-    plan = Plan(Level.INTRUSIVE, (*SIZED, *BLOCKS), confirm=yes)
+    plan = ConformancePlan(Level.INTRUSIVE, (*SIZED, *BLOCKS), confirm=yes)
     report = ConformRun(Judged(slave).link, NODE_ID, plan, device=device).run()
-    assert report.count(Verdict.PASS) == len(SIZED + BLOCKS)
+    assert report.count(CheckVerdict.PASS) == len(SIZED + BLOCKS)
 
 
 def test_a_server_that_takes_one_request_at_a_time_fails_nothing() -> None:
     r1 = R1()
-    plan = Plan(Level.INTRUSIVE, ("US", "BU", "DS", "BD"), confirm=yes)
+    plan = ConformancePlan(Level.INTRUSIVE, ("US", "BU", "DS", "BD"), confirm=yes)
     report = r1.judge(plan, link=OneAtATime(r1))
-    assert report.count(Verdict.PASS) > 20
+    assert report.count(CheckVerdict.PASS) > 20
     assert not_harmless(report) == []
 
 
 def test_a_wrong_segment_of_an_upload_fails_no_download() -> None:
     never_last = Defect("c is not set", (), says("585#054142434445(.*)", r"585#044142434445\1"))
     (result,) = judge(never_last, "DS-03").results
-    assert result.outcome.verdict is Verdict.INCONCLUSIVE
+    assert result.outcome.verdict is CheckVerdict.INCONCLUSIVE
     assert result.outcome.reason.startswith("could not be read back, see the checks of group US")
 
 
@@ -162,9 +158,9 @@ def test_a_mandatory_object_that_is_not_there_fails_one_check() -> None:
     entries = [e for e in slave.dictionary.description if e.index not in MANDATORY]
     bare = make_slave(Dictionary(entries, slave.dictionary.objects), NODE_ID)
     device = EdsDevice(DeviceInfo(), tuple(entries), slave.dictionary.objects)
-    plan = Plan(Level.INTRUSIVE, confirm=yes)
+    plan = ConformancePlan(Level.INTRUSIVE, confirm=yes)
     report = ConformRun(Judged(bare).link, NODE_ID, plan, device=device).run()
-    failed = [one.check.id for one in report.results if one.outcome.verdict is Verdict.FAIL]
+    failed = [one.check.id for one in report.results if one.outcome.verdict is CheckVerdict.FAIL]
     assert failed == ["UE-01", "UE-02", "UE-05"]
     reasons = {result.check.id: result.outcome.reason for result in report.results}
     assert reasons["DE-17"] == "the node has no 1018h:00: UE-05"
@@ -178,7 +174,7 @@ def test_a_pdo_that_exists_keeps_its_mapping_whatever_is_written(
     text = EDS.read_text("utf-8").replace("\r", "")
     assert head in text
     eds.write_text(text.replace(head, f"{head}LowLimit=0\nHighLimit=8\n"), "utf-8")
-    plan = Plan(level, ("OD-1600.00-*",), confirm=yes)
+    plan = ConformancePlan(level, ("OD-1600.00-*",), confirm=yes)
     report = Judged.of(eds).judge(plan, eds)
     assert "OD-1600.00-high" in {result.check.id for result in report.results}
     assert not_harmless(report) == []
@@ -186,7 +182,7 @@ def test_a_pdo_that_exists_keeps_its_mapping_whatever_is_written(
 
 def test_what_the_inhibit_time_holds_back_does_not_come_in_the_next_check() -> None:
     outcome = judge(Defect("none", ()), "EM-08").results[0].outcome
-    assert outcome.verdict is Verdict.PASS
+    assert outcome.verdict is CheckVerdict.PASS
     assert sum(line.text.startswith("085#0000") for line in outcome.evidence) == len(CLEARED)
 
 
@@ -195,7 +191,7 @@ def test_an_error_of_before_the_run_that_is_gone_brings_no_reset() -> None:
     Stimulus(r1, SlaveActions(r1.slave))("emergency", "5000", "01")
     r1.rig.run_for(10_000)
     link = SpyLink(r1)
-    report = r1.judge(Plan(Level.INTRUSIVE, ("NMT-11", "HB"), confirm=yes), link=link)
+    report = r1.judge(ConformancePlan(Level.INTRUSIVE, ("NMT-11", "HB"), confirm=yes), link=link)
     assert not_harmless(report) == []
     assert sum(frame.can_id == 0 and frame.data[0] == RESET for frame in link.sent) <= 1
 
@@ -253,20 +249,20 @@ def judge_as_described(defect: Defect, *only: str) -> Report:
     """Judge a slave with an EDS that says what it has."""
     slave = make_defective(defect).slave
     device = EdsDevice(DeviceInfo(), tuple(slave.dictionary.description), slave.dictionary.objects)
-    plan = Plan(Level.INTRUSIVE, only, confirm=yes)
+    plan = ConformancePlan(Level.INTRUSIVE, only, confirm=yes)
     return ConformRun(Judged(slave).link, NODE_ID, plan, device=device).run()
 
 
 def test_a_pdo_that_is_not_enabled_without_objects_fails_no_check_of_others() -> None:
     report = judge(Defect("wants a mapping", (), wants_a_mapping, rows=UNMAPPED), *AFTER)
     assert not_harmless(report) == []
-    assert report.count(Verdict.PASS) == len(AFTER)
+    assert report.count(CheckVerdict.PASS) == len(AFTER)
 
 
 def test_a_pdo_that_cannot_be_enabled_at_all_is_told() -> None:
     stubborn = Defect("never", (), refuses(AbortCode.VALUE_RANGE, "1400:01", "1800:01"))
     outcomes = {r.check.id: r.outcome for r in judge(stubborn, *AFTER).results}
-    assert {each.verdict for each in outcomes.values()} == {Verdict.INCONCLUSIVE}
+    assert {each.verdict for each in outcomes.values()} == {CheckVerdict.INCONCLUSIVE}
     assert outcomes["PC-23"].reason.startswith("could not be prepared: step 1, given macro enable")
     assert "abort 0609 0030h" in outcomes["PC-23"].reason
 
@@ -300,7 +296,7 @@ def test_a_limit_that_leaves_one_value_makes_a_constant() -> None:
 def test_an_event_timer_of_the_node_disturbs_no_check() -> None:
     timed = EntryDescription(0x1800, 5, "event timer", DataType.UNSIGNED16, RW, default=100)
     report = judge(Defect("event timer", (), rows=(timed,)), "PR-01", "PR-03", "PR-24", "NMT-14")
-    assert [r.outcome.verdict for r in report.results] == [Verdict.PASS] * 4
+    assert [r.outcome.verdict for r in report.results] == [CheckVerdict.PASS] * 4
     assert report.unrestored == ()
 
 
@@ -310,12 +306,12 @@ def test_a_value_that_is_there_already_is_not_written_to_see_whether_it_goes() -
         EntryDescription(0x1017, 0, "heartbeat", DataType.UNSIGNED16, RW, default=100),
     )
     report = judge(Defect("there already", (), rows=there), "NMT-10", "NMT-11", "ST-04", "ST-05")
-    assert [r.outcome.verdict for r in report.results] == [Verdict.PASS] * 4
+    assert [r.outcome.verdict for r in report.results] == [CheckVerdict.PASS] * 4
 
 
 def test_the_node_id_that_lss_gives_is_no_other_node() -> None:
     report = judge(Defect("none", ()), "LS-04", "LS-08")
-    assert report.count(Verdict.PASS) == 2
+    assert report.count(CheckVerdict.PASS) == 2
     assert report.settings["other nodes"] == "none"
 
 
@@ -328,8 +324,8 @@ def test_a_heartbeat_right_behind_the_boot_up_is_told_under_its_own_clause() -> 
         r.check.id: (r.outcome.verdict, r.check.source)
         for r in judge(Defect("at once", (), beats_behind_boot_up), "NMT-01", "HB-05").results
     }
-    assert outcomes["NMT-01"][0] is Verdict.PASS
-    assert outcomes["HB-05"] == (Verdict.FAIL, "CiA 301 v4.2.0, 7.2.8.3.2.2")
+    assert outcomes["NMT-01"][0] is CheckVerdict.PASS
+    assert outcomes["HB-05"] == (CheckVerdict.FAIL, "CiA 301 v4.2.0, 7.2.8.3.2.2")
 
 
 @pytest.mark.parametrize(
@@ -350,7 +346,7 @@ def test_another_abort_code_that_the_text_allows(
 
 def test_a_refusal_when_all_has_come_is_one() -> None:
     report = judge(Defect("late", (), refuses_late), "DS-08")
-    assert [r.outcome.verdict for r in report.results] == [Verdict.PASS]
+    assert [r.outcome.verdict for r in report.results] == [CheckVerdict.PASS]
 
 
 def refuses_late(slave: CanopenSlave) -> Bends:
@@ -375,9 +371,9 @@ def refuses_late(slave: CanopenSlave) -> Bends:
 
 def test_a_busy_host_is_no_slow_producer_of_sync() -> None:
     slow = Defect("SYNC is late", (), services={Sync: Slow})
-    for shared, verdict in ((True, Verdict.INCONCLUSIVE), (False, Verdict.FAIL)):
+    for shared, verdict in ((True, CheckVerdict.INCONCLUSIVE), (False, CheckVerdict.FAIL)):
         defective = DefectiveR1(slow)
-        plan = Plan(Level.INTRUSIVE, ("SY-02",), confirm=yes, shared_host=shared)
+        plan = ConformancePlan(Level.INTRUSIVE, ("SY-02",), confirm=yes, shared_host=shared)
         link = Lagging(defective.link)
         device = EdsDevice(DeviceInfo(), tuple(make_dictionary(frozenset()).description), {})
         report = ConformRun(link, NODE_ID, plan, device=device).run()

@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canopen.conform.notation.step_text import parse_step
-from tickrig.host.canopen.conform.notation.step_words import step_words
-from tickrig.host.canopen.conform.notation.suite import suite_checks
+from tickrig.host.canopen.conform.notation import parse_step, step_words
+from tickrig.host.canopen.conform.suite import suite_checks
 
 STEPS = [step for check in suite_checks() for step in check.steps]
 

@@ -6,11 +6,9 @@ import pytest
 
 from tests.environment import ROOT
 from tests.host.canopen.conform.r1 import R1
-from tickrig.host.canopen.conform.check import Check, Level
-from tickrig.host.canopen.conform.notation.names import NAME
-from tickrig.host.canopen.conform.notation.step_text import parse_step
-from tickrig.host.canopen.conform.notation.suite import ORDER, parse_group, read_suite, suite_checks
-from tickrig.host.canopen.conform.plan import Plan
+from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.notation import NAME, parse_step
+from tickrig.host.canopen.conform.suite import ORDER, parse_group, read_suite, suite_checks
 
 CHECKS = suite_checks()
 SOURCE = re.compile(r"(practice: .+; )?CiA \d{3}(-\d)? v\d\.\d\.\d, .+|practice: .+")
@@ -45,7 +43,9 @@ def test_what_only_reads_has_no_step_that_writes() -> None:
 
 
 def test_each_name_stands_for_something_on_some_node() -> None:
-    report = R1(("1029", "1F80")).judge(Plan(Level.INTRUSIVE, confirm=lambda question: True))
+    report = R1(("1029", "1F80")).judge(
+        ConformancePlan(Level.INTRUSIVE, confirm=lambda question: True)
+    )
     reasons = {result.check.id: result.outcome.reason for result in report.results}
     named = [check for check in CHECKS if NAME.search(words_of(check))]
     assert len(named) > 200

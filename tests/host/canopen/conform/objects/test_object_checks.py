@@ -8,13 +8,12 @@ import pytest
 
 from tests.host.canopen.conform.bench import NODE_ID, Bench, make_bench
 from tests.host.canopen.data_sheet.corpus import GOOD, counted_only
-from tickrig.device.canopen.core.dictionary import Dictionary
+from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
-from tickrig.host.canopen.conform.bus.step_failed import StepFailed
+from tickrig.host.canopen.conform.bus.exchange import StepFailed
 from tickrig.host.canopen.conform.check import Check, Level, Step
-from tickrig.host.canopen.conform.notation.names import resolve_address
-from tickrig.host.canopen.conform.objects.object_checks import object_checks
-from tickrig.host.canopen.conform.objects.object_steps import play_object_step
+from tickrig.host.canopen.conform.notation import resolve_address
+from tickrig.host.canopen.conform.object_checks import object_checks, play_object_step
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.wire.canopen.datatypes import DataType, Value

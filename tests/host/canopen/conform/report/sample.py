@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from tickrig.host.canopen.conform.check import Check, Level
 from tickrig.host.canopen.conform.verdict import (
+    CheckOutcome,
+    CheckVerdict,
     Direction,
-    Line,
-    Outcome,
+    FrameLine,
     Report,
     Result,
-    Verdict,
 )
 
 HOSTILE = "<script>alert('1')</script>]]>&amp;\"\x1b[2J\n\x00\ud800\u202eFAIL all"
 
 EVIDENCE = (
-    Line(1_000_000, Direction.SENT, "605#4001200000000000"),
-    Line(1_001_250, Direction.RECEIVED, "585#4B01200034120000"),
-    Line(1_001_300, Direction.REMARK, "power cycle"),
-    Line(1_002_000, Direction.SENT, "705#R1"),
-    Line(1_003_000, Direction.RECEIVED, "0000017F#"),
+    FrameLine(1_000_000, Direction.SENT, "605#4001200000000000"),
+    FrameLine(1_001_250, Direction.RECEIVED, "585#4B01200034120000"),
+    FrameLine(1_001_300, Direction.REMARK, "power cycle"),
+    FrameLine(1_002_000, Direction.SENT, "705#R1"),
+    FrameLine(1_003_000, Direction.RECEIVED, "0000017F#"),
 )
 
 
 def result(
     name: str,
-    verdict: Verdict = Verdict.PASS,
+    verdict: CheckVerdict = CheckVerdict.PASS,
     reason: str = "",
     *,
-    first: Outcome | None = None,
-    evidence: tuple[Line, ...] = EVIDENCE,
+    first: CheckOutcome | None = None,
+    evidence: tuple[FrameLine, ...] = EVIDENCE,
 ) -> Result:
     group = name.partition("-")[0]
     check = Check(
@@ -41,7 +41,7 @@ def result(
         needs=frozenset({"store", "hbcons"}),
         steps=(),
     )
-    return Result(check, Outcome(verdict, reason, evidence, 1_000_000, 1_004_000), first)
+    return Result(check, CheckOutcome(verdict, reason, evidence, 1_000_000, 1_004_000), first)
 
 
 SAMPLE = Report(
@@ -50,12 +50,17 @@ SAMPLE = Report(
     level=Level.COMMUNICATION,
     results=(
         result("NMT-01"),
-        result("NMT-11", Verdict.FAIL, "got 585#4B01200034120000, want 585#4B0120000000...."),
-        result("HB-10", Verdict.INCONCLUSIVE, "this host was 80 ms late"),
-        result("HB-12", Verdict.NOT_APPLICABLE, "1016h is not there", evidence=()),
-        result("HB-13", Verdict.NOT_APPLICABLE, "1016h is not there", evidence=()),
-        result("US-08", Verdict.IMPLEMENTATION_DEFINED, "no time-out within 5 s"),
-        result("PR-03", Verdict.BLOCKED, "no boot-up within 5 s", first=Outcome(Verdict.FAIL, "?")),
+        result("NMT-11", CheckVerdict.FAIL, "got 585#4B01200034120000, want 585#4B0120000000...."),
+        result("HB-10", CheckVerdict.INCONCLUSIVE, "this host was 80 ms late"),
+        result("HB-12", CheckVerdict.NOT_APPLICABLE, "1016h is not there", evidence=()),
+        result("HB-13", CheckVerdict.NOT_APPLICABLE, "1016h is not there", evidence=()),
+        result("US-08", CheckVerdict.IMPLEMENTATION_DEFINED, "no time-out within 5 s"),
+        result(
+            "PR-03",
+            CheckVerdict.BLOCKED,
+            "no boot-up within 5 s",
+            first=CheckOutcome(CheckVerdict.FAIL, "?"),
+        ),
         result("LS-02"),
     ),
     node={"1008h device name": HOSTILE, "1000h device type": "F0191h"},

@@ -13,20 +13,18 @@ from tests.host.canopen.conform.defects.defect import Defect
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.report.sample import EVIDENCE, HOSTILE, SAMPLE, result
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.host.canmon.model.sequence.parse_sequence import TomlSequence
-from tickrig.host.canmon.model.sequence.sequence_run import SequenceRun
-from tickrig.host.canopen.conform.report.badge import badge
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.sequence import SequenceRun, TomlSequence
 from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
+from tickrig.host.canopen.conform.report.ci import badge, report_junit
 from tickrig.host.canopen.conform.report.issue import issue_text
 from tickrig.host.canopen.conform.report.page import html_page
 from tickrig.host.canopen.conform.report.report_json import report_json
-from tickrig.host.canopen.conform.report.report_junit import report_junit
 from tickrig.host.canopen.conform.report.text import text_report
-from tickrig.host.canopen.conform.verdict import Outcome, Report, Result, Verdict
+from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report, Result
 
 KNOWN = Baseline(frozenset({"NMT-11", "LS-02", "XX-99"}))
-MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", Verdict.FAIL, "no") for n in range(30)))
+MANY = replace(SAMPLE, results=tuple(result(f"UE-{n}", CheckVerdict.FAIL, "no") for n in range(30)))
 
 
 def test_the_text_has_a_line_a_group_and_failures_with_frames_and_what_to_look_at() -> None:
@@ -77,14 +75,14 @@ def test_of_many_failures_the_last_ones_are_told_without_their_frames() -> None:
 
 
 def test_a_failure_without_a_frame_is_told_by_its_name() -> None:
-    silent = result("HB-01", Verdict.FAIL, "no 705#7F within 220 ms", evidence=())
+    silent = result("HB-01", CheckVerdict.FAIL, "no 705#7F within 220 ms", evidence=())
     assert "FAIL HB-01: what HB-01 wants" in text_report(replace(SAMPLE, results=(silent,)))
 
 
 def test_a_second_go_like_the_first_is_told_once() -> None:
     later = tuple(line._replace(at_us=line.at_us + 50_000) for line in EVIDENCE)
-    first = Outcome(Verdict.FAIL, "no", EVIDENCE)
-    again = result("UE-01", Verdict.FAIL, "no", first=first, evidence=later)
+    first = CheckOutcome(CheckVerdict.FAIL, "no", EVIDENCE)
+    again = result("UE-01", CheckVerdict.FAIL, "no", first=first, evidence=later)
     report = replace(SAMPLE, results=(again,))
     for write in (text_report, report_junit, html_page):
         assert write(report).count("40 01 20 00") == 1
@@ -99,7 +97,7 @@ def test_a_second_go_like_the_first_is_told_once() -> None:
 def test_objects_that_fail_alike_are_one_cause() -> None:
     def failed(index: int, suffix: str, got: str) -> Result:
         reason = f"step {index % 7}, refuse read {index:04X}:01: got {got}, want abort 0609 0011h"
-        return result(f"OD-{index:04X}-{suffix}", Verdict.FAIL, reason)
+        return result(f"OD-{index:04X}-{suffix}", CheckVerdict.FAIL, reason)
 
     alike = [failed(index, "subs", "a value") for index in range(0x1000, 0x1020)]
     others = [failed(0x1000, "subs", "OK (60h)"), failed(0x1000, "long", "a value")]
@@ -114,7 +112,7 @@ def test_steps_are_in_json_and_on_the_page_of_what_failed() -> None:
     steps = ({"send": "605#40"}, {"refuse read": "$absent_object", "codes": ["06020000"]})
     checks = [
         replace(one, check=replace(one.check, steps=steps))
-        for one in (result("UE-01"), result("UE-02", Verdict.FAIL))
+        for one in (result("UE-01"), result("UE-02", CheckVerdict.FAIL))
     ]
     report = replace(SAMPLE, results=tuple(checks))
     said = json.loads(report_json(report))["checks"]
@@ -126,7 +124,7 @@ def test_steps_are_in_json_and_on_the_page_of_what_failed() -> None:
 
 def test_checks_that_nobody_began_are_counted_in_a_line() -> None:
     reason = "node 5 does not answer; heard here: nobody"
-    silent = tuple(result(f"UE-{n}", Verdict.BLOCKED, reason, evidence=()) for n in range(30))
+    silent = tuple(result(f"UE-{n}", CheckVerdict.BLOCKED, reason, evidence=()) for n in range(30))
     text = text_report(replace(SAMPLE, results=(*silent, *SAMPLE.results)))
     assert text.count("BLOCKED") == 2
     assert "\n\nBLOCKED 30 checks: node 5 does not answer; heard here: nobody\n" in text
@@ -252,7 +250,7 @@ def test_only_our_style_is_let_in_and_nothing_is_fetched() -> None:
 
 
 def test_nothing_from_the_wire_is_markup() -> None:
-    evil = replace(result(HOSTILE, Verdict.FAIL, HOSTILE), first=SAMPLE.results[6].first)
+    evil = replace(result(HOSTILE, CheckVerdict.FAIL, HOSTILE), first=SAMPLE.results[6].first)
     report = replace(SAMPLE, source=HOSTILE, results=(evil,), findings=(HOSTILE,), aborted=HOSTILE)
     tame = [
         (one.tag, sorted(one.attributes)) for one in parse_page(html_page(_tame(report))).below()

@@ -8,16 +8,15 @@ from typing import Final
 import pytest
 
 from tests.host.canopen.conform.r1 import EDS, R1, yes
-from tickrig.device.canopen.core.entry import Entry
-from tickrig.device.canopen.core.slave import CanopenSlave
+from tickrig.device.canopen.dictionary import Entry
+from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
-from tickrig.host.canopen.conform.plan import Plan
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames
@@ -120,7 +119,7 @@ def told(r1: R1) -> dict[tuple[int, int], bytes]:
 
 
 def judge(r1: R1, level: Level, *only: str) -> Report:
-    return r1.judge(Plan(level, only, confirm=yes))
+    return r1.judge(ConformancePlan(level, only, confirm=yes))
 
 
 SAMPLE: Final = (5, 400, *range(700, 7_600, 530), 7_473)
@@ -135,8 +134,8 @@ def test_who_only_reads_is_heard_to_read(known: bool) -> None:
     link = CanHost(rig, wire.end())
     rig.run_for(2_000_000)
     device = read_sound(EDS)[0] if known else None
-    report = ConformRun(link, 5, Plan(Level.READ_ONLY), device=device).run()
-    assert report.count(Verdict.PASS) > 20
+    report = ConformRun(link, 5, ConformancePlan(Level.READ_ONLY), device=device).run()
+    assert report.count(CheckVerdict.PASS) > 20
     requests = {frame.data[0] >> 5 for frame in ear.heard}
     assert {frame.can_id for frame in ear.heard} == {0x605}
     assert requests <= {2, 3, 4, 5}, "upload, its segments, abort, block upload"

@@ -6,7 +6,7 @@ import pytest
 
 from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.conformance import conformance
-from tickrig.host.canopen.conform.verdict import Report, Verdict
+from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.wire.can import CanFrame, Frames
 
 NMT = ("NMT-03", "HB")
@@ -56,7 +56,7 @@ def test_who_only_reads_tells_a_heartbeat_that_1017h_does_not() -> None:
 
 def test_a_heartbeat_that_the_run_has_ended_is_not_restored() -> None:
     report = judge(Beating("705#7F"), "communication")
-    assert report.count(Verdict.FAIL) == 0
+    assert report.count(CheckVerdict.FAIL) == 0
     assert report.findings == ("heartbeat each 400 ms, but 1017h = 0",)
     assert report.unrestored == ("heartbeat each 400 ms: gone, and 1017h = 0 as before",)
 

@@ -10,17 +10,20 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from tickrig.device.canopen.device_rtc.component import CanopenComponent
-from tickrig.device.canopen.device_rtc.device import make_device_rtc, make_dictionary
+from tickrig.device.canopen.device_rtc import CanopenComponent, make_device_rtc, make_dictionary
 from tickrig.emulators.canopen.build import describe_rtc
 from tickrig.host.rtc.canopen.builder.build import build
-from tickrig.host.rtc.canopen.builder.names import COMPONENT_NAMES
-from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE, Project, parse_project
+from tickrig.host.rtc.canopen.builder.profile_file import (
+    COMPONENT_NAMES,
+    EXAMPLE,
+    Project,
+    parse_project,
+)
 from tickrig.host.rtc.canopen.commands.builder import main
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.eds.eds_writer import write_eds
-from tickrig.wire.rtc_canopen.objects import object_table
+from tickrig.wire.rtc_canopen import object_table
 
 EVERYTHING = """
 name = "EveryThing"

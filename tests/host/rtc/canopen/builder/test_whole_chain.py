@@ -7,12 +7,12 @@ from pathlib import Path
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.node.node_spec import parse_node
+from tickrig.emulators.canopen.choices import parse_node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc.canopen.builder.build import build
 from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE, parse_project
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.serve import read_files, serve
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tickrig.host.rtc.canopen.definition.definition import (
+from tickrig.host.rtc.canopen.definition import (
     BusEntry,
+    DefinitionError,
     MasterEntry,
     NodeEntry,
     PdoEntry,
@@ -23,12 +24,10 @@ from tickrig.host.rtc.canopen.definition.definition import (
     StartEntry,
     SystemDefinition,
 )
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
-from tickrig.host.rtc.canopen.definition.definition_writer import write_definition
-from tickrig.host.rtc.canopen.errors import DefinitionError
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition_writer import write_definition
 from tickrig.wire.canopen.pdo import MappedObject
-from tickrig.wire.rtc_canopen.port_types import PORT_TYPES
-from tickrig.wire.rtc_canopen.profile import PortDirection
+from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
 
 K16 = """\
 bus: {channel: vcan0, bitrate: 1000000}

@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 from tests.host.rtc.canopen.bench import EDS, Bench
 from tickrig.host.canopen.eds import open_eds
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc.canopen.definition.device_file import read_device_file
+from tickrig.host.rtc.canopen.definition import read_device_file
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 
 PALETTE = EDS / "f-palette.eds"

@@ -13,7 +13,7 @@ from textual.widgets import Input
 from tests.host.rtc.canopen.bench import SYSTEMS, node
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.node.node import Node
+from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc.canopen.editor import app as editor_app
@@ -22,7 +22,7 @@ from tickrig.host.rtc.canopen.editor.session import AddComponents, EditorSession
 from tickrig.host.rtc.canopen.editor.widgets import CursorView
 from tickrig.host.rtc.canopen.events import ServerEvent
 from tickrig.host.rtc.canopen.serve import open_server
-from tickrig.host.tui.line_view import LineView, line_text
+from tickrig.host.tui import LineView, line_text
 
 FIG_120 = SYSTEMS / "fig120.yaml"
 CAST = {16: "f-palette", 32: "motor-core-unit"}

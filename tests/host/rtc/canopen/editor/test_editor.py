@@ -12,12 +12,12 @@ from tests.host.canmon.tui.pilot import screen_text
 from tests.host.rtc.canopen.bench import EDS
 from tests.host.rtc.canopen.components import Knob
 from tests.host.rtc.canopen.editor.desk import Desk, at_desk
-from tickrig.host.rtc.canopen.definition.definition import PdoLink, PdoName, RtConnection
-from tickrig.host.rtc.canopen.definition.definition_reader import parse_definition
+from tickrig.host.rtc.canopen.definition import PdoLink, PdoName, RtConnection
+from tickrig.host.rtc.canopen.definition_reader import parse_definition
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
 from tickrig.host.rtc.canopen.editor.widgets import QuestionScreen
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
-from tickrig.host.tui.framed_app import FramedApp
+from tickrig.host.tui import FramedApp
 from tickrig.wire.rtc_types.basic import TimedShortSeq
 
 TWO = f"""

@@ -11,13 +11,11 @@ import pytest
 
 from tests.host.rtc.canopen.bench import SYSTEMS
 from tickrig.host.links.can_link import CanLink
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.links.link import StampedFrames, StampedLink
+from tickrig.host.links.link import LinkClosed, StampedFrames, StampedLink
 from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.host.rtc.canopen.events import ServerEvent, ServerEventType
 from tickrig.host.rtc.canopen.serve import open_server
-from tickrig.wire.can import Frames
-from tickrig.wire.can_error import ErrorState
+from tickrig.wire.can import ErrorState, Frames
 
 FIG_120 = SYSTEMS / "fig120.yaml"
 PATIENCE_S = 20.0

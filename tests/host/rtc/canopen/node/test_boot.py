@@ -10,10 +10,9 @@ from tests.emulators.can.can_bench import frames
 from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR, Bench
 from tests.host.rtc.canopen.components import add_knob
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc.canopen.definition.device_file import read_device_file
-from tickrig.host.rtc.canopen.errors import DefinitionError
+from tickrig.host.rtc.canopen.definition import DefinitionError, read_device_file
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.host.rtc.canopen.node.served_node import NodePhase
+from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.wire.rtc_types.basic import TimedOctet
 
 PALETTE = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.rtc.canopen.node.duplicate_detector import CROWDED, DuplicateNodeDetector
+from tickrig.host.rtc.canopen.served_node import CROWDED, DuplicateNodeDetector
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
 
 MS = 1_000

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.rtc import InPort, connect
-from tickrig.host.rtc.canopen.proxy.pdo_layout import PDO_FIELD_TYPES, lay_out, proxy_index
-from tickrig.host.rtc.canopen.proxy.pdo_ports import PdoSink, PdoSource
+from tickrig.host.rtc.canopen.pdo_layout import PDO_FIELD_TYPES, lay_out, proxy_index
+from tickrig.host.rtc.canopen.proxy import PdoSink, PdoSource
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_types import basic

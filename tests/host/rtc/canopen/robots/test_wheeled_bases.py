@@ -8,10 +8,7 @@ from typing import Any
 import pytest
 
 from tickrig.host.rtc import InPort, Manager, ModuleSpec, OutPort, RtComponent
-from tickrig.host.rtc.canopen.robots.beego import Beego
-from tickrig.host.rtc.canopen.robots.fourx import WHEELS, FourX
-from tickrig.host.rtc.canopen.robots.joystick import Joystick
-from tickrig.host.rtc.canopen.robots.wheeled_base import WheeledBase
+from tickrig.host.rtc.canopen.robots import WHEELS, Beego, FourX, Joystick, WheeledBase
 from tickrig.host.rtc.ports.data_port import DataPort
 from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedShort
 from tickrig.wire.rtc_types.extended_2d import TimedPose2D, TimedVelocity2D, Velocity2D

@@ -23,7 +23,7 @@ if importlib.util.find_spec("omniORB") is None and not os.environ.get("CI"):
 def orb() -> Iterator[Orb]:
     """Return an ORB on a free port of this machine."""
     from tests.host.rtc.engines.openrtm.name_server import free_port  # noqa: PLC0415 - an extra
-    from tickrig.host.cli.openrtm_options import Endpoint  # noqa: PLC0415
+    from tickrig.host.cli.engine_options import Endpoint  # noqa: PLC0415
     from tickrig.host.rtc.engines.openrtm.orb import Orb  # noqa: PLC0415
 
     orb = Orb(Endpoint(port=free_port()))

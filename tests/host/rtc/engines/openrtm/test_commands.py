@@ -25,7 +25,7 @@ PALETTE = f"""
 nodes: [{{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device}}]
 bus: {{interface: virtual, channel: rtc}}
 """
-STICK = "from tickrig.host.rtc.canopen.robots.joystick import Joystick as Stick"
+STICK = "from tickrig.host.rtc.canopen.robots import Joystick as Stick"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 from omniORB import URI
 
 from tests.host.rtc.engines.openrtm.name_server import OmniNames, eventually
-from tickrig.host.cli.openrtm_options import parse_endpoint
+from tickrig.host.cli.engine_options import parse_endpoint
 from tickrig.host.rtc.engines.openrtm.names import NameServer
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference
 

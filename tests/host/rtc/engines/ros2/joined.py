@@ -20,7 +20,7 @@ from tickrig.host.cli.engine_options import EngineOptions
 from tickrig.host.cli.ros2_options import Ros2Options
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.engines.engines_joined import engines_joined
-from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.system.call_queue import CallQueue
 
 CHAIN = """
 [[component]]

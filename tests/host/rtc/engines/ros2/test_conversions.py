@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tests.host.rtc.engines.ros2.extra import CYCLONE
 from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
-from tickrig.host.rtc.engines.ros2.stamps import Stamps
+from tickrig.host.rtc.engines.ros2.message_types import Stamps
 from tickrig.host.rtc.engines.ros2.topic_entry import usual_entry
 from tickrig.wire.rtc_types import basic, extended_2d, iis
 from tickrig.wire.rtc_types.actuators import ActArrayState, Actuator

@@ -343,7 +343,7 @@ def test_bytes_that_are_no_twist_are_told_once(
 def test_no_peer_that_is_joined_is_said_not_to_be(
     joined: Joined, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tickrig.host.rtc.engines.ros2.foreign_endpoints.MATCH_S", 0.5)
+    monkeypatch.setattr("tickrig.host.rtc.engines.ros2.participant.MATCH_S", 0.5)
     _, first = robot(joined)
     peers = [first, *(joined.peer() for _ in range(3))]
     for peer in peers:

@@ -7,17 +7,18 @@ import termios
 import pytest
 
 from tests.host.rtc.motion.port_bench import PERIOD_US, PortBench
-from tickrig.host.links.errors import LinkClosed
-from tickrig.host.rtc.motion.options.game_pad import GamePad, open_pad
-from tickrig.host.rtc.motion.options.game_pad_devices import (
+from tickrig.host.links.link import LinkClosed
+from tickrig.host.rtc.motion.options.game_pad import (
     ABS_RX,
     ABS_X,
     ABS_Y,
     EV_ABS,
     Axes,
     EvdevPad,
+    GamePad,
     KeyboardPad,
     StickPosition,
+    open_pad,
 )
 from tickrig.wire.rtc_types.extended_2d import Velocity2D
 

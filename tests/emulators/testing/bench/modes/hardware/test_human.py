@@ -13,14 +13,14 @@ import pytest
 
 from tests.emulators.testing.bench.modes.hardware.plans import Answers, serial_plan
 from tickrig import Bench
-from tickrig.emulators.record.bench_replay import read_bench_recording
+from tickrig.emulators.record.replay import read_bench_recording
 from tickrig.emulators.testing.bench.errors import (
     BenchBlocked,
     NotOnThisBench,
     OperatorRefused,
     PortGone,
 )
-from tickrig.emulators.testing.bench.modes.hardware.terminal import Terminal
+from tickrig.emulators.testing.bench.modes.human_operator import Terminal
 from tickrig.emulators.testing.rig_file.plan import (
     HardwarePlan,
     PortPlan,

@@ -7,8 +7,8 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
-from tickrig.emulators.testing.bench.modes.real.watched_bus import open_watched
+from tickrig.emulators.testing.bench.modes.door_watch import HostPace
+from tickrig.emulators.testing.bench.modes.watched_ports import open_watched_bus
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.text.trace import Mark
 
@@ -30,7 +30,7 @@ class Watch(HostPace):
 
 def test_what_passes_is_told() -> None:
     watch = Watch()
-    with open_watched(PLAN, watch, {}) as bus, open_watched(PLAN, Watch(), {}) as other:
+    with open_watched_bus(PLAN, watch, {}) as bus, open_watched_bus(PLAN, Watch(), {}) as other:
         bus.send(MESSAGE)
         other.send(MESSAGE)
         assert bus.recv(0) is not None
@@ -46,7 +46,7 @@ def test_an_adapter_that_is_pulled_out_is_gone(code: int, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(VirtualBus, "send", fail)
     monkeypatch.setattr(VirtualBus, "_recv_internal", fail)
-    with open_watched(PLAN, Watch(), {}) as bus:
+    with open_watched_bus(PLAN, Watch(), {}) as bus:
         with pytest.raises(PortGone, match="failed to transmit"):
             bus.send(MESSAGE)
         with pytest.raises(can.CanOperationError):  # as hosts know it
@@ -65,7 +65,7 @@ def test_what_a_driver_cannot_read_is_passed_over(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(VirtualBus, "_recv_internal", receive)
     watch = Watch()
-    with open_watched(PLAN, watch, {}) as bus:
+    with open_watched_bus(PLAN, watch, {}) as bus:
         assert bus.recv(None) is not None
         assert bus.recv(0) is not None
         assert bus.recv(0) is None
@@ -78,7 +78,7 @@ def test_a_driver_that_always_fails_is_a_bus_that_is_gone(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(VirtualBus, "_recv_internal", fail)
     monkeypatch.setattr("tickrig.host.links.can_link.FAULTY_S", 0.0)
-    with open_watched(PLAN, Watch(), {}) as bus, pytest.raises(PortGone, match="100 reads"):
+    with open_watched_bus(PLAN, Watch(), {}) as bus, pytest.raises(PortGone, match="100 reads"):
         bus.recv(None)
 
 
@@ -87,14 +87,14 @@ def test_a_bus_that_takes_nothing_is_there_still(monkeypatch: pytest.MonkeyPatch
         raise can.CanOperationError("the buffer is full", errno.ENOBUFS)
 
     monkeypatch.setattr(VirtualBus, "send", fail)
-    with open_watched(PLAN, Watch(), {}) as bus, pytest.raises(can.CanOperationError) as caught:
+    with open_watched_bus(PLAN, Watch(), {}) as bus, pytest.raises(can.CanOperationError) as caught:
         bus.send(MESSAGE)
     assert not isinstance(caught.value, PortGone)
 
 
 def test_a_bus_that_cannot_be_opened_is_not_there() -> None:
     with pytest.raises(PortGone, match="cannot open nothing_such x: "):
-        open_watched(BusPlan(interface="nothing_such", channel="x"), Watch(), {})
+        open_watched_bus(BusPlan(interface="nothing_such", channel="x"), Watch(), {})
 
 
 def test_why_a_bus_cannot_be_opened_is_all_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -103,5 +103,5 @@ def test_why_a_bus_cannot_be_opened_is_all_that_is_told(monkeypatch: pytest.Monk
 
     monkeypatch.setattr("can.Bus", fail)
     with pytest.raises(PortGone, match="udp_multicast needs none") as caught:
-        open_watched(BusPlan(interface="socketcan", channel="vcan0"), Watch(), {})
+        open_watched_bus(BusPlan(interface="socketcan", channel="vcan0"), Watch(), {})
     assert caught.value.__suppress_context__

@@ -5,9 +5,8 @@ from typing import Any
 import pytest
 
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.modes.real.door_watch import HostPace
-from tickrig.emulators.testing.bench.modes.real.watched_link import LinkGone, WatchedLink
-from tickrig.host.links.errors import LinkClosed
+from tickrig.emulators.testing.bench.modes.door_watch import HostPace, LinkGone, WatchedLink
+from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.trace import Mark
 
 

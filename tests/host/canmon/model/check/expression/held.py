@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from tests.host.canmon.model.record_log import hear
 from tickrig.host.canmon.model.check.checker import Checker
-from tickrig.host.canmon.model.check.rule import Finding
+from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import parse_rules
 from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.frames.record import Record
+from tickrig.host.canmon.model.frames import Record
 
 MAPPED = "0.1 583#4F001A0002000000\n0.1 583#43001A0110004160\n0.1 583#43001A0220006460\n"
 """TPDO1 of node 3 carries statusword and actual position: both are read from the node."""
 
 
-def findings(rule: str, records: list[Record], end_us: int | None = None) -> list[Finding]:
+def findings(rule: str, records: list[Record], end_us: int | None = None) -> list[TrafficFinding]:
     """Return all findings."""
     checker, decoder = Checker(parse_rules({"rule": [rule]})), Decoder()
     found = [one for record in records for one in checker.take(record, decoder.take(record))]

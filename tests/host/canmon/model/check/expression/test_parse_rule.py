@@ -10,9 +10,14 @@ from hypothesis import strategies as st
 
 from tests.host.canmon.model.check.expression.held import MAPPED, findings
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.check.expression.parse_rule import BEHIND, DEMANDS, parse_rule
-from tickrig.host.canmon.model.check.expression.quantity_parser import SCOPES, RuleError
 from tickrig.host.canmon.model.check.frame_rules import NoEmcy, NoErrorFrames, NoSdoAbort
+from tickrig.host.canmon.model.check.rule_parser import (
+    BEHIND,
+    DEMANDS,
+    SCOPES,
+    RuleError,
+    parse_rule,
+)
 from tickrig.host.canmon.model.check.rules import joined, parse_rules
 
 WANTED = f"wanted {', '.join(DEMANDS)}, or 'and', 'or'"

@@ -4,8 +4,8 @@ import pytest
 
 from tests.host.canmon.model.check.expression.held import MAPPED, broken, findings, unjudged
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import FdFrame
 
 
 def test_a_state_that_is_reached_in_time_is_right() -> None:

@@ -3,8 +3,8 @@ from __future__ import annotations
 import pytest
 
 from tests.host.canmon.model.check.expression.held import MAPPED, broken, findings
-from tickrig.host.canmon.model.frames.record import Record
-from tickrig.wire.can_fd import FdFrame
+from tickrig.host.canmon.model.frames import Record
+from tickrig.wire.can import FdFrame
 
 FAULT = "3.statusword.fault never"
 ENABLED, FAULTY = "183#370264000000", "183#3F0264000000"

@@ -14,16 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.host.canmon.model.logs.test_log_lines import HEARDS
-from tickrig.host.canmon.model.frames.record import AnyFrame, Record
+from tickrig.host.canmon.model.frames import AnyFrame, Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
 from tickrig.host.canmon.model.logs.mark import dropped, gone
 from tickrig.host.canmon.model.logs.notation import parse_frame
-from tickrig.host.canmon.model.logs.pcap.can_packet import packet
-from tickrig.wire.can import CanFrame
-from tickrig.wire.can_error import ErrorFrame
-from tickrig.wire.can_fd import FD_LENGTHS, FdFrame
+from tickrig.host.canmon.model.logs.pcap import packet
+from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
 
 START_US = 1_700_000_000_000_000
 FRAMES = [

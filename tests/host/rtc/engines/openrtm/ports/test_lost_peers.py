@@ -15,7 +15,7 @@ import pytest
 from tests.host.rtc.engines.openrtm.name_server import free_port
 from tests.host.rtc.engines.openrtm.ports.foreign import Peer, Served
 from tickrig.host.control.clock import ServingClock
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
 
 WITNESS = """
 import time

@@ -9,7 +9,7 @@ import pytest
 from omniORB import any as omni_any
 
 from tests.host.rtc.engines.openrtm.ports.foreign import Peer, Served
-from tickrig.host.rtc.engines.openrtm.ports.properties import texts
+from tickrig.host.rtc.engines.openrtm.connector_ends import texts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.data_port import InPort

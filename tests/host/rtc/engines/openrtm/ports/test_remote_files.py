@@ -15,10 +15,10 @@ from tests.host.rtc.chain import make_manager
 from tests.host.rtc.engines.openrtm.live_system import start_system
 from tests.host.rtc.engines.openrtm.name_server import DEADLINE_S, OmniNames, eventually
 from tests.host.rtc.engines.openrtm.ports.foreign import Peer
-from tickrig.host.cli.openrtm_options import Endpoint
+from tickrig.host.cli.engine_options import Endpoint
 from tickrig.host.rtc.engines.openrtm.peers import parse_path
 from tickrig.host.rtc.system.system import restore
-from tickrig.host.rtc.system.system_toml import parse_toml
+from tickrig.host.rtc.system.system_file import parse_toml
 
 SYSTEM = """
 [[component]]

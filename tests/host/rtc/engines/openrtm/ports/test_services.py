@@ -8,7 +8,7 @@ import pytest
 
 from tests.host.rtc.engines.openrtm.ports.foreign import Peer, Served
 from tickrig.host.rtc import RtComponent
-from tickrig.host.rtc.engines.openrtm.ports.properties import texts
+from tickrig.host.rtc.engines.openrtm.connector_ends import texts
 from tickrig.host.rtc.motion.components.ref_hard import RefHardRh3
 from tickrig.host.rtc.motion.options.obstacles import CollisionDetection
 

@@ -9,14 +9,14 @@ from omniORB import CORBA
 
 from tests.host.rtc.engines.openrtm.name_server import DEADLINE_S, free_port
 from tests.host.rtc.spy import Spy
-from tickrig.host.cli.openrtm_options import Endpoint, OpenRtmOptions, parse_endpoint
+from tickrig.host.cli.engine_options import Endpoint, OpenRtmOptions, parse_endpoint
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc.components import ConfigSample, ConsoleOut
 from tickrig.host.rtc.engines.openrtm.engine import openrtm_joined
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.remote.call_queue import CallQueue
+from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
-from tickrig.host.rtc.system.real_time import RealTime
+from tickrig.host.rtc.system.schedule import RealTime
 
 RATE_HZ = 100.0
 

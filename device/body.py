@@ -1,0 +1,333 @@
+"""Bodies that drives move: poses, wheels, contact with the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from math import cos, pi, remainder, sin, tau
+from operator import add
+from typing import Final, NamedTuple
+
+from tickrig.device.twin import Copyable, Immutable
+
+# Where a body is, and how far an arc takes it.
+
+
+@dataclass(frozen=True, slots=True)
+class Pose(Immutable):
+    """A place on a plane, and the way to look.
+
+    Attributes:
+        x_m: metres.
+        y_m: metres, to the left of x.
+        heading_rad: from x towards y, not wrapped.
+    """
+
+    x_m: float = 0.0
+    y_m: float = 0.0
+    heading_rad: float = 0.0
+
+    @property
+    def wrapped_rad(self) -> float:
+        """The heading within half a turn to each side."""
+        return remainder(self.heading_rad, tau)
+
+    def moved(self, left_m: float, right_m: float, tread_m: float) -> Pose:
+        """Return the pose after both sides have rolled at steady speeds.
+
+        The path is an arc, which is taken exactly: its chord has the heading
+        of its middle.
+
+        Args:
+            left_m: way of the left wheels.
+            right_m: way of the right wheels.
+            tread_m: distance between left and right wheels.
+
+        >>> Pose().moved(1.0, 1.0, 0.4)
+        Pose(x_m=1.0, y_m=0.0, heading_rad=0.0)
+        """
+        return Pose(*arc((self.x_m, self.y_m, self.heading_rad), left_m, right_m, tread_m))
+
+
+def arc(
+    place: tuple[float, float, float], left_m: float, right_m: float, tread_m: float
+) -> tuple[float, float, float]:
+    """Return x, y and heading after an arc; `Pose.moved` in plain numbers, for each step."""
+    x_m, y_m, heading_rad = place
+    turn_rad = (right_m - left_m) / tread_m
+    half_rad = turn_rad / 2
+    chord_m = (left_m + right_m) / 2
+    if half_rad:
+        chord_m *= sin(half_rad) / half_rad
+    middle_rad = heading_rad + half_rad
+    return (
+        x_m + chord_m * cos(middle_rad),
+        y_m + chord_m * sin(middle_rad),
+        heading_rad + turn_rad,
+    )
+
+
+# Where a wheel touches the ground.
+
+GRAVITY_M_S2: Final = 9.80665
+"""Standard gravity."""
+
+
+@dataclass(slots=True)
+class Contact:
+    """A wheel that carries its share of a body over the ground.
+
+    Without `friction` the ground goes with the wheel, and the wheel feels the
+    mass as inertia. With it, the ground's speed changes by at most
+    friction x gravity; what the wheel turns beyond that is slip. While it slips, the
+    wheel feels the force of friction instead of the mass.
+
+    Not emulated: a friction that depends on speed or direction, a share of the
+    weight that changes with acceleration.
+
+    Attributes:
+        radius_m: of the wheel.
+        mass_kg: its share of the body.
+        friction: coefficient, None if it never slips.
+        speed_m_s: of the ground below it.
+        slip_m_s: speed of the rim beyond that, 0 with grip.
+    """
+
+    radius_m: float
+    mass_kg: float
+    friction: float | None = None
+    speed_m_s: float = field(default=0.0, init=False)
+    slip_m_s: float = field(default=0.0, init=False)
+
+    def roll(self, turn_rad: float, step_s: float) -> float:
+        """Turn the wheel at a steady speed; return the way over the ground in metres."""
+        rim_m_s = turn_rad * self.radius_m / step_s
+        speed_m_s = rim_m_s
+        if self.friction is not None:
+            most = self.friction * GRAVITY_M_S2 * step_s
+            speed_m_s = min(max(rim_m_s, self.speed_m_s - most), self.speed_m_s + most)
+        self.speed_m_s, self.slip_m_s = speed_m_s, rim_m_s - speed_m_s
+        return speed_m_s * step_s
+
+    @property
+    def load_kg_m2(self) -> float:
+        """The inertia that the wheel feels."""
+        return 0.0 if self.slip_m_s else self.mass_kg * self.radius_m**2
+
+    @property
+    def load_nm(self) -> float:
+        """The torque that the ground has on the wheel, positive forward."""
+        if not self.slip_m_s or self.friction is None:
+            return 0.0
+        torque_nm = self.friction * self.mass_kg * GRAVITY_M_S2 * self.radius_m
+        return -torque_nm if self.slip_m_s > 0 else torque_nm
+
+
+# A body on driven wheels at its left and right side.
+
+STEP_S: Final = 1e-3
+"""Length of a step; drives tick as often."""
+
+SIDES: Final = {
+    "differential": (("left",), ("right",)),
+    "skid-steer": (("front_left", "rear_left"), ("front_right", "rear_right")),
+}
+"""Wheels at the left and at the right, by the kind of body."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyParameters(Immutable):
+    """What a body is like.
+
+    Attributes:
+        kind: of `SIDES`.
+        wheel_radius_m: of each wheel.
+        tread_m: distance between left and right wheels.
+        mass_kg: carried by the driven wheels, each the same share.
+        friction: coefficient between wheels and ground, None if they never slip.
+
+    Raises:
+        ValueError: no such kind, or a length or mass that cannot be.
+    """
+
+    kind: str
+    wheel_radius_m: float
+    tread_m: float
+    mass_kg: float = 0.0
+    friction: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if self.kind not in SIDES:
+            raise ValueError(f"kind {self.kind!r} is not one of {', '.join(SIDES)}")
+        for name, value in (("wheel_radius_m", self.wheel_radius_m), ("tread_m", self.tread_m)):
+            if not value > 0:
+                raise ValueError(f"{name} {value} is not above 0")
+        for name, value in (("mass_kg", self.mass_kg), ("friction", self.friction or 0.0)):
+            if not value >= 0:
+                raise ValueError(f"{name} {value} is not 0 or more")
+
+    @property
+    def wheels(self) -> tuple[str, ...]:
+        """Names of the wheels."""
+        left, right = SIDES[self.kind]
+        return (*left, *right)
+
+
+class WheeledBody(Copyable):
+    """A differential drive, or a skid steer whose sides move as the mean of their wheels.
+
+    It goes as far as its wheels have turned since the step before, on an exact
+    arc. Its mass lies above the wheels, at half the tread to each side: so each
+    wheel feels mass / number of wheels x radius squared, straight on as in a turn.
+
+    Not emulated: castors, the force that turns the wheels of a skid steer
+    sideways, rolling resistance, slopes, collisions.
+
+    Args:
+        parameters: what it is like.
+
+    Attributes:
+        pose: where it is; it may be put elsewhere.
+        speed_m_s: forward, in the latest step.
+        turn_rad_s: to the left, in the latest step.
+        contacts: its wheels on the ground, by name.
+    """
+
+    def __init__(self, parameters: BodyParameters) -> None:
+        self.parameters, self.pose = parameters, Pose()
+        self.speed_m_s = self.turn_rad_s = 0.0
+        share_kg = parameters.mass_kg / len(parameters.wheels)
+        self.contacts: Mapping[str, Contact] = {
+            name: Contact(parameters.wheel_radius_m, share_kg, parameters.friction)
+            for name in parameters.wheels
+        }
+        self._angles = dict.fromkeys(parameters.wheels, 0.0)
+
+    def step(self, angles_rad: Mapping[str, float]) -> None:
+        """Let a step pass in which the wheels have turned to these angles."""
+        ways = {}
+        for name, contact in self.contacts.items():
+            ways[name] = contact.roll(angles_rad[name] - self._angles[name], STEP_S)
+            self._angles[name] = angles_rad[name]
+        left_m, right_m = (_mean([ways[name] for name in side]) for side in self._sides)
+        tread_m = self.parameters.tread_m
+        if left_m or right_m:
+            self.pose = self.pose.moved(left_m, right_m, tread_m)
+        self.speed_m_s = (left_m + right_m) / 2 / STEP_S
+        self.turn_rad_s = (right_m - left_m) / tread_m / STEP_S
+
+    @property
+    def resting(self) -> bool:
+        """Whether a step with the same angles would change nothing."""
+        return not any(c.speed_m_s or c.slip_m_s for c in self.contacts.values())
+
+    @property
+    def slipping(self) -> bool:
+        """Whether a wheel slips."""
+        return any(contact.slip_m_s for contact in self.contacts.values())
+
+    @property
+    def _sides(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        return SIDES[self.parameters.kind]
+
+
+def _mean(values: Sequence[float]) -> float:
+    return reduce(add, values, 0.0) / len(values)
+
+
+# A body on three omni wheels: it goes any way, and turns meanwhile.
+
+_OMNI_STEP_S: Final = 1e-3
+
+_BEARINGS: Final = (pi / 3, pi, -pi / 3)
+"""Where the wheels are, from the front to the left; each rolls at right angles to that."""
+
+
+class Velocity(NamedTuple):
+    """In the frame of the body: m/s forward, m/s to the left, rad/s to the left."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    w: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OmniParameters(Immutable):
+    """What a body is like.
+
+    Attributes:
+        wheel_radius_m: of each wheel.
+        base_radius_m: from the middle to each wheel.
+        response_s: time constant of the wheels' speed.
+        most_rad_s: the highest speed of a wheel.
+
+    Raises:
+        ValueError: a number that is not above 0.
+    """
+
+    wheel_radius_m: float = 0.05
+    base_radius_m: float = 0.2
+    response_s: float = 0.05
+    most_rad_s: float = 20.0
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        for name in ("wheel_radius_m", "base_radius_m", "response_s", "most_rad_s"):
+            if not 0 < (value := getattr(self, name)) < 1_000:
+                raise ValueError(f"{name} {value} is not above 0 and below 1000")
+
+    def wheel_speeds(self, velocity: Velocity) -> tuple[float, ...]:
+        """Return the speeds of the wheels in rad/s; all slower alike where one is too fast."""
+        vx, vy, turn = velocity.vx, velocity.vy, velocity.w * self.base_radius_m
+        rims = (vy * cos(at) - vx * sin(at) + turn for at in _BEARINGS)
+        speeds = tuple(rim / self.wheel_radius_m for rim in rims)
+        share = min(1.0, self.most_rad_s / max(1e-9, *map(abs, speeds)))
+        return tuple(speed * share for speed in speeds)
+
+    def velocity(self, speeds: tuple[float, ...]) -> Velocity:
+        """Return how the body goes when its wheels turn at these speeds.
+
+        >>> omni = OmniParameters()
+        >>> [round(n, 6) for n in omni.velocity(omni.wheel_speeds(Velocity(0.1, -0.2, 0.3)))]
+        [0.1, -0.2, 0.3]
+        """
+        rims = [speed * self.wheel_radius_m for speed in speeds]
+        pairs = list(zip(rims, _BEARINGS, strict=True))
+        vx = -reduce(add, [rim * sin(at) for rim, at in pairs], 0.0) * 2 / 3
+        vy = reduce(add, [rim * cos(at) for rim, at in pairs], 0.0) * 2 / 3
+        return Velocity(vx, vy, reduce(add, rims, 0.0) / 3 / self.base_radius_m)
+
+
+@dataclass(slots=True)
+class OmniBody(Copyable):
+    """Three wheels that follow their commands with a time constant, without slip.
+
+    Not emulated: rollers, slip, mass, encoders, the driver.
+
+    Attributes:
+        parameters: what it is like.
+        pose: where it is; it may be put elsewhere.
+        velocity: in the latest step.
+    """
+
+    parameters: OmniParameters = field(default_factory=OmniParameters)
+    pose: Pose = field(default_factory=Pose)
+    velocity: Velocity = field(default=Velocity(), init=False)
+    _speeds: tuple[float, ...] = field(default=(0.0, 0.0, 0.0), init=False)
+
+    def step(self, wanted: Velocity) -> None:
+        """Go on for a millisecond."""
+        share = _OMNI_STEP_S / (_OMNI_STEP_S + self.parameters.response_s)
+        wheels = zip(self._speeds, self.parameters.wheel_speeds(wanted), strict=True)
+        self._speeds = tuple(speed + (target - speed) * share for speed, target in wheels)
+        self.velocity = velocity = self.parameters.velocity(self._speeds)
+        pose, turn_rad = self.pose, velocity.w * _OMNI_STEP_S
+        middle_rad = pose.heading_rad + turn_rad / 2
+        ahead_m, left_m = velocity.vx * _OMNI_STEP_S, velocity.vy * _OMNI_STEP_S
+        self.pose = Pose(
+            pose.x_m + ahead_m * cos(middle_rad) - left_m * sin(middle_rad),
+            pose.y_m + ahead_m * sin(middle_rad) + left_m * cos(middle_rad),
+            pose.heading_rad + turn_rad,
+        )

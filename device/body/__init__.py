@@ -1,1 +1,0 @@
-"""Bodies of mobile robots: what turning wheels do to them."""

@@ -1,0 +1,527 @@
+"""A component on CANopen as a device: life cycle, ports, terminals."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
+from functools import partial
+from typing import ClassVar, Final, Generic, TypeVar
+
+from tickrig.device.canopen.dictionary import Dictionary, Entry
+from tickrig.device.canopen.pdo.tpdo import PdoProducer
+from tickrig.device.canopen.slave import Application, CanopenSlave, Nonvolatile, ServiceMaker
+from tickrig.device.canopen.stack import make_slave
+from tickrig.device.component import CallbackRunner, DeviceComponent, Result, Timer, declared, shown
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.rtc_canopen import (
+    LONG,
+    CanopenPortProfile,
+    CanopenPortType,
+    PortDirection,
+    PortTransport,
+    RtcProfile,
+    object_table,
+)
+
+# Data ports of a DeviceRTC: a value in the dictionary, carried by a PDO.
+
+T = TypeVar("T")
+
+
+class CanopenPort(Generic[T]):
+    """What both kinds of ports have.
+
+    Args:
+        name: a letter, then up to 31 letters, digits and underscores.
+        port_type: type of its values; `SHORT.sequence(4)` makes a port of four.
+        cob_id: CAN-ID of its PDO; None for that of the pre-defined connection set, which the
+            first four of each direction have. Without one the PDO is off.
+        transport: None for a PDO if the type fits into one, else SDO.
+    """
+
+    direction: ClassVar[PortDirection]
+
+    def __init__(
+        self,
+        name: str,
+        port_type: CanopenPortType[T],
+        *,
+        cob_id: int | None = None,
+        transport: PortTransport | None = None,
+    ) -> None:
+        self.name, self.port_type = name, port_type
+        self.cob_id, self.transport = cob_id, transport
+        self.entries: Sequence[Entry] = ()
+
+    def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
+        """Keep its value in these objects; `event` sends the TPDOs that carry one."""
+        self.entries, self._event = entries, event
+
+    @property
+    def profile(self) -> CanopenPortProfile:
+        """The port as the profile of its component has it."""
+        return CanopenPortProfile(
+            self.name, self.direction, self.port_type, self.cob_id, self.transport
+        )
+
+    @property
+    def value(self) -> T:
+        """The present value."""
+        return self.port_type.decode([entry.data for entry in self.entries])
+
+
+class CanopenInPort(CanopenPort[T]):
+    """Where the bus writes, by RPDO or SDO, and the component reads.
+
+    Attributes:
+        is_new: whether the bus has written since it was read, also the same value.
+    """
+
+    direction: ClassVar[PortDirection] = PortDirection.IN
+    is_new: bool = False
+
+    def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
+        """Keep its value in these objects, and hear of each write."""
+        super().join(entries, event)
+        for entry in entries:
+            entry.written = self._on_written
+
+    def read(self) -> T:
+        """Return the present value; it is not new any more."""
+        self.is_new = False
+        return self.value
+
+    def _on_written(self, entry: Entry) -> None:
+        self.is_new = True
+
+
+class CanopenOutPort(CanopenPort[T]):
+    """Where the component writes; its TPDO goes out once in a tick with a write."""
+
+    direction: ClassVar[PortDirection] = PortDirection.OUT
+
+    def write(self, value: T) -> None:
+        """Leave a value; it is sent in Active, also if it is the same as before.
+
+        Raises:
+            ValueError: the type has no such value.
+        """
+        for entry, data in zip(self.entries, self.port_type.encode(value), strict=True):
+            entry.assign(data)
+            self._event(entry)
+
+
+# What a developer writes: the ports of a DeviceRTC, and what it does in each state.
+
+
+class CanopenComponent(DeviceComponent):
+    """A component on a CANopen device; a subclass says what it is and does.
+
+    Ports have objects from 2100h on in order of declaration. Reset Node makes a new
+    component, as power-on does.
+
+    Attributes:
+        type_name: type of the component; see `RtcProfile` for these six.
+        version: as 1.0.
+        vendor: who made it.
+        category: what it is.
+        rate_hz: how often `on_execute`, `error_check` and `on_error` run (DECISION K12).
+        product_code: 1018h:02, 0 for one that is made of the type name.
+        strict_cia301: whether NMT leads out of Error as CiA 301 has it (DECISION K9).
+
+    Raises:
+        ValueError: a profile or ports that cannot be.
+
+    >>> from tickrig.device.canopen.device_rtc import CanopenInPort, CanopenOutPort
+    >>> from tickrig.wire.rtc_canopen import LONG
+    >>> class Doubler(CanopenComponent):
+    ...     type_name = "Doubler"
+    ...     number = CanopenInPort("number", LONG)
+    ...     double = CanopenOutPort("double", LONG)
+    ...
+    ...     def on_execute(self) -> None:
+    ...         self.double.write(2 * self.number.read())
+    >>> [f"{port.index:04X}h {port.profile.name}" for port in Doubler.profile().placed()]
+    ['2100h number', '2101h double']
+    """
+
+    version: ClassVar[str] = "1.0"
+    vendor: ClassVar[str] = ""
+    category: ClassVar[str] = ""
+    rate_hz: ClassVar[int] = 100
+    product_code: ClassVar[int] = 0
+    strict_cia301: ClassVar[bool] = False
+
+    def __init__(self) -> None:
+        self.inputs = QuantityBank(self.physical)
+        self.ports = {port.name: port for port in self._own_ports(CanopenPort)}
+
+    @classmethod
+    def profile(cls) -> RtcProfile:
+        """Return what the component says of itself; ValueError if that cannot be."""
+        try:
+            return RtcProfile(
+                type_name=cls.type_name,
+                version=cls.version,
+                vendor=cls.vendor,
+                category=cls.category,
+                rate_hz=cls.rate_hz,
+                product_code=cls.product_code,
+                ports=tuple(port.profile for _, port in declared(cls, CanopenPort)),
+            )
+        except ValueError as error:
+            raise ValueError(f"{cls.__name__}: {error}") from None
+
+    def error_check(self) -> Result:
+        """Look after the device, once a period while Inactive; an error leads to Error."""
+
+
+class CanopenEcho(CanopenComponent):
+    """One in-port, one out-port, both Long."""
+
+    type_name = "Echo"
+    vendor = "tickrig"
+    category = "example"
+    inlet = CanopenInPort("in", LONG)
+    outlet = CanopenOutPort("out", LONG)
+
+    def on_execute(self) -> None:
+        """Hand on what is new."""
+        if self.inlet.is_new:
+            self.outlet.write(self.inlet.read())
+
+
+# States of a DeviceRTC and what runs on the way (NEDO report, 3.4.43.3, Table 3, Fig. 110).
+#
+# Where figure and table are silent the decisions K6 to K13 of the project hold.
+
+
+class RtcState(Enum):
+    """State of a component (OMG RTC 1.1, LifeCycleState), and what comes after the end."""
+
+    CREATED = "Created"
+    INACTIVE = "Inactive"
+    ACTIVE = "Active"
+    ERROR = "Error"
+    FINALIZED = "Finalized"
+
+
+_STATES: Final = {
+    NmtState.INITIALISING: RtcState.CREATED,
+    NmtState.PRE_OPERATIONAL: RtcState.INACTIVE,
+    NmtState.OPERATIONAL: RtcState.ACTIVE,
+    NmtState.STOPPED: RtcState.ERROR,
+}
+"""Table 3, for a component that was initialized."""
+
+_ACTIVITIES: Final = {
+    RtcState.INACTIVE: "error_check",
+    RtcState.ACTIVE: "on_execute",
+    RtcState.ERROR: "on_error",
+}
+"""What a state does at the rate of the component."""
+
+_Effects = Mapping[NmtCommand, tuple[str, ...]]
+
+_MOVES: Final[_Effects] = {
+    NmtCommand.START: (),
+    NmtCommand.STOP: (),
+    NmtCommand.ENTER_PRE_OPERATIONAL: (),
+}
+_RESETS: Final[_Effects] = {
+    NmtCommand.RESET_NODE: ("on_reset",),
+    NmtCommand.RESET_COMMUNICATION: ("on_reset",),
+}
+_ADMITTED: Final[Mapping[RtcState, _Effects]] = {
+    RtcState.CREATED: {NmtCommand.RESET_NODE: ()},  # K11
+    RtcState.INACTIVE: {
+        **_MOVES,
+        NmtCommand.RESET_NODE: ("on_finalize",),
+        NmtCommand.RESET_COMMUNICATION: (),
+    },
+    RtcState.ACTIVE: {
+        **_MOVES,
+        NmtCommand.RESET_NODE: ("on_deactivated", "on_finalize"),
+        NmtCommand.RESET_COMMUNICATION: ("on_deactivated",),
+    },
+    RtcState.ERROR: _RESETS,  # K8, K9
+    RtcState.FINALIZED: {},
+}
+"""Commands that are carried out, and what runs before (M8, M9, K10)."""
+
+_STRICT_ERROR: Final[_Effects] = {
+    **_RESETS,
+    NmtCommand.START: ("on_reset",),
+    NmtCommand.ENTER_PRE_OPERATIONAL: ("on_reset",),
+}
+"""The same in Error with `strict_cia301` (K9)."""
+
+_ENTERED: Final[Mapping[tuple[NmtState, NmtState], tuple[str, ...]]] = {
+    (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL): ("on_activated",),  # M2
+    (NmtState.STOPPED, NmtState.OPERATIONAL): ("on_activated",),  # K9
+    (NmtState.OPERATIONAL, NmtState.PRE_OPERATIONAL): ("on_deactivated",),  # M3
+    (NmtState.OPERATIONAL, NmtState.STOPPED): ("on_deactivated", "on_aborting"),  # M6, M7, K6
+}
+"""What runs after a change of the NMT state; nothing on M4 and M5 (K7)."""
+
+_ENDING: Final = {
+    RtcState.INACTIVE: ("on_finalize",),
+    RtcState.ACTIVE: ("on_deactivated", "on_finalize"),
+    RtcState.ERROR: ("on_finalize",),
+}
+"""What runs before the end (M11)."""
+
+
+# The life cycle of RTC inside the NMT states (NEDO report, 3.4.43.3, Fig. 110).
+
+
+class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
+    """Runs the callbacks of a component when its node changes its NMT state, and before.
+
+    The NMT state is the state of the component, once that is initialized. Whoever
+    changes it, master, error behaviour or the component itself, the callbacks are the
+    same; they run at once, after all services have heard of the change.
+
+    Args:
+        node: the slave.
+        make: makes a component, joined to the dictionary.
+
+    Attributes:
+        component: the component as it is; a reset of the node makes a new one.
+    """
+
+    def __init__(self, node: CanopenSlave, make: Callable[[], CanopenComponent]) -> None:
+        self._node, self._make = node, make
+        self.create()
+
+    def create(self) -> None:
+        """Begin with a new component (M1)."""
+        super().__init__(self._make())
+        self._initialized = self._finalized = False
+
+    @property
+    def state(self) -> RtcState:
+        """State of the component."""
+        if self._finalized:
+            return RtcState.FINALIZED
+        return _STATES[self._node.state] if self._initialized else RtcState.CREATED
+
+    @property
+    def activity(self) -> str:
+        """Callback that the state runs at the component's rate, empty if it has none."""
+        name = _ACTIVITIES.get(self.state, "")
+        own = name and getattr(type(self.component), name) is not getattr(CanopenComponent, name)
+        return name if own else ""
+
+    def boots(self) -> bool:
+        """Run `on_initialize` if that is due; say whether the node boots (M1, K11)."""
+        if not self._initialized and not self._finalized:
+            self._initialized = self.call("on_initialize")
+        return self._initialized and not self._finalized
+
+    def admits(self, command: NmtCommand) -> bool:
+        """Run what comes before an NMT command; say whether it is carried out."""
+        state = self.state
+        table = _ADMITTED[state]
+        if state is RtcState.ERROR and self.component.strict_cia301:
+            table = _STRICT_ERROR
+        if command not in table:
+            return False
+        well = self._call_all(table[command])
+        if state is RtcState.ERROR:
+            return well
+        if command is NmtCommand.RESET_NODE:
+            self.create()
+        return True
+
+    def moved(self, old: NmtState, new: NmtState) -> None:
+        """Run the callbacks of a change that was made; an error leads to Error."""
+        well = self._call_all(_ENTERED.get((old, new), ()))
+        if well or new is NmtState.STOPPED:
+            return
+        if old is NmtState.OPERATIONAL:
+            self.call("on_aborting")
+        self._node.enter(NmtState.STOPPED)
+
+    def run(self) -> None:
+        """Run what the state does; an error leads to Error (M5, M6)."""
+        if not self.call(self.activity) and self.state is not RtcState.ERROR:
+            self._node.enter(NmtState.STOPPED)
+
+    def finalize(self) -> None:
+        """End (M11): the node falls silent until its supply was cut."""
+        if self.state in _ENDING:
+            self._call_all(_ENDING[self.state])
+            self._finalized = True
+            self._node.reset_node()
+
+    def _call_all(self, callbacks: tuple[str, ...]) -> bool:
+        """Run callbacks, all of them; False if one failed."""
+        results = [self.call(name) for name in callbacks]
+        return all(results)
+
+
+# The physical side of a DeviceRTC: what the component declares, its ports and its state.
+
+_SHUT_DOWN: Final = "shut_down"
+
+_INPUTS: Final = (
+    InputSignal(
+        _SHUT_DOWN,
+        "button: the component ends, and the node is silent until a power cut",
+        SignalType.BUTTON,
+    ),
+)
+"""Every DeviceRTC has these; a component may add its own."""
+
+_OUTPUTS: Final = (
+    OutputSignal("rtc_state", "Created, Inactive, Active, Error or Finalized"),
+    OutputSignal("callback", "the callback that ran last"),
+    OutputSignal("executed", "how often on_execute ran"),
+)
+"""Every DeviceRTC has these; each port adds its value as in.NAME or out.NAME."""
+
+
+def _inputs_of(kind: type[CanopenComponent]) -> tuple[InputSignal, ...]:
+    """Return the physical inputs of a component; ValueError if two have the same name."""
+    table = (*_INPUTS, *kind.physical)
+    name, count = Counter(item.name for item in table).most_common(1)[0]
+    if count > 1:
+        raise ValueError(f"{kind.__name__}: {count} inputs are called {name!r}")
+    return table
+
+
+def _outputs_of(component: CanopenComponent) -> dict[str, OutputSignal]:
+    """Return the physical outputs of a component."""
+    ports = [
+        OutputSignal(
+            f"{port.direction.value}.{port.name}", f"value of this {port.direction.value}-port"
+        )
+        for port in component.ports.values()
+    ]
+    return {output.name: output for output in (*_OUTPUTS, *ports)}
+
+
+def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
+    """Return the present value of an output; KeyError if there is none."""
+    match name:
+        case "rtc_state":
+            return life.state.value
+        case "callback":
+            return life.latest
+        case "executed":
+            return life.executed
+    return shown(life.component.ports[name.partition(".")[2]].value)
+
+
+# DeviceRTC: a component at work in a CANopen slave.
+
+
+class DeviceRtc(Application):
+    """Runs a component with the NMT state of its node (NEDO report, 3.4.43.3, Fig. 110).
+
+    Callbacks take no time. What the state does at the component's rate begins one
+    period after the state was entered.
+
+    Not emulated: service ports, configuration sets, several components on one node.
+
+    Args:
+        node: the slave; its dictionary is that of the component.
+        slot: its place in the order of a tick.
+        kind: the component.
+
+    Attributes:
+        life: the life cycle, with the component.
+
+    Raises:
+        ValueError: physical inputs that cannot be.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int, kind: type[CanopenComponent]) -> None:
+        super().__init__(node, slot)
+        self._kind, self._placed = kind, kind.profile().placed()
+        self.has_inputs(_inputs_of(kind))
+        self.life = CanopenLifeCycle(node, self._make)
+        self.outputs: Mapping[str, OutputSignal] = _outputs_of(self.life.component)
+        self._timer = Timer(kind.rate_hz)
+        node.boots, node.admits = self.life.boots, self.life.admits
+        node.entered = self._moved
+
+    def read(self, name: str) -> float | str:
+        """Look at an output, as it was left by the latest tick.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return _text_of(self.life, name)
+
+    def power_on(self) -> None:
+        """Begin with a new component."""
+        self.life.create()
+
+    def start(self) -> None:
+        """Do nothing until the node has booted."""
+        self._timer.stop()
+
+    def on_execute(self, now_us: int) -> None:
+        """Run what the state of the component does, if a period has ended."""
+        if self.inputs[_SHUT_DOWN]:
+            self.life.finalize()
+        if self._timer.elapsed(now_us):
+            self.life.run()
+        self.schedule(self._timer.due_us)
+
+    def _moved(self, old: NmtState, new: NmtState) -> None:
+        """Let the new state count its periods from now on, then run the callbacks."""
+        self._timer.stop()
+        if self.life.activity:
+            self._timer.start(self.node.now_us)
+        self.request()
+        self.life.moved(old, new)
+
+    def _make(self) -> CanopenComponent:
+        """Make a component and join it to the dictionary."""
+        component = self._kind()
+        component.inputs = self.inputs
+        for place in self._placed:
+            entries = [self.node.dictionary[place.index, sub] for sub in place.subs]
+            component.ports[place.profile.name].join(entries, self._event)
+        return component
+
+    def _event(self, entry: Entry) -> None:
+        PdoProducer.of(self.node).request_for(entry)
+
+
+def make_dictionary(kind: type[CanopenComponent]) -> Dictionary:
+    """Make the objects of a component; ValueError if its profile cannot be."""
+    table = object_table(kind.profile())
+    return Dictionary(table, table.objects)
+
+
+def application_of(kind: type[CanopenComponent]) -> ServiceMaker:
+    """Return what makes the application of a component."""
+    return partial(DeviceRtc, kind=kind)
+
+
+def make_device_rtc(
+    kind: type[CanopenComponent], node_id: int, nonvolatile: Nonvolatile | None = None
+) -> CanopenSlave:
+    """Make a slave that is a DeviceRTC.
+
+    Args:
+        kind: the component.
+        node_id: 1..127, or 255 for a slave that waits for LSS.
+        nonvolatile: what it kept from an earlier life.
+
+    Raises:
+        ValueError: a component or a node-ID that cannot be.
+    """
+    return make_slave(make_dictionary(kind), node_id, nonvolatile, application_of(kind))

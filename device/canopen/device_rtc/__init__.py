@@ -1,1 +1,0 @@
-"""DeviceRTC: an RT component inside a CANopen slave (NEDO report, 3.4.43.3)."""

@@ -1,0 +1,456 @@
+"""The object dictionary of a slave: entries, their rules and aborts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import pairwise
+from operator import attrgetter
+from typing import Final
+
+from tickrig.device.twin import Immutable, Part
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectDescription
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, FLAG_30, INVALID, is_restricted
+from tickrig.wire.canopen.sdo_frame import AbortCode
+
+# How a service refuses an SDO access: an exception that the SDO server turns into an abort.
+
+
+class SdoAbort(Exception):  # noqa: N818 - the standard's word
+    """The access is refused; it never leaves the slave but as an abort frame.
+
+    Attributes:
+        code: why.
+    """
+
+    def __init__(self, code: AbortCode) -> None:
+        super().__init__(f"{code.name} (0x{code:08X})")
+        self.code = code
+
+
+def whole_number(value: Value) -> int:
+    """Return a value that must be an integer; SdoAbort if the dictionary says otherwise."""
+    if not isinstance(value, int):
+        raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
+    return value
+
+
+# One entry of the object dictionary of a slave: its value, and who acts on it.
+
+_TRUTH: Final = (0, 1)
+
+_Guard = Callable[["Entry", Value], None]
+OnEntry = Callable[["Entry"], None]
+
+
+class Entry(Part):
+    """The value of a variable, or of one element of an array or record.
+
+    Its bytes are kept as they go over the wire. The service that owns an object
+    hangs its rules onto the entry; each of them is called with the entry.
+
+    Args:
+        description: name, type, access and limits; shared with other slaves.
+
+    Attributes:
+        description: as given.
+        data: the present value as bytes.
+        guard: called with a value that comes over the bus; raises SdoAbort to refuse it.
+        written: called after a value came over the bus.
+        source: gives the bytes to read instead of `data`; may raise SdoAbort.
+        measured: `source` gives what is measured, whenever it is asked; it never raises, and
+            asking changes nothing.
+        watchers: called whenever the value has changed, from the bus or from the inside.
+        takes_commands: what is written is a command, as "save": the guard alone judges it, for the
+            limits are those of what is read.
+    """
+
+    __slots__ = (
+        *("data", "description", "guard", "measured", "source", "takes_commands", "watchers"),
+        "written",
+    )
+
+    def __init__(self, description: EntryDescription) -> None:
+        self.description = description
+        self.data = description.default
+        self.guard: _Guard | None = None
+        self.written: OnEntry | None = None
+        self.source: Callable[[Entry], bytes] | None = None
+        self.measured = self.takes_commands = False
+        self.watchers: tuple[OnEntry, ...] = ()
+
+    def __repr__(self) -> str:
+        """Name it as a log line would."""
+        return repr(self.description)
+
+    @property
+    def index(self) -> int:
+        """Index, 0x0000..0xFFFF."""
+        return self.description.index
+
+    @property
+    def sub(self) -> int:
+        """Sub-index, 0..255."""
+        return self.description.sub
+
+    @property
+    def key(self) -> int:
+        """Index and sub-index in one number."""
+        return self.description.key
+
+    @property
+    def data_type(self) -> DataType:
+        """Size and notation."""
+        return self.description.data_type
+
+    @property
+    def size(self) -> int:
+        """Size in bytes, 0 where it varies."""
+        return self.description.size
+
+    @property
+    def takes_all(self) -> bool:
+        """Whether every value of the right size is taken, and nobody acts on it."""
+        low, high, kind = self.description.low, self.description.high, self.data_type
+        free = low is None and high is None and kind is not DataType.BOOLEAN
+        return free and self.guard is None and self.written is None
+
+    @property
+    def value(self) -> Value:
+        """The present value."""
+        return self.data_type.decode(self.present() if self.measured else self.data)
+
+    @value.setter
+    def value(self, value: Value) -> None:
+        self.assign(self.data_type.encode(value))
+
+    @property
+    def number(self) -> int:
+        """The present value of an integer."""
+        data = self.present() if self.measured else self.data
+        return int.from_bytes(data, "little", signed=self.description.signed)
+
+    def watch(self, changed: OnEntry) -> None:
+        """Have `changed` called whenever the value has changed from what it is now."""
+        if self.measured:
+            self.data = self.present()
+        self.watchers = (*self.watchers, changed)
+
+    def unwatch(self, changed: OnEntry) -> None:
+        """Do so no longer."""
+        self.watchers = tuple(watcher for watcher in self.watchers if watcher != changed)
+
+    def assign(self, data: bytes) -> None:
+        """Change the value from the inside; watchers are called."""
+        if data != self.data:
+            self.data = data
+            for changed in self.watchers:
+                changed(self)
+
+    def force(self, data: bytes) -> None:
+        """Change the value from the inside; its owner acts as if the bus had written it."""
+        self.assign(data)
+        if self.written is not None:
+            self.written(self)
+
+    def present(self) -> bytes:
+        """Return what is to be read now; SdoAbort if its owner has nothing."""
+        return self.data if self.source is None else self.source(self)
+
+    def upload(self) -> bytes:
+        """Read over the bus; SdoAbort if that is not allowed."""
+        if not self.description.readable:
+            raise SdoAbort(AbortCode.WRITE_ONLY)
+        return self.present()
+
+    def check_writable(self) -> None:
+        """Raise SdoAbort unless the bus may write."""
+        if not self.description.writable:
+            raise SdoAbort(AbortCode.READ_ONLY)
+
+    def check_size(self, size: int) -> None:
+        """Raise SdoAbort if so many bytes cannot be a value."""
+        if size > (self.size or self.description.max_bytes):
+            raise SdoAbort(AbortCode.TOO_LONG)
+        if size < self.size:
+            raise SdoAbort(AbortCode.TOO_SHORT)
+
+    def check_owner(self, data: bytes) -> None:
+        """Raise SdoAbort if the owner of the object refuses a value."""
+        if self.guard is not None:
+            self.guard(self, self.data_type.decode(data))
+
+    def download(self, data: bytes) -> None:
+        """Write over the bus; SdoAbort if access, size, range or the owner refuses."""
+        self.check_writable()
+        self.check_size(len(data))
+        value = self.data_type.decode(data)
+        if self.data_type is DataType.BOOLEAN and value not in _TRUTH:
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+        if self.guard is not None:  # what the object itself refuses has a code of its own
+            self.guard(self, value)
+        if isinstance(value, int | float) and not self.takes_commands:
+            self._check_limits(value)
+        self.force(data)
+
+    def receive(self, data: bytes) -> None:
+        """Write from a PDO: what is refused is not taken, and nobody is notified."""
+        try:
+            self.download(data)
+        except SdoAbort:
+            return
+
+    def _check_limits(self, value: int | float) -> None:
+        low, high = self.description.low, self.description.high
+        if high is not None and value > high:
+            raise SdoAbort(AbortCode.VALUE_TOO_HIGH)
+        if low is not None and value < low:
+            raise SdoAbort(AbortCode.VALUE_TOO_LOW)
+
+
+# The object dictionary: entries by index and sub-index.
+
+NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
+
+
+class DictionaryDescription(Immutable):
+    """What never changes in the dictionaries of one type of device; all its slaves share it.
+
+    Args:
+        entries: in any order; they are kept sorted.
+        objects: names and kinds of arrays and records; a variable is called as its entry.
+
+    Raises:
+        ValueError: two entries have the same index and sub-index.
+
+    Attributes:
+        entries: sorted by index and sub-index.
+        objects: names and kinds by index, sorted.
+        places: place among the entries by index << 8 | sub-index.
+        spans: places of all entries of an object, by index.
+        elements: places of the entries from sub-index 1 on without a gap, by index.
+    """
+
+    __slots__ = ("elements", "entries", "objects", "places", "spans")
+
+    def __init__(
+        self, entries: Iterable[EntryDescription], objects: Mapping[int, ObjectDescription]
+    ) -> None:
+        self.entries = tuple(sorted(entries, key=attrgetter("key")))
+        self.places = {entry.key: place for place, entry in enumerate(self.entries)}
+        if len(self.places) != len(self.entries):
+            twice = next(a for a, b in pairwise(self.entries) if a.key == b.key)
+            raise ValueError(f"{twice!r} is in the dictionary twice")
+        self.objects: Mapping[int, ObjectDescription] = {
+            entry.index: objects.get(entry.index, ObjectDescription(entry.name))
+            for entry in self.entries
+        }
+
+        self.spans: dict[int, slice] = {}
+        self.elements: dict[int, slice] = {}
+        for place, entry in enumerate(self.entries):
+            first = self.spans.get(entry.index, slice(place, place)).start
+            self.spans[entry.index] = slice(first, place + 1)
+            first = self.elements.get(entry.index, slice(place, place)).start
+            if entry.sub == place - first + 1:
+                self.elements[entry.index] = slice(first, place + 1)
+
+    def __iter__(self) -> Iterator[EntryDescription]:
+        """Give all entries, sorted."""
+        return iter(self.entries)
+
+
+class Dictionary(Part):
+    """All entries of one slave: values of its own, and a description that it shares.
+
+    Args:
+        entries: in any order; they are kept sorted. Or the description of another dictionary.
+        objects: names and kinds of arrays and records; a variable is called as its entry.
+
+    Raises:
+        ValueError: two entries have the same index and sub-index.
+
+    Attributes:
+        description: names, types, access, limits and defaults.
+        by_multiplexer: readable entries that an SDO has named, by the three bytes that do.
+
+    >>> from tickrig.wire.canopen.datatypes import DataType
+    >>> from tickrig.wire.canopen.eds.object_table import RW
+    >>> dictionary = Dictionary([EntryDescription(0x2000, 0, "Gain", DataType.UNSIGNED8, RW)])
+    >>> dictionary[0x2000, 0].value = 5
+    >>> dictionary[0x2000, 0].value, dictionary.copy()[0x2000, 0].value
+    (5, 0)
+    """
+
+    __slots__ = ("_entries", "_only", "_places", "by_multiplexer", "description")
+
+    def __init__(
+        self,
+        entries: Iterable[EntryDescription],
+        objects: Mapping[int, ObjectDescription] = NO_OBJECTS,
+    ) -> None:
+        if isinstance(entries, DictionaryDescription):
+            description = entries
+        else:
+            description = DictionaryDescription(entries, objects)
+        self.description, self._places = description, description.places
+        self._entries = list(map(Entry, description.entries))
+        self.by_multiplexer: dict[bytes, Entry] = {}
+        self._only: frozenset[int] | None = None
+
+    def restrict(self, only: frozenset[int] | None) -> None:
+        """Let SDOs find no other objects than some, as those of a boot loader.
+
+        Args:
+            only: their indices; None for all that there are.
+        """
+        self._only = only
+        self.by_multiplexer.clear()
+
+    def copy(self) -> Dictionary:
+        """Return the same objects with their default values, for another slave."""
+        return Dictionary(self.description)
+
+    @property
+    def objects(self) -> Mapping[int, ObjectDescription]:
+        """Names and kinds by index, sorted."""
+        return self.description.objects
+
+    def __iter__(self) -> Iterator[Entry]:
+        """Give all entries, sorted."""
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        """Return the number of entries."""
+        return len(self._entries)
+
+    def __contains__(self, at: tuple[int, int]) -> bool:
+        """Return whether there is an entry at (index, sub-index)."""
+        return at[0] << 8 | at[1] in self._places
+
+    def __getitem__(self, at: tuple[int, int]) -> Entry:
+        """Return the entry at (index, sub-index); KeyError if there is none."""
+        entry = self.find(*at)
+        if entry is None:
+            raise KeyError(f"{at[0]:04X}h:{at[1]:02X} is not in the dictionary")
+        return entry
+
+    def find(self, index: int, sub: int = 0) -> Entry | None:
+        """Look an entry up.
+
+        Args:
+            index: of the object, 0x0000..0xFFFF.
+            sub: sub-index, 0x00..0xFF.
+
+        Returns:
+            The entry, None if there is none.
+        """
+        place = self._places.get(index << 8 | sub)
+        return None if place is None else self._entries[place]
+
+    def look_up(self, multiplexer: bytes) -> Entry:
+        """Look up the entry that an SDO names.
+
+        Args:
+            multiplexer: three bytes, the index with its low byte first and the sub-index.
+
+        Returns:
+            The entry.
+
+        Raises:
+            SdoAbort: there is no such object, or no such sub-index.
+        """
+        entry = self.by_multiplexer.get(multiplexer)
+        if entry is None:
+            index = int.from_bytes(multiplexer[:2], "little")
+            entry = self.find(index, multiplexer[2])
+            there = self._only is None or index in self._only
+            if entry is None or not there:
+                known = there and index in self.objects
+                raise SdoAbort(AbortCode.NO_SUBINDEX if known else AbortCode.NO_OBJECT)
+            if entry.description.readable:
+                self.by_multiplexer[multiplexer] = entry
+        return entry
+
+    def object(self, index: int) -> list[Entry]:
+        """List the entries of an object.
+
+        Args:
+            index: of the object.
+
+        Returns:
+            All of them, sorted; none if there is no such object.
+        """
+        span = self.description.spans.get(index)
+        return [] if span is None else self._entries[span]
+
+    def within(self, area: range) -> list[int]:
+        """List the objects in an area.
+
+        Args:
+            area: indices, such as `range(0x1000, 0x2000)`.
+
+        Returns:
+            Those of which there is an object, sorted.
+        """
+        return [index for index in self.description.spans if index in area]
+
+    def elements(self, index: int, most: int = 254) -> list[Entry]:
+        """List the elements of an array.
+
+        Args:
+            index: of the object.
+            most: no more than so many.
+
+        Returns:
+            Its entries from sub-index 1 on, up to the first gap.
+        """
+        places = self.description.elements.get(index)
+        return [] if places is None else self._entries[places][:most]
+
+
+# What may be written to the COB-ID of a service that is not a PDO.
+
+_NOT_SDO: Final = ~(INVALID | FLAG_30 | CAN_ID_MASK)
+_NOT_EMCY: Final = ~(INVALID | CAN_ID_MASK)
+
+
+def is_valid(cob_id: int) -> bool:
+    """Return whether the object exists: bit 31 is 0 (EMCY, SDO)."""
+    return not cob_id & INVALID
+
+
+def _takes_part(cob_id: int) -> bool:
+    """Return whether the device consumes or produces: bit 31 or bit 30 is 1 (TIME)."""
+    return bool(cob_id & (INVALID | FLAG_30))
+
+
+def check_emcy_cob_id(entry: Entry, value: Value) -> None:
+    """Guard 1014h and 1028h: see `_check`."""
+    _check(entry, value, _NOT_EMCY, is_valid)
+
+
+def check_sdo_cob_id(entry: Entry, value: Value) -> None:
+    """Guard 1201h to 127Fh: see `_check`."""
+    _check(entry, value, _NOT_SDO, is_valid)
+
+
+def check_time_cob_id(entry: Entry, value: Value) -> None:
+    """Guard 1012h: see `_check`."""
+    _check(entry, value, _NOT_SDO, _takes_part)
+
+
+def _check(entry: Entry, value: Value, unknown: int, in_use: Callable[[int], bool]) -> None:
+    """Refuse with 0609 0030h what a COB-ID cannot be.
+
+    That is: bits that are neither flags nor an 11-bit CAN-ID (29-bit CAN-IDs are not
+    emulated), a restricted CAN-ID in use, and another CAN-ID while the old one is in use
+    and stays so.
+    """
+    cob_id, old = value if isinstance(value, int) else unknown, entry.number
+    can_id = cob_id & CAN_ID_MASK
+    refused = in_use(cob_id) and (
+        is_restricted(can_id) or (in_use(old) and can_id != old & CAN_ID_MASK)
+    )
+    if cob_id & unknown or refused:
+        raise SdoAbort(AbortCode.VALUE_RANGE)

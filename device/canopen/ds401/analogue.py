@@ -1,0 +1,449 @@
+"""Analogue inputs and outputs (CiA 401): channels, converters, limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, floor, inf, isfinite, isnan
+from typing import Final
+
+from tickrig.device.canopen.dictionary import Dictionary, Entry
+from tickrig.device.canopen.ds401.families import (
+    ANALOGUE_ERROR_MODE,
+    ANALOGUE_INPUT,
+    ANALOGUE_OUTPUT,
+    DEFAULT_TRIGGER,
+    INTEGER_ERROR_VALUE,
+    INTEGER_LIMITS,
+    INTERRUPT_SOURCE,
+    INTERRUPT_TRIGGER,
+    REAL_ERROR_VALUE,
+    REAL_LIMITS,
+    AnalogueObjects,
+    elements,
+    find_number,
+)
+from tickrig.device.physical import InputSignal, OutputSignal
+from tickrig.device.twin import Immutable, Part
+
+# What an analogue channel is in the physical world: range, unit and steps.
+
+
+@dataclass(frozen=True, slots=True)
+class Converter(Immutable):
+    """A linear converter between a physical quantity and the counts of an object.
+
+    >>> adc = Converter("v", "V", low=0.0, high=5.0, high_raw=4095, shift=3)
+    >>> adc.counts(1.25), adc.quantity(8192)
+    (8192, 1.2503052503052503)
+
+    Not emulated: offset and gain errors, noise, the conversion time.
+
+    Attributes:
+        suffix: ends the name of a channel: `ai1_v`.
+        unit: for people.
+        low: smallest quantity.
+        high: largest quantity.
+        high_raw: steps at `high`.
+        low_raw: steps at `low`.
+        shift: places by which a step stands left in the object, as CiA 401 wants it.
+        width: bits of the object that the counts are meant for.
+
+    Raises:
+        ValueError: an empty range, or counts that the object cannot hold.
+    """
+
+    suffix: str
+    unit: str
+    low: float
+    high: float
+    high_raw: int
+    low_raw: int = 0
+    shift: int = 0
+    width: int = 16
+
+    def __post_init__(self) -> None:
+        if not self.low < self.high or not self.low_raw < self.high_raw:
+            raise ValueError(f"converter: {self.low}..{self.high} {self.unit} is no range")
+        limit = 1 << self.width - 1
+        if not -limit <= self.low_raw << self.shift <= self.high_raw << self.shift < limit:
+            raise ValueError(f"converter: counts do not fit into {self.width} bit")
+
+    @property
+    def span(self) -> tuple[int, int, int]:
+        """What the object holds for `low` and for `high`, and a step between."""
+        return self.low_raw << self.shift, self.high_raw << self.shift, 1 << self.shift
+
+    def counts(self, quantity: float) -> int:
+        """Return what the object holds for a quantity, which is limited to the range."""
+        part = (min(max(quantity, self.low), self.high) - self.low) / (self.high - self.low)
+        return floor(self.low_raw + part * (self.high_raw - self.low_raw) + 0.5) << self.shift
+
+    def quantity(self, counts: int) -> float:
+        """Return the quantity of these counts, limited to the range."""
+        part = ((counts >> self.shift) - self.low_raw) / (self.high_raw - self.low_raw)
+        return self.low + min(max(part, 0.0), 1.0) * (self.high - self.low)
+
+
+# What an analogue input and an analogue output have in common.
+
+_REAL32_MAX: Final = (2 - 2.0**-23) * 2.0**127
+
+
+def _quantity(entry: Entry | None, default: float = 0) -> float:
+    """Return the number in an object, the default if there is no object or no number in it."""
+    value = default if entry is None else entry.value
+    return value if isinstance(value, int | float) else default
+
+
+def _factor(entry: Entry | None) -> float:
+    """Return a scaling; many an EDS leaves it at 0, which is taken as 1."""
+    return _quantity(entry, 1) or 1
+
+
+def _show(entry: Entry, value: float) -> None:
+    """Put a number into an object, limited to what its data type holds."""
+    if entry.data_type.is_integer:
+        low, high = entry.data_type.limits
+        entry.value = int(max(low, min(high, value)))
+    else:
+        entry.value = copysign(inf, value) if abs(value) > _REAL32_MAX else value
+
+
+class AnalogueChannel(Part):
+    """One channel: its objects, its converter, its scaling.
+
+    The widest integer object has the counts; narrower ones have their upper bits.
+    A REAL32 object has the physical quantity if there is a converter, or else the
+    counts, or else what the world sets. Scaled value = value x scaling + offset.
+
+    Args:
+        prefix: `ai` or `ao`.
+        number: 1..254.
+        converter: None for plain counts.
+
+    Attributes:
+        name: of the physical input or output.
+        integers: integer objects, the narrowest first.
+        real: the REAL32 object, None if there is none.
+        converter: see above.
+    """
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        objects: AnalogueObjects,
+        prefix: str,
+        number: int,
+        converter: Converter | None,
+    ) -> None:
+        def find(index: int) -> Entry | None:
+            return find_number(dictionary, index, number)
+
+        self.name = f"{prefix}{number}" + (f"_{converter.suffix}" if converter else "")
+        self.converter = converter
+        self.integers = [entry for index in objects.integers if (entry := find(index)) is not None]
+        self.real = find(objects.real)
+        self._real_offset, self._real_scaling = (
+            find(objects.real_offset),
+            find(objects.real_scaling),
+        )
+        self._offset, self._scaling = find(objects.integer_offset), find(objects.integer_scaling)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the physical side."""
+        return self.converter.unit if self.converter else ""
+
+    @property
+    def whole(self) -> bool:
+        """Whether the physical side is counted in whole numbers."""
+        return self.converter is None and bool(self.integers)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Smallest and largest quantity of the physical side."""
+        if self.converter is not None:
+            return self.converter.low, self.converter.high
+        return self.integers[-1].data_type.limits if self.integers else (-_REAL32_MAX, _REAL32_MAX)
+
+    def scalings(self) -> list[Entry]:
+        """Return offsets and scalings."""
+        found = (self._offset, self._scaling, self._real_offset, self._real_scaling)
+        return [entry for entry in found if entry is not None]
+
+    def scaled(self, counts: float) -> float:
+        """Scale an integer value."""
+        return counts * _factor(self._scaling) + _quantity(self._offset)
+
+    def real_scaled(self, value: float) -> float:
+        """Scale a REAL32 value."""
+        return value * _factor(self._real_scaling) + _quantity(self._real_offset)
+
+
+# One analogue input, what of it is an event, and which were one (CiA 401, 6400h to 642Dh).
+
+
+class EventRule(Part):
+    """The limits and deltas of one channel, as integers or as REAL32.
+
+    Each bit of the interrupt trigger selection (6421h) is an event of its own:
+
+    | bit | event                                               |
+    |-----|-----------------------------------------------------|
+    | 0   | the value was below the upper limit and is no more  |
+    | 1   | the value was at the lower limit or above and is below |
+    | 2   | it differs from what was sent last by more than the delta |
+    | 3   | it is below what was sent last by more than the negative delta |
+    | 4   | it is above what was sent last by more than the positive delta |
+
+    A limit is an event when it is crossed, not as long as it is exceeded. A limit
+    that the device has no object for is none, a delta is 0.
+
+    Args:
+        dictionary: the objects of the device.
+        number: of the channel.
+        index: of the upper limit; the other four follow.
+        entry: the value that is judged.
+
+    Attributes:
+        there: whether the device has one of the five objects for the channel.
+    """
+
+    def __init__(self, dictionary: Dictionary, number: int, index: int, entry: Entry) -> None:
+        objects = [find_number(dictionary, index + offset, number) for offset in range(5)]
+        self._upper, self._lower, *self._deltas = objects
+        self.settings = [found for found in objects if found is not None]
+        self._entry = entry
+        self._sent = self._seen = _quantity(entry)
+
+    def begin(self) -> None:
+        """Take the value as sent."""
+        self._sent = self._seen = _quantity(self._entry)
+
+    def sent(self) -> None:
+        """Note that the value is on the bus."""
+        self._sent = _quantity(self._entry)
+
+    def judge(self, trigger: int) -> bool:
+        """Return whether the value is an event."""
+        now, before = _quantity(self._entry), self._seen
+        self._seen = now
+        change = now - self._sent
+        delta, negative, positive = (_quantity(entry) for entry in self._deltas)
+        events = (
+            self._upper is not None and before < _quantity(self._upper) <= now,
+            self._lower is not None and before >= _quantity(self._lower) > now,
+            abs(change) > delta,
+            -change > negative,
+            change > positive,
+        )
+        return any(event and trigger >> bit & 1 for bit, event in enumerate(events))
+
+
+_BANK_CHANNELS: Final = 32
+
+
+class InterruptSource(Part):
+    """Banks of 32 channels; reading a bank over the bus clears it.
+
+    Attributes:
+        entries: the banks.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self._banks = dict(elements(dictionary, INTERRUPT_SOURCE))
+        self.entries = list(self._banks.values())
+        for entry in self.entries:
+            entry.source = _read
+
+    def note(self, number: int) -> None:
+        """Set the bit of a channel, 1..254."""
+        bank, bit = divmod(number - 1, _BANK_CHANNELS)
+        entry = self._banks.get(bank + 1)
+        if entry is not None and bit < 8 * entry.size:
+            bits = int.from_bytes(entry.data, "little") | 1 << bit
+            entry.assign(bits.to_bytes(entry.size, "little"))
+
+
+def _read(entry: Entry) -> bytes:
+    data = entry.data
+    entry.assign(bytes(entry.size))
+    return data
+
+
+class AnalogueInput(Part):
+    """Converts, scales and judges one channel.
+
+    Integer limits and deltas are right-aligned: in the unit of the widest integer
+    object. Those of REAL32 are in the unit of 6403h. Without any of them each
+    change is an event.
+
+    Attributes:
+        number: 1..254.
+        channel: its objects.
+        entries: those that show its value.
+    """
+
+    def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
+        self.number = number
+        self.channel = AnalogueChannel(dictionary, ANALOGUE_INPUT, "ai", number, converter)
+        real = [self.channel.real] if self.channel.real is not None else []
+        self.entries = [*self.channel.integers, *real]
+        self._trigger = find_number(dictionary, INTERRUPT_TRIGGER, number)
+        whole = EventRule(dictionary, number, INTEGER_LIMITS, ([*real, *self.channel.integers])[-1])
+        fraction = EventRule(dictionary, number, REAL_LIMITS, self.entries[-1])
+        self._rules = [rule for rule in (whole, fraction) if rule.settings] or [whole]
+        self._judged: tuple[float, bool] | None = None
+        for entry in self.objects():
+            entry.watch(self._judge_anew)
+
+    @property
+    def name(self) -> str:
+        """What the physical input is called."""
+        return self.channel.name
+
+    @property
+    def input(self) -> InputSignal:
+        """The physical input."""
+        (low, high), whole = self.channel.bounds, self.channel.whole
+        converter = self.channel.converter
+        text = f"analogue input {self.number}"
+        start = min(max(0, low), high)
+        return InputSignal(
+            self.channel.name,
+            text,
+            low=low,
+            high=high,
+            unit=self.channel.unit,
+            initial=start,
+            real=not whole,
+            counts=converter.span if converter else (),
+        )
+
+    def objects(self) -> list[Entry]:
+        """Return the objects that change what is read or what is an event."""
+        trigger = [self._trigger] if self._trigger is not None else []
+        judged = [entry for rule in self._rules for entry in rule.settings]
+        return [*self.channel.scalings(), *trigger, *judged]
+
+    def begin(self, physical: float) -> None:
+        """Take the present value as sent."""
+        self._judged = None
+        self._convert(physical)
+        for rule in self._rules:
+            rule.begin()
+
+    def sent(self) -> None:
+        """Note that the present value is on the bus."""
+        for rule in self._rules:
+            rule.sent()
+
+    def update(self, physical: float, *, enabled: bool) -> bool:
+        """Read the channel. Returns: whether that is an event, as far as events are enabled."""
+        if self._judged == (physical, enabled):
+            return False
+        self._judged = physical, enabled
+        self._convert(physical)
+        trigger = int(_quantity(self._trigger, DEFAULT_TRIGGER))
+        events = [rule.judge(trigger) for rule in self._rules]
+        event = enabled and any(events)
+        if event:
+            self.sent()
+        return event
+
+    def _judge_anew(self, entry: Entry) -> None:
+        self._judged = None
+
+    def _convert(self, physical: float) -> None:
+        channel, converter, value = self.channel, self.channel.converter, physical
+        if channel.integers:
+            bits = channel.integers[-1].data_type.bits
+            counts = int(physical)
+            if converter is not None:
+                counts = _justified(converter.counts(physical), converter.width, bits)
+            _show(channel.integers[-1], channel.scaled(counts))
+            for entry in channel.integers[:-1]:
+                widest = int(_quantity(channel.integers[-1]))
+                _show(entry, _justified(widest, bits, entry.data_type.bits))
+        if channel.real is not None:
+            if converter is not None:
+                value = converter.quantity(converter.counts(physical))
+            _show(channel.real, channel.real_scaled(value))
+
+
+def _justified(counts: int, from_bits: int, to_bits: int) -> int:
+    """Return left-justified counts in another width."""
+    return floor(counts * 2.0 ** (to_bits - from_bits))
+
+
+# One analogue output (CiA 401, 6410h to 6413h).
+
+
+class AnalogueOutput(Part):
+    """Puts one channel out.
+
+    Integer error values are right-aligned: in the unit of the object, and limited
+    to it. If several objects name the channel, the one that changed last counts;
+    the others do not follow. A REAL32 that is no number leaves the output as it is.
+
+    Attributes:
+        number: 1..254.
+        channel: its objects.
+        level: the physical value.
+        failed: its error value counts instead of what was written.
+    """
+
+    def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
+        self.number, self.level, self.failed = number, 0.0, False
+        self.channel = AnalogueChannel(dictionary, ANALOGUE_OUTPUT, "ao", number, converter)
+        real = [self.channel.real] if self.channel.real is not None else []
+        self._written = [*real, *self.channel.integers]
+        self._latest = self._written[-1]
+        self._mode = find_number(dictionary, ANALOGUE_ERROR_MODE, number)
+        self._error = find_number(dictionary, INTEGER_ERROR_VALUE, number)
+        self._real_error = find_number(dictionary, REAL_ERROR_VALUE, number)
+        for entry in self._written:
+            entry.watch(self._write)
+
+    @property
+    def output(self) -> OutputSignal:
+        """The physical output."""
+        return OutputSignal(self.channel.name, f"analogue output {self.number}", self.channel.unit)
+
+    def objects(self) -> list[Entry]:
+        """Return the objects that change what is put out."""
+        found = (self._mode, self._error, self._real_error)
+        settings = [entry for entry in found if entry is not None]
+        return [*self._written, *self.channel.scalings(), *settings]
+
+    def power_on(self) -> None:
+        """Begin at 0, or at what the converter has instead."""
+        converter = self.channel.converter
+        self.level = converter.quantity(converter.counts(0.0)) if converter is not None else 0.0
+
+    def update(self) -> None:
+        """Put out."""
+        error = self.failed and _quantity(self._mode, 1) != 0
+        put = self._real if self._latest is self.channel.real else self._whole
+        level = put(error=error)
+        if isfinite(level):
+            self.level = level
+
+    def _whole(self, *, error: bool) -> float:
+        entry, converter = self._latest, self.channel.converter
+        low, high = entry.data_type.limits
+        value = _quantity(self._error) if error else entry.number
+        counts = int(max(low, min(high, self.channel.scaled(max(low, min(high, value))))))
+        if converter is None:
+            return counts
+        return converter.quantity(counts * 2**converter.width >> entry.data_type.bits)
+
+    def _real(self, *, error: bool) -> float:
+        value = _quantity(self._real_error) if error else _quantity(self._latest)
+        level, (low, high) = self.channel.real_scaled(value), self.channel.bounds
+        if self.channel.converter is None or isnan(level):
+            return level
+        return max(low, min(high, level))
+
+    def _write(self, entry: Entry) -> None:
+        self._latest, self.failed = entry, False

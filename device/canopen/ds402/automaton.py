@@ -1,0 +1,342 @@
+"""The state machine of a drive (CiA 402-2), and its supervision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, IntEnum, IntFlag, auto
+from typing import Final
+
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.axis import Axis, Control, Stopping
+from tickrig.device.canopen.ds402.settings import ErrorCode, is_controllable
+from tickrig.device.twin import Immutable, Part
+
+# The state machine of a drive, and what the drive does in each state (CiA 402-2).
+
+
+class Controlword(IntFlag):
+    """Bits of 6040h; 4, 5 and 6 belong to the mode of operation."""
+
+    SWITCH_ON = 0x0001
+    ENABLE_VOLTAGE = 0x0002
+    QUICK_STOP = 0x0004  # active at 0
+    ENABLE_OPERATION = 0x0008
+    START = 0x0010  # new set-point, start homing
+    CHANGE_AT_ONCE = 0x0020
+    RELATIVE = 0x0040
+    FAULT_RESET = 0x0080
+    HALT = 0x0100
+    CHANGE_ON_SET_POINT = 0x0200
+
+
+class Statusword(IntFlag):
+    """Bits of 6041h beside those of the state; 12 and 13 belong to the mode of operation."""
+
+    VOLTAGE_ENABLED = 0x0010
+    WARNING = 0x0080
+    REMOTE = 0x0200
+    TARGET_REACHED = 0x0400
+    INTERNAL_LIMIT = 0x0800
+    MODE_12 = 0x1000  # set-point acknowledge, homing attained, speed is zero, follows the target
+    MODE_13 = 0x2000  # homing error, following error
+    HOMED = 0x8000  # of the manufacturer: the position refers to the home position
+
+
+class DriveState(IntEnum):
+    """State by its bits in the statusword."""
+
+    NOT_READY_TO_SWITCH_ON = 0x00
+    SWITCH_ON_DISABLED = 0x40
+    READY_TO_SWITCH_ON = 0x21
+    SWITCHED_ON = 0x23
+    OPERATION_ENABLED = 0x27
+    QUICK_STOP_ACTIVE = 0x07
+    FAULT_REACTION_ACTIVE = 0x0F
+    FAULT = 0x08
+
+
+class Command(Enum):
+    """What a controlword asks for; switch on also means disable operation."""
+
+    SHUTDOWN = auto()
+    SWITCH_ON = auto()
+    ENABLE_OPERATION = auto()
+    DISABLE_VOLTAGE = auto()
+    QUICK_STOP = auto()
+
+
+_COMMANDS: Final = (
+    (0x87, 0x06, Command.SHUTDOWN),
+    (0x8F, 0x07, Command.SWITCH_ON),
+    (0x8F, 0x0F, Command.ENABLE_OPERATION),
+    (0x82, 0x00, Command.DISABLE_VOLTAGE),
+    (0x86, 0x02, Command.QUICK_STOP),
+)
+"""Mask, value, command."""
+
+_SOD: Final = DriveState.SWITCH_ON_DISABLED
+_READY: Final = DriveState.READY_TO_SWITCH_ON
+_ON: Final = DriveState.SWITCHED_ON
+_ENABLED: Final = DriveState.OPERATION_ENABLED
+_QUICK_STOP: Final = DriveState.QUICK_STOP_ACTIVE
+
+NEXT_STATE: Final = {
+    (_SOD, Command.SHUTDOWN): _READY,  # transition 2
+    (_READY, Command.SWITCH_ON): _ON,  # 3
+    (_READY, Command.ENABLE_OPERATION): _ENABLED,  # 3, then 4 by itself
+    (_READY, Command.DISABLE_VOLTAGE): _SOD,  # 7
+    (_READY, Command.QUICK_STOP): _SOD,  # 7
+    (_ON, Command.ENABLE_OPERATION): _ENABLED,  # 4
+    (_ON, Command.SHUTDOWN): _READY,  # 6
+    (_ON, Command.DISABLE_VOLTAGE): _SOD,  # 10
+    (_ON, Command.QUICK_STOP): _SOD,  # 10
+    (_ENABLED, Command.SWITCH_ON): _ON,  # 5
+    (_ENABLED, Command.SHUTDOWN): _READY,  # 8
+    (_ENABLED, Command.DISABLE_VOLTAGE): _SOD,  # 9
+    (_ENABLED, Command.QUICK_STOP): _QUICK_STOP,  # 11
+    (_QUICK_STOP, Command.DISABLE_VOLTAGE): _SOD,  # 12
+    (_QUICK_STOP, Command.ENABLE_OPERATION): _ENABLED,  # 16, if 605Ah lets it stay
+}
+"""Transitions 0, 1, 13, 14 and 15 are made by the drive, by a fault and by its reset."""
+
+_POWERED: Final = (_ENABLED, _QUICK_STOP, DriveState.FAULT_REACTION_ACTIVE)
+"""States in which the motor may have torque."""
+
+_RAMPS: Final = {
+    DriveState.SWITCHED_ON: indices.DISABLE_OPERATION_OPTION,
+    DriveState.READY_TO_SWITCH_ON: indices.SHUTDOWN_OPTION,
+}
+"""Option codes that say how Operation enabled is left: transitions 5 and 8."""
+
+
+def command_of(controlword: int) -> Command | None:
+    """Return what a controlword asks for, None if it asks for nothing.
+
+    >>> command_of(0x0006), command_of(0x0080)
+    (<Command.SHUTDOWN: 1>, None)
+    """
+    for mask, value, command in _COMMANDS:
+        if controlword & mask == value:
+            return command
+    return None
+
+
+class Automaton(Part):
+    """Transitions 5 and 8 are made when the motor stands, if their option says so.
+
+    Args:
+        stopping: brakes as the option codes say.
+        begin_mode: begins the chosen mode of operation.
+
+    Attributes:
+        state: the present state.
+    """
+
+    def __init__(self, stopping: Stopping, begin_mode: Callable[[], None]) -> None:
+        self._stopping, self._begin_mode = stopping, begin_mode
+        self.state = DriveState.NOT_READY_TO_SWITCH_ON
+        self._leaving: DriveState | None = None
+        self._severe = False
+
+    @property
+    def powered(self) -> bool:
+        """Whether the motor may have torque."""
+        return self.state in _POWERED
+
+    @property
+    def operating(self) -> bool:
+        """Whether the mode of operation is at work, and is not being left."""
+        return self.state is DriveState.OPERATION_ENABLED and self._leaving is None
+
+    def restart(self) -> None:
+        """Be as after power-on."""
+        self.state, self._leaving = DriveState.NOT_READY_TO_SWITCH_ON, None
+
+    def obey(self, command: Command) -> None:
+        """Make the transition that a controlword asks for, if there is one."""
+        if self.state is DriveState.OPERATION_ENABLED:
+            self._leaving = None
+        following = NEXT_STATE.get((self.state, command))
+        if following is None or self._must_finish(following):
+            return
+        if self.state is DriveState.OPERATION_ENABLED and following in _RAMPS:
+            self._leaving = following
+        else:
+            self.enter(following)
+
+    def enter(self, state: DriveState) -> None:
+        """Change the state."""
+        if state is DriveState.OPERATION_ENABLED:
+            self._begin_mode()
+        self.state, self._leaving = state, None
+
+    def react(self, code: int) -> None:
+        """React to a fault: transition 13."""
+        severe = not (is_controllable(code) and self.powered)
+        if self.state is DriveState.FAULT_REACTION_ACTIVE:
+            self._severe |= severe
+        elif self.state is not DriveState.FAULT:
+            self._severe = severe
+            self.enter(DriveState.FAULT_REACTION_ACTIVE)
+
+    def run(self, operate: Callable[[int], bool], now_us: int) -> bool:
+        """Run one control period of the present state.
+
+        Args:
+            operate: runs one control period of the mode of operation.
+            now_us: the time.
+
+        Returns:
+            True if nothing is left to do until an input changes.
+        """
+        match self.state:
+            case DriveState.NOT_READY_TO_SWITCH_ON:
+                self.enter(DriveState.SWITCH_ON_DISABLED)
+            case DriveState.OPERATION_ENABLED:
+                return operate(now_us) if self._leaving is None else self._leave(self._leaving)
+            case DriveState.QUICK_STOP_ACTIVE:
+                return self._quick_stop()
+            case DriveState.FAULT_REACTION_ACTIVE:
+                return self._slow_down()
+            case _:
+                pass
+        return True
+
+    def _must_finish(self, following: DriveState) -> bool:
+        """Return whether a quick stop cannot be left for Operation enabled: transition 16."""
+        return (
+            self.state is DriveState.QUICK_STOP_ACTIVE
+            and following is DriveState.OPERATION_ENABLED
+            and not self._stopping.stays
+        )
+
+    def _leave(self, leaving: DriveState) -> bool:
+        """Brake, then make transition 5 or 8."""
+        stands = self._stopping.by(_RAMPS[leaving])
+        if stands:
+            self.enter(leaving)
+        return stands
+
+    def _quick_stop(self) -> bool:
+        stands = self._stopping.quick_stop()
+        if stands and not self._stopping.stays:
+            self.enter(DriveState.SWITCH_ON_DISABLED)
+        return stands
+
+    def _slow_down(self) -> bool:
+        stands = self._severe or self._stopping.by(indices.FAULT_REACTION_OPTION)
+        if stands:
+            self.enter(DriveState.FAULT)
+        return stands
+
+
+# What a drive watches: its supply, its motor, and whether the motor follows.
+
+_OPEN_PHASE_SHARE: Final = 0.05
+"""Below this share of the current limit no current flows."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds(Immutable):
+    """What a drive takes for sound.
+
+    Attributes:
+        supply_mv: lowest and highest supply.
+        winding_dc: highest temperature of the winding, in tenths of a degree Celsius.
+        winding_warning_dc: from here on it warns.
+        stall_us: how long the motor may stand at a limit although it shall turn.
+    """
+
+    supply_mv: tuple[int, int] = (9_000, 36_000)
+    winding_dc: int = 1_250
+    winding_warning_dc: int = 1_125
+    stall_us: int = 1_000_000
+
+
+class Supervision(Part):
+    """Finds faults by what the drive measures.
+
+    Args:
+        axis: what is watched.
+        bounds: what is sound.
+
+    Attributes:
+        wired: faults that the electronics see, as their inputs are now.
+        has_supply: the supply is not too low (bit 4 of the statusword).
+        waiting: a time-out runs.
+        not_following: the following error is larger than 6065h.
+    """
+
+    def __init__(self, axis: Axis, bounds: Bounds) -> None:
+        self._axis, self.bounds = axis, bounds
+        self.wired: tuple[ErrorCode, ...] = ()
+        self.waiting = self.not_following = False
+        self.has_supply = True
+        self._error_us = self._stall_us = 0
+
+    @property
+    def warns(self) -> bool:
+        """Whether the winding is warm (bit 7 of the statusword)."""
+        return self._axis.motor.winding_dc >= self.bounds.winding_warning_dc
+
+    def present(self, *, powered: bool) -> list[ErrorCode]:
+        """Return the faults whose cause is there now; a short circuit needs power to be seen."""
+        motor, bounds = self._axis.motor, self.bounds
+        supply_mv, (lowest_mv, highest_mv) = motor.supply_mv, bounds.supply_mv
+        found = [code for code in self.wired if powered or code is not ErrorCode.OVER_CURRENT]
+        if supply_mv < lowest_mv:
+            found.append(ErrorCode.UNDER_VOLTAGE)
+        if supply_mv > highest_mv:
+            found.append(ErrorCode.OVER_VOLTAGE)
+        if motor.winding_dc > bounds.winding_dc:
+            found.append(ErrorCode.DRIVE_TEMPERATURE)
+        return found
+
+    def step(self, now_us: int, *, powered: bool) -> list[ErrorCode]:
+        """Watch for one tick.
+
+        Returns:
+            The faults that are there, and those that a motion with power shows.
+        """
+        found, self.waiting = self.present(powered=powered), False
+        self.has_supply = ErrorCode.UNDER_VOLTAGE not in found
+        if not powered:
+            self.not_following = False
+            self._error_us = self._stall_us = now_us
+            return found
+        if self._loses_reference(now_us):
+            found.append(ErrorCode.FOLLOWING_ERROR)
+        if self._stalls(now_us):
+            found.append(self._stall_code())
+        return found
+
+    def skip(self, now_us: int) -> None:
+        """Go on as after ticks up to `now_us` in which the motor followed."""
+        self._error_us = self._stall_us = now_us
+
+    def _loses_reference(self, now_us: int) -> bool:
+        axis = self._axis
+        controlled = axis.control is Control.POSITION
+        window = axis.settings.following_error_window
+        self.not_following = controlled and abs(axis.following_error) > window
+        if not self.not_following:
+            self._error_us = now_us
+            return False
+        self.waiting = True
+        return now_us - self._error_us >= axis.settings.following_error_us
+
+    def _stalls(self, now_us: int) -> bool:
+        """Return whether the motor has stood for too long although it shall turn."""
+        axis = self._axis
+        shall_turn = axis.motor.current_limited or axis.is_fast(axis.reference.velocity)
+        if axis.control is Control.CURRENT or not (shall_turn and axis.stands):
+            self._stall_us = now_us
+            return False
+        self.waiting = True
+        return now_us - self._stall_us >= self.bounds.stall_us
+
+    def _stall_code(self) -> ErrorCode:
+        motor = self._axis.motor
+        flows = abs(motor.current_ma) > 1_000 * _OPEN_PHASE_SHARE * motor.current_limit_a
+        return ErrorCode.MOTOR_BLOCKED if flows else ErrorCode.MOTOR_PHASE

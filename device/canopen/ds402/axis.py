@@ -1,0 +1,559 @@
+"""The axis of a drive: reference, motor, stopping, limits and limit switches."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum, auto
+from math import inf
+from typing import Final, Protocol
+
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.settings import ErrorCode, Parameters, Settings
+from tickrig.device.physical import InputSignal, QuantityBank
+from tickrig.device.twin import Part
+
+# What the drive demands of its motor at this instant.
+
+STEP_S: Final = 0.001
+"""Period of the control, in seconds: one tick."""
+
+
+class Control(Enum):
+    """Which loop of the motor a mode works with."""
+
+    POSITION = auto()
+    VELOCITY = auto()
+    CURRENT = auto()
+
+
+class Reference(Part):
+    """The demanded motion; it belongs to the drive and outlives a change of the mode.
+
+    What a mode does not control follows the motor: the position in velocity modes,
+    position and velocity in torque modes. So each mode finds a reference from
+    which it can go on without a jump.
+
+    Attributes:
+        position: counts of the motor's encoder.
+        velocity: counts per second.
+        acceleration: counts per second per second, for the feed-forward.
+        current_a: amperes.
+    """
+
+    __slots__ = ("acceleration", "current_a", "position", "velocity")
+
+    def __init__(self) -> None:
+        self.position = self.velocity = self.acceleration = self.current_a = 0.0
+
+    def ramp(self, velocity: float, acceleration: float, deceleration: float) -> bool:
+        """Make a step towards a velocity. Returns: whether it is reached.
+
+        Args:
+            velocity: counts per second.
+            acceleration: of the step away from zero, positive.
+            deceleration: of the step towards zero, positive.
+        """
+        before = self.velocity
+        braking = abs(velocity) < abs(before) or velocity * before < 0
+        most = (deceleration if braking else acceleration) * STEP_S
+        change = velocity - before
+        if abs(change) <= most:
+            self.move(velocity)
+            return True
+        self.move(before + (most if change > 0 else -most))
+        return False
+
+    def move(self, velocity: float) -> None:
+        """Make a step with constant acceleration that ends with a velocity."""
+        before, self.velocity = self.velocity, velocity
+        self.acceleration = (velocity - before) / STEP_S
+        self.position += (before + velocity) / 2 * STEP_S
+
+    def place(self, position: float, velocity: float = 0.0, acceleration: float = 0.0) -> None:
+        """Be somewhere, as a generator of positions says."""
+        self.position, self.velocity, self.acceleration = position, velocity, acceleration
+
+
+# What a drive needs of its motor, and a motor without physics.
+
+
+class Motor(Protocol):
+    """A motor with power stage, encoder and control loops; see `device.servo.servo.Servo`.
+
+    Attributes:
+        current_limit_a: the current that the drive allows.
+    """
+
+    current_limit_a: float
+
+    @property
+    def counts_per_turn(self) -> int:
+        """Counts of the encoder in a turn of the motor."""
+
+    @property
+    def counts(self) -> int:
+        """What the encoder says."""
+
+    @property
+    def velocity_counts_s(self) -> int:
+        """Its rate, in counts per second."""
+
+    @property
+    def current_ma(self) -> int:
+        """Current of the motor, in milliamperes, with the sign of its torque."""
+
+    @property
+    def supply_mv(self) -> int:
+        """Supply of the power stage, in millivolts."""
+
+    @property
+    def winding_dc(self) -> int:
+        """Temperature of the winding, in tenths of a degree Celsius."""
+
+    @property
+    def current_limited(self) -> bool:
+        """Whether a limit cut the demand in the last step."""
+
+    @property
+    def shaft_deg(self) -> float:
+        """Angle of the output shaft."""
+
+    @property
+    def shaft_deg_s(self) -> float:
+        """Its speed."""
+
+    @property
+    def resting(self) -> bool:
+        """Whether nothing would change without a new command or input."""
+
+    def release(self) -> None:
+        """Switch the power stage off."""
+
+    def drive_current(self, current_a: float) -> None:
+        """Have this current."""
+
+    def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
+        """Have this velocity, in counts per second."""
+
+    def drive_position(
+        self, position: float, velocity: float = 0.0, acceleration: float = 0.0
+    ) -> None:
+        """Be at this position, in counts."""
+
+    def step_to(self, now_us: int) -> None:
+        """Let time pass."""
+
+
+_COUNTS_S2_PER_A: Final = 1_000.0
+
+
+class IdealMotor(Part):
+    """A motor that is at once where it shall be, and as fast as it shall be.
+
+    It stands still at once when it is released. A current turns it as a mass without
+    friction: 1 A gives 1000 counts per second per second.
+
+    Not emulated: load, temperature, limits of current and voltage.
+    """
+
+    counts_per_turn: Final = 2_000
+    supply_mv: Final = 24_000
+    winding_dc: Final = 250
+    current_limited: Final = False
+
+    def __init__(self) -> None:
+        self.current_limit_a = 0.0
+        self._position = self._velocity = self._current_a = 0.0
+        self._moves_by_itself = False
+        self._now_us = 0
+
+    @property
+    def counts(self) -> int:
+        """The position, rounded."""
+        return round(self._position)
+
+    @property
+    def velocity_counts_s(self) -> int:
+        """The velocity, rounded."""
+        return round(self._velocity)
+
+    @property
+    def shaft_deg(self) -> float:
+        """The same in degrees."""
+        return self._position / self.counts_per_turn * 360
+
+    @property
+    def shaft_deg_s(self) -> float:
+        """The velocity in degrees per second."""
+        return self._velocity / self.counts_per_turn * 360
+
+    @property
+    def current_ma(self) -> int:
+        """The current that it was given."""
+        return round(self._current_a * 1_000)
+
+    @property
+    def resting(self) -> bool:
+        """Whether it stands, and no current turns it."""
+        return self._velocity == 0 and self._current_a == 0
+
+    def release(self) -> None:
+        """Stand still."""
+        self._velocity = self._current_a = 0.0
+
+    def drive_current(self, current_a: float) -> None:
+        """Turn faster and faster."""
+        self._current_a, self._moves_by_itself = current_a, True
+
+    def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
+        """Turn."""
+        self._velocity, self._current_a, self._moves_by_itself = velocity, 0.0, True
+
+    def drive_position(
+        self, position: float, velocity: float = 0.0, acceleration: float = 0.0
+    ) -> None:
+        """Be there."""
+        self._position, self._velocity, self._current_a = position, velocity, 0.0
+        self._moves_by_itself = False
+
+    def step_to(self, now_us: int) -> None:
+        """Turn on, unless its position is given."""
+        passed_s, self._now_us = (now_us - self._now_us) / 1_000_000, now_us
+        if self._moves_by_itself:
+            before = self._velocity
+            self._velocity += self._current_a * _COUNTS_S2_PER_A * passed_s
+            self._position += (before + self._velocity) / 2 * passed_s
+
+
+# The moved axis: its motor, where its zero is, and where it may go.
+
+_STANDSTILL_TURNS_S: Final = 0.5
+"""A motor that turns more slowly stands: its encoder resolves no better within a tick."""
+
+
+class Axis(Part):
+    """Positions of the user are INTEGER32 and wrap at the ends of 607Bh.
+
+    Attributes:
+        motor: what moves.
+        reference: what the motor is demanded to do, in counts.
+        control: the loop that the motor works with in this tick.
+        settings: the present configuration.
+        zero: counts of the encoder at position 0 of the user.
+        homed: whether a homing has set it.
+    """
+
+    def __init__(self, motor: Motor, settings: Settings) -> None:
+        self.motor: Motor = motor
+        self.settings = settings
+        self.reference, self.control = Reference(), Control.POSITION
+        self.zero, self.homed = 0.0, False
+
+    @property
+    def position(self) -> int:
+        """Position actual value, in units of the user."""
+        return self.position_of(self.motor.counts)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the motor stands, as far as its encoder shows."""
+        return not self.is_fast(self.motor.velocity_counts_s)
+
+    @property
+    def forward(self) -> int:
+        """Sign of the counts in the positive direction of the user."""
+        return 1 if self.settings.units.per_position > 0 else -1
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Software limits in counts, the lower one first; infinite if there are none."""
+        low, high = self.settings.software_limits
+        return low + self.zero, high + self.zero
+
+    @property
+    def following_error(self) -> float:
+        """Counts from the motor to the reference."""
+        return self.reference.position - self.motor.counts
+
+    @property
+    def unwrapped(self) -> tuple[float, float]:
+        """Lowest and highest counts, within a unit, at which `wrap` does nothing."""
+        low, high = self.settings.position_range
+        unit = self.settings.units.per_position
+        first, last = sorted((self.zero + (low + 1) * unit, self.zero + (high - 1) * unit))
+        return first, last
+
+    @property
+    def standstill(self) -> float:
+        """Velocity up to which the motor stands, in counts per second."""
+        return _STANDSTILL_TURNS_S * self.motor.counts_per_turn
+
+    def is_fast(self, velocity: float) -> bool:
+        """Return whether a velocity in counts per second is more than standstill."""
+        return abs(velocity) > self.standstill
+
+    def position_of(self, counts: float) -> int:
+        """Return the position of the user at these counts."""
+        low, high = self.settings.position_range
+        position = round((counts - self.zero) / self.settings.units.per_position)
+        return (position - low) % (high - low + 1) + low
+
+    def counts_of(self, position: int) -> float:
+        """Return the counts at a position of the user."""
+        return self.zero + position * self.settings.units.per_position
+
+    def counts_near(self, position: int) -> float:
+        """Return the counts at a position, on the shorter way from the reference."""
+        low, high = self.settings.position_range
+        span = high - low + 1
+        unit = self.settings.units.per_position
+        away = position - (self.reference.position - self.zero) / unit
+        return self.reference.position + ((away + span / 2) % span - span / 2) * unit
+
+    def per_mille_of(self, current_a: float) -> int:
+        """Return a current in thousandths of the rated one; the user's sign."""
+        return round(1_000 * current_a / self.settings.rated_current_a) * self.forward
+
+    def wrap(self) -> None:
+        """Move the zero by a whole range when the motor has left the range."""
+        low, high = self.settings.position_range
+        unit = self.settings.units.per_position
+        turns = (round((self.motor.counts - self.zero) / unit) - low) // (high - low + 1)
+        self.zero += turns * (high - low + 1) * unit
+
+    def place_home(self, position: int, counts: int) -> None:
+        """Take a place for a position of the user: homing is attained."""
+        self.zero = counts - position * self.settings.units.per_position
+        self.homed = True
+
+    def command(self) -> None:
+        """Have the motor do what the reference says; what is not controlled follows it."""
+        motor, reference, control = self.motor, self.reference, self.control
+        if control is not Control.CURRENT:
+            reference.current_a = motor.current_ma / 1_000
+        if control is Control.POSITION:
+            motor.drive_position(reference.position, reference.velocity, reference.acceleration)
+        elif control is Control.VELOCITY:
+            motor.drive_velocity(reference.velocity, reference.acceleration)
+            reference.position = float(motor.counts)
+        else:
+            motor.drive_current(reference.current_a)
+            reference.place(motor.counts, motor.velocity_counts_s)
+
+    def release(self) -> None:
+        """Switch the power stage off."""
+        self.motor.release()
+        self.reference.place(self.motor.counts, self.motor.velocity_counts_s)
+        self.reference.current_a = 0.0
+
+    def configure(self, settings: Settings) -> None:
+        """Follow another configuration."""
+        self.settings = settings
+        self.motor.current_limit_a = min(settings.max_current_a, *settings.limits_a)
+
+
+# How a drive comes to a standstill: the option codes 605Ah to 605Eh (CiA 402-2).
+
+
+class Ramp(IntEnum):
+    """How the motor is slowed down."""
+
+    NONE = 0  # the power stage is switched off, the shaft coasts
+    SLOW_DOWN = 1  # with the deceleration of the profile, 6084h
+    QUICK_STOP = 2  # with the quick stop deceleration, 6085h
+    CURRENT_LIMIT = 3  # as hard as the current limit lets it
+
+
+_STAYING: Final = 4
+"""Added to a quick stop option: the drive stays in Quick stop active."""
+
+
+class Stopping(Part):
+    """Slows the reference of an axis down.
+
+    Not emulated: options 4 and 8, the voltage limit; options of a manufacturer.
+
+    Args:
+        axis: whose reference it is.
+        parameters: have the option codes.
+    """
+
+    def __init__(self, axis: Axis, parameters: Parameters) -> None:
+        self._axis, self._parameters = axis, parameters
+
+    @property
+    def stays(self) -> bool:
+        """Whether a quick stop ends in Quick stop active."""
+        return self._parameters.number(indices.QUICK_STOP_OPTION) > _STAYING
+
+    def quick_stop(self) -> bool:
+        """Make a step as 605Ah says. Returns: whether the motor stands."""
+        return self.brake(self._parameters.number(indices.QUICK_STOP_OPTION) % _STAYING)
+
+    def by(self, index: int) -> bool:
+        """Make a step as another option code says. Returns: whether the motor stands."""
+        return self.brake(self._parameters.number(index))
+
+    def brake(self, ramp: int) -> bool:
+        """Make a step of a ramp.
+
+        Returns:
+            True if the motor stands, or has not to be slowed down.
+        """
+        axis, settings = self._axis, self._axis.settings
+        if ramp == Ramp.NONE:
+            return True
+        if axis.control is Control.CURRENT:
+            axis.control = Control.VELOCITY
+        deceleration = {
+            Ramp.SLOW_DOWN: settings.deceleration,
+            Ramp.QUICK_STOP: settings.quick_stop_deceleration,
+        }.get(Ramp(ramp), inf)
+        return axis.reference.ramp(0.0, deceleration, deceleration) and axis.stands
+
+
+# Limit switches and home switch of an axis (CiA 402-2, 60FDh).
+
+FAR_DEG: Final = 1e9
+"""An angle that no shaft ever reaches."""
+
+_NEGATIVE_LIMIT: Final = 0x01
+_POSITIVE_LIMIT: Final = 0x02
+_HOME: Final = 0x04
+"""Bits of 60FDh."""
+
+INPUTS: Final[tuple[InputSignal, ...]] = (
+    InputSignal("negative_limit_switch", "limit switch in negative direction is pressed by hand"),
+    InputSignal("positive_limit_switch", "limit switch in positive direction is pressed by hand"),
+    InputSignal("home_switch", "home switch is pressed by hand"),
+    *(
+        InputSignal(name, text, low=-FAR_DEG, high=FAR_DEG, unit="deg", initial=initial, real=True)
+        for name, text, initial in (
+            ("negative_limit_at", "angle at and below which the shaft presses it", -FAR_DEG),
+            ("positive_limit_at", "angle at and above which the shaft presses it", FAR_DEG),
+            ("home_from", "angle from which the shaft presses the home switch", FAR_DEG),
+            ("home_to", "angle up to which the shaft presses the home switch", -FAR_DEG),
+        )
+    ),
+)
+
+
+class Switches(Part):
+    """The switches as the drive sees them: pressed by hand, or by the shaft at an angle.
+
+    Negative and positive are directions of the user, as 607Eh makes them.
+
+    Attributes:
+        word: bits 0 to 2 of 60FDh.
+        by_angle: the shaft presses some of them.
+    """
+
+    def __init__(self) -> None:
+        self.word = 0
+        self._hand = 0
+        self._angles = (-inf, inf, inf, -inf)
+        self.by_angle = False
+
+    def set(self, inputs: QuantityBank) -> None:
+        """Follow the physical inputs."""
+        hand, angles = INPUTS[:3], INPUTS[3:]
+        self._hand = sum(1 << bit for bit, item in enumerate(hand) if inputs[item.name])
+        low, high, first, last = (inputs[item.name] for item in angles)
+        self._angles = low, high, first, last
+        self.by_angle = any(inputs[item.name] != item.initial for item in angles)
+        self.word = self._hand
+
+    def look(self, shaft_deg: float) -> None:
+        """Follow the shaft."""
+        low, high, first, last = self._angles
+        self.word = (
+            self._hand
+            | (_NEGATIVE_LIMIT if shaft_deg <= low else 0)
+            | (_POSITIVE_LIMIT if shaft_deg >= high else 0)
+            | (_HOME if first <= shaft_deg <= last else 0)
+        )
+
+    @property
+    def free(self) -> bool:
+        """Whether no limit switch is pressed, nor could be by the shaft."""
+        return not (self.by_angle or self.word & (_NEGATIVE_LIMIT | _POSITIVE_LIMIT))
+
+    @property
+    def negative_limit(self) -> bool:
+        """Whether the negative limit switch is pressed."""
+        return bool(self.word & _NEGATIVE_LIMIT)
+
+    @property
+    def positive_limit(self) -> bool:
+        """Whether the positive limit switch is pressed."""
+        return bool(self.word & _POSITIVE_LIMIT)
+
+    @property
+    def home(self) -> bool:
+        """Whether the home switch is pressed."""
+        return bool(self.word & _HOME)
+
+
+# Where a drive may go and how fast: limit switches, software limits, velocity (CiA 402-2).
+
+Clamped = tuple[float, bool]
+"""A demand, or the limit that is nearest to it, and whether that is another value."""
+
+
+class Limits(Part):
+    """What an axis may do.
+
+    Args:
+        axis: whose settings count.
+        switches: its limit switches.
+    """
+
+    def __init__(self, axis: Axis, switches: Switches) -> None:
+        self._axis, self._switches = axis, switches
+
+    def velocity(self, wanted: float) -> Clamped:
+        """Clamp a velocity, in counts per second, to the largest one."""
+        most = self._axis.settings.max_velocity
+        return _clamp(wanted, -most, most)
+
+    def position(self, counts: float) -> Clamped:
+        """Clamp a position to the software limits."""
+        low, high = self._axis.ends
+        return _clamp(counts, low, high)
+
+    def current(self, wanted_a: float) -> Clamped:
+        """Clamp a current to the torque limits of both directions."""
+        settings = self._axis.settings
+        backward, forward = settings.limits_a
+        most = settings.max_current_a
+        return _clamp(wanted_a, -min(backward, most), min(forward, most))
+
+    def reached(self) -> ErrorCode | None:
+        """Return what ends the way on which the reference leads, None while it is free.
+
+        That is a pressed limit switch, or a software limit that could not be kept otherwise.
+        """
+        axis, reference = self._axis, self._axis.reference
+        towards = reference.velocity
+        if axis.control is Control.CURRENT:
+            towards = towards or reference.current_a
+        if not towards:
+            return None
+        if towards * axis.forward > 0:
+            if self._switches.positive_limit:
+                return ErrorCode.POSITIVE_LIMIT
+        elif self._switches.negative_limit:
+            return ErrorCode.NEGATIVE_LIMIT
+        ends = axis.control is not Control.POSITION and self._room(towards) <= 0
+        return ErrorCode.SOFTWARE_LIMIT if ends else None
+
+    def _room(self, towards: float) -> float:
+        """Return the counts that are left before the motor has to brake for a software limit."""
+        axis, reference = self._axis, self._axis.reference
+        low, high = axis.ends
+        way = high - reference.position if towards > 0 else reference.position - low
+        return way - reference.velocity**2 / (2 * axis.settings.quick_stop_deceleration)
+
+
+def _clamp(wanted: float, low: float, high: float) -> Clamped:
+    value = max(low, min(high, wanted))
+    return value, value != wanted

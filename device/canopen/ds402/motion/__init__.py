@@ -1,1 +1,0 @@
-"""The axis of a drive: references, profiles, limits, switches, units; no mode of operation."""

@@ -1,1 +1,0 @@
-"""The objects of a drive as numbers and settings (CiA 402-2), and its physical side."""

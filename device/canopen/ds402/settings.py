@@ -1,0 +1,359 @@
+"""What the objects of a drive set: parameters, settings, error codes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from math import inf, tau
+from typing import Final
+
+from tickrig.device.canopen.dictionary import Dictionary, OnEntry
+from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402.indices import DEFAULTS, NO_LIMIT
+from tickrig.device.twin import Immutable, Part
+from tickrig.wire.canopen.emcy import ErrorRegister
+
+# Error codes of a drive, and how it reacts to them (CiA 402-2, error codes).
+
+
+class ErrorCode(IntEnum):
+    """What a drive can find wrong."""
+
+    OVER_CURRENT = 0x2310
+    OVER_VOLTAGE = 0x3210
+    UNDER_VOLTAGE = 0x3220
+    DRIVE_TEMPERATURE = 0x4310
+    MOTOR_BLOCKED = 0x7121
+    MOTOR_PHASE = 0x7122
+    INCREMENTAL_SENSOR = 0x7305
+    POSITION_SENSOR = 0x7320
+    COMMUNICATION = 0x8100
+    HEARTBEAT = 0x8130
+    FOLLOWING_ERROR = 0x8611
+    NEGATIVE_LIMIT = 0xFF06
+    POSITIVE_LIMIT = 0xFF07
+    SOFTWARE_LIMIT = 0xFF09
+
+
+_CONTROLLABLE: Final = frozenset(
+    (
+        *(ErrorCode.DRIVE_TEMPERATURE, ErrorCode.FOLLOWING_ERROR, ErrorCode.MOTOR_BLOCKED),
+        *(ErrorCode.NEGATIVE_LIMIT, ErrorCode.POSITIVE_LIMIT, ErrorCode.SOFTWARE_LIMIT),
+    )
+)
+"""Faults after which the motor can still be slowed down as 605Eh says; others switch it off."""
+
+COMMUNICATION_ERRORS: Final = range(0x8100, 0x8200)
+
+_REGISTERS: Final = {
+    0x2: ErrorRegister.CURRENT,
+    0x3: ErrorRegister.VOLTAGE,
+    0x4: ErrorRegister.TEMPERATURE,
+}
+"""Bit of the error register by the first digit of the error code."""
+
+
+def is_controllable(code: int) -> bool:
+    """Return whether the motor can be slowed down after a fault."""
+    return code in _CONTROLLABLE or code in COMMUNICATION_ERRORS
+
+
+def register_of(code: int) -> ErrorRegister:
+    """Return the bit of the error register.
+
+    >>> [register_of(code).name for code in (0x3220, 0x8130, 0x8611)]
+    ['VOLTAGE', 'COMMUNICATION', 'DEVICE_PROFILE']
+    """
+    if code in COMMUNICATION_ERRORS:
+        return ErrorRegister.COMMUNICATION
+    return _REGISTERS.get(code >> 12, ErrorRegister.DEVICE_PROFILE)
+
+
+# The objects of a drive as numbers, whether the device has them or not.
+
+
+class Parameters(Part):
+    """Reads objects, and writes those that are there.
+
+    Args:
+        dictionary: of the slave.
+        defaults: values of objects that the device has not, by (index, sub-index).
+    """
+
+    def __init__(
+        self, dictionary: Dictionary, defaults: Mapping[tuple[int, int], int] = DEFAULTS
+    ) -> None:
+        self._dictionary, self._defaults = dictionary, defaults
+
+    def number(self, index: int, sub: int = 0) -> int:
+        """Return a value; that of the defaults if the device has no such object, or 0."""
+        entry = self._dictionary.find(index, sub)
+        return self._defaults.get((index, sub), 0) if entry is None else entry.number
+
+    def write(self, index: int, value: int, sub: int = 0) -> None:
+        """Set a value, if the device has such an object; too large a one is cut to its range."""
+        entry = self._dictionary.find(index, sub)
+        if entry is not None:
+            entry.value = clamped(value, 8 * entry.size, signed=entry.description.signed)
+
+    def watch(self, indices: Iterable[int], changed: OnEntry) -> None:
+        """Call `changed` whenever one of these objects changes."""
+        wanted = frozenset(indices)
+        for entry in self._dictionary:
+            if entry.index in wanted:
+                entry.watch(changed)
+
+
+def clamped(value: int, bits: int, *, signed: bool) -> int:
+    """Return the nearest number that an integer of so many bits holds.
+
+    >>> clamped(40_000, 16, signed=True), clamped(-1, 16, signed=False)
+    (32767, 0)
+    """
+    low = -(1 << bits - 1) if signed else 0
+    return max(low, min(low + (1 << bits) - 1, value))
+
+
+# How a drive is set up: the configuration objects in the units of its motor.
+
+_NO_TORQUE_LIMIT: Final = 0xFFFF
+
+_POSITION_REVERSED: Final = 0x80
+_VELOCITY_REVERSED: Final = 0x40
+"""Bits of the polarity 607Eh."""
+
+_REVOLUTIONS: Final = 0xB4
+_PER_MINUTE: Final = 0x47
+"""Numerator and denominator of a velocity in an SI unit object (CiA 303-2)."""
+
+_ANGLES: Final = {0x10: tau, 0x41: 360.0, _REVOLUTIONS: 1.0}
+"""How many radians, degrees and revolutions a turn has, by their number there."""
+
+_RPM_DIMENSION: Final = 0xA4
+"""Dimension index of revolutions per minute in 608Ch."""
+
+CONFIGURATION: Final = (
+    *range(indices.QUICK_STOP_OPTION, indices.FAULT_REACTION_OPTION + 1),
+    *range(indices.FOLLOWING_ERROR_WINDOW, indices.POSITION_WINDOW_TIME + 1),
+    *range(indices.VELOCITY_WINDOW, indices.VELOCITY_THRESHOLD_TIME + 1),
+    *(indices.ABORT_CONNECTION, indices.MAX_TORQUE, indices.MAX_CURRENT),
+    *(indices.RATED_CURRENT, indices.RATED_TORQUE, indices.POSITION_RANGE),
+    *range(indices.HOME_OFFSET, indices.TORQUE_SLOPE + 1),
+    *(indices.VELOCITY_NOTATION, indices.VELOCITY_DIMENSION, indices.ENCODER_RESOLUTION),
+    *(indices.GEAR_RATIO, indices.FEED_CONSTANT, indices.HOMING_SPEEDS),
+    *(indices.HOMING_ACCELERATION, indices.SI_UNIT_POSITION, indices.SI_UNIT_VELOCITY),
+    indices.INTERPOLATION_PERIOD,
+    *(indices.MAX_ACCELERATION, indices.MAX_DECELERATION),
+    *(indices.POSITIVE_TORQUE_LIMIT, indices.NEGATIVE_TORQUE_LIMIT),
+)
+"""Objects whose change makes the settings anew."""
+
+
+class Units(Part):
+    """Converts between objects and the counts of the motor's encoder.
+
+    A position unit is one count, or what 6091h and 6092h make of a revolution of
+    the motor, which has as many counts as 608Fh says; or an angle behind the gear of 6091h
+    if 60A8h says so, with the power of ten that it gives. A velocity unit is a
+    position unit per second, or revolutions of the motor per minute if 60A9h or
+    608Ch says so, with the power of ten that they give; an acceleration unit is a
+    velocity unit per second. 607Eh turns the signs.
+
+    Not emulated: 6090h, 6093h to 6097h; other dimensions.
+
+    Args:
+        parameters: the objects.
+        counts_per_turn: of the motor's encoder, where 608Fh is not there.
+
+    Attributes:
+        per_position: counts in a position unit, with its sign.
+        per_velocity: counts per second in a velocity unit, with its sign.
+        per_acceleration: the same without sign.
+    """
+
+    def __init__(self, parameters: Parameters, counts_per_turn: int) -> None:
+        polarity = parameters.number(indices.POLARITY)
+        per_turn = _ratio(parameters, indices.ENCODER_RESOLUTION) or float(counts_per_turn)
+        position = _angle_unit(parameters, per_turn) or _counts_per_unit(parameters, per_turn)
+        velocity = _velocity_unit(parameters, per_turn) or position
+        self.per_position = -position if polarity & _POSITION_REVERSED else position
+        self.per_velocity = -velocity if polarity & _VELOCITY_REVERSED else velocity
+        self.per_acceleration = velocity
+
+
+@dataclass(frozen=True, slots=True)
+class Settings(Immutable):
+    """A snapshot of the configuration.
+
+    Positions are in counts from where the encoder was switched on less the home
+    position, velocities in counts per second, accelerations in counts per second
+    per second, all of them without sign; `inf` stands for no limit.
+
+    Attributes:
+        units: of the user.
+        max_velocity: the smaller one of 607Fh and 6080h (revolutions per minute of the motor).
+        software_limits: 607Dh with the home offset, as distances from the zero of the user.
+        following_error_us: how long the error may be too large (6066h).
+        interpolation_us: 60C2h.
+        rated_current_a: 6075h.
+        max_current_a: by 6072h, 6073h.
+        torque_slope_a_s: 6087h as amperes per second.
+        limits_a: by 60E0h and 60E1h, both positive.
+    """
+
+    units: Units
+    max_velocity: float
+    profile_velocity: float
+    end_velocity: float
+    acceleration: float
+    deceleration: float
+    quick_stop_deceleration: float
+    max_acceleration: float
+    max_deceleration: float
+    homing_speeds: tuple[float, float]
+    homing_acceleration: float
+    software_limits: tuple[float, float]
+    position_range: tuple[int, int]
+    following_error_window: float
+    following_error_us: int
+    position_window: float
+    position_window_us: int
+    velocity_window: float
+    velocity_window_us: int
+    velocity_threshold: float
+    velocity_threshold_us: int
+    interpolation_us: int
+    rated_current_a: float
+    max_current_a: float
+    limits_a: tuple[float, float]
+    torque_slope_a_s: float
+
+
+def read_settings(parameters: Parameters, counts_per_turn: int) -> Settings:
+    """Return the present configuration."""
+    read, units = parameters.number, Units(parameters, counts_per_turn)
+    velocity, acceleration, position = (
+        *(abs(units.per_velocity), units.per_acceleration, abs(units.per_position)),
+    )
+    rated_current_a = max(1, read(indices.RATED_CURRENT)) / 1_000
+
+    def rate(index: int, most: float = inf) -> float:
+        value = read(index)
+        return most if value == NO_LIMIT else min(most, max(1, value) * acceleration)
+
+    max_acceleration = rate(indices.MAX_ACCELERATION)
+    max_deceleration = rate(indices.MAX_DECELERATION)
+    max_velocity = min(
+        _limit(read(indices.MAX_PROFILE_VELOCITY), velocity),
+        _limit(read(indices.MAX_MOTOR_SPEED), counts_per_turn / 60),
+    )
+    return Settings(
+        units=units,
+        max_velocity=max_velocity,
+        profile_velocity=min(max_velocity, read(indices.PROFILE_VELOCITY) * velocity),
+        end_velocity=min(max_velocity, read(indices.END_VELOCITY) * velocity),
+        acceleration=rate(indices.PROFILE_ACCELERATION, max_acceleration),
+        deceleration=rate(indices.PROFILE_DECELERATION, max_deceleration),
+        quick_stop_deceleration=rate(indices.QUICK_STOP_DECELERATION, max_deceleration),
+        max_acceleration=max_acceleration,
+        max_deceleration=max_deceleration,
+        homing_speeds=(
+            max(1, read(indices.HOMING_SPEEDS, 1)) * velocity,
+            max(1, read(indices.HOMING_SPEEDS, 2)) * velocity,
+        ),
+        homing_acceleration=rate(indices.HOMING_ACCELERATION, max_acceleration),
+        software_limits=_software_limits(parameters, units),
+        position_range=_position_range(parameters),
+        following_error_window=_limit(read(indices.FOLLOWING_ERROR_WINDOW), position),
+        following_error_us=read(indices.FOLLOWING_ERROR_TIME_OUT) * 1_000,
+        position_window=_limit(read(indices.POSITION_WINDOW), position),
+        position_window_us=read(indices.POSITION_WINDOW_TIME) * 1_000,
+        velocity_window=read(indices.VELOCITY_WINDOW) * velocity,
+        velocity_window_us=read(indices.VELOCITY_WINDOW_TIME) * 1_000,
+        velocity_threshold=read(indices.VELOCITY_THRESHOLD) * velocity,
+        velocity_threshold_us=read(indices.VELOCITY_THRESHOLD_TIME) * 1_000,
+        interpolation_us=_period_us(parameters),
+        rated_current_a=rated_current_a,
+        max_current_a=rated_current_a
+        * min(_per_mille(read(indices.MAX_TORQUE)), _per_mille(read(indices.MAX_CURRENT))),
+        limits_a=(
+            rated_current_a * _per_mille(read(indices.NEGATIVE_TORQUE_LIMIT)),
+            rated_current_a * _per_mille(read(indices.POSITIVE_TORQUE_LIMIT)),
+        ),
+        torque_slope_a_s=_limit(read(indices.TORQUE_SLOPE), rated_current_a / 1_000),
+    )
+
+
+def _limit(value: int, unit: float) -> float:
+    return inf if value == NO_LIMIT else value * unit
+
+
+def _per_mille(value: int) -> float:
+    return inf if value == _NO_TORQUE_LIMIT else value / 1_000
+
+
+def _software_limits(parameters: Parameters, units: Units) -> tuple[float, float]:
+    """Return the limits in counts, lower one first; none if the lower is not below the upper."""
+    lower = parameters.number(indices.SOFTWARE_LIMIT, 1)
+    upper = parameters.number(indices.SOFTWARE_LIMIT, 2)
+    if lower >= upper:
+        return -inf, inf
+    first, second = sorted((lower * units.per_position, upper * units.per_position))
+    widest = abs(units.per_position) * indices.I32_MAX
+    return (-inf if first <= -widest else first), (inf if second >= widest else second)
+
+
+def _position_range(parameters: Parameters) -> tuple[int, int]:
+    """Return 607Bh; the whole INTEGER32 if its ends are not apart."""
+    low, high = (parameters.number(indices.POSITION_RANGE, sub) for sub in (1, 2))
+    return (low, high) if low < high else (indices.I32_MIN, indices.I32_MAX)
+
+
+def _period_us(parameters: Parameters) -> int:
+    """Return 60C2h, at least one tick."""
+    value = parameters.number(indices.INTERPOLATION_PERIOD, 1)
+    exponent = parameters.number(indices.INTERPOLATION_PERIOD, 2)
+    if not -6 <= exponent <= 0:
+        return 1_000
+    return int(max(1_000, value * 10 ** (6 + exponent)))
+
+
+def _ratio(parameters: Parameters, index: int) -> float:
+    """Return sub-index 1 by sub-index 2, 0 if one of them is 0."""
+    numerator, denominator = parameters.number(index, 1), parameters.number(index, 2)
+    return numerator / denominator if denominator else 0.0
+
+
+def _counts_per_unit(parameters: Parameters, per_turn: float) -> float:
+    feed = _ratio(parameters, indices.FEED_CONSTANT)
+    gear = _ratio(parameters, indices.GEAR_RATIO)
+    return per_turn * gear / feed if feed and gear else 1.0
+
+
+def _angle_unit(parameters: Parameters, per_turn: float) -> float:
+    """Return the counts of a unit that is an angle, 0 if the unit is none."""
+    unit = parameters.number(indices.SI_UNIT_POSITION)
+    angle = _ANGLES.get(unit >> 16 & 0xFF, 0.0)
+    if not angle:
+        return 0.0
+    gear = _ratio(parameters, indices.GEAR_RATIO) or 1.0
+    return per_turn * gear / angle * _power_of_ten(unit >> 24)
+
+
+def _velocity_unit(parameters: Parameters, per_turn: float) -> float:
+    """Return the counts per second of a unit in rpm, 0 if the unit is another one."""
+    unit = parameters.number(indices.SI_UNIT_VELOCITY)
+    if unit >> 8 & 0xFFFF == _REVOLUTIONS << 8 | _PER_MINUTE:
+        exponent = unit >> 24
+    elif parameters.number(indices.VELOCITY_DIMENSION) == _RPM_DIMENSION:
+        exponent = parameters.number(indices.VELOCITY_NOTATION) & 0xFF
+    else:
+        return 0.0
+    return per_turn / 60 * _power_of_ten(exponent)
+
+
+def _power_of_ten(exponent: int) -> float:
+    """Return the power of ten of an INTEGER8, as a byte."""
+    power: float = 10.0 ** ((exponent ^ 0x80) - 0x80)
+    return power

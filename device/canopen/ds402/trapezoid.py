@@ -1,0 +1,265 @@
+"""Trapezoidal profiles, and following them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from math import copysign, cos, pi, sin, sqrt
+from typing import Final, NamedTuple
+
+from tickrig.device.canopen.ds402.axis import Reference
+from tickrig.device.canopen.slave import TICK_US
+from tickrig.device.twin import Immutable, Part
+
+# Motion profiles: the way to a position or a velocity within limits, in closed form.
+#
+# A path is planned when the target or a limit changes, from the motion at that
+# moment, and asked where it is at any later time. So it is exact: it ends on its
+# target, with no drift, whenever the control steps come. Each of its ramps has
+# the shape of 6086h; the way along a ramp is the mean of its two velocities times
+# its duration in every shape, so that one plan serves them all.
+
+_US_PER_S: Final = 1_000_000
+
+
+class RampShape(IntEnum):
+    """Motion profile type (6086h); jerk-free 2 and jerk-limited 3 are not supported."""
+
+    LINEAR = 0
+    SIN2 = 1
+
+
+class Motion(NamedTuple):
+    """Where something is and how it moves; unit/s and unit/s^2 for any unit of length."""
+
+    position: float
+    velocity: float = 0.0
+    acceleration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PathLimits(Immutable):
+    """What a path may use, all greater than 0.
+
+    Attributes:
+        velocity: the fastest.
+        acceleration: the steepest ramp away from standstill; the peak of a sin^2 ramp.
+        deceleration: likewise towards standstill.
+        shape: of the ramps.
+    """
+
+    velocity: float
+    acceleration: float
+    deceleration: float
+    shape: RampShape = RampShape.LINEAR
+
+
+class Leg(NamedTuple):
+    """A part of a path: to a velocity in a time."""
+
+    velocity: float
+    duration_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class RampLeg(Immutable):
+    """A leg at its place in time and way."""
+
+    end_s: float
+    duration_s: float
+    start: float
+    velocity: float
+    change: float
+    shape: RampShape
+
+    def at(self, now_s: float) -> Motion:
+        """Return the motion at a time of this leg."""
+        since_s = now_s - self.end_s + self.duration_s
+        straight = self.start + self.velocity * since_s
+        if self.shape is RampShape.LINEAR or self.change == 0.0:
+            acceleration = self.change / self.duration_s
+            gained = acceleration * since_s
+            return Motion(straight + gained * since_s / 2, self.velocity + gained, acceleration)
+        half, rate = self.change / 2, pi / self.duration_s
+        angle = rate * since_s
+        return Motion(
+            straight + half * (since_s - sin(angle) / rate),
+            self.velocity + half * (1.0 - cos(angle)),
+            half * rate * sin(angle),
+        )
+
+
+class Path(Part):
+    """A planned way; after its end it goes on with its last velocity.
+
+    Attributes:
+        began_us: when it was planned.
+        end_s: its duration.
+        end: position and velocity where it ends.
+    """
+
+    __slots__ = ("_ramps", "began_us", "end", "end_s")
+
+    def __init__(
+        self,
+        now_us: int,
+        start: Motion,
+        legs: Iterable[Leg],
+        shape: RampShape = RampShape.LINEAR,
+        target: float | None = None,
+    ) -> None:
+        """Lay legs one after the other.
+
+        Args:
+            now_us: when it begins.
+            start: where it begins.
+            legs: its parts.
+            shape: of the ramps.
+            target: where it ends to the last bit, if that is known.
+        """
+        position, velocity, end_s = start.position, start.velocity, 0.0
+        ramps = []
+        for leg in legs:
+            change, end_s = leg.velocity - velocity, end_s + leg.duration_s
+            ramps.append(RampLeg(end_s, leg.duration_s, position, velocity, change, shape))
+            position += (velocity + leg.velocity) / 2 * leg.duration_s
+            velocity = leg.velocity
+        self._ramps = [ramp for ramp in ramps if ramp.duration_s > 0.0]
+        self.began_us, self.end_s = now_us, end_s
+        self.end = Motion(position if target is None else target, velocity)
+
+    def at(self, now_us: int) -> Motion:
+        """Return the motion at a time not before it began."""
+        now_s = (now_us - self.began_us) / _US_PER_S
+        for ramp in self._ramps:
+            if now_s < ramp.end_s:
+                return ramp.at(now_s)
+        since_s = now_s - self.end_s
+        return Motion(self.end.position + self.end.velocity * since_s, self.end.velocity)
+
+    def ended(self, now_us: int) -> bool:
+        """Return whether the target is reached."""
+        return (now_us - self.began_us) / _US_PER_S >= self.end_s
+
+
+def to_velocity(now_us: int, start: Motion, velocity: float, limits: PathLimits) -> Path:
+    """Plan a change of velocity; it is not cut to the velocity limit.
+
+    A change of direction brakes to standstill first, and accelerates then.
+    """
+    legs = _ramps(start.velocity, velocity, _effective(limits))
+    return Path(now_us, start, legs, limits.shape)
+
+
+def to_position(
+    now_us: int, start: Motion, target: float, limits: PathLimits, end_velocity: float = 0.0
+) -> Path:
+    """Plan the fastest way to a position.
+
+    What moves away from the target, or too fast to stop there, brakes to
+    standstill and comes back; what is faster than the limit brakes to it first.
+
+    Args:
+        now_us: when it begins.
+        start: position and velocity at that time.
+        target: where to.
+        limits: what the way may use.
+        end_velocity: speed at the target in the direction of the way, at least 0. If the way
+            is too short for it, the speed there is as near as the limits let it be.
+    """
+    distance = target - start.position
+    legs = _legs(start.velocity, distance, _effective(limits), min(end_velocity, limits.velocity))
+    return Path(now_us, start, legs, limits.shape, target)
+
+
+def _effective(limits: PathLimits) -> PathLimits:
+    """Return limits with the mean slope of a ramp instead of its peak."""
+    if limits.shape is RampShape.LINEAR:
+        return limits
+    mean = 2 / pi
+    return PathLimits(limits.velocity, limits.acceleration * mean, limits.deceleration * mean)
+
+
+def _ramps(velocity: float, wanted: float, limits: PathLimits) -> list[Leg]:
+    if velocity * wanted < 0.0:
+        return [*_ramps(velocity, 0.0, limits), *_ramps(0.0, wanted, limits)]
+    speeds_up = abs(wanted) > abs(velocity)
+    slope = limits.acceleration if speeds_up else limits.deceleration
+    return [Leg(wanted, abs(wanted - velocity) / slope)]
+
+
+def _legs(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
+    """Return the legs of a way to a position; in which direction it is makes no difference."""
+    direction = copysign(1.0, distance or velocity)
+    velocity, distance = velocity * direction, distance * direction
+    stopping = velocity * abs(velocity) / (2 * limits.deceleration)
+    if velocity < 0.0 or (end == 0.0 and stopping > distance):
+        rest = _legs(0.0, distance - stopping, limits, end)
+        legs = [*_ramps(velocity, 0.0, limits), *rest]
+    else:
+        legs = _forward(velocity, distance, limits, end)
+    return [Leg(leg.velocity * direction, leg.duration_s) for leg in legs]
+
+
+def _forward(velocity: float, distance: float, limits: PathLimits, end: float) -> list[Leg]:
+    """Return the legs of a way straight ahead: to the top velocity, along, to the end velocity."""
+    up, down = limits.acceleration, limits.deceleration
+    slowest = sqrt(max(0.0, velocity**2 - 2 * down * distance)) if end > 0.0 else 0.0
+    end = max(slowest, min(end, sqrt(velocity**2 + 2 * up * distance)))
+    peak = sqrt((2 * up * down * distance + down * velocity**2 + up * end**2) / (up + down))
+    top = max(end, min(limits.velocity, peak))
+    legs = [*_ramps(velocity, top, limits), Leg(top, 0.0), *_ramps(top, end, limits)]
+    if top > 0.0:
+        ways = (velocity + top) / 2 * legs[0].duration_s + (top + end) / 2 * legs[2].duration_s
+        legs[1] = Leg(top, max(0.0, (distance - ways) / top))
+    return legs
+
+
+# The reference of a drive on a planned path.
+
+
+class PathFollower(Part):
+    """Keeps the reference on a path, as long as nobody else moves it.
+
+    The reference that a mode finds is that of the tick before: there a path begins.
+
+    Args:
+        reference: of the drive.
+    """
+
+    __slots__ = ("_left_at", "_path", "_reference")
+
+    def __init__(self, reference: Reference) -> None:
+        self._reference, self._path = reference, Path(0, Motion(0.0), ())
+        self._left_at: tuple[float, float] | None = None
+
+    @property
+    def kept(self) -> bool:
+        """Whether there is a path, and the reference is still on it."""
+        return self._left_at == (self._reference.position, self._reference.velocity)
+
+    @property
+    def motion(self) -> Motion:
+        """The present reference, where a path may begin."""
+        return Motion(self._reference.position, self._reference.velocity)
+
+    def begin(self, path: Path) -> None:
+        """Take another path; it has to begin at `motion`, at `began_us`."""
+        self._path, self._left_at = path, (self._reference.position, self._reference.velocity)
+
+    def leave(self) -> None:
+        """Have no path any more."""
+        self._left_at = None
+
+    def follow(self, now_us: int) -> bool:
+        """Move the reference to where the path is now. Returns: whether the path has ended."""
+        motion = self._path.at(now_us)
+        self._reference.place(*motion)
+        self._left_at = motion.position, motion.velocity
+        return self._path.ended(now_us)
+
+
+def began_us(now_us: int) -> int:
+    """Return since when the reference is where a mode finds it in this tick, in microseconds."""
+    return now_us - TICK_US

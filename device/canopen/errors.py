@@ -1,0 +1,366 @@
+"""Errors of a slave: EMCY produced and consumed, error behaviour."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from enum import IntEnum
+from typing import Final, NamedTuple
+
+from tickrig._compiled import mypyc_attr
+from tickrig.device.canopen.dictionary import (
+    Dictionary,
+    Entry,
+    SdoAbort,
+    check_emcy_cob_id,
+    is_valid,
+)
+from tickrig.device.canopen.slave import ALIVE, CanopenSlave, Handler, Service
+from tickrig.device.twin import Listeners, Part
+from tickrig.wire.can import CanFrame, ErrorState
+from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.emcy import TEXT_BYTES, Emcy, EmcyCode, ErrorRegister
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, NmtState
+from tickrig.wire.canopen.sdo_frame import AbortCode
+from tickrig.wire.errors import FramingError
+
+# Error behaviour (CiA 301, object dictionary; object 1029h).
+
+_ERROR_BEHAVIOUR: Final = 0x1029
+_COMMUNICATION_ERROR: Final = 1
+OUTPUT_ERROR: Final = 2
+INPUT_ERROR: Final = 3
+"""Sub-indices; output and input errors are those of CiA 401."""
+
+
+class Behaviour(IntEnum):
+    """NMT state after an error."""
+
+    PRE_OPERATIONAL = 0  # only from Operational
+    NO_CHANGE = 1
+    STOPPED = 2
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class ErrorBehaviour(Service):
+    """Changes the NMT state on a communication error, or on an error of the device.
+
+    Without its sub-index of 1029h a communication error is as with 0, another
+    error changes nothing. It acts after the EMCY producer, so that the EMCY is sent
+    before the slave is Stopped. Values that mean nothing are refused with 0609 0030h.
+
+    Not emulated: sub-indices of other profiles and of manufacturers; an application
+    may write to `node.enter` what it wants.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self._behaviours: dict[int, Entry] = {}
+        self._errors: list[int] = []
+        for error in (_COMMUNICATION_ERROR, OUTPUT_ERROR, INPUT_ERROR):
+            entry = node.dictionary.find(_ERROR_BEHAVIOUR, error)
+            if entry is not None:
+                entry.guard = _known
+                self._behaviours[error] = entry
+
+    def start(self) -> None:
+        """Know of no error."""
+        self._errors.clear()
+
+    def communication_error(self) -> None:
+        """Act in this tick."""
+        self.act(_COMMUNICATION_ERROR)
+
+    def act(self, error: int) -> None:
+        """Act in this tick on an error, given by its sub-index."""
+        self._errors.append(error)
+        self.schedule(self.node.now_us)
+
+    def tick(self, now_us: int) -> None:
+        """Change the NMT state."""
+        for error in self._errors:
+            self._change(self._behaviour(error))
+        self._errors.clear()
+
+    def _behaviour(self, error: int) -> int:
+        if error in self._behaviours:
+            return self._behaviours[error].number
+        communication = error == _COMMUNICATION_ERROR
+        return Behaviour.PRE_OPERATIONAL if communication else Behaviour.NO_CHANGE
+
+    def _change(self, behaviour: int) -> None:
+        node = self.node
+        if behaviour == Behaviour.PRE_OPERATIONAL and node.state is NmtState.OPERATIONAL:
+            node.enter(NmtState.PRE_OPERATIONAL)
+        elif behaviour == Behaviour.STOPPED and node.state in ALIVE:
+            node.enter(NmtState.STOPPED)
+
+
+def _known(entry: Entry, value: Value) -> None:
+    if value not in tuple(Behaviour):
+        raise SdoAbort(AbortCode.VALUE_RANGE)
+
+
+# EMCY producer with error register and error history (CiA 301, emergency object).
+
+_ERROR_REGISTER: Final = 0x1001
+_PRE_DEFINED_ERROR_FIELD: Final = 0x1003
+_COB_ID_EMCY: Final = 0x1014
+_INHIBIT_TIME_EMCY: Final = 0x1015
+
+_QUEUE_LENGTH: Final = 16
+"""EMCY messages that wait; more are lost, as in a real device."""
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class EmcyProducer(Service):
+    """Reports errors, once when they occur and once when they are gone (0000h).
+
+    An error is known by its code and its text. 1001h is the sum of the errors
+    that are there, with the generic bit as long as there is one. Each error that
+    goes is reported, with the register that is left. In Stopped and in bus-off the
+    messages wait; they are sent afterwards. A reset forgets errors and messages:
+    who still sees the cause has to raise it again.
+
+    Not emulated: 29-bit CAN-IDs.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        find = node.dictionary.find
+        self._register, self._cob_id = find(_ERROR_REGISTER), find(_COB_ID_EMCY)
+        self._inhibit = find(_INHIBIT_TIME_EMCY)
+        self._history = ErrorHistory(node.dictionary)
+        self._active: dict[tuple[int, bytes], int] = {}
+        self._queue: list[bytes] = []
+        self._free_us, self._bus_off = 0, False
+        if self._cob_id is not None:
+            self._cob_id.guard = check_emcy_cob_id
+
+    @property
+    def register(self) -> int:
+        """The error register."""
+        bits = int(ErrorRegister.GENERIC) if self._active else 0
+        for register in self._active.values():
+            bits |= register & 0xFF
+        return bits
+
+    def power_on(self) -> None:
+        """Take the bus for sound."""
+        self._bus_off = False
+
+    def start(self) -> None:
+        """Know of no error."""
+        self._active.clear()
+        self._queue.clear()
+        self._free_us = 0
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        """Note and report an error that was not there."""
+        key = code & 0xFFFF, _padded(text)
+        if key not in self._active:
+            self._active[key] = register
+            self._history.note(*key)
+            self._queue_message(*key)
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        """Report that an error is gone, if it was there."""
+        gone = [
+            key
+            for key in self._active
+            if key[0] == code and (text is None or key[1] == _padded(text))
+        ]
+        for key in gone:
+            del self._active[key]
+            self._queue_message(EmcyCode.NO_ERROR, key[1])
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Send what had to wait in Stopped."""
+        if self._queue:
+            self.schedule(self._free_us)
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Wait in bus-off; send afterwards."""
+        self._bus_off = state is ErrorState.BUS_OFF
+        if self._queue:
+            self.schedule(self._free_us)
+
+    def tick(self, now_us: int) -> None:
+        """Send what the inhibit time lets pass."""
+        cob_id = self._cob_id
+        if cob_id is None or not is_valid(cob_id.number):
+            self._queue.clear()
+            return
+        if self.node.state not in ALIVE or self._bus_off:
+            return
+        inhibit_us = self._inhibit.number * 100 if self._inhibit is not None else 0
+        while self._queue and self._free_us <= now_us:
+            self.node.send(cob_id.number & CAN_ID_MASK, self._queue.pop(0))
+            self._free_us = now_us + inhibit_us
+        if self._queue:
+            self.schedule(self._free_us)
+
+    def _queue_message(self, code: int, text: bytes) -> None:
+        register = self.register
+        if self._register is not None:
+            self._register.assign(bytes([register]))
+        if len(self._queue) < _QUEUE_LENGTH:
+            self._queue.append(Emcy(code, register, text).encode())
+        self.schedule(self._free_us)
+
+
+class ErrorHistory(Part):
+    """Keeps the latest errors, the newest at sub-index 1.
+
+    Sub-index 0 counts them; 0 written to it forgets them all, other values are
+    refused with 0609 0030h. A sub-index without an error is answered with
+    0800 0024h. A field is the error code with the first two manufacturer-specific
+    bytes above it. That an error is gone is not noted.
+
+    Args:
+        dictionary: with or without 1003h.
+    """
+
+    def __init__(self, dictionary: Dictionary) -> None:
+        self._count = dictionary.find(_PRE_DEFINED_ERROR_FIELD)
+        self._fields = dictionary.elements(_PRE_DEFINED_ERROR_FIELD)
+        if self._count is not None:
+            self._count.guard = _only_zero
+            for field in self._fields:
+                field.source = self._read
+
+    def note(self, code: int, text: bytes) -> None:
+        """Put an error at the top; the oldest one falls out when all fields are full."""
+        if self._count is None or not self._fields:
+            return
+        count = min(self._count.number + 1, len(self._fields))
+        for sub in reversed(range(1, count)):
+            self._fields[sub].assign(self._fields[sub - 1].data)
+        self._fields[0].assign(code.to_bytes(2, "little") + text[:2].ljust(2, b"\0"))
+        self._count.assign(bytes([count]))
+
+    def _read(self, field: Entry) -> bytes:
+        if self._count is None or field.sub > self._count.number:
+            raise SdoAbort(AbortCode.NO_DATA)
+        return field.data
+
+
+def _only_zero(entry: Entry, value: Value) -> None:
+    if value != 0:
+        raise SdoAbort(AbortCode.VALUE_RANGE)
+
+
+def _padded(text: bytes) -> bytes:
+    return text[:TEXT_BYTES].ljust(TEXT_BYTES, b"\0")
+
+
+# EMCY consumer (CiA 301, emergency object; object 1028h).
+
+_EMERGENCY_CONSUMER: Final = 0x1028
+_MAX_NODES: Final = 127
+
+
+class EmcyConsumer(Service):
+    """Consumes the EMCY of other nodes: the sub-index is their node-ID.
+
+    What to do about it is left to the application. An EMCY that has not eight
+    bytes is ignored.
+
+    Attributes:
+        latest: the latest EMCY of each node since the reset.
+        on_emcy: called with the node-ID and the message.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.latest: dict[int, Emcy] = {}
+        self.on_emcy: Listeners[Callable[[int, Emcy], None]] = Listeners()
+        self._entries = [
+            entry
+            for entry in node.dictionary.object(_EMERGENCY_CONSUMER)
+            if 1 <= entry.sub <= _MAX_NODES
+        ]
+        for entry in self._entries:
+            entry.guard = check_emcy_cob_id
+            entry.watch(self.follow_cob_id)
+
+    def start(self) -> None:
+        """Know nothing of others."""
+        self.latest.clear()
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Listen in Pre-operational and Operational."""
+        if state in ALIVE:
+            for entry in self._entries:
+                if is_valid(entry.number):
+                    yield entry.number & CAN_ID_MASK, _Producer(self, entry.sub).receive
+
+    def take(self, node_id: int, emcy: Emcy) -> None:
+        """Take the EMCY of a node."""
+        self.latest[node_id] = emcy
+        for notify in self.on_emcy:
+            notify(node_id, emcy)
+
+
+class _Producer(NamedTuple):
+    """Another node, which may send EMCY."""
+
+    consumer: EmcyConsumer
+    node_id: int
+
+    def receive(self, frame: CanFrame) -> None:
+        with suppress(FramingError):
+            self.consumer.take(self.node_id, Emcy.parse(frame.data))
+
+
+# What a slave does about its CAN controller's fault confinement (CiA 301, emergency object).
+
+
+class ErrorStateEmcy(Service):
+    """Reports error-passive (8120h) and that bus-off is over (8140h).
+
+    8120h is cleared when the controller is error-active again. Bus-off is a
+    communication error (1029h). 8140h is sent when it is over, and cleared at once:
+    nothing is wrong then.
+
+    Not emulated: when and whether a controller recovers is its own business.
+
+    Attributes:
+        state: what the controller reported last.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.state = ErrorState.ACTIVE
+
+    def power_on(self) -> None:
+        """Begin error-active."""
+        self.state = ErrorState.ACTIVE
+
+    def booted(self) -> None:
+        """Report anew, after the boot-up message, what is still so."""
+        if self.state is ErrorState.PASSIVE:
+            self.schedule(self.node.now_us + 1)
+
+    def tick(self, now_us: int) -> None:
+        """Report error-passive."""
+        self._report_passive()
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Report a change."""
+        node, old, self.state = self.node, self.state, state
+        if old is state:
+            return
+        if state is ErrorState.BUS_OFF:
+            node.communication_error()
+            return
+        if old is ErrorState.BUS_OFF:
+            node.emergency(EmcyCode.BUS_OFF_RECOVERED, ErrorRegister.COMMUNICATION)
+            node.emergency_clear(EmcyCode.BUS_OFF_RECOVERED)
+        if state is ErrorState.PASSIVE:
+            self._report_passive()
+        else:
+            node.emergency_clear(EmcyCode.CAN_PASSIVE)
+
+    def _report_passive(self) -> None:
+        self.node.emergency(EmcyCode.CAN_PASSIVE, ErrorRegister.COMMUNICATION)

@@ -1,0 +1,341 @@
+"""The NMT slave, heartbeat and node guarding."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum, auto
+from typing import Final
+
+from tickrig._compiled import mypyc_attr
+from tickrig.device.canopen.dictionary import Entry, SdoAbort
+from tickrig.device.canopen.slave import ALWAYS, UNCONFIGURED, CanopenSlave, Handler, Service
+from tickrig.device.twin import Part
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.datatypes import Value
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
+from tickrig.wire.canopen.nmt import (
+    ALL_NODES,
+    ERROR_CONTROL_COB_ID,
+    NMT_COB_ID,
+    NmtCommand,
+    NmtState,
+)
+from tickrig.wire.canopen.sdo_frame import AbortCode
+from tickrig.wire.instant import NEVER
+
+# NMT slave: boot-up, commands, self start (CiA 301, network management).
+
+_NEXT_STATE: Final = {
+    NmtCommand.START: NmtState.OPERATIONAL,
+    NmtCommand.STOP: NmtState.STOPPED,
+    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+}
+"""The same from every state but Initialising (CiA 301, NMT state diagram)."""
+
+_NMT_STARTUP: Final = 0x1F80
+_SELF_START_MASK: Final = 0b1101
+_SELF_START: Final = 0b1000
+"""1F80h of a slave that starts itself (CiA 302-2)."""
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class NmtSlave(Service):
+    """Follows the NMT master."""
+
+    def booted(self) -> None:
+        """Send the boot-up message and enter Pre-operational, or Operational by itself."""
+        if not self.node.boots():
+            return
+        self.node.send(ERROR_CONTROL_COB_ID + self.node.node_id, bytes([NmtState.INITIALISING]))
+        self.node.enter(NmtState.PRE_OPERATIONAL)
+        startup = self.node.dictionary.find(_NMT_STARTUP)
+        if startup is not None and startup.number & _SELF_START_MASK == _SELF_START:
+            self.node.enter(NmtState.OPERATIONAL)
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Listen to the NMT master; a node without node-ID waits for LSS alone."""
+        if self.node.node_id != UNCONFIGURED:
+            yield NMT_COB_ID, self._receive
+
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the NMT master: what it listens to follows the state."""
+        return (can_id for can_id, _ in self.handlers(state))
+
+    def _receive(self, frame: CanFrame) -> None:
+        """Obey; what is not a command for this node is ignored."""
+        if len(frame.data) != 2 or frame.data[1] not in (ALL_NODES, self.node.node_id):
+            return
+        try:
+            command = NmtCommand(frame.data[0])
+        except ValueError:
+            return
+        if self.node.admits(command):
+            self._obey(command)
+
+    def _obey(self, command: NmtCommand) -> None:
+        match command:
+            case NmtCommand.RESET_NODE:
+                self.node.reset_node()
+            case NmtCommand.RESET_COMMUNICATION:
+                self.node.reset_communication()
+            case _:
+                self.node.enter(_NEXT_STATE[command])
+
+
+# Error control of a slave: heartbeat producer, node and life guarding (CiA 301, 1017h, 100Ch).
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class HeartbeatProducer(Service):
+    """Sends the NMT state each producer heartbeat time.
+
+    The boot-up message counts as the first heartbeat. A time that is written,
+    over the bus or from the inside, begins anew, so the first one comes after
+    one period.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self._period = node.dictionary.find(0x1017)
+        self._due_us = NEVER
+        self._begins = False
+        if self._period is not None:
+            self._period.watch(self._changed)
+            self._period.written = self._changed  # the same value, too, begins anew
+
+    def booted(self) -> None:
+        """Count from the boot-up message."""
+        self._begin()
+
+    def tick(self, now_us: int) -> None:
+        """Begin to count, or send one heartbeat."""
+        node = self.node
+        period_us = 1_000 * self._period.number if self._period is not None else 0
+        if self._begins:
+            self._due_us = now_us
+        else:
+            node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
+        self._begins = False
+        self._due_us += period_us
+        self.schedule(self._due_us if period_us else NEVER)
+
+    def _changed(self, entry: Entry) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        """Count from the next tick on, or from this one; not before the boot-up message."""
+        if self.node.state is not NmtState.INITIALISING:
+            self._begins = True
+            self.schedule(0)
+
+
+_GUARD_TIME: Final = 0x100C
+_LIFE_TIME_FACTOR: Final = 0x100D
+_PRODUCER_HEARTBEAT_TIME: Final = 0x1017
+_TOGGLE: Final = 0x80
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class NodeGuarding(Service):
+    """Answers guarding requests with the NMT state, and watches that they come.
+
+    The toggle bit begins with 0 after a reset and changes with each answer. Life
+    guarding begins with the first request; none within guard time times life time
+    factor is EMCY 8130h and a communication error (1029h), until the next request.
+    Heartbeat has priority: with 1017h set, requests are not answered and nothing
+    is watched. Without 100Ch there is no guarding.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        find = node.dictionary.find
+        self._guard_time, self._factor = find(_GUARD_TIME), find(_LIFE_TIME_FACTOR)
+        self._heartbeat = find(_PRODUCER_HEARTBEAT_TIME)
+        self._toggle = 0
+        for entry in (self._guard_time, self._factor, self._heartbeat):
+            if entry is not None:
+                entry.watch(self._changed)
+
+    @property
+    def life_time_us(self) -> int:
+        """The node life time, 0 if life guarding is off."""
+        if self._guard_time is None or self._factor is None:
+            return 0
+        return self._guard_time.number * self._factor.number * 1_000
+
+    @property
+    def _heartbeat_instead(self) -> bool:
+        return self._heartbeat is not None and self._heartbeat.number > 0
+
+    def start(self) -> None:
+        """Begin with toggle 0, and wait for the first request."""
+        self._toggle = 0
+
+    def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Listen to requests in every state but Initialising."""
+        if state in ALWAYS and self._guard_time is not None:
+            yield ERROR_CONTROL_COB_ID + self.node.node_id, self._receive
+
+    def tick(self, now_us: int) -> None:
+        """Note that the master does not guard any more."""
+        self.node.emergency(EmcyCode.HEARTBEAT, ErrorRegister.COMMUNICATION)
+        self.node.communication_error()
+
+    def _receive(self, frame: CanFrame) -> None:
+        if self._heartbeat_instead:
+            return
+        node = self.node
+        node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([self._toggle | node.state]))
+        self._toggle ^= _TOGGLE
+        node.emergency_clear(EmcyCode.HEARTBEAT, b"")
+        life_time_us = self.life_time_us
+        self.schedule(node.now_us + life_time_us if life_time_us else NEVER)
+
+    def _changed(self, entry: Entry) -> None:
+        """Wait for the next request: the times are others now."""
+        self.node.emergency_clear(EmcyCode.HEARTBEAT, b"")
+        self.schedule(NEVER)
+
+
+# Heartbeat consumer (CiA 301, error control services; object 1016h).
+
+_CONSUMER_HEARTBEAT_TIME: Final = 0x1016
+_MAX_NODES: Final = 127
+_RESERVED: Final = 0xFF00_0000
+
+
+class Watch(Enum):
+    """What is known of a monitored node."""
+
+    UNKNOWN = auto()  # no heartbeat yet: nothing is late
+    ALIVE = auto()
+    LOST = auto()
+
+
+class Monitor(Part):
+    """Watches the heartbeat of one node.
+
+    Args:
+        consumer: the service that it belongs to.
+        value: an entry of 1016h: node-ID in bits 16 to 23, time in ms below.
+
+    Attributes:
+        node_id: whom it watches.
+        period_us: the consumer heartbeat time.
+        watch: what is known.
+        nmt_state: the NMT state that the node sent last, None before.
+        deadline_us: when its heartbeat is late.
+    """
+
+    __slots__ = ("_consumer", "deadline_us", "nmt_state", "node_id", "period_us", "watch")
+
+    def __init__(self, consumer: HeartbeatConsumer, value: int) -> None:
+        self._consumer = consumer
+        self.node_id, self.period_us = _node_id(value), _time_us(value)
+        self.watch, self.deadline_us = Watch.UNKNOWN, NEVER
+        self.nmt_state: int | None = None
+
+    def receive(self, frame: CanFrame) -> None:
+        """Take a heartbeat."""
+        if len(frame.data) != 1:
+            return
+        self.nmt_state = frame.data[0]
+        before, self.watch = self.watch, Watch.ALIVE
+        self.deadline_us = self._consumer.node.now_us + self.period_us
+        if before is not Watch.ALIVE:
+            if before is Watch.LOST:
+                self.clear()
+            self._consumer.reschedule()
+
+    def lose(self) -> None:
+        """Note that the heartbeat is late."""
+        self.watch, self.deadline_us = Watch.LOST, NEVER
+        node = self._consumer.node
+        node.emergency(EmcyCode.HEARTBEAT, ErrorRegister.COMMUNICATION, bytes([self.node_id]))
+        node.communication_error()
+
+    def clear(self) -> None:
+        """Clear the error, if there is one."""
+        self._consumer.node.emergency_clear(EmcyCode.HEARTBEAT, bytes([self.node_id]))
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class HeartbeatConsumer(Service):
+    """Watches the heartbeats of other nodes.
+
+    Monitoring begins with the first heartbeat; the boot-up message counts as
+    one. A heartbeat that does not come is EMCY 8130h, whose first
+    manufacturer-specific byte is the node-ID, and a communication error (1029h).
+    The error is cleared when a heartbeat comes again, or when its entry is
+    changed. An entry with time 0 or a node-ID that is not 1..127 is not used. A
+    second one for the same node-ID is refused with 0604 0043h, reserved bits with
+    0609 0030h.
+
+    Attributes:
+        monitors: the entries that are used.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.monitors: dict[int, Monitor] = {}
+        self._entries = node.dictionary.elements(_CONSUMER_HEARTBEAT_TIME, _MAX_NODES)
+        for entry in self._entries:
+            entry.guard = self._check
+            entry.watch(self._changed)
+
+    def start(self) -> None:
+        """Watch the nodes of the power-on values."""
+        for entry in self._entries:
+            self._watch(entry)
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Listen to heartbeats in every state but Initialising."""
+        if state in ALWAYS:
+            for monitor in self.monitors.values():
+                yield ERROR_CONTROL_COB_ID + monitor.node_id, monitor.receive
+
+    def tick(self, now_us: int) -> None:
+        """See which heartbeats are late."""
+        for monitor in self.monitors.values():
+            if monitor.deadline_us <= now_us:
+                monitor.lose()
+        self.reschedule()
+
+    def reschedule(self) -> None:
+        """Wait for the earliest deadline."""
+        deadlines = (monitor.deadline_us for monitor in self.monitors.values())
+        self.schedule(min(deadlines, default=NEVER))
+
+    def _watch(self, entry: Entry) -> None:
+        if _is_used(entry.number):
+            self.monitors[entry.sub] = Monitor(self, entry.number)
+
+    def _changed(self, entry: Entry) -> None:
+        monitor = self.monitors.pop(entry.sub, None)
+        if monitor is not None:
+            monitor.clear()
+        self._watch(entry)
+        self.node.rewire()
+        self.reschedule()
+
+    def _check(self, entry: Entry, value: Value) -> None:
+        number = value if isinstance(value, int) else 0
+        if number & _RESERVED:
+            raise SdoAbort(AbortCode.VALUE_RANGE)
+        others = (other.number for other in self._entries if other is not entry)
+        if _is_used(number) and any(
+            _is_used(other) and _node_id(other) == _node_id(number) for other in others
+        ):
+            raise SdoAbort(AbortCode.PARAMETER_INCOMPATIBLE)
+
+
+def _node_id(value: int) -> int:
+    return value >> 16 & 0xFF
+
+
+def _time_us(value: int) -> int:
+    return (value & 0xFFFF) * 1_000
+
+
+def _is_used(value: int) -> bool:
+    return bool(_time_us(value)) and 1 <= _node_id(value) <= _MAX_NODES

@@ -1,0 +1,644 @@
+"""The SDO servers of a slave: expedited, segmented and block transfer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tickrig._compiled import mypyc_attr
+from tickrig.device.canopen.dictionary import Entry, SdoAbort, check_sdo_cob_id, is_valid
+from tickrig.device.canopen.slave import ALIVE, Handler, Service
+from tickrig.device.twin import Immutable, Part
+from tickrig.wire.can import CanFrame, data_frame
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, NmtState
+from tickrig.wire.canopen.sdo_frame import (
+    BLOCK_ACKNOWLEDGE,
+    BLOCK_CRC,
+    BLOCK_END,
+    BLOCK_ENDED,
+    BLOCK_LAST,
+    BLOCK_SEQNO,
+    BLOCK_SIZE_INDICATED,
+    BLOCK_START,
+    BLOCK_SUBCOMMAND,
+    EXPEDITED,
+    EXPEDITED_BYTES,
+    FRAME_BYTES,
+    LAST,
+    MAX_BLOCK_SIZE,
+    REQUEST_COB_ID,
+    RESPONSE_COB_ID,
+    SEGMENT_BYTES,
+    SIZE_INDICATED,
+    SPECIFIER,
+    TOGGLE,
+    AbortCode,
+    ClientCommand,
+    ServerCommand,
+    crc16,
+)
+from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.device.canopen.slave import CanopenSlave
+
+
+# Segmented transfer of one object (CiA 301, SDO download and SDO upload segment).
+
+# Whole numbers and bytes at hand: segments come by the thousand.
+_REQUESTED: Final = SPECIFIER | TOGGLE
+_UPLOAD_SEGMENT: Final = int(ClientCommand.UPLOAD_SEGMENT)
+_DOWNLOAD_SEGMENT: Final = int(ClientCommand.DOWNLOAD_SEGMENT)
+_HEADS: Final = {toggle: bytes([toggle]) for toggle in (0, TOGGLE)}
+"""First byte of an uploaded segment that is not the last one, by its toggle bit."""
+_TAKEN: Final = {
+    toggle: bytes([ServerCommand.DOWNLOAD_SEGMENT | toggle]) + bytes(SEGMENT_BYTES)
+    for toggle in (0, TOGGLE)
+}
+"""Response to a downloaded segment, by its toggle bit."""
+
+
+class DownloadSize(Part):
+    """Judges the size that a client announces, and that of what comes.
+
+    Args:
+        server: has the memory of the slave.
+        entry: what is written.
+        announced: bytes that the client is going to send, None if it does not say.
+
+    Raises:
+        SdoAbort: the entry cannot be written, or what is announced does not fit.
+
+    Attributes:
+        announced: as given.
+        most: bytes that may come; with more `check` says what is wrong.
+    """
+
+    def __init__(self, server: SdoServer, entry: Entry, announced: int | None) -> None:
+        entry.check_writable()
+        self.announced = announced
+        self._long = entry.size or entry.description.max_bytes
+        self._free = entry.size or server.free_bytes(entry)
+        if announced is not None:
+            entry.check_size(announced)
+            self.check(announced)
+            self._long = announced
+        self.most = min(self._long, self._free)
+
+    def check(self, size: int) -> None:
+        """Raise SdoAbort if so many bytes are more than was announced, or than fits."""
+        if size > self._long:
+            raise SdoAbort(AbortCode.TOO_LONG)
+        if size > self._free:
+            raise SdoAbort(AbortCode.OUT_OF_MEMORY)
+
+
+class SegmentedUpload(Part):
+    """Gives a value as it was when the client asked for it."""
+
+    def __init__(self, server: SdoServer, data: bytes) -> None:
+        self._server, self._data = server, data
+        self._at, self._toggle = 0, 0
+        server.confirm(ServerCommand.UPLOAD | SIZE_INDICATED, len(data).to_bytes(4, "little"))
+        server.wait(self._segment)
+
+    def _segment(self, request: bytes) -> None:
+        """Give the next segment."""
+        command, toggle, at = request[0], self._toggle, self._at
+        if command & _REQUESTED != _UPLOAD_SEGMENT | toggle:
+            self._server.go_on_otherwise(request, _UPLOAD_SEGMENT)
+            return
+        self._at = behind = at + SEGMENT_BYTES
+        self._toggle = toggle ^ TOGGLE
+        if behind < len(self._data):
+            self._server.respond(_HEADS[toggle] + self._data[at:behind])
+            self._server.go_on()
+        else:
+            self._give_last(toggle, self._data[at:])
+
+    def _give_last(self, toggle: int, part: bytes) -> None:
+        head = toggle | SEGMENT_BYTES - len(part) << 1 | LAST
+        self._server.respond(bytes([head]) + part.ljust(SEGMENT_BYTES, b"\0"))
+        self._server.end()
+
+
+class SegmentedDownload(Part):
+    """Collects a value; the object changes when the last segment has come."""
+
+    def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
+        self._server, self._entry = server, entry
+        self._data, self._toggle = bytearray(), 0
+        announced = int.from_bytes(request[4:], "little") if request[0] & SIZE_INDICATED else None
+        self._size = DownloadSize(server, entry, announced)
+        self._most, self._put = self._size.most, server.node.put
+        self._taken = {at: data_frame(server.response_id, _TAKEN[at]) for at in _TAKEN}
+        server.confirm(ServerCommand.DOWNLOAD)
+        server.wait(self._segment)
+
+    def _segment(self, request: bytes) -> None:
+        """Take the next segment."""
+        command, toggle, data = request[0], self._toggle, self._data
+        if command & _REQUESTED != _DOWNLOAD_SEGMENT | toggle:
+            self._server.go_on_otherwise(request, _DOWNLOAD_SEGMENT)
+            return
+        data += request[1 : FRAME_BYTES - (command >> 1 & 7)]
+        if len(data) > self._most:
+            self._size.check(len(data))
+        if command & LAST:
+            self._commit()
+        self._put(self._taken[toggle])
+        self._toggle = toggle ^ TOGGLE
+        if command & LAST:
+            self._server.end()
+        else:
+            self._server.go_on()
+
+    def _commit(self) -> None:
+        """Write all that came; SdoAbort if it is too little, or the object refuses."""
+        if len(self._data) < (self._size.announced or 0):
+            raise SdoAbort(AbortCode.TOO_SHORT)
+        self._entry.download(bytes(self._data))
+
+
+# Block transfer of one object (CiA 301, SDO block download and SDO block upload).
+
+_END_MASK: Final = 0xE1
+"""Command specifier and subcommand of the end; n is between them."""
+
+
+class BlockDownload(Part):
+    """Collects a value in blocks; the object changes when the client has ended the transfer.
+
+    A segment out of sequence is dropped, and the block acknowledged at its end
+    with the last one in sequence. If the end itself is lost, the client must
+    notice, or the transfer times out: a client may be slow inside a block. The
+    size is judged before the CRC. Inside a block every frame but an abort is a
+    segment.
+    """
+
+    def __init__(self, server: SdoServer, entry: Entry, request: bytes) -> None:
+        self._server, self._entry = server, entry
+        self._data, self._in_sequence, self._finished = bytearray(), 0, False
+        self._crc = request[0] & BLOCK_CRC
+        indicated = request[0] & BLOCK_SIZE_INDICATED
+        announced = int.from_bytes(request[4:], "little") if indicated else None
+        self._size = DownloadSize(server, entry, announced)
+        self._block_size = server.block_size
+        command = ServerCommand.BLOCK_DOWNLOAD | self._crc
+        server.confirm(command, bytes([self._block_size, 0, 0, 0]))
+        server.wait(self._segment)
+
+    def _segment(self, request: bytes) -> None:
+        """Take a segment of the running block."""
+        head, due = request[0], self._in_sequence + 1
+        if head == due and due < self._block_size:  # most are: in sequence, and not the last
+            self._in_sequence = due
+            self._data += request[1:]
+            self._server.go_on()
+        elif head == ClientCommand.ABORT:
+            self._server.end()
+        else:
+            self._end_block(head, request)
+
+    def _end_block(self, head: int, request: bytes) -> None:
+        """Take the last segment of a block, or drop one that is out of sequence."""
+        seqno = head & BLOCK_SEQNO
+        if seqno == self._in_sequence + 1:
+            self._in_sequence = seqno
+            self._data += request[1:]
+            self._finished = head >= BLOCK_LAST
+        if head >= BLOCK_LAST or seqno >= self._block_size:
+            self._acknowledge()
+        else:
+            self._server.go_on()
+
+    def _acknowledge(self) -> None:
+        """Say how far the block was received, and begin the next."""
+        self._size.check(len(self._data) - SEGMENT_BYTES)
+        self._block_size = self._server.block_size
+        head = bytes([BLOCK_ACKNOWLEDGE, self._in_sequence, self._block_size])
+        self._server.respond(head + bytes(5))
+        self._in_sequence = 0
+        self._server.wait(self._end if self._finished else self._segment)
+
+    def _end(self, request: bytes) -> None:
+        """Judge the whole, and write it."""
+        if request[0] & _END_MASK != BLOCK_END:
+            self._server.initiate(request)
+            return
+        data = bytes(self._data[: len(self._data) - (request[0] >> 2 & 7)])
+        self._size.check(len(data))
+        if len(data) < (self._size.announced or 0):
+            raise SdoAbort(AbortCode.TOO_SHORT)
+        if self._crc and crc16(data) != int.from_bytes(request[1:3], "little"):
+            raise SdoAbort(AbortCode.CRC)
+        self._entry.download(data)
+        self._server.respond(bytes([BLOCK_ENDED]) + bytes(7))
+        self._server.end()
+
+
+class BlockUpload(Part):
+    """Gives a value as it was when the client asked for it, a block in one tick.
+
+    A value no longer than the client's protocol switch threshold is given by
+    expedited or segmented upload. A lost segment is sent again from there on,
+    in a new block. The block size of the last acknowledgement is not looked at.
+    The server says that it can do the CRC to clients that can: there are clients
+    that check it whenever the server can.
+    """
+
+    def __init__(self, server: SdoServer, data: bytes, request: bytes) -> None:
+        self._server, self._data = server, data
+        self._next = self._sent = 0
+        self._segments = max(1, -(-len(data) // SEGMENT_BYTES))
+        self._use_block_size(request[4])
+        threshold = request[5]
+        if threshold and len(data) <= threshold:
+            server.upload(data)
+            return
+        with_crc = request[0] & BLOCK_CRC
+        self._crc = crc16(data) if with_crc else 0
+        command = ServerCommand.BLOCK_UPLOAD | with_crc | BLOCK_SIZE_INDICATED
+        server.confirm(command, len(data).to_bytes(4, "little"))
+        server.wait(self._start)
+
+    def _use_block_size(self, block_size: int) -> None:
+        if not 1 <= block_size <= MAX_BLOCK_SIZE:
+            raise SdoAbort(AbortCode.BLOCK_SIZE)
+        self._block_size = block_size
+
+    def _start(self, request: bytes) -> None:
+        """Wait until the client is ready."""
+        if request[0] == BLOCK_START:
+            self._send_block()
+        else:
+            self._server.initiate(request)
+
+    def _send_block(self) -> None:
+        data, respond = self._data, self._server.respond
+        self._sent = min(self._block_size, self._segments - self._next)
+        at = self._next * SEGMENT_BYTES
+        for seqno in range(1, self._sent):
+            respond(bytes([seqno]) + data[at : at + SEGMENT_BYTES])
+            at += SEGMENT_BYTES
+        last = BLOCK_LAST if self._next + self._sent == self._segments else 0
+        respond(bytes([self._sent | last]) + data[at : at + SEGMENT_BYTES].ljust(7, b"\0"))
+        self._server.wait(self._acknowledge)
+
+    def _acknowledge(self, request: bytes) -> None:
+        """Go on after the last segment that the client has received."""
+        if request[0] != BLOCK_ACKNOWLEDGE:
+            self._server.initiate(request)
+            return
+        if request[1] > self._sent:
+            raise SdoAbort(AbortCode.SEQUENCE_NUMBER)
+        self._next += request[1]
+        if self._next == self._segments:
+            self._finish()
+        else:
+            self._use_block_size(request[2])
+            self._send_block()
+
+    def _finish(self) -> None:
+        fill = self._segments * SEGMENT_BYTES - len(self._data)
+        head = bytes([BLOCK_END | fill << 2])
+        self._server.respond(head + self._crc.to_bytes(2, "little") + bytes(5))
+        self._server.wait(self._end)
+
+    def _end(self, request: bytes) -> None:
+        """Wait until the client has checked what it has."""
+        if request[0] == BLOCK_ENDED:
+            self._server.end()
+        else:
+            self._server.initiate(request)
+
+
+# One SDO server: takes requests on one CAN-ID and answers on another (CiA 301, SDO).
+
+_TIMEOUT_US: Final = 5_000_000
+_MEMORY_BYTES: Final = 64 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class SdoLimits(Immutable):
+    """What CiA 301 leaves to the device.
+
+    Attributes:
+        timeout_us: silence of the client after which a transfer is aborted, at least 1.
+        memory_bytes: what all strings and domains of the slave hold together; what an
+            object itself may hold stands in its description.
+    """
+
+    timeout_us: int = _TIMEOUT_US
+    memory_bytes: int = _MEMORY_BYTES
+
+    def __post_init__(self) -> None:
+        if self.timeout_us < 1:
+            raise ValueError(f"an SDO time-out of {self.timeout_us} us is less than 1 us")
+        if self.memory_bytes < 0:
+            raise ValueError(f"a memory of {self.memory_bytes} bytes is less than 0")
+
+
+USUAL: Final = SdoLimits()
+
+
+State = Callable[[bytes], None]
+"""What the next request means; a transfer is in one of these at a time."""
+
+_NO_MULTIPLEXER: Final = bytes(3)
+_INITIATE: Final[dict[int, int]] = {
+    ClientCommand.DOWNLOAD: 0,
+    ClientCommand.UPLOAD: 0,
+    ClientCommand.BLOCK_UPLOAD: BLOCK_SUBCOMMAND,
+    ClientCommand.BLOCK_DOWNLOAD: BLOCK_END & BLOCK_SUBCOMMAND,
+}
+"""Commands that begin a transfer; bits of a block command that are 0 in an initiate request."""
+_UPLOAD: Final = int(ClientCommand.UPLOAD)
+_EXPEDITED: Final = tuple(
+    bytes([ServerCommand.UPLOAD | EXPEDITED | SIZE_INDICATED | EXPEDITED_BYTES - size << 2])
+    for size in range(EXPEDITED_BYTES + 1)
+)
+"""First byte of an expedited answer, by the number of bytes."""
+_FILL: Final = tuple(bytes(EXPEDITED_BYTES - size) for size in range(EXPEDITED_BYTES + 1))
+
+
+class SdoServer(Part):
+    """Serves one client: one transfer at a time, every kind of CiA 301.
+
+    Where CiA 301 leaves it open: requests that do not have 8 bytes are ignored.
+    A new initiate request ends a running transfer silently. What is no request
+    in the present state is aborted with 0504 0001h, with multiplexer 0 if no
+    transfer runs. Reserved bits are not looked at.
+
+    Not emulated: network indication, the time that a real server needs.
+
+    Args:
+        node: the slave.
+        wake: asks for a look at `due_us` at that time.
+        limits: what CiA 301 leaves to the device.
+
+    Attributes:
+        request_id: CAN-ID from client to server.
+        response_id: CAN-ID from server to client.
+        block_size: segments in a block that it offers for block download, 1..127.
+        due_us: when the transfer times out.
+    """
+
+    def __init__(self, node: CanopenSlave, wake: Callable[[int], None], limits: SdoLimits) -> None:
+        self.node, self._wake = node, wake
+        self.limit(limits)
+        self.request_id: int
+        self.response_id: int
+        self.block_size = MAX_BLOCK_SIZE
+        self._entries = node.dictionary.by_multiplexer
+        self._multiplexer: bytes
+        self._idle: State = self._without_transfer
+        self._state: State
+        self.due_us: int
+
+    def limit(self, limits: SdoLimits) -> None:
+        """Put up with other limits, from the next request on."""
+        self._memory_bytes, self._timeout_us = limits.memory_bytes, limits.timeout_us
+
+    def receive(self, frame: CanFrame) -> None:
+        """Take a request, or the next segment."""
+        request = frame[1]
+        if len(request) == FRAME_BYTES:
+            try:
+                self._state(request)
+            except SdoAbort as refused:
+                self.abort(refused.code)
+
+    def respond(self, response: bytes) -> None:
+        """Send to the client."""
+        self.node.send(self.response_id, response)
+
+    def confirm(self, command: int, rest: bytes = bytes(4)) -> None:
+        """Send a response that names the object of the transfer."""
+        self.respond(bytes([command]) + self._multiplexer + rest)
+
+    def wait(self, state: State) -> None:
+        """Let the transfer wait for a request, but not for ever."""
+        self._state = state
+        self.go_on()
+        self._wake(self.due_us)
+
+    def go_on(self) -> None:
+        """Let the transfer wait for the next request of the same meaning, as long again."""
+        self.due_us = self.node.now_us + self._timeout_us
+
+    def go_on_otherwise(self, request: bytes, specifier: int) -> None:
+        """Take what is not the segment that was due: SdoAbort if only its toggle bit is wrong."""
+        if request[0] & SPECIFIER == specifier:
+            raise SdoAbort(AbortCode.TOGGLE_BIT)
+        self.initiate(request)
+
+    def free_bytes(self, entry: Entry) -> int:
+        """Return what a string or domain may hold beside all others."""
+        others = (one for one in self.node.dictionary if not one.size and one is not entry)
+        return self._memory_bytes - sum(len(one.data) for one in others)
+
+    def end(self) -> None:
+        """End the transfer."""
+        self._state, self._multiplexer, self.due_us = self._idle, _NO_MULTIPLEXER, NEVER
+
+    def abort(self, code: AbortCode) -> None:
+        """End the transfer; the client gets the reason."""
+        self.confirm(ServerCommand.ABORT, code.to_bytes(4, "little"))
+        self.end()
+
+    def initiate(self, request: bytes) -> None:
+        """Take a request that does not go on with a transfer: it begins one, or ends it."""
+        command = request[0]
+        if command == ClientCommand.ABORT:
+            self.end()
+            return
+        specifier = command & SPECIFIER
+        if specifier not in _INITIATE or command & _INITIATE[specifier]:
+            raise SdoAbort(AbortCode.COMMAND_SPECIFIER)
+        self._multiplexer = request[1:4]
+        entry = self.node.dictionary.look_up(self._multiplexer)
+        match specifier:
+            case ClientCommand.DOWNLOAD:
+                self._begin_download(entry, request)
+            case ClientCommand.UPLOAD:
+                self.upload(entry.upload())
+            case ClientCommand.BLOCK_UPLOAD:
+                BlockUpload(self, entry.upload(), request)
+            case _:
+                BlockDownload(self, entry, request)
+
+    def upload(self, data: bytes) -> None:
+        """Give a value in one answer, or begin to give it in segments."""
+        size = len(data)
+        if 0 < size <= EXPEDITED_BYTES:
+            self.respond(_EXPEDITED[size] + self._multiplexer + data + _FILL[size])
+            self.end()
+        else:
+            SegmentedUpload(self, data)
+
+    def _without_transfer(self, request: bytes) -> None:
+        """Take a request while no transfer runs; reading a small value is the short way."""
+        if request[0] == _UPLOAD:
+            multiplexer = request[1:4]
+            entry = self._entries.get(multiplexer)
+            if entry is not None and entry.source is None:
+                data = entry.data
+                size = len(data)
+                if 0 < size <= EXPEDITED_BYTES:
+                    response = _EXPEDITED[size] + multiplexer + data + _FILL[size]
+                    self.node.send(self.response_id, response)
+                    return
+        self.initiate(request)
+
+    def _begin_download(self, entry: Entry, request: bytes) -> None:
+        """Write at once, or begin to take segments.
+
+        Expedited data without a size fills the object: the bytes beyond are not looked at.
+        """
+        command = request[0]
+        if not command & EXPEDITED:
+            SegmentedDownload(self, entry, request)
+            return
+        size = EXPEDITED_BYTES - (command >> 2 & 3)
+        if not command & SIZE_INDICATED:
+            size = min(entry.size or EXPEDITED_BYTES, EXPEDITED_BYTES)
+        entry.download(request[4 : 4 + size])
+        self.respond(bytes([ServerCommand.DOWNLOAD]) + request[1:4] + bytes(4))
+        self.end()
+
+
+# All SDO servers of a slave (CiA 301, SDO server parameter; objects 1200h to 127Fh).
+
+_DEFAULT_SERVER: Final = 0x1200
+_ADDITIONAL_SERVERS: Final = range(0x1201, 0x1280)
+_CLIENT_TO_SERVER: Final = 1
+_SERVER_TO_CLIENT: Final = 2
+
+
+class _Additional(NamedTuple):
+    """A server with the two COB-IDs that rule it."""
+
+    server: SdoServer
+    request: Entry
+    response: Entry
+
+    @property
+    def exists(self) -> bool:
+        return is_valid(self.request.number) and is_valid(self.response.number)
+
+    def configure(self) -> None:
+        """Take over the CAN-IDs; a server that has been switched off ends its transfer."""
+        if self.exists:
+            self.server.request_id = self.request.number & CAN_ID_MASK
+            self.server.response_id = self.response.number & CAN_ID_MASK
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class SdoServers(Service):
+    """The default server and the additional ones.
+
+    The default server is there without 1200h too; 1200h, where it is, always
+    tells the truth and cannot be written. An additional server serves as soon
+    as both its COB-IDs are valid; a CAN-ID changes only while its own COB-ID is
+    invalid. Bit 30 (dynamic) is kept and has no effect. Transfers end silently
+    when the slave leaves Pre-operational and Operational.
+
+    Not emulated: 29-bit CAN-IDs, a check of two servers on one CAN-ID.
+
+    Attributes:
+        default: the server of 1200h.
+        limits: what all its servers put up with.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int, limits: SdoLimits = USUAL) -> None:
+        super().__init__(node, slot)
+        self._due_us, self.limits = NEVER, limits
+        self.default = SdoServer(node, self._wake, limits)
+        self._additional = [
+            _Additional(SdoServer(node, self._wake, limits), request, response)
+            for index in node.dictionary.within(_ADDITIONAL_SERVERS)
+            if (request := node.dictionary.find(index, _CLIENT_TO_SERVER))
+            and (response := node.dictionary.find(index, _SERVER_TO_CLIENT))
+        ]
+        for additional in self._additional:
+            for entry in (additional.request, additional.response):
+                entry.guard = check_sdo_cob_id
+                entry.written = self._configure
+        self.servers = [self.default, *(additional.server for additional in self._additional)]
+
+    def limit(self, limits: SdoLimits) -> None:
+        """Put up with other limits, from the next request on.
+
+        Args:
+            limits: the new ones.
+        """
+        self.limits = limits
+        for server in self.servers:
+            server.limit(limits)
+
+    def start(self) -> None:
+        """Take the power-on values into service."""
+        self._due_us = NEVER
+        self._end_all()
+        self.default.request_id = REQUEST_COB_ID + self.node.node_id
+        self.default.response_id = RESPONSE_COB_ID + self.node.node_id
+        self._describe(_CLIENT_TO_SERVER, self.default.request_id)
+        self._describe(_SERVER_TO_CLIENT, self.default.response_id)
+        for additional in self._additional:
+            additional.configure()
+
+    def _describe(self, sub: int, can_id: int) -> None:
+        entry = self.node.dictionary.find(_DEFAULT_SERVER, sub)
+        if entry is not None and entry.data_type is DataType.UNSIGNED32:
+            entry.assign(can_id.to_bytes(entry.size, "little"))
+            entry.guard = _refuse
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Listen to the clients in Pre-operational and Operational."""
+        if state in ALIVE:
+            yield self.default.request_id, self.default.receive
+            for additional in self._additional:
+                if additional.exists:
+                    yield additional.server.request_id, additional.server.receive
+
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Name the clients: they write COB-IDs, heartbeat consumers, mappings."""
+        return (can_id for can_id, _ in self.handlers(state))
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """Drop transfers with the state that served them."""
+        if new not in ALIVE:
+            self._end_all()
+
+    def tick(self, now_us: int) -> None:
+        """Look for clients that have been silent too long."""
+        for server in self.servers:
+            if server.due_us <= now_us:
+                server.abort(AbortCode.TIMEOUT)
+        self._due_us = min(server.due_us for server in self.servers)
+        self.schedule(self._due_us)
+
+    def _wake(self, due_us: int) -> None:
+        """See that no server's time passes; waking too early does no harm."""
+        if due_us < self._due_us:
+            self._due_us = due_us
+            self.schedule(due_us)
+
+    def _configure(self, entry: Entry) -> None:
+        """Follow a COB-ID that the bus has changed."""
+        for additional in self._additional:
+            additional.configure()
+            if not additional.exists:
+                additional.server.end()
+        self.node.rewire()
+
+    def _end_all(self) -> None:
+        for server in self.servers:
+            server.end()
+
+
+def _refuse(_entry: Entry, _value: Value) -> None:
+    raise SdoAbort(AbortCode.READ_ONLY)

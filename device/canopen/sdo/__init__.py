@@ -1,1 +1,0 @@
-"""SDO servers of a slave (CiA 301); their frames are in wire/canopen/sdo."""

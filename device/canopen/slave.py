@@ -1,0 +1,648 @@
+"""A CANopen slave: services and an application around an object dictionary."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from operator import attrgetter, itemgetter
+from typing import Final, NamedTuple, Self
+
+from tickrig._compiled import mypyc_attr
+from tickrig.device.canopen.dictionary import Dictionary, Entry
+from tickrig.device.horizon import Horizon
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank
+from tickrig.device.twin import Copyable, Listeners
+from tickrig.wire.can import CanFrame, ErrorState, Frames, data_frame
+from tickrig.wire.canopen.datatypes import TimeOfDay
+from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.instant import NEVER
+
+# What a slave keeps when its power is cut.
+
+
+@dataclass(slots=True)
+class Nonvolatile:
+    """The non-volatile memory of one slave; an emulator may keep it in a file.
+
+    Attributes:
+        parameters: stored values by index << 8 | sub-index (1010h).
+        node_id: node-ID stored by LSS, None if none was.
+        bit_rate_index: bit timing index stored by LSS, None if none was.
+        version: counts every change, so that an emulator knows when to write its file.
+        program: downloaded (1F50h), empty where it was cleared; None for the one it was made with.
+    """
+
+    parameters: dict[int, bytes] = field(default_factory=dict)
+    node_id: int | None = None
+    bit_rate_index: int | None = None
+    version: int = 0
+    program: bytes | None = None
+
+    def changed(self) -> None:
+        """Note that something was stored or erased."""
+        self.version += 1
+
+
+# What all services of a slave have in common.
+
+Handler = Callable[[CanFrame], None]
+
+ALIVE = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL)
+ALWAYS = (NmtState.PRE_OPERATIONAL, NmtState.OPERATIONAL, NmtState.STOPPED)
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Service(Copyable):
+    """One communication service: SDO server, PDOs, SYNC, ...
+
+    A service finds its objects in the dictionary when it is made and hangs its
+    rules onto them (`Entry.guard`, `written`, `source`). An object that is not
+    there switches the service off.
+
+    Attributes:
+        node: the slave that it belongs to.
+        slot: its place in the order of a tick.
+        asked_us: when it wants its `tick`, `NEVER` for not at all; `schedule` sets it.
+    """
+
+    __slots__ = ("asked_us", "node", "slot")
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        self.node, self.slot, self.asked_us = node, slot, NEVER
+
+    @classmethod
+    def of(cls, node: CanopenSlave) -> Self:
+        """Look this service up in a slave.
+
+        Args:
+            node: the slave.
+
+        Returns:
+            Its first service of this class.
+
+        Raises:
+            StopIteration: it has none.
+        """
+        return next(service for service in node.services if isinstance(service, cls))
+
+    def power_on(self) -> None:
+        """Forget what only a power cut makes it forget."""
+
+    def start(self) -> None:
+        """Begin anew after Reset communication: the dictionary holds power-on values."""
+
+    def booted(self) -> None:
+        """Act at the end of Initialising, in a slave that has a node-ID."""
+
+    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Give the CAN-IDs of data frames that it wants.
+
+        Args:
+            state: in this NMT state.
+
+        Yields:
+            CAN-IDs, each with what handles its frames.
+        """
+        return iter(())
+
+    def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+        """Give the CAN-IDs of remote frames that it wants.
+
+        Args:
+            state: in this NMT state.
+
+        Yields:
+            CAN-IDs, each with what handles its frames.
+        """
+        return iter(())
+
+    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+        """Give those of the CAN-IDs whose frames may change what the node listens to.
+
+        An acceptance filter lets everything pass behind such a frame.
+
+        Args:
+            state: in this NMT state.
+
+        Yields:
+            CAN-IDs.
+        """
+        return iter(())
+
+    def state_changed(self, old: NmtState, new: NmtState) -> None:
+        """React to a change of the NMT state, after it was made.
+
+        Args:
+            old: the state before.
+            new: the present state.
+        """
+
+    def emergency(self, code: int, register: int, text: bytes) -> None:
+        """React to an error; `CanopenSlave.emergency` has the same arguments.
+
+        Args:
+            code: emergency error code.
+            register: bits of the error register 1001h.
+            text: manufacturer-specific bytes.
+        """
+
+    def emergency_clear(self, code: int, text: bytes | None) -> None:
+        """React to the end of an error.
+
+        Args:
+            code: emergency error code.
+            text: its manufacturer-specific bytes; None for all errors of this code.
+        """
+
+    def communication_error(self) -> None:
+        """React to a lost heartbeat, a life guarding event or bus-off (CiA 301, 1029h:01)."""
+
+    def bus_state(self, state: ErrorState) -> None:
+        """React to the CAN controller's fault confinement.
+
+        Args:
+            state: error active, error passive or bus-off.
+        """
+
+    def tick(self, now_us: int) -> None:
+        """Do what is due; called in the tick for which it was scheduled.
+
+        Args:
+            now_us: time of the tick.
+        """
+
+    def follow_cob_id(self, entry: Entry) -> None:
+        """Listen to another CAN-ID, as a watcher of a COB-ID does.
+
+        Args:
+            entry: the COB-ID, which has changed.
+        """
+        self.node.rewire()
+
+    def schedule(self, due_us: int) -> None:
+        """Ask for `tick`, instead of what was asked for before.
+
+        Args:
+            due_us: when; `NEVER` for not at all.
+        """
+        self.node.await_tick(self, due_us)
+
+
+# Which of the services of a slave handle which frames.
+
+_REMOTE: Final = 0x2000_0000
+
+_shared: Final[Callable[[frozenset[int]], frozenset[int]]] = lru_cache(frozenset)
+"""Returns the set that all slaves have which name the same; it then stays in the cache."""
+
+
+def _frame_handlers(services: Iterable[Service], state: NmtState) -> dict[int, Handler]:
+    """Return the handlers by CAN-ID, those of remote frames by `REMOTE | CAN-ID`."""
+    handlers: dict[int, Handler] = {}
+    for service in services:
+        for can_id, handler in service.handlers(state):
+            first = handlers.get(can_id)
+            handlers[can_id] = _Both(first, handler).handle if first else handler
+        for can_id, handler in service.remote_handlers(state):
+            handlers[_REMOTE | can_id] = handler
+    return handlers
+
+
+class _Both(NamedTuple):
+    """Two handlers of one CAN-ID: two services may listen to it."""
+
+    first: Handler
+    second: Handler
+
+    def handle(self, frame: CanFrame) -> None:
+        self.first(frame)
+        self.second(frame)
+
+
+# A CANopen slave: dictionary, NMT state and services, one step a tick.
+
+TICK_US: Final = 1_000
+UNCONFIGURED: Final = 0xFF
+"""Node-ID of a slave that waits for LSS (CiA 305)."""
+
+COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
+
+_slot = attrgetter("slot")
+_priority = itemgetter(0)
+"""Priority of a data frame: its CAN-ID. Frames of one tick leave sorted by it, as out of the
+mailboxes of a CAN controller; on the wire `emulators/can/arbitration.py` decides."""
+
+ServiceMaker = Callable[["CanopenSlave", int], Service]
+
+
+class CanopenSlave(Copyable):
+    """A `Device[Frames]` that is a CANopen slave (CiA 301).
+
+    Frames of a tick are handled in the order in which they came over the wire.
+    Then services act in the order in which they are listed: SYNC, RPDO, SDO,
+    application, TPDO, EMCY, heartbeat. The frames of one tick leave sorted by priority, that
+    is by CAN-ID; those of one CAN-ID keep their order.
+
+    Not emulated: the time that a real slave's processor needs.
+
+    Args:
+        dictionary: the objects; services follow what is in it.
+        node_id: 1..127, or `UNCONFIGURED`; LSS may have stored another.
+        services: what makes the services, in the order of a tick.
+        nonvolatile: what survives a power cycle.
+
+    Raises:
+        ValueError: an impossible node-ID.
+
+    Attributes:
+        dictionary: its objects.
+        services: its services, in the order of a tick.
+        node_id: the active node-ID.
+        configured_id: the node-ID it was made with.
+        pending_id: the node-ID that counts from the next reset on (CiA 305).
+        state: NMT state.
+        now_us: time of the latest tick.
+        due_us: when the next service is due.
+        accepts: CAN-IDs that it listens to, for the acceptance filter of a wire; None,
+            for all, from power-on or a reset to the first tick.
+        reconfigured_by: CAN-IDs of the frames that may change `accepts` when handled.
+        on_accepts: called when these two have changed.
+        time_of_day: the latest TIME stamp that was received, None before the first.
+        silent_until_us: nothing is sent before; LSS switches the bit rate.
+        on_state: called with the old and the new state on each change of the NMT state.
+        on_sync: called with the counter of each SYNC, 0 if it has none.
+        on_bit_rate: called with the bit rate in bit/s that LSS has switched to.
+        sync_handlers: the same as `on_sync`, for what belongs to the slave: RPDOs, TPDOs, then
+            the application.
+        horizon: how far its application may work ahead; None, without a rig, for tick by tick.
+        model: the ready-made model that it is, empty if it is none; for traces.
+        boots: returns at the end of Initialising whether the node boots or stays there.
+        admits: returns before each NMT command whether it is carried out.
+        entered: called as `on_state`, before it; what belongs to the slave.
+    """
+
+    __slots__ = (  # each slave's attributes lie in one place then, for 1,016 of them 5 %
+        *("__dict__", "__weakref__", "_asking", "_handlers", "_out", "_powered", "accepts"),
+        *("admits", "boots", "configured_id", "dictionary", "due_us", "entered", "horizon"),
+        *("model", "node_id", "nonvolatile", "now_us", "on_accepts", "on_bit_rate", "on_state"),
+        *("on_sync", "pending_id", "reconfigured_by", "services", "silent_until_us", "state"),
+        *("sync_handlers", "time_of_day"),
+    )
+
+    def __init__(
+        self,
+        dictionary: Dictionary,
+        node_id: int,
+        services: tuple[ServiceMaker, ...],
+        nonvolatile: Nonvolatile | None = None,
+    ) -> None:
+        if node_id != UNCONFIGURED and not 1 <= node_id <= 127:
+            raise ValueError(f"node-ID {node_id} is not in 1..127 and not {UNCONFIGURED}")
+        self.dictionary, self.nonvolatile = dictionary, nonvolatile or Nonvolatile()
+        self.configured_id = self.pending_id = node_id
+        self.node_id, self.state, self.now_us = node_id, NmtState.INITIALISING, 0
+        self.on_state: Listeners[Callable[[NmtState, NmtState], None]] = Listeners()
+        self.on_sync: Listeners[Callable[[int], None]] = Listeners()
+        self.on_bit_rate: Listeners[Callable[[int], None]] = Listeners()
+        self.sync_handlers: list[Callable[[int], None]] = []
+        self.boots: Callable[[], bool] = _boots
+        self.admits: Callable[[NmtCommand], bool] = _admits
+        self.entered: Callable[[NmtState, NmtState], None] | None = None
+        self.time_of_day: TimeOfDay | None = None
+        self.silent_until_us, self.model = 0, ""
+        self.horizon: Horizon | None = None
+        self._powered = False
+        self._out: Frames = ()  # no list: one that stays keeps the garbage collector busy, 4 %
+        self._handlers: dict[int, Handler]
+        self.accepts: frozenset[int] | None = None
+        self.reconfigured_by: frozenset[int] = frozenset()
+        self.on_accepts: list[Callable[[], None]] = []
+        self._asking: tuple[Service, ...] = ()  # those that have ever asked for a tick, in order
+        self.due_us: int = 0
+        self.services: list[Service] = [make(self, slot) for slot, make in enumerate(services)]
+
+    @property
+    def tick_us(self) -> int:
+        """The control period."""
+        return TICK_US
+
+    def reset(self) -> None:
+        """Lose power; the next tick is the first one after power-on."""
+        self._powered = False
+        self.due_us = 0
+        self._listen_to(None)
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Run one tick.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the frames that arrived since the latest tick.
+
+        Returns:
+            The frames that it sends in this tick.
+        """
+        self.now_us = now_us
+        if not self._powered:
+            self._power_on()
+            rx = ()  # it was off, or initialised, when these came
+        for frame in rx:
+            if frame[2] or frame[3]:
+                self._receive_special(frame)
+            elif (handler := self._handlers.get(frame[0])) is not None:
+                handler(frame)
+        if self.due_us <= now_us:
+            self._run_due(now_us)
+        out = self._out
+        if not out:
+            return ()
+        self._out = ()
+        if now_us < self.silent_until_us:
+            return ()
+        return out if len(out) == 1 else tuple(sorted(out, key=_priority))
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Put a data frame into this tick's traffic.
+
+        Args:
+            can_id: 11-bit CAN-ID, 0x000..0x7FF.
+            data: 0 to 8 bytes.
+        """
+        self._out += (data_frame(can_id, data),)
+
+    def put(self, frame: CanFrame) -> None:
+        """Put a frame into this tick's traffic that was made before.
+
+        Args:
+            frame: a data frame.
+        """
+        self._out += (frame,)
+
+    def emergency(self, code: int, register: int, text: bytes = b"") -> None:
+        """Raise an error: it is active until it is cleared, and raising it again is none.
+
+        Args:
+            code: emergency error code; see `EmcyCode`.
+            register: bits of the error register 1001h; the generic bit comes by itself.
+            text: manufacturer-specific bytes, up to 5; errors of one code may differ in them.
+        """
+        if self._powered:
+            for service in self.services:
+                service.emergency(code, register, text)
+
+    def emergency_clear(self, code: int, text: bytes | None = None) -> None:
+        """Clear an error; one that is not active is no error.
+
+        Args:
+            code: emergency error code, as it was raised.
+            text: the bytes with which it was raised; without them all of this code are cleared.
+        """
+        for service in self.services:
+            service.emergency_clear(code, text)
+
+    def communication_error(self) -> None:
+        """Let the error behaviour for communication errors act (1029h:01)."""
+        for service in self.services:
+            service.communication_error()
+
+    def bus_state(self, state: ErrorState) -> None:
+        """Take what the CAN controller reports; for the one that owns the controller.
+
+        Args:
+            state: error active, error passive or bus-off.
+        """
+        if self._powered:
+            for service in self.services:
+                service.bus_state(state)
+
+    def overrun(self) -> None:
+        """Report that the CAN controller lost frames (EMCY 8110h); the error is over at once."""
+        self.emergency(EmcyCode.CAN_OVERRUN, ErrorRegister.COMMUNICATION)
+        self.emergency_clear(EmcyCode.CAN_OVERRUN)
+
+    def schedule(self, slot: int, due_us: int) -> None:
+        """Enter when a service wants its `tick`.
+
+        Args:
+            slot: the place of the service.
+            due_us: when; `NEVER` for not at all.
+        """
+        self.await_tick(self.services[slot], due_us)
+
+    def await_tick(self, service: Service, due_us: int) -> None:
+        """Enter when a service wants its `tick`; `schedule` names it by its place.
+
+        Args:
+            service: one of the slave.
+            due_us: when; `NEVER` for not at all.
+        """
+        before, service.asked_us = service.asked_us, due_us
+        if due_us < NEVER and service not in self._asking:
+            self._asking = tuple(sorted((*self._asking, service), key=_slot))
+        if due_us < self.due_us:
+            self.due_us = due_us
+        elif before == self.due_us and self._powered:
+            self.due_us = self._first_due()
+
+    def rewire(self) -> None:
+        """Collect anew which CAN-IDs the services listen to: a COB-ID or the state changed."""
+        services, state = self.services, self.state
+        self._handlers = handlers = _frame_handlers(services, state)
+        found = (can_id for service in services for can_id in service.reconfigured_by(state))
+        self.reconfigured_by = _shared(frozenset(found))
+        self._listen_to(frozenset(key & ~_REMOTE for key in handlers))
+
+    def _listen_to(self, accepts: frozenset[int] | None) -> None:
+        self.accepts = accepts
+        for notify in self.on_accepts:
+            notify()
+
+    def enter(self, state: NmtState) -> None:
+        """Change the NMT state; services and application are notified.
+
+        Args:
+            state: the new state; the same one changes nothing.
+        """
+        old, self.state = self.state, state
+        if old is state:
+            return
+        self.rewire()
+        for service in self.services:
+            service.state_changed(old, state)
+        if self.entered is not None:
+            self.entered(old, state)
+        for notify in self.on_state:
+            notify(old, state)
+
+    def reset_node(self) -> None:
+        """Reset application and communication: every object has its power-on value again."""
+        self._reset(range(0x1_0000))
+
+    def reset_communication(self) -> None:
+        """Reset the communication objects, 1000h to 1FFFh, and boot again."""
+        self._reset(COMMUNICATION_AREA)
+
+    def _power_on(self) -> None:
+        self._powered = True
+        self._out = ()
+        self.pending_id = self.nonvolatile.node_id or self.configured_id
+        self.time_of_day, self.silent_until_us = None, 0
+        for service in self.services:
+            service.power_on()
+        self.reset_node()
+
+    def _reset(self, area: range) -> None:
+        self.node_id = self.pending_id
+        stored = self.nonvolatile.parameters
+        for entry in self.dictionary:
+            if entry.index in area:
+                data = stored.get(entry.key)
+                if data is None:
+                    data = entry.description.power_on_data(self.node_id)
+                entry.assign(data)
+        self._boot()
+
+    def _boot(self) -> None:
+        """Go through Initialising; a slave without node-ID stays there, for LSS alone."""
+        self.enter(NmtState.INITIALISING)
+        for slot, service in enumerate(self.services):
+            self.schedule(slot, NEVER)
+            service.start()
+        self.rewire()
+        if self.node_id != UNCONFIGURED:
+            for service in self.services:
+                service.booted()
+
+    def _receive_special(self, frame: CanFrame) -> None:
+        """Handle a remote frame; 29-bit frames are for nobody here."""
+        handler = self._handlers.get(_REMOTE | frame.can_id)
+        if frame.remote and not frame.extended and handler is not None:
+            handler(frame)
+
+    def _run_due(self, now_us: int, first: int = 0) -> None:
+        """Let the services act that are due, in their order; most have never asked for a tick."""
+        asking = self._asking
+        for service in asking:
+            if service.asked_us <= now_us and service.slot >= first:
+                service.asked_us = NEVER
+                service.tick(now_us)
+                if self._asking is not asking:  # one that had never asked may be due behind it
+                    self._run_due(now_us, service.slot + 1)
+                    return
+        if self._powered:
+            self.due_us = self._first_due()
+
+    def _first_due(self) -> int:
+        """Return when the first of the services is due that have ever asked for a tick."""
+        first_us = NEVER
+        for service in self._asking:
+            first_us = min(first_us, service.asked_us)
+        return first_us
+
+
+def _boots() -> bool:
+    """Boot, as CiA 301 has it."""
+    return True
+
+
+def _admits(command: NmtCommand) -> bool:
+    """Carry out each command, as CiA 301 has it."""
+    return True
+
+
+# What a device does with its objects, at its place in the tick.
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class Application(Service):
+    """Works on the objects after the RPDOs and SDOs of a tick, before its TPDOs.
+
+    By itself it does nothing. A device profile overrides `on_execute`, which is
+    called in the ticks that it asks for: by `request`, by `schedule`, when one
+    of its watched objects has changed, and when a physical input was set. It
+    reacts to NMT states (`state_changed`), to resets (`start`), to lost masters
+    (`communication_error`) and, if it enters itself in `node.sync_handlers`, of each
+    SYNC; it reports errors by `node.emergency`.
+
+    Attributes:
+        inputs: what the world does to the device: `has_inputs` makes them.
+        outputs: what the world sees of it; `read` gives the values.
+    """
+
+    def __init__(self, node: CanopenSlave, slot: int) -> None:
+        super().__init__(node, slot)
+        self.inputs = QuantityBank()
+        self.outputs: Mapping[str, OutputSignal] = {}
+
+    def has_inputs(
+        self, table: Iterable[InputSignal], groups: Mapping[str, tuple[str, ...]] | None = None
+    ) -> None:
+        """Give it physical inputs; setting one asks for `on_execute`.
+
+        Args:
+            table: the inputs.
+            groups: names of several inputs that are set together.
+        """
+        self.inputs = QuantityBank(table, groups, self.request)
+
+    def read(self, name: str) -> int | float | str:
+        """Look at a physical output.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its present value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        raise KeyError(name)
+
+    def on_execute(self, now_us: int) -> None:
+        """Read inputs, work, write outputs; a device profile overrides it.
+
+        Args:
+            now_us: time of the tick.
+        """
+
+    def without_power(self, now_us: int) -> int:
+        """Let time pass while the supply is cut: what moves coasts.
+
+        Called in the first tick without power, and when a physical input was set.
+
+        Args:
+            now_us: time of the tick.
+
+        Returns:
+            When it wants to be called again, `NEVER` if nothing will change by itself.
+        """
+        return NEVER
+
+    def request(self) -> None:
+        """Ask for `on_execute` in this tick; between two ticks, in the next one."""
+        self.schedule(self.node.now_us)
+
+    def watch(self, entries: Iterable[Entry]) -> None:
+        """Call `on_execute` whenever one of some objects has changed.
+
+        Args:
+            entries: the objects.
+        """
+        changed = self._object_changed
+        for entry in entries:
+            entry.watch(changed)
+
+    def _object_changed(self, entry: Entry) -> None:
+        self.request()
+
+    def tick(self, now_us: int) -> None:
+        """Execute; `on_execute` says what."""
+        self.on_execute(now_us)
+
+
+def number_of(entry: Entry | None, default: int) -> int:
+    """Return the number in an object, the default if the device has no such object."""
+    return default if entry is None else entry.number

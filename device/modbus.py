@@ -1,0 +1,227 @@
+"""A Modbus slave and its registers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig._compiled import mypyc_attr
+from tickrig.device.twin import Copyable, Immutable, Part
+from tickrig.wire.errors import WireError
+from tickrig.wire.instant import NEVER
+from tickrig.wire.modbus import (
+    BROADCAST,
+    MAX_FRAME_BYTES,
+    SHORTEST_SILENCE_US,
+    ExceptionCode,
+    Refusal,
+    encode_exception,
+    encode_frame,
+    encode_response,
+    parse_frame,
+    parse_request,
+)
+
+# Holding registers under names; a number of 32 bits takes two, its high half first.
+
+_WORD: Final = 0x1_0000
+
+
+@dataclass(frozen=True, slots=True)
+class Register(Immutable):
+    """A number that a master sees.
+
+    Attributes:
+        address: of its first register.
+        name: what the device calls it.
+        text: what it is, with its unit.
+        words: registers it takes, 1 or 2.
+        signed: in two's complement.
+        low: smallest value that a master may write.
+        high: largest value that a master may write.
+        initial: value after power-up.
+        writable: a master may write it.
+    """
+
+    address: int
+    name: str
+    text: str
+    words: int = 1
+    signed: bool = False
+    low: int = 0
+    high: int = 0xFFFF
+    initial: int = 0
+    writable: bool = False
+
+
+class Registers(Part):
+    """The numbers of a device.
+
+    A number of 32 bits is written as a whole; half of it is an illegal address.
+
+    Args:
+        table: the numbers.
+        measured: those that are asked for when a master reads them.
+    """
+
+    def __init__(
+        self, table: Iterable[Register], measured: Mapping[str, Callable[[], int]]
+    ) -> None:
+        self.table: Mapping[str, Register] = {register.name: register for register in table}
+        self._at = {
+            register.address + word: (register, word)
+            for register in self.table.values()
+            for word in range(register.words)
+        }
+        self._measured = measured
+        self._values: dict[str, int] = {}
+        self._latest_read, self._places = (0, 0), list[tuple[str, int]]()  # of the latest read
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to what holds after power-up."""
+        self._values = {name: register.initial for name, register in self.table.items()}
+
+    def __getitem__(self, name: str) -> int:
+        """Return a number."""
+        measure = self._measured.get(name)
+        return self._values[name] if measure is None else measure()
+
+    def __setitem__(self, name: str, value: int) -> None:
+        """Set a number, as the device itself does."""
+        self._values[name] = value
+
+    def check(self, first: int, count: int) -> None:
+        """Raise Refusal if a register is not there."""
+        if (first, count) == self._latest_read:
+            return
+        found = [self._find(address) for address in range(first, first + count)]
+        self._places = [(r.name, 16 * (r.words - 1 - word)) for r, word in found]
+        self._latest_read = (first, count)
+
+    def read(self, first: int, count: int) -> list[int]:
+        """Return registers; Refusal if one is not there."""
+        self.check(first, count)
+        values = {name: self[name] for name in dict(self._places)}
+        return [values[name] >> shift & 0xFFFF for name, shift in self._places]
+
+    def write(self, first: int, values: Sequence[int]) -> dict[str, int]:
+        """Write registers, all or none; return what was written, by name.
+
+        Raises:
+            Refusal: one is not there, or read-only, or would be written by half, or its
+                value is out of range.
+        """
+        written: dict[str, int] = {}
+        at = first
+        while at < first + len(values):
+            register, word = self._find(at)
+            words = values[at - first : at - first + register.words]
+            if word or len(words) < register.words or not register.writable:
+                raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+            written[register.name] = _joined(register, words)
+            at += register.words
+        self._values.update(written)
+        return written
+
+    def _find(self, address: int) -> tuple[Register, int]:
+        try:
+            return self._at[address]
+        except KeyError:
+            raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS) from None
+
+
+def _joined(register: Register, words: Sequence[int]) -> int:
+    value = 0
+    for word in words:
+        value = value * _WORD + word
+    top = _WORD**register.words
+    if register.signed and value >= top // 2:
+        value -= top
+    if not register.low <= value <= register.high:
+        raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
+    return value
+
+
+# The slave's side of a line: frames parted by silence, requests answered in turn.
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class ModbusSlave(Copyable):
+    """Answers a master on an RTU line.
+
+    A frame ends with silence; it is served then, and the answer leaves at once. What is
+    no frame, or for somebody else, is passed over, as the standard says.
+
+    Not emulated: function codes beside 03, 06, 10h and 17h, diagnostics, the
+    refusal of frames with a gap of 1.5 characters.
+
+    Args:
+        registers: what it holds.
+        written: called with what a master wrote, by name.
+        address: 1..247.
+        silence_us: what ends a frame.
+
+    Attributes:
+        served: requests for this slave that were answered or obeyed.
+        garbled: frames with a wrong length or CRC.
+        last_request_us: when the last request for this slave was served.
+    """
+
+    def __init__(
+        self,
+        registers: Registers,
+        written: Callable[[Mapping[str, int]], None],
+        address: int = 1,
+        silence_us: int = SHORTEST_SILENCE_US,
+    ) -> None:
+        self._registers, self._written = registers, written
+        self._address, self._silence_us = address, silence_us
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was heard."""
+        self._frame, self._last_us = b"", 0
+        self.served = self.garbled = self.last_request_us = 0
+
+    @property
+    def due_us(self) -> int:
+        """When the frame that has begun ends, if nothing more comes."""
+        return self._last_us + self._silence_us if self._frame else NEVER
+
+    def tick(self, now_us: int, rx: bytes) -> bytes:
+        """Take bytes; return an answer."""
+        answer = b""
+        if now_us >= self.due_us:
+            answer, self._frame = self._serve(now_us, self._frame), b""
+        if rx:
+            self._frame = (self._frame + rx)[: MAX_FRAME_BYTES + 1]
+            self._last_us = now_us
+        return answer
+
+    def _serve(self, now_us: int, frame: bytes) -> bytes:
+        try:
+            address, message = parse_frame(frame)
+        except WireError:
+            self.garbled += 1
+            return b""
+        if address not in (BROADCAST, self._address):
+            return b""
+        self.served, self.last_request_us = self.served + 1, now_us
+        answer = self._obey(message)
+        return b"" if address == BROADCAST else encode_frame(address, answer)
+
+    def _obey(self, message: bytes) -> bytes:
+        registers, values = self._registers, list[int]()
+        try:
+            request = parse_request(message)
+            if request.read is not None:
+                registers.check(*request.read)  # nothing is written if this is refused
+            if request.write is not None:
+                self._written(registers.write(*request.write))
+            if request.read is not None:
+                values = registers.read(*request.read)
+        except Refusal as refusal:
+            return encode_exception(message[0], refusal.code)
+        return encode_response(request, values)

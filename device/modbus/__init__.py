@@ -1,1 +1,0 @@
-"""A Modbus slave on a serial line, and the registers it holds."""

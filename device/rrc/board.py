@@ -1,0 +1,306 @@
+"""The board of an RRC: its power stage, load, buzzer and terminals."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
+from tickrig.device.rrc.settings import POWERED_ON, FailTarget, Move, RrcConfig, RrcState
+from tickrig.wire.instant import NEVER
+from tickrig.wire.rrc import (
+    BASE_PCT,
+    LINE_FEED_PCT,
+    OVERFLOW_PCT,
+    PERIOD_PCT,
+    REPLY_PCT,
+    STATUS_PCT,
+    TOO_FAR_BEHIND_PCT,
+    RrcEvent,
+)
+
+# The physical side of the RRC and of the VR2 around it.
+
+_BUTTON: Final = SignalType.BUTTON
+_FAULT: Final = SignalType.FAULT
+
+INPUTS: Final = (
+    InputSignal("rrc_power", "supply of the RRC, from the VR2 battery or USB", initial=1),
+    InputSignal("power_button", "power button of the controller", _BUTTON),
+    InputSignal("alarm_button", "alarm button of the controller", _BUTTON),
+    InputSignal("speed_up_button", "speed mode up, on the controller", _BUTTON),
+    InputSignal("speed_down_button", "speed mode down, on the controller", _BUTTON),
+    InputSignal("stick_v_pct", "stick, forward is positive", low=-100, high=100, unit="%"),
+    InputSignal("stick_w_pct", "stick, right is positive", low=-100, high=100, unit="%"),
+    InputSignal("gauge", "voltage gauge of the battery", low=1, high=10, initial=10),
+    InputSignal(
+        "extra_load_pct", "work of the RRC beside its own, per period", high=1_000, unit="%"
+    ),
+    InputSignal("bus_noise", "noise on the VR2 bus", _FAULT),
+    InputSignal("joystick_fault", "the joystick module says nonsense", _FAULT),
+    InputSignal("power_module_fault", "the power module says nonsense", _FAULT),
+    InputSignal("vr2_fault", "VR2 has an error of its own, as a motor without its cable", _FAULT),
+    InputSignal("bus_unplugged", "a connector of the VR2 bus is out", _FAULT),
+)
+
+_RUNNING_FAULTS: Final = {
+    "bus_noise": RrcEvent.BY_COMMUNICATION_ERROR,
+    "joystick_fault": RrcEvent.BY_JOYSTICK_MODULE_ERROR,
+    "power_module_fault": RrcEvent.BY_POWER_MODULE_ERROR,
+    "vr2_fault": RrcEvent.BY_SYSTEM_ERROR,
+    "bus_unplugged": RrcEvent.BY_NO_COMMUNICATION,
+}
+"""What each fault is called once it has lasted (condition 8, DECISION R25)."""
+
+_POWER_ON_FAULTS: Final = {
+    "bus_noise": RrcEvent.POWER_ON_ERROR1,
+    "joystick_fault": RrcEvent.POWER_ON_ERROR1,
+    "power_module_fault": RrcEvent.POWER_ON_ERROR2,
+    "vr2_fault": RrcEvent.POWER_ON_ERROR2,
+}
+"""What each fault does to a power-on. The manual names two causes without saying which."""
+
+OUTPUTS: Final = {
+    output.name: output
+    for output in (
+        OutputSignal("state", "state of the RRC"),
+        OutputSignal("vr2_power", "1 while VR2 runs"),
+        OutputSignal("error_led", "1 while the controller's LED blinks an error"),
+        OutputSignal(
+            "stick_drives", "1 while the stick drives, 0 while it waits or the host drives"
+        ),
+        OutputSignal("out_v_pct", "translation to the power module", "%"),
+        OutputSignal("out_w_pct", "rotation to the power module", "%"),
+        OutputSignal("speed_mode", "speed mode of VR2, 1 to 5"),
+        OutputSignal("gear", "imitated gear: N, F or R"),
+        OutputSignal("buzzer", "1 while the RRC's buzzer sounds"),
+        OutputSignal("load_pct", "work of the RRC, mean of 100 ms; 0 while VR2 is off", "%"),
+        OutputSignal("margin_pct", "100 minus load_pct; below 0 the RRC falls behind", "%"),
+        OutputSignal("backlog_pct", "work that the RRC is behind, of a period; 300 stops VR2", "%"),
+        OutputSignal("pace_lines_s", "lines a second that a host may send, at 90 % load", "1/s"),
+    )
+}
+
+
+def new_inputs() -> InputBank:
+    """Return the inputs of a fresh RRC: supplied, everything at rest, battery full."""
+    return InputBank(INPUTS, groups={"stick": ("stick_v_pct", "stick_w_pct")})
+
+
+# How much work the RRC has, and when it is too much (DECISION R27).
+
+_SHOWN_PERIODS: Final = 10
+"""`load_pct` is the mean of so many periods."""
+
+
+@dataclass(slots=True)
+class LoadAccount:
+    """Work left over from past periods, in per cent of a period.
+
+    Each line feed that arrives costs, whatever becomes of its line, and so does what an overflow
+    throws away. Two commands and a status line fit exactly, and then nothing drains; with two OK
+    lines they run 30 over, and VR2 stops in the tenth such tick.
+
+    Attributes:
+        backlog_pct: work that is left over.
+        extra_pct: work that the world adds, in per cent of a period.
+        settled: whether a period without traffic changes nothing here.
+    """
+
+    backlog_pct: int = 0
+    extra_pct: int = 0
+    settled: bool = True
+    _costs_pct: tuple[int, ...] = (0,) * _SHOWN_PERIODS  # of the latest periods
+
+    @property
+    def load_pct(self) -> int:
+        """Mean work of the latest 100 ms; what is above 100 becomes backlog."""
+        costs_pct: int = sum(self._costs_pct)
+        return costs_pct // _SHOWN_PERIODS
+
+    @property
+    def too_far_behind(self) -> bool:
+        """Whether the work has piled up so far that the RRC gives up."""
+        return self.backlog_pct >= TOO_FAR_BEHIND_PCT
+
+    def spend(
+        self, line_feeds: int, overflows: int, replies: int, *, status: bool, extra_pct: int
+    ) -> None:
+        """Account for one period in which VR2 runs.
+
+        Args:
+            line_feeds: that arrived.
+            overflows: of the receive buffer, and each 256 bytes more that one threw away.
+            replies: lines sent, without those that tell of an overflow and the status line.
+            status: whether a status line was sent.
+            extra_pct: work that the world adds, in per cent of a period.
+        """
+        self.extra_pct = extra_pct
+        idle_pct = BASE_PCT + extra_pct + (STATUS_PCT if status else 0)
+        cost_pct = idle_pct + LINE_FEED_PCT * line_feeds + OVERFLOW_PCT * overflows
+        cost_pct += REPLY_PCT * replies
+        self.backlog_pct = max(0, self.backlog_pct + cost_pct - PERIOD_PCT)
+        self._costs_pct = (*self._costs_pct[1:], cost_pct)
+        self.settled = not self.backlog_pct and self._costs_pct == (idle_pct,) * _SHOWN_PERIODS
+
+
+# The RRC's buzzer: patterns of the host, and the automatic alarm below them.
+
+_ALARM_TICKS: Final = 50
+"""The automatic alarm sounds and rests this long by turns (DECISION R18)."""
+
+
+@dataclass(slots=True)
+class Buzzer:
+    """What the buzzer does in each tick.
+
+    Attributes:
+        sounding: whether it sounded in the latest tick.
+        changes_at: the next tick at which that may change without input.
+    """
+
+    sounding: bool = False
+    changes_at: int | None = None
+    _phases: deque[tuple[int, bool]] = field(default_factory=deque, init=False)  # (end, on)
+
+    def play(self, tick: int, times: tuple[int, ...]) -> None:
+        """Play on and off times in ticks, from the next tick on, instead of what plays now.
+
+        A zero time skips its phase; all zero is silence (DECISION R24).
+        """
+        self._phases.clear()
+        end = tick + 1
+        self._phases.append((end, False))
+        for number, ticks in enumerate(times):
+            end += ticks
+            if ticks:
+                self._phases.append((end, number % 2 == 0))
+
+    def silence(self) -> None:
+        """Drop the host's pattern."""
+        self._phases.clear()
+
+    def tick(self, tick: int, alarm_since: int | None) -> None:
+        """Sound or rest in this tick.
+
+        Args:
+            tick: number of the tick.
+            alarm_since: tick at which the automatic alarm began, None without one.
+        """
+        while self._phases and tick >= self._phases[0][0]:
+            self._phases.popleft()
+        if self._phases:
+            self.changes_at, self.sounding = self._phases[0]
+        elif alarm_since is not None:
+            periods, rest = divmod(tick - alarm_since, _ALARM_TICKS)
+            self.sounding, self.changes_at = periods % 2 == 0, tick - rest + _ALARM_TICKS
+        else:
+            self.sounding, self.changes_at = False, None
+
+
+# The way through power-on and power-off: button, faults and time, but no commands.
+
+
+class Step(NamedTuple):
+    """What a tick brings: an event to send, a move to make."""
+
+    event: str | None = None
+    move: Move | None = None
+
+
+_NOTHING: Final = Step()
+
+
+@dataclass(slots=True)
+class PowerSequence:
+    """Watches power button, faults and time.
+
+    Attributes:
+        config: durations and names.
+    """
+
+    config: RrcConfig
+    _button: int = field(default=0, init=False)
+    _since: int | None = field(default=None, init=False)  # the present wait began
+    _faults: dict[str, int] = field(default_factory=dict, init=False)  # present since
+
+    def enter(self, state: RrcState, tick: int) -> None:
+        """Begin the wait of a state; the power button begins that of the others."""
+        timed = state in (RrcState.INITIALIZE, RrcState.POWER_OFF_BY_BUTTON)
+        self._since = tick if timed else None
+        self._faults.clear()
+
+    def step(self, state: RrcState, tick: int, inputs: InputBank) -> Step:
+        """Look at the physical side, once a tick; Initialize does not see the button yet."""
+        if state is RrcState.INITIALIZE and self._since is not None:
+            return self._waiting(state, tick - self._since, inputs)
+        pressed = inputs["power_button"] > self._button
+        self._button = inputs["power_button"]
+        if state in POWERED_ON:
+            return self._running(tick, inputs, pressed=pressed)
+        if pressed and self._since is None:
+            return self._begin(state, tick)
+        if self._since is None:
+            return _NOTHING
+        return self._waiting(state, tick - self._since, inputs)
+
+    def due_tick(self, state: RrcState) -> int:
+        """Return the next tick at which something happens without input."""
+        holds = (since + self.config.fault_hold_ticks for since in self._faults.values())
+        if self._since is None:
+            return min(holds, default=NEVER)
+        return self._since + self._wait_ticks(state)
+
+    def _running(self, tick: int, inputs: InputBank, *, pressed: bool) -> Step:
+        if pressed:
+            return Step(RrcEvent.BY_BUTTON, Move.POWER_BUTTON)
+        for name, event in _RUNNING_FAULTS.items():
+            if not inputs[name]:
+                self._faults.pop(name, None)
+            elif tick - self._faults.setdefault(name, tick) >= self.config.fault_hold_ticks:
+                return Step(event, Move.FORCED)
+        return _NOTHING
+
+    def _begin(self, state: RrcState, tick: int) -> Step:
+        """Start what the power button starts: power-on, or the end of a forced stop."""
+        self._since = tick
+        return Step(self.config.power_on_event) if state is RrcState.WAIT_POWER_ON else _NOTHING
+
+    def _wait_ticks(self, state: RrcState) -> int:
+        match state:
+            case RrcState.INITIALIZE:
+                return self.config.initialize_ticks
+            case RrcState.WAIT_POWER_ON:
+                return self.config.power_on_ticks
+            case RrcState.POWER_OFF_BY_BUTTON:
+                return self.config.button_off_ticks
+            case _:
+                return self.config.forced_off_ticks
+
+    def _waiting(self, state: RrcState, waited: int, inputs: InputBank) -> Step:
+        if waited < self._wait_ticks(state):
+            return _NOTHING
+        match state:
+            case RrcState.INITIALIZE:
+                return Step(RrcEvent.INITIALIZED, Move.INITIALIZED)
+            case RrcState.WAIT_POWER_ON:
+                return self._power_on_result(waited, inputs)
+            case _:
+                return Step(RrcEvent.POWER_OFF_FINISHED, Move.TRAFFIC_ENDED)
+
+    def _power_on_result(self, waited: int, inputs: InputBank) -> Step:
+        if inputs["bus_unplugged"]:
+            if waited < self.config.power_on_timeout_ticks:
+                return _NOTHING
+            return self._power_on_failed(RrcEvent.POWER_ON_TIMEOUT)
+        for name, event in _POWER_ON_FAULTS.items():
+            if inputs[name]:
+                return self._power_on_failed(event)
+        self._since = None
+        return Step(RrcEvent.POWER_ON_SUCCESS, Move.POWER_ON_SUCCEEDED)
+
+    def _power_on_failed(self, event: RrcEvent) -> Step:
+        self._since = None
+        again = self.config.power_on_fail_target is FailTarget.INITIALIZE
+        return Step(event, Move.POWER_ON_FAILED if again else None)

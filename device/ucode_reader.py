@@ -1,0 +1,322 @@
+"""An infra-red reader of ucodes on its serial line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import atan2, hypot, isfinite, radians, remainder, tau
+from typing import ClassVar, Final
+
+from tickrig.device.body import Pose
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.device.twin import Copyable, Immutable
+from tickrig.wire.errors import FieldError
+from tickrig.wire.instant import NEVER
+from tickrig.wire.lines import LineSplitter
+from tickrig.wire.ucode import MAX_LEVEL, ROUNDS, LineType, UcodeLine, parse_ucode
+
+# What a reader is like. The source names no product; these are choices.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReaderParameters(Immutable):
+    """A reader.
+
+    Attributes:
+        range_m: how far it hears a marker, 0.1..99.
+        cone_deg: whole angle in which it hears, around where it looks, 1..360.
+
+    Raises:
+        ValueError: a value that cannot be.
+    """
+
+    range_m: float = 3.0
+    cone_deg: int = 90
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be."""
+        if not 0.1 <= self.range_m <= 99:
+            raise ValueError(f"range_m {self.range_m} is not in 0.1..99 m")
+        if not 1 <= self.cone_deg <= 360:
+            raise ValueError(f"cone_deg {self.cone_deg} is not in 1..360 degrees")
+
+
+# Infra-red markers in the environment, and which of them a reader hears.
+
+
+@dataclass(frozen=True, slots=True)
+class Marker(Immutable):
+    """A marker that sends its ucode to all sides, on a flat floor.
+
+    Attributes:
+        ucode: 128 bits, 32 hex digits in capitals.
+        x_m: its place.
+        y_m: its place, to the left of x.
+
+    Raises:
+        ValueError: no ucode, or no place.
+    """
+
+    ucode: str
+    x_m: float
+    y_m: float
+
+    def __post_init__(self) -> None:
+        """Refuse what is no marker."""
+        if not (isfinite(self.x_m) and isfinite(self.y_m)):
+            raise ValueError(f"a marker has a place, got {self.x_m}, {self.y_m}")
+        if parse_ucode(self.ucode) != self.ucode:
+            raise FieldError(f"ucode {self.ucode!r} is not written in capitals")
+
+
+@dataclass(frozen=True, slots=True)
+class Reception(Immutable):
+    """A marker that was heard.
+
+    Attributes:
+        ucode: what it sent.
+        level: of its signal: 100 % at the reader, falling to 1 % at the end of the range.
+    """
+
+    ucode: str
+    level: int
+
+
+def receive(
+    markers: Sequence[Marker], pose: Pose, parameters: ReaderParameters, share: float = 1.0
+) -> tuple[Reception, ...]:
+    """Return the markers that a reader hears, the nearest first.
+
+    Not there: walls, which infra-red light does not pass; markers that disturb one another;
+    reflections.
+
+    Args:
+        markers: those that send.
+        pose: of the reader.
+        parameters: its range and cone.
+        share: of its range that is left, as of a dirty window, 0..1.
+    """
+    range_m, half_rad = parameters.range_m * share, radians(parameters.cone_deg) / 2
+    found = []
+    for marker in markers:
+        dx, dy = marker.x_m - pose.x_m, marker.y_m - pose.y_m
+        away_m = hypot(dx, dy)
+        off_rad = abs(remainder(atan2(dy, dx) - pose.heading_rad, tau)) if away_m else 0.0
+        if away_m <= range_m and off_rad <= half_rad:
+            level = max(1, round(MAX_LEVEL * (1 - away_m / parameters.range_m)))
+            found.append((away_m, marker.ucode, Reception(marker.ucode, level)))
+    return tuple(reception for _, _, reception in sorted(found, key=lambda item: item[:2]))
+
+
+# The physical side of a reader: where it is, what disturbs it, and what breaks.
+
+_FAR_M: Final = 10_000
+_MOST_MARKERS: Final = 1_000
+
+INPUTS: Final = (
+    InputSignal("x_m", "place of the reader", low=-_FAR_M, high=_FAR_M, unit="m", real=True),
+    InputSignal(
+        "y_m", "place of it, to the left of x", low=-_FAR_M, high=_FAR_M, unit="m", real=True
+    ),
+    InputSignal("heading_rad", "where it looks", low=-1e6, high=1e6, unit="rad", real=True),
+    InputSignal("dark_marker", "the marker without supply, from 1; 0 if none", high=_MOST_MARKERS),
+    InputSignal("dirty_window", "dust: half of the range is left", SignalType.FAULT),
+    InputSignal("sunlight", "light that leaves nothing to be heard", SignalType.FAULT),
+    InputSignal("power_cut", "the supply is off, and everything is forgotten", SignalType.FAULT),
+)
+
+_GROUPS: Final = {"pose": ("x_m", "y_m", "heading_rad")}
+
+OUTPUTS: Final = (
+    OutputSignal("listening", "1 while it listens"),
+    OutputSignal("in_view", "markers that it would hear now"),
+    OutputSignal("received", "markers heard in the latest round"),
+    OutputSignal("rounds", "rounds since power-up"),
+    OutputSignal("refused", "lines that were no command, since power-up"),
+)
+
+
+_TICK_US: Final = 1_000
+_BOOT_US: Final = 200_000
+"""From power-up to the first line; what comes before is lost."""
+
+_ROUND_US: Final = 100_000
+MOST_RECEIVED: Final = 6
+"""Markers of a round: as many lines as 38400 bit/s carry in it."""
+
+_VERSION: Final = 1
+_DIRTY_SHARE: Final = 0.5
+
+
+class UcodeReader(Copyable):
+    """A reader; a `Device[bytes]`.
+
+    It listens in rounds of 100 ms. At the end of each it sends a line for each marker that it
+    heard, the nearest first and six at most, then one that ends the round. What it is
+    and where it looks is that of the end of the round.
+
+    The report (3.4.43.3 (4), Fig. 123) has the reader and no protocol of it: the lines and all
+    numbers are ours. Not emulated: walls, markers that disturb one another, bits of the light.
+
+    Args:
+        parameters: what it is like.
+        markers: those of its environment, 1000 at most.
+
+    Attributes:
+        type_name: what its device type is called, for traces.
+        inputs: what the world does to it, see `terminals.INPUTS`.
+        markers: they may be changed; the next round hears them.
+    """
+
+    type_name: ClassVar[str] = "ucode-reader"
+
+    def __init__(
+        self, parameters: ReaderParameters | None = None, markers: tuple[Marker, ...] = ()
+    ) -> None:
+        self.parameters, self.markers = parameters or ReaderParameters(), markers
+        self.inputs = QuantityBank(INPUTS, _GROUPS, self._input_set)
+        self._lines = LineSplitter(64)
+        self._on, self._restarted, self._switched = True, True, False
+        self._power_up(0)
+
+    @property
+    def tick_us(self) -> int:
+        """How finely it keeps time."""
+        return _TICK_US
+
+    @property
+    def due_us(self) -> int:
+        """When anything would happen without input."""
+        return 0 if self._restarted or self._switched else self._due_us
+
+    @property
+    def outputs(self) -> Mapping[str, OutputSignal]:
+        """What `read` knows."""
+        return _OUTPUTS
+
+    @property
+    def pose(self) -> Pose:
+        """Where it is."""
+        return Pose(*(self.inputs[name] for name in _GROUPS["pose"]))
+
+    @property
+    def in_view(self) -> tuple[Reception, ...]:
+        """What it would hear now."""
+        if not self._on or self.inputs["sunlight"]:
+            return ()
+        dark = self.inputs["dark_marker"]
+        senders = [marker for number, marker in enumerate(self.markers, 1) if number != dark]
+        share = _DIRTY_SHARE if self.inputs["dirty_window"] else 1.0
+        return receive(senders, self.pose, self.parameters, share)
+
+    def reset(self) -> None:
+        """Begin as after power-up."""
+        self._restarted = True
+
+    def read(self, name: str, /) -> int | float:
+        """Look at an output.
+
+        Args:
+            name: one of `outputs`.
+
+        Returns:
+            Its value.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        return _READ[name](self)
+
+    def tick(self, now_us: int, rx: bytes, /) -> bytes:
+        """Take what arrived, and go on to now.
+
+        Args:
+            now_us: time since the rig was started, a multiple of `tick_us`.
+            rx: the bytes that arrived since the latest tick.
+
+        Returns:
+            The bytes that it sends in this tick.
+        """
+        if self.inputs.changed:
+            self._inputs_changed()
+        if self._restarted:
+            self._power_up(now_us)
+        if not self._on:
+            return b""
+        sent = b""
+        if self._booting:
+            if now_us < self._due_us:
+                return b""
+            sent = self._begin(now_us)
+        elif self._due_us <= now_us:
+            sent = self._end_round()
+        for line in self._lines.push(rx.replace(b"\r", b"\n")):
+            sent += self._obey(now_us, line) if line else b""
+        return sent
+
+    def _input_set(self) -> None:
+        self._switched = bool(self.inputs["power_cut"]) == self._on
+
+    def _inputs_changed(self) -> None:
+        self.inputs.changed = self._switched = False
+        on = not self.inputs["power_cut"]
+        if on != self._on:
+            self._on, self._restarted = on, True
+
+    def _power_up(self, now_us: int) -> None:
+        self._restarted, self._booting, self._listening = False, True, False
+        self._due_us = now_us + _BOOT_US if self._on else NEVER
+        self._round = self._rounds = self._refused = self._received = 0
+        self._lines.clear()
+
+    def _begin(self, now_us: int) -> bytes:
+        """Booted: tell who it is, and listen."""
+        self._booting = False
+        self._listen(now_us)
+        return self._identification()
+
+    def _listen(self, now_us: int) -> None:
+        self._listening, self._due_us = True, now_us + _ROUND_US
+
+    def _identification(self) -> bytes:
+        reader = self.parameters
+        fields = (_VERSION, round(reader.range_m * 1_000), reader.cone_deg, int(self._listening))
+        return UcodeLine(LineType.READER, fields).encode()
+
+    def _end_round(self) -> bytes:
+        number, self._round = self._round, (self._round + 1) % ROUNDS
+        self._due_us += _ROUND_US
+        self._rounds += 1
+        received = self.in_view[:MOST_RECEIVED]
+        self._received = len(received)
+        if self.inputs["sunlight"]:
+            return UcodeLine(LineType.LIGHT, (number,)).encode()
+        lines = [UcodeLine(LineType.UCODE, (number, each.ucode, each.level)) for each in received]
+        lines.append(UcodeLine(LineType.ROUND, (number, len(received))))
+        return b"".join(line.encode() for line in lines)
+
+    def _obey(self, now_us: int, line: bytes) -> bytes:
+        match line:
+            case b"ID":
+                return self._identification()
+            case b"ON" if not self._listening:
+                self._listen(now_us)
+            case b"ON":
+                pass
+            case b"OFF":
+                self._listening, self._due_us, self._received = False, NEVER, 0
+            case _:
+                self._refused += 1
+                return UcodeLine(LineType.REFUSED, ()).encode()
+        return self._identification()
+
+
+_OUTPUTS: Final = {output.name: output for output in OUTPUTS}
+
+_READ: Final[Mapping[str, Callable[[UcodeReader], int]]] = {
+    "listening": lambda reader: int(reader._listening),
+    "in_view": lambda reader: len(reader.in_view),
+    "received": lambda reader: reader._received,
+    "rounds": lambda reader: reader._rounds,
+    "refused": lambda reader: reader._refused,
+}

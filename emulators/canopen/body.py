@@ -1,0 +1,300 @@
+"""Robots' bodies on emulated drives: as a rig file has them, and as a coupling of their rig."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import degrees, radians
+from typing import Final, NamedTuple
+
+from tickrig.device.body import SIDES, BodyParameters, WheeledBody
+from tickrig.device.canopen.slave import TICK_US
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.canopen.signals import NodeSignal
+from tickrig.host.cli.messages import Refused
+from tickrig.host.text.values import Setting
+from tickrig.wire.instant import NEVER
+
+# A body on the shafts of drives, as a coupling of their rig.
+
+_FAR_M: Final = 1e6
+"""As far as a body can be put."""
+
+_MOST_FRICTION: Final = 10
+
+
+class PoseSignal:
+    """One coordinate of a body; setting it puts the body elsewhere, wheels and speed as they are.
+
+    Args:
+        body: the body.
+        name: `x_m`, `y_m` or `heading_deg`.
+        text: what it is, for people.
+        unit: its unit.
+    """
+
+    def __init__(self, body: WheeledBody, name: str, text: str, unit: str) -> None:
+        most = 180 if name == "heading_deg" else _FAR_M
+        self.item = InputSignal(name, text, SignalType.LEVEL, -most, most, unit, real=True)
+        self._body, self._bank = body, QuantityBank([self.item])
+
+    def read(self) -> float:
+        """Return where it is now."""
+        pose = self._body.pose
+        match self.item.name:
+            case "x_m":
+                return pose.x_m
+            case "y_m":
+                return pose.y_m
+        return degrees(pose.wrapped_rad)
+
+    def check(self, value: Setting) -> float:
+        """Return the value, or raise ValueError."""
+        return self._bank.check(self.item.name, value)
+
+    def write(self, value: Setting) -> None:
+        """Put it there."""
+        number, pose = float(self.check(value)), self._body.pose
+        match self.item.name:
+            case "x_m":
+                pose = replace(pose, x_m=number)
+            case "y_m":
+                pose = replace(pose, y_m=number)
+            case _:
+                pose = replace(pose, heading_rad=radians(number))
+        self._body.pose = pose
+
+
+class FrictionSignal:
+    """The ground's friction, of a body that can slip."""
+
+    def __init__(self, body: WheeledBody) -> None:
+        text = "coefficient of friction between wheels and ground"
+        self.item = InputSignal("friction", text, high=_MOST_FRICTION, real=True)
+        self._body, self._bank = body, QuantityBank([self.item])
+
+    def read(self) -> float:
+        """Return the coefficient."""
+        return next(iter(self._body.contacts.values())).friction or 0.0
+
+    def check(self, value: Setting) -> float:
+        """Return the value, or raise ValueError."""
+        return self._bank.check(self.item.name, value)
+
+    def write(self, value: Setting) -> None:
+        """Change the ground below all wheels."""
+        friction = float(self.check(value))
+        for contact in self._body.contacts.values():
+            contact.friction = friction
+
+
+NAME: Final = "body"
+
+_BODY_OUTPUTS: Final = (
+    OutputSignal("x_m", "place", "m"),
+    OutputSignal("y_m", "place, to the left of x", "m"),
+    OutputSignal("heading_deg", "from x towards y, -180..180", "deg"),
+    OutputSignal("speed_m_s", "speed forward", "m/s"),
+    OutputSignal("turn_deg_s", "turning speed, positive to the left", "deg/s"),
+    OutputSignal("slipping", "1 while a wheel slips"),
+)
+
+SHAFTS: Final = (
+    ("shaft_deg", "load_nm", "load_kg_m2"),
+    ("angle_deg", "shaft_load_nm", "load_kg_m2"),
+)
+"""What drives call the angle of their shaft, the torque on it, and the inertia on it."""
+
+
+class DrivenWheel(NamedTuple):
+    """A wheel on the shaft of a drive.
+
+    Attributes:
+        name: of the wheel.
+        node: the drive.
+        forward: -1 if it is mounted the other way round.
+    """
+
+    name: str
+    node: Node
+    forward: int = 1
+
+
+class BodyOnDrives:
+    """Lets a body go as the shafts of its drives turn, and lets them feel it.
+
+    Args:
+        body: the body.
+        wheels: for each of its wheels the drive.
+
+    Raises:
+        ValueError: a node that has no shaft.
+    """
+
+    name = NAME
+    tick_us = TICK_US
+
+    def __init__(self, body: WheeledBody, wheels: Collection[DrivenWheel]) -> None:
+        self.body = body
+        self._shafts = {wheel.name: _Shaft(wheel) for wheel in wheels}
+        self.physical: Mapping[str, NodeSignal] = {
+            signal.item.name: signal
+            for signal in (
+                PoseSignal(body, "x_m", "place", "m"),
+                PoseSignal(body, "y_m", "place, to the left of x", "m"),
+                PoseSignal(body, "heading_deg", "from x towards y", "deg"),
+            )
+        }
+        if body.parameters.friction is not None:
+            self.physical = {**self.physical, "friction": FrictionSignal(body)}
+        self.outputs: Mapping[str, OutputSignal] = {item.name: item for item in _BODY_OUTPUTS}
+        self.groups: Mapping[str, tuple[str, ...]] = {"pose": ("x_m", "y_m", "heading_deg")}
+        self._load()
+
+    @property
+    def due_us(self) -> int:
+        """Whether it moves although nothing drives it: it slides."""
+        return NEVER if self.body.resting else 0
+
+    def act(self, now_us: int, /) -> None:
+        """Go on, and load the shafts."""
+        self.body.step({name: shaft.angle_rad for name, shaft in self._shafts.items()})
+        self._load()
+
+    def signal(self, name: str) -> NodeSignal | None:
+        """Return the thing of this name, None if there is none."""
+        return self.physical.get(name)
+
+    def signal_names(self) -> list[str]:
+        """Return all names."""
+        return list(self.physical)
+
+    def read(self, name: str) -> Setting:
+        """Return an output; KeyError if there is none."""
+        match name:
+            case "speed_m_s":
+                return self.body.speed_m_s
+            case "turn_deg_s":
+                return degrees(self.body.turn_rad_s)
+            case "slipping":
+                return int(self.body.slipping)
+        return self.physical[name].read()
+
+    def _load(self) -> None:
+        for name, contact in self.body.contacts.items():
+            self._shafts[name].load(contact.load_nm, contact.load_kg_m2)
+
+
+class _Shaft:
+    """The shaft of a drive, seen from its wheel."""
+
+    def __init__(self, wheel: DrivenWheel) -> None:
+        node, self._forward = wheel.node, wheel.forward
+        self._application, self._bank = node.application, node.application.inputs
+        names = [row for row in SHAFTS if row[0] in node.outputs]
+        if not names:
+            raise ValueError(f"{wheel.name}: node {node.name} has no shaft")
+        self._angle, self._torque, self._inertia = names[0]
+
+    @property
+    def angle_rad(self) -> float:
+        """The angle, positive forward."""
+        return self._forward * radians(float(self._application.read(self._angle)))
+
+    def load(self, torque_nm: float, inertia_kg_m2: float) -> None:
+        """Let it feel a torque, positive forward, and an inertia."""
+        _set(self._bank, self._torque, self._forward * torque_nm)
+        _set(self._bank, self._inertia, inertia_kg_m2)
+
+
+def _set(bank: QuantityBank, name: str, value: float) -> None:
+    """Set an input as far as it goes; an ideal motor has none and feels nothing."""
+    item = bank.table.get(name)
+    if item is not None and bank[name] != (value := min(max(value, item.low), item.high)):
+        bank.set(name, value)
+
+
+# A body as a rig file describes it.
+
+_NUMBERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
+_NEEDED: Final = ("wheel_radius_m", "tread_m")
+_MIRRORED: Final = "mirrored"
+
+
+@dataclass(frozen=True, slots=True)
+class BodySpec:
+    """A body and its drives.
+
+    Attributes:
+        place: where it is written, for errors.
+        parameters: what it is like.
+        drives: node-ID of the drive of each wheel.
+        mirrored: wheels whose drive is mounted the other way round.
+    """
+
+    place: str
+    parameters: BodyParameters
+    drives: Mapping[str, int]
+    mirrored: tuple[str, ...] = ()
+
+    def put_on(self, nodes: Sequence[Node]) -> BodyOnDrives:
+        """Put it on the shafts of its drives; Refused if one of them is missing or none."""
+        by_name = {node.name: node for node in nodes}
+        wheels = []
+        for name, node_id in self.drives.items():
+            node = by_name.get(str(node_id))
+            if node is None:
+                raise Refused(f"{self.place}: {name} = {node_id}, but there is no such node")
+            wheels.append(DrivenWheel(name, node, -1 if name in self.mirrored else 1))
+        try:
+            return BodyOnDrives(WheeledBody(self.parameters), wheels)
+        except ValueError as error:
+            raise Refused(f"{self.place}: {error}") from None
+
+
+def read_body(place: str, table: object) -> BodySpec:
+    """Read the table [body]; Refused with the key if it cannot be used."""
+    if not isinstance(table, dict):
+        raise Refused(f"{place}: it is a table [body]")
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in SIDES:
+        raise Refused(f"{place}: kind {kind!r} is not one of {', '.join(SIDES)}")
+    wheels = [name for side in SIDES[kind] for name in side]
+    known = ["kind", *wheels, *_NUMBERS, _MIRRORED]
+    if unknown := [key for key in table if key not in known]:
+        raise Refused(f"{place}: no key {unknown[0]}; known: {', '.join(known)}")
+    if missing := [key for key in (*wheels, *_NEEDED) if key not in table]:
+        raise Refused(f"{place}: {missing[0]} is missing")
+    return BodySpec(
+        place,
+        _parameters(place, kind, table),
+        {name: _node_id(place, name, table[name]) for name in wheels},
+        _mirrored(place, wheels, table.get(_MIRRORED, [])),
+    )
+
+
+def _parameters(place: str, kind: str, table: Mapping[str, object]) -> BodyParameters:
+    numbers = {}
+    for key in _NUMBERS:
+        if key in table:
+            value = table[key]
+            if not isinstance(value, int | float) or isinstance(value, bool):
+                raise Refused(f"{place}: {key} {value!r} is not a number")
+            numbers[key] = float(value)
+    try:
+        return BodyParameters(kind=kind, **numbers)
+    except ValueError as error:
+        raise Refused(f"{place}: {error}") from None
+
+
+def _node_id(place: str, name: str, value: object) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= 127:
+        raise Refused(f"{place}: {name} {value!r} is not a node-ID in 1..127")
+    return value
+
+
+def _mirrored(place: str, wheels: Sequence[str], value: object) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(name in wheels for name in value):
+        raise Refused(f"{place}: {_MIRRORED} {value!r} is not a list of {', '.join(wheels)}")
+    return tuple(value)

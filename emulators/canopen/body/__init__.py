@@ -1,1 +1,0 @@
-"""Robots' bodies on emulated drives."""

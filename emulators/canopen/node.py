@@ -1,0 +1,461 @@
+"""An emulated CANopen node with power, a plug and a hand inside, and several under one roof."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import ClassVar, Final, Protocol
+
+from tickrig.device.canopen.slave import TICK_US, UNCONFIGURED, Application, CanopenSlave
+from tickrig.device.horizon import Horizon
+from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.device.twin import Copyable
+from tickrig.emulators.can.bus_device import Accepted
+from tickrig.emulators.can.outside.bridge import CountingPort, PortBefore
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.signals import (
+    Emergency,
+    NodeSignal,
+    NotedSignal,
+    ObjectSignal,
+    OnSet,
+    Quantity,
+    SwitchSignal,
+    find_object,
+    object_name,
+)
+from tickrig.host.text.log import log_of
+from tickrig.host.text.names import near
+from tickrig.host.text.values import Setting
+from tickrig.wire.can import CanFrame, ErrorState, Frames
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.instant import NEVER
+
+# One emulated CANopen node: a slave with power, a plug and a hand inside.
+
+_STATE_NAMES: Final = {
+    NmtState.INITIALISING: "Initialising",
+    NmtState.STOPPED: "Stopped",
+    NmtState.OPERATIONAL: "Operational",
+    NmtState.PRE_OPERATIONAL: "Pre-operational",
+}
+_ERROR_STATE_NAMES: Final = {
+    ErrorState.ACTIVE: "error-active",
+    ErrorState.PASSIVE: "error-passive",
+    ErrorState.BUS_OFF: "bus-off",
+}
+_OFF: Final = "Off"
+
+NODE_INPUTS: Final = ("power_off", "unplugged", "emergency")
+"""Every node has these beside those of its device."""
+
+NODE_OUTPUTS: Final = (
+    OutputSignal("state", "NMT state, or Off"),
+    OutputSignal("node_id", "active node-ID, 255 while it has none"),
+    OutputSignal("can_state", "fault confinement of its CAN controller"),
+)
+
+
+class Node(Copyable):
+    """A `Device[Frames]` around a slave, with the physical side of its application.
+
+    Without power it neither sends nor hears, and begins anew when power is back.
+    What is done to it from the inside, and what its CAN controller reports,
+    takes effect at the beginning of its next tick. A controller that is bus-off is
+    told to recover at once, as most drivers do.
+
+    Not emulated: LSS switches the bit rate of the node alone; the bus keeps its own.
+
+    Args:
+        name: prefix of the names of its things among those of other nodes.
+        slave: the slave.
+        wire: its bus.
+
+    Attributes:
+        application: what the device does with its objects.
+        port: its end of the bus.
+        physical: what the world does to it, by name.
+        groups: names of several of these that are set together.
+        outputs: what the world sees of it, by name.
+        on_set: called with each input or object that was set by name, and its value.
+        on_crash: called with what the program of the slave raises, which then begins anew, as
+            after a watchdog; without it that is raised here.
+    """
+
+    _new_in_twins: ClassVar[Mapping[str, object]] = {"on_set": None, "on_crash": None}
+
+    def __init__(self, name: str, slave: CanopenSlave, wire: CanWire) -> None:
+        self.name, self.slave, self.application = name, slave, Application.of(slave)
+        self.port = wire.end()
+        self.port.auto_recovery = True
+        self._wire, self._on, self._ticked = wire, True, False
+        self._coasts_us = NEVER
+        self._pending: list[Callable[[], None]] = []
+        self.on_set: OnSet | None = None
+        self.on_crash: Callable[[Exception], object] | None = None
+        bank = self.application.inputs
+        self.physical: Mapping[str, NodeSignal] = {
+            "power_off": SwitchSignal("power_off", "its supply is cut", self._switch),
+            "unplugged": SwitchSignal("unplugged", "its CAN plug is pulled", self._plug),
+            "emergency": Emergency(slave, self._defer),
+            **{name: Quantity(bank, item, self._coast) for name, item in bank.table.items()},
+        }
+        self.groups = bank.groups
+        self.outputs: Mapping[str, OutputSignal] = {
+            **{item.name: item for item in NODE_OUTPUTS},
+            **self.application.outputs,
+        }
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it has power."""
+        return self._on
+
+    @property
+    def tick_us(self) -> int:
+        """The control period."""
+        return self.slave.tick_us
+
+    @property
+    def inputs(self) -> QuantityBank:
+        """The physical inputs of its application, whoever sets them."""
+        return self.application.inputs
+
+    @property
+    def due_us(self) -> int:
+        """When the slave is due."""
+        if self._pending:
+            return 0
+        return self.slave.due_us if self._on else self._coasts_us
+
+    @property
+    def horizon(self) -> Horizon | None:
+        """How far the slave may work ahead."""
+        return self.slave.horizon
+
+    @horizon.setter
+    def horizon(self, horizon: Horizon | None) -> None:
+        self.slave.horizon = horizon
+
+    @property
+    def accepts(self) -> Accepted:
+        """CAN-IDs that it listens to."""
+        return self.slave.accepts
+
+    @property
+    def reconfigured_by(self) -> frozenset[int]:
+        """CAN-IDs of the frames that may change `accepts` when handled."""
+        return self.slave.reconfigured_by
+
+    @property
+    def on_accepts(self) -> list[Callable[[], None]]:
+        """Whom to call when these two have changed."""
+        return self.slave.on_accepts
+
+    def bus_state(self, state: ErrorState, /) -> None:
+        """Hear of a change of its CAN controller; the slave hears of it in the next tick."""
+        self._defer(partial(self.slave.bus_state, state))
+
+    def reset(self) -> None:
+        """Power-on reset."""
+        self.slave.reset()
+
+    def tick(self, now_us: int, rx: Frames, /) -> Frames:
+        """Tick the slave, if it has power."""
+        if not self._on:
+            self._pending.clear()
+            if now_us >= self._coasts_us:
+                self._coasts_us = self.application.without_power(now_us)
+            return ()
+        try:
+            if self._ticked:
+                self._catch_up(now_us)
+            self._ticked = True
+            return self.slave.tick(now_us, rx)
+        except Exception as error:
+            if self.on_crash is None:
+                raise
+            self.on_crash(error)
+            self._begin_anew(self.on_crash)
+            return ()
+
+    def signal(self, name: str) -> NodeSignal | None:
+        """Return the thing of this name, None if there is none."""
+        signal = self.physical.get(name) or self._object(name)
+        return NotedSignal(signal, self.on_set) if signal and self.on_set else signal
+
+    def _object(self, name: str) -> NodeSignal | None:
+        entry = find_object(self.slave.dictionary, name)
+        if entry is None:
+            return None
+        return ObjectSignal(object_name(self.slave.dictionary, entry), entry, self._defer)
+
+    def signal_names(self) -> list[str]:
+        """Return all names."""
+        dictionary = self.slave.dictionary
+        return [*self.physical, *(object_name(dictionary, entry) for entry in dictionary)]
+
+    def begin_with(self, start: Mapping[str, Setting]) -> None:
+        """Set inputs and objects that are not as usual when it begins; ValueError if it cannot."""
+        for name, value in start.items():
+            if (signal := self.signal(name)) is None:
+                raise ValueError(f"{self.name} has no input {name!r}")
+            signal.write(value)
+
+    def read(self, name: str) -> Setting:
+        """Return an output; KeyError if there is none."""
+        match name:
+            case "state":
+                return _STATE_NAMES[self.slave.state] if self._on and self._ticked else _OFF
+            case "node_id":
+                return self.slave.node_id
+            case "can_state":
+                return _ERROR_STATE_NAMES[self.port.controller.state]
+        return self.application.read(name)
+
+    def _defer(self, action: Callable[[], None]) -> None:
+        """Act at the beginning of the next tick: what is heard in it may then be another."""
+        self._pending.append(action)
+        self.port.pass_all()
+
+    def _catch_up(self, now_us: int) -> None:
+        """Let what was done since the last tick take effect."""
+        self.slave.now_us = now_us
+        while self._pending:
+            self._pending.pop(0)()
+
+    def _begin_anew(self, on_crash: Callable[[Exception], object]) -> None:
+        """Reset the slave; one that cannot begin anew is dead until its power is switched."""
+        self._pending.clear()
+        try:
+            self.slave.reset()
+        except Exception as error:
+            self._on = False
+            on_crash(error)
+
+    def _switch(self, off: int) -> None:
+        if off:
+            self._wire.cut_power(self.port)
+        elif not self._on:
+            self.slave.reset()
+        self._on, self._ticked = not off, self._ticked and not off
+        self._coast()
+        self._plug(self.physical["unplugged"].read())
+
+    def _coast(self) -> None:
+        """Let the application go on, if it is without power."""
+        self._coasts_us = 0
+
+    def _plug(self, pulled: Setting) -> None:
+        if pulled:
+            self._wire.disconnect(self.port)
+        elif self._on:
+            self._wire.reconnect(self.port)
+
+
+# The physical side of several nodes, and of what they are part of: all under one roof.
+
+
+class NodePart(Protocol):
+    """A node, or a body on nodes: something with a name and a physical side.
+
+    Attributes:
+        name: of the part.
+        physical: what the world does to it, by name.
+        groups: names of several of these that are set together.
+        outputs: what the world sees of it, by name.
+    """
+
+    name: str
+    physical: Mapping[str, NodeSignal]
+    groups: Mapping[str, tuple[str, ...]]
+    outputs: Mapping[str, OutputSignal]
+
+    def signal(self, name: str) -> NodeSignal | None:
+        """Return the thing of this name, None if there is none."""
+
+    def signal_names(self) -> list[str]:
+        """Return all names."""
+        ...
+
+    def read(self, name: str) -> Setting:
+        """Return an output; KeyError if there is none."""
+        ...
+
+
+class Nodes:
+    """All nodes of a bus, with the signals of each.
+
+    The things of one node are called as they are, `0x6000:1`, `state`; those of
+    several have the node before them, `5/0x6000:1`, `5/state`, those of a body too,
+    `body/x_m`, unless it is all there is.
+
+    Args:
+        nodes: some, or none.
+        bodies: what is joined to them, or is seen by itself.
+    """
+
+    def __init__(self, nodes: Sequence[Node], bodies: Sequence[NodePart] = ()) -> None:
+        self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
+        self._alone = self.parts[0] if len(nodes) == 1 or len(self.parts) == 1 else None
+        self._by_name: Mapping[str, NodePart] = {part.name: part for part in self.parts}
+        self.inputs = NodeInputs(self)
+        self.outputs: Mapping[str, OutputSignal] = {
+            self.full_name(part, item.name): replace(item, name=self.full_name(part, item.name))
+            for part in self.parts
+            for item in part.outputs.values()
+        }
+
+    @property
+    def tick_us(self) -> int:
+        """The control period of all of them."""
+        return TICK_US
+
+    def read(self, name: str, /) -> Setting:
+        """Return the present value of an output; KeyError if there is none."""
+        part, rest = self.find(name)
+        if part is None:
+            raise KeyError(name)
+        return part.read(rest)
+
+    def full_name(self, part: NodePart, name: str) -> str:
+        """Return what a thing of a part is called."""
+        return name if part is self._alone else f"{part.name}/{name}"
+
+    def find(self, name: str) -> tuple[NodePart | None, str]:
+        """Return the part that a name belongs to, and the rest of the name."""
+        prefix, slash, rest = name.partition("/")
+        if slash:
+            return self._by_name.get(prefix), rest
+        return self._alone, name
+
+    @property
+    def lost(self) -> int:
+        """Frames that found a buffer full."""
+        return sum(node.port.lost for node in self.nodes)
+
+
+class NodeInputs:
+    """The `Inputs` of nodes: their physical side and every object of their dictionaries.
+
+    Attributes:
+        table: the inputs by name; a variable may be named with its sub-index too.
+        groups: names of several inputs that are set together.
+    """
+
+    def __init__(self, nodes: Nodes) -> None:
+        self.changed = False
+        self.table: Mapping[str, InputSignal] = _Table(nodes)
+        self.groups: Mapping[str, tuple[str, ...]] = {
+            nodes.full_name(part, name): tuple(nodes.full_name(part, item) for item in members)
+            for part in nodes.parts
+            for name, members in part.groups.items()
+        }
+        self._nodes = nodes
+
+    def __getitem__(self, name: str) -> Setting:
+        """Return the present value of an input."""
+        return self._signal(name).read()
+
+    def set(self, name: str, value: Setting) -> None:
+        """Set an input; ValueError if there is none, or it does not take the value."""
+        self._signal(name).write(value)
+
+    def check(self, name: str, value: Setting) -> Setting:
+        """Return the value, or raise ValueError as `set` would, as far as can be known before."""
+        return self._signal(name).check(value)
+
+    def find(self, name: str, signal_type: SignalType | None = None) -> InputSignal:
+        """Return the description of an input; ValueError if there is none of this type."""
+        item = self.table.get(name)
+        if item is None or signal_type not in (None, item.type):
+            wanted = signal_type.value if signal_type else "input"
+            names = self.names(signal_type) if signal_type else self.table
+            raise ValueError(f"no {wanted} {name!r}; {near(name, names)}")
+        return item
+
+    def names(self, signal_type: SignalType) -> tuple[str, ...]:
+        """Return the names of all inputs of a type; objects are levels and texts."""
+        if signal_type in (SignalType.BUTTON, SignalType.FAULT):
+            return tuple(
+                self._nodes.full_name(part, name)
+                for part in self._nodes.parts
+                for name, signal in part.physical.items()
+                if signal.item.type is signal_type
+            )
+        return tuple(name for name in self.table if self.table[name].type is signal_type)
+
+    def _signal(self, name: str) -> NodeSignal:
+        part, rest = self._nodes.find(name)
+        signal = part.signal(rest) if part else None
+        if signal is None:
+            raise ValueError(f"no input {name!r}; {near(name, self.table)}")
+        return signal
+
+
+class _Table(Mapping[str, InputSignal]):
+    """The descriptions, made when they are asked for: nodes have many objects."""
+
+    def __init__(self, nodes: Nodes) -> None:
+        self._nodes = nodes
+
+    def __getitem__(self, name: str) -> InputSignal:
+        part, rest = self._nodes.find(name)
+        signal = part.signal(rest) if part else None
+        if part is None or signal is None:
+            raise KeyError(name)
+        return replace(signal.item, name=self._nodes.full_name(part, signal.item.name))
+
+    def __contains__(self, name: object) -> bool:
+        part, rest = self._nodes.find(name) if isinstance(name, str) else (None, "")
+        return part is not None and part.signal(rest) is not None
+
+    def __iter__(self) -> Iterator[str]:
+        nodes = self._nodes
+        return (nodes.full_name(part, name) for part in nodes.parts for name in part.signal_names())
+
+    def __len__(self) -> int:
+        return sum(len(part.signal_names()) for part in self._nodes.parts)
+
+
+# A bus outside on which a node may be a second time.
+
+_ERROR_CONTROL: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + UNCONFIGURED)
+
+_logger = log_of(__name__)
+
+
+class SecondNodeAlarm(PortBefore):
+    """A port that warns, once for each node, of somebody outside who has its node-ID.
+
+    It hears boot-ups, heartbeats and answers to guarding. A second node that sends none of them
+    is not noticed; nor is one while ours is without power.
+
+    Args:
+        port: the port behind it.
+        nodes: ours.
+    """
+
+    def __init__(self, port: CountingPort, nodes: Sequence[Node]) -> None:
+        super().__init__(port)
+        self._alone = list(nodes)
+
+    def poll(self, now_us: int, /) -> Frames:
+        """Read what others have sent."""
+        frames = super().poll(now_us)
+        for frame in frames:
+            if frame.can_id in _ERROR_CONTROL and self._alone:
+                self._look(frame)
+        return frames
+
+    def _look(self, frame: CanFrame) -> None:
+        if frame.extended or not frame.data:
+            return
+        node_id = frame.can_id - ERROR_CONTROL_COB_ID
+        for node in self._alone:
+            if node.slave.node_id == node_id and node.is_on:
+                self._alone.remove(node)
+                text = "node-ID %d is on the bus twice: somebody else sent %s; end one of the two"
+                _logger.warning(text, node_id, frame)
+                return

@@ -1,1 +1,0 @@
-"""One emulated CANopen node, and several under one roof."""

@@ -1,1 +1,0 @@
-"""The demonstration of Fig. 120: a potentiometer turns a motor, without a PC in between."""

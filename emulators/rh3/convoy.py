@@ -1,0 +1,168 @@
+"""Robots that go together in one map frame: carts on two wheels, and on omni wheels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from tickrig.device.body import OmniBody, OmniParameters, Velocity
+from tickrig.device.body import Pose as BodyPose
+from tickrig.device.rh3.parameters import BaseParameters
+from tickrig.emulators.rh3.closed_loop import Cart, ClosedLoop
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.geometry import Pose
+from tickrig.host.rtc.motion.options.follower import Follower
+from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose_2d
+from tickrig.wire.rtc_types import iis
+from tickrig.wire.rtc_types.basic import Time
+
+_WIDE: Final = {"dataport.buffer.length": "64"}
+_STEP_US: Final = 1_000
+
+_WATCHDOG_US: Final = 500_000
+"""Silence after which it stops, as the base on two wheels does."""
+
+
+class OmniCart(RtComponent):
+    """Takes IIS velocities with all three parts, and writes its pose, which is the true one.
+
+    A velocity with a number that is none means stop.
+
+    Not emulated: a driver and its line, encoders, an odometry that errs.
+
+    Attributes:
+        body: the wheels and where they are.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("OmniCart", "Robot on three omni wheels, emulated")
+
+    def __init__(self, instance_name: str, parameters: OmniParameters | None = None) -> None:
+        super().__init__(instance_name)
+        self.velocity = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
+        self.position = self.add_port(OutPort("OdometryPosition", iis.TimedPose2D))
+        self.body = OmniBody(parameters or OmniParameters())
+        self._wanted, self._received_us = Velocity(), 0
+
+    @property
+    def true_pose(self) -> Pose:
+        """Where it is."""
+        pose = self.body.pose
+        return Pose(pose.x_m, pose.y_m, pose.wrapped_rad)
+
+    def place(self, pose: Pose) -> None:
+        """Put it somewhere."""
+        self.body.pose = BodyPose(*pose)
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at standstill."""
+        self._wanted = Velocity()
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Go on for a period."""
+        if (latest := read_newest(self.velocity)) is not None:
+            numbers = (latest.data.vx, latest.data.vy, latest.data.va)
+            self._wanted = Velocity(*numbers) if plausible(*numbers) else Velocity()
+            self._received_us = ec.now_us
+        elif ec.now_us - self._received_us > _WATCHDOG_US:
+            self._wanted = Velocity()
+        for _ in range(ec.period_us // _STEP_US):
+            self.body.step(self._wanted)
+        now = Time.from_us(ec.now_us)
+        self.position.write(iis.TimedPose2D(now, data=to_pose_2d(self.true_pose)))
+        return ReturnCode.RTC_OK
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot of a convoy, by the names of its ports.
+
+    Attributes:
+        position: where its self-position leaves.
+        velocity: where its moving command arrives.
+        cart: it has the true pose.
+        sideways: it goes any way.
+    """
+
+    position: str
+    velocity: str
+    cart: Cart | OmniCart
+    sideways: bool = False
+
+    @property
+    def true_pose(self) -> Pose:
+        """Where it is."""
+        return self.cart.true_pose
+
+
+class Convoy:
+    """Robots in virtual time; the first keeps its planner, the others do what is joined to them.
+
+    Args:
+        carts: where those on two wheels stand at first.
+        omni: where those on omni wheels stand.
+
+    Attributes:
+        loop: carts, their lines and the manager.
+        robots: carts first.
+    """
+
+    def __init__(self, carts: Sequence[Pose], omni: Sequence[Pose] = ()) -> None:
+        self.loop = ClosedLoop(*[BaseParameters() for _ in carts])
+        self.robots = (
+            *(self._cart(n, pose) for n, pose in enumerate(carts)),
+            *(self._omni_cart(n, pose) for n, pose in enumerate(omni)),
+        )
+        self._leaders: dict[int, int] = {}
+
+    def follow(self, robot: int, leader: int) -> None:
+        """Let a robot follow another from now on; whom it followed before is forgotten."""
+        manager, name = self.loop.manager, f"Follower{robot}"
+        if robot not in self._leaders:
+            self._add_follower(robot, name)
+        else:
+            before = self.robots[self._leaders[robot]]
+            manager.disconnect(before.position, f"{name}.leader")
+        manager.connect(self.robots[leader].position, f"{name}.leader", _WIDE)
+        self._leaders[robot] = leader
+
+    def command(self, source: str) -> None:
+        """Let all robots obey one OutPort of IIS velocities, in the place of their planners."""
+        manager = self.loop.manager
+        manager.disconnect("PathFollower0.velocity", self.robots[0].velocity)
+        for robot in self.robots:
+            manager.connect(source, robot.velocity, _WIDE)
+
+    def _add_follower(self, robot: int, name: str) -> None:
+        manager, own = self.loop.manager, self.robots[robot]
+        follower = Follower(name)
+        follower.configuration.set("sideways", str(int(own.sideways)))
+        context = manager.context_of(own.velocity.partition(".")[0])
+        manager.add(follower, context=context)
+        manager.connect(own.position, f"{name}.position", _WIDE)
+        manager.connect(f"{name}.velocity", own.velocity, _WIDE)
+        manager.activate(name)
+
+    def _cart(self, number: int, pose: Pose) -> Robot:
+        cart, manager = self.loop.carts[number], self.loop.manager
+        place(cart, pose)
+        velocity = f"RefHardRh3{number}.InTargetVelocity"
+        if number:
+            manager.disconnect(f"PathFollower{number}.velocity", velocity)
+        return Robot(f"Odometry{number}.OdometryPosition", velocity, cart)
+
+    def _omni_cart(self, number: int, pose: Pose) -> Robot:
+        name = f"OmniCart{number}"
+        cart = self.loop.manager.add(OmniCart(name), rate_hz=50.0)
+        cart.place(pose)
+        self.loop.manager.activate(name)
+        return Robot(f"{name}.OdometryPosition", f"{name}.InTargetVelocity", cart, sideways=True)
+
+
+def place(cart: Cart, pose: Pose) -> None:
+    """Put a cart somewhere, and let its odometry begin there."""
+    cart.base.ground.pose = BodyPose(*pose)
+    configuration = cart.chain.odometry.configuration
+    for name, number in zip(("x", "y", "theta"), pose, strict=True):
+        configuration.set(f"initialPose_{name}", repr(number))

@@ -1,0 +1,613 @@
+"""A serial line served over TCP, plain or by RFC 2217, to hosts that cannot open a pty."""
+
+from __future__ import annotations
+
+import errno
+import ipaddress
+import logging
+import os
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any, Final
+
+from serial import SerialBase, rfc2217
+from serial.rfc2217 import COM_PORT_OPTION, IAC, IAC_DOUBLED, PortManager
+
+from tickrig.device.twin import NonCopyable
+from tickrig.emulators.serial.bridge import HostSetting
+from tickrig.host.links.serial_link import tune
+from tickrig.wire.instant import NEVER
+
+# Where a serial line is served: `rfc2217://[HOST:]PORT` or `socket://[HOST:]PORT`.
+
+_SCHEMES: Final = ("rfc2217", "socket")
+_LOOPBACK: Final = "127.0.0.1"
+_MAX_PORT: Final = 65_535
+
+
+@dataclass(frozen=True, slots=True)
+class ServeUrl:
+    """An address to listen at, and what is spoken there.
+
+    Attributes:
+        scheme: `rfc2217`, or `socket` for the bytes of the line and nothing else.
+        host: name or address of this machine, an IPv6 address without brackets.
+        port: TCP port; 0 lets the system pick one.
+    """
+
+    scheme: str
+    host: str = _LOOPBACK
+    port: int = 0
+
+    def __str__(self) -> str:
+        """Return the URL as pyserial opens it."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{self.scheme}://{host}:{self.port}"
+
+
+def parse_serve_url(text: str) -> ServeUrl:
+    """Read where a line is to be served.
+
+    Args:
+        text: `SCHEME://[HOST:]PORT`; without a host only this machine can connect.
+
+    Raises:
+        ValueError: it is none; the text says what came and what is allowed.
+
+    >>> str(parse_serve_url("rfc2217://7000")), str(parse_serve_url("socket://[::1]:0"))
+    ('rfc2217://127.0.0.1:7000', 'socket://[::1]:0')
+    """
+    scheme, found, place = text.partition("://")
+    if not found or scheme not in _SCHEMES:
+        allowed = " or ".join(f"{name}://[HOST:]PORT" for name in _SCHEMES)
+        raise ValueError(f"{text!r} is not {allowed}")
+    host, colon, port = place.rpartition(":")
+    bare = host[1:-1] if host[:1] + host[-1:] == "[]" else host
+    if colon and not bare:
+        raise ValueError(f"{text!r}: no host before the colon; 0.0.0.0 is every address")
+    if not (port.isascii() and port.isdecimal()) or int(port[:6]) > _MAX_PORT:
+        raise ValueError(f"{text!r}: port {port!r} is not in 0..{_MAX_PORT}")
+    if ":" in bare and bare == host:
+        raise ValueError(f"{text!r}: an IPv6 address stands in brackets, as [::1]")
+    return ServeUrl(scheme, bare or _LOOPBACK, int(port))
+
+
+# A host that was told to leave.
+
+LEAVING_US: Final = 1_000_000
+_DISCARDED_BYTES: Final = 65_536
+
+
+class DismissedHost:
+    """A host that is told why it cannot stay, and has a second to read it.
+
+    A connection that is closed while its host still sends is reset, and some systems then drop
+    what the host had not read yet. So what comes is read, and dropped.
+
+    Args:
+        connection: to the host.
+        now_us: the time.
+        reason: a line of text.
+    """
+
+    def __init__(self, connection: socket.socket, now_us: int, reason: str) -> None:
+        self._connection, self._until_us = connection, now_us + LEAVING_US
+        connection.setblocking(False)
+        with suppress(OSError):  # gone already
+            connection.send(f"{reason}\r\n".encode())
+            connection.shutdown(socket.SHUT_WR)
+
+    def is_gone(self, now_us: int) -> bool:
+        """Hang up if the host has, or if its time is over; return whether it is gone."""
+        try:
+            gone = not self._connection.recv(_DISCARDED_BYTES)
+        except BlockingIOError:
+            gone = False
+        except OSError:
+            gone = True
+        if gone or now_us >= self._until_us:
+            self.close()
+            return True
+        return False
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
+
+
+# A host on a TCP connection that carries the bytes of the line and nothing else.
+
+READ_BYTES: Final = 1_024
+_SEND_BUFFER_BYTES: Final = 16_384
+"""Of the kernel: what is in it comes late to a host that did not read."""
+
+LAST_WORDS_US: Final = 1_000_000
+STUCK_US: Final = 30_000_000
+
+
+class HostConnection:
+    """A host on a plain connection; nothing here ever waits for it.
+
+    What it does not read is kept up to `buffer_bytes`; after that whole sends are dropped
+    and counted, as on a pty. A host that sends no more, but may still read, as `nc` at the
+    end of its input, is given what comes within a second.
+
+    Args:
+        connection: to the host.
+        buffer_bytes: bytes kept for a host that does not read.
+
+    Attributes:
+        connection: to the host.
+        over: the host has gone, or was hung up on.
+        mistake: why it has to be left, if it sent what cannot be understood.
+        is_idle: nothing of it was waiting at the latest look.
+        lost: bytes dropped because it did not read.
+    """
+
+    def __init__(self, connection: socket.socket, buffer_bytes: int) -> None:
+        self.connection, self._buffer_bytes = connection, buffer_bytes
+        self._unsent, self._held = bytearray(), b""
+        self._stuck_us: int | None = None
+        self._last_words_us: int | None = None
+        self.over, self.mistake, self.is_idle, self.lost = False, "", True, 0
+        connection.setblocking(False)
+        with suppress(OSError):  # gone already, or no TCP: the ends of a pair, in tests
+            _tune(connection)
+
+    @property
+    def setting(self) -> str:
+        """What it has set the port to, as `9600 8N1`; empty where it cannot."""
+        return ""
+
+    def has_ended(self, now_us: int) -> bool:
+        """Whether another host may have the line: this one sends no more, or is stuck."""
+        stuck = self._stuck_us is not None and now_us - self._stuck_us >= STUCK_US
+        return self.over or stuck or self._last_words_us is not None
+
+    def poll(self, now_us: int) -> bytes:
+        """Take some of what it sent; what was held comes first."""
+        if not self._held:
+            return self._look(now_us)
+        data, self._held, self.is_idle = self._held, b"", False
+        if self._last_words_us is not None:  # it is answered from now on
+            self._last_words_us = now_us + LAST_WORDS_US
+        return data
+
+    def hold(self, now_us: int) -> None:
+        """Negotiate while another host has the line, and keep some of what it sends."""
+        if len(self._held) < READ_BYTES and not self.has_ended(now_us):
+            self._held += self._look(now_us)
+        self.over |= self.has_ended(now_us) and not self._held  # it has not waited
+
+    def send(self, now_us: int, traffic: bytes) -> None:
+        """Send as much as fits, and keep the rest for later."""
+        if len(self._unsent) + len(traffic) > self._buffer_bytes:
+            self.lost += len(traffic)
+        else:
+            self._unsent += self._give_out(traffic)
+        self.flush(now_us)
+
+    def flush(self, now_us: int) -> None:
+        """Send of what is kept as much as fits."""
+        sent = 0
+        try:
+            if self._unsent and not self.over:
+                sent = self.connection.send(self._unsent)
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.over = True
+        del self._unsent[:sent]
+        if sent or not self._unsent:
+            self._stuck_us = None
+        elif self._stuck_us is None:
+            self._stuck_us = now_us
+
+    def close(self) -> None:
+        """Hang up."""
+        self.over = True
+        self.connection.close()
+
+    @property
+    def _may_read(self) -> bool:
+        """Whether there is room for what reading may bring forth."""
+        return True
+
+    def _take_in(self, data: bytes) -> bytes:
+        """Return what of it is for the device."""
+        return data
+
+    def _give_out(self, traffic: bytes) -> bytes:
+        """Return how it is sent to the host."""
+        return traffic
+
+    def _look(self, now_us: int) -> bytes:
+        """Take some of what comes."""
+        self.flush(now_us)
+        self.is_idle = True
+        if self._last_words_us is not None:
+            self.over |= now_us >= self._last_words_us
+        if self.over or self._last_words_us is not None or not self._may_read:
+            return b""
+        return self._take_in(self._read(now_us))
+
+    def _read(self, now_us: int) -> bytes:
+        try:
+            data = self.connection.recv(READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            self.over = True
+            return b""
+        self.is_idle = False
+        if not data:
+            self._last_words_us = now_us + LAST_WORDS_US
+        return data
+
+
+def _tune(connection: socket.socket) -> None:
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER_BYTES)
+    tune(connection)
+
+
+# A host on a connection that speaks telnet with the serial options of RFC 2217.
+
+_SIGNATURE: Final = b"tickrig"
+MAX_UNSENT_BYTES: Final = 8_192
+MAX_SUBOPTION_BYTES: Final = 256
+
+_VALUE_BYTES: Final = {
+    **dict.fromkeys(
+        [
+            rfc2217.SET_DATASIZE,
+            rfc2217.SET_PARITY,
+            rfc2217.SET_STOPSIZE,
+            rfc2217.SET_CONTROL,
+            rfc2217.SET_LINESTATE_MASK,
+            rfc2217.SET_MODEMSTATE_MASK,
+            rfc2217.PURGE_DATA,
+        ],
+        1,
+    ),
+    rfc2217.SET_BAUDRATE: 4,
+}
+"""How long the value of a command is at least."""
+
+_KNOWN_VALUES: Final[Mapping[bytes, Mapping[int, object]]] = {
+    rfc2217.SET_PARITY: rfc2217.RFC2217_REVERSE_PARITY_MAP,
+    rfc2217.SET_STOPSIZE: rfc2217.RFC2217_REVERSE_STOPBIT_MAP,
+}
+_NO_FLOW_CONTROL_IN: Final = 14
+_NO_FLOW_CONTROL: Final = 1
+
+
+class QuietAdapter(SerialBase):
+    """The settings of a serial adapter with nothing on its modem lines: all of them are off."""
+
+    cts = dsr = ri = cd = False
+
+    def reset_input_buffer(self) -> None:
+        """Do nothing: what the device sent is on its way to the host, who drops it there."""
+
+    def reset_output_buffer(self) -> None:
+        """Do nothing: what came before is on the line."""
+
+
+class SafePortManager(PortManager):
+    """pyserial's, made whole: it answers what RFC 2217 has answered, and survives any value."""
+
+    def _telnet_process_subnegotiation(self, suboption: bytes) -> None:
+        option, command, value = suboption[:1], suboption[1:2], suboption[2:]
+        if option != COM_PORT_OPTION or len(value) < _VALUE_BYTES.get(command, 0):
+            return
+        if command in _KNOWN_VALUES and value[0] not in _KNOWN_VALUES[command]:
+            suboption = option + command + b"\0"  # it is told what is set
+        if command == b"\0":
+            self.rfc2217_send_subnegotiation(b"\x64", _SIGNATURE)
+        elif command == rfc2217.SET_CONTROL and (state := self._control_state(value[0])):
+            self.rfc2217_send_subnegotiation(rfc2217.SERVER_SET_CONTROL, bytes([state]))
+        else:
+            super()._telnet_process_subnegotiation(suboption)  # type: ignore[misc] # no stub
+            if command in (rfc2217.SET_LINESTATE_MASK, rfc2217.SET_MODEMSTATE_MASK):
+                self.rfc2217_send_subnegotiation(rfc2217.RFC2217_ANSWER_MAP[command], value[:1])
+
+    def _control_state(self, request: int) -> int:
+        """Return what is answered to SET-CONTROL where pyserial has no answer, else 0."""
+        port = self.serial
+        for query, is_on in ((4, port.break_condition), (7, port.dtr), (10, port.rts)):
+            if request == query:
+                return query + 1 if is_on else query + 2
+        if request in range(13, 17):
+            return _NO_FLOW_CONTROL_IN
+        return _NO_FLOW_CONTROL if request in range(17, 20) else 0
+
+
+class Rfc2217Connection(HostConnection):
+    """A host that may set the port, as on a serial server; pyserial's `rfc2217://` is one.
+
+    What it sets is answered and remembered, and changes nothing on the line: the device has
+    its own rate. Its DTR, RTS and break reach nobody; CTS, DSR, CD and RI are off. One whose
+    telnet cannot be understood is left. Not emulated: FLOWCONTROL-SUSPEND, and purging what
+    is on the line already.
+
+    Args:
+        connection: to the host.
+        buffer_bytes: bytes kept for a host that does not read.
+        baud: what the port is set to until the host sets it, with 8N1.
+    """
+
+    def __init__(self, connection: socket.socket, buffer_bytes: int, baud: int) -> None:
+        super().__init__(connection, buffer_bytes)
+        self._adapter = QuietAdapter(baudrate=baud)  # type: ignore[abstract] # it carries no bytes
+        # typeshed wants two pyserial ports; any port and a writer will do (pyserial docs)
+        self._manager = SafePortManager(self._adapter, self)  # type: ignore[arg-type]
+
+    @property
+    def setting(self) -> str:
+        """What it has set the port to, as `9600 8N1`."""
+        port = self._adapter
+        return f"{port.baudrate} {port.bytesize}{port.parity}{port.stopbits}"
+
+    def write(self, data: bytes) -> None:
+        """Answer a negotiation; pyserial's manager calls this."""
+        self._unsent += data
+
+    @property
+    def _may_read(self) -> bool:
+        return len(self._unsent) < MAX_UNSENT_BYTES
+
+    def _take_in(self, data: bytes) -> bytes:
+        try:
+            taken = b"".join(self._manager.filter(data))
+        except TypeError:  # how pyserial's manager fails at it
+            self.mistake = "IAC SE without IAC SB"
+            return b""
+        if len(self._manager.suboption or b"") > MAX_SUBOPTION_BYTES:
+            self.mistake = f"IAC SB without IAC SE in {MAX_SUBOPTION_BYTES} bytes"
+        return taken
+
+    def _give_out(self, traffic: bytes) -> bytes:
+        return traffic.replace(IAC, IAC_DOUBLED)
+
+
+# The host's end of a serial line, served over TCP.
+
+_RECEIVE_BUFFER_BYTES: Final = 4_096
+"""Of the kernel: a host that writes faster than the line is held up soon, as at a real port."""
+
+_MAX_BAUD: Final = 4_000_000
+"""Above it no adapter goes: the device is on USB, and its host may set what it likes."""
+
+MAX_DISMISSED: Final = 8
+
+QUIET_US: Final = 10_000_000
+"""After a warning there is none for so long."""
+
+_OPEN_TO_OTHERS: Final = (
+    "Whoever reaches port %s of %s can drive this device: there is no password."
+    " Leave out the host to serve this machine alone."
+)
+
+_log = logging.getLogger(__name__)
+
+
+class NetworkPort(NonCopyable):
+    """A `Port[bytes]` that a host reaches over TCP; hosts may come and go, one at a time.
+
+    A second host is told so in a line of text and is left, unless the present one sends no
+    more, or has not read for 30 s. Whether it does is known only behind all that it sent: until
+    that is on the line one more host is listened to, and a little of what it sends is kept.
+    While there is no host, what the device sends is gone, as
+    on a line without one. Nothing here ever waits, and what is kept for a host is bounded. There
+    is no password: a port that other machines can reach is warned of.
+
+    Args:
+        url: where to listen.
+        buffer_bytes: bytes kept for a host that does not read.
+
+    Attributes:
+        url: where hosts of this machine connect, as pyserial opens it, with its port.
+        address: the address that it listens at.
+        port: its TCP port.
+        spoken: whether a host ever sent something.
+
+    Raises:
+        OSError: the port is taken, or the host is no address of this machine; the URL is its
+            `filename`.
+    """
+
+    why_not_copied = "it is a TCP port of this machine"
+
+    def __init__(self, url: ServeUrl, buffer_bytes: int = 4_096) -> None:
+        self._listener = _listen(url)
+        self._buffer_bytes, self._baud = buffer_bytes, 115_200
+        self._host: HostConnection | None = None
+        self._next: tuple[HostConnection, str] | None = None
+        self._dismissed: list[DismissedHost] = []
+        self._lost, self._peer, self._quiet_until_us = 0, "", 0
+        self._setting: HostSetting | None = None
+        self.spoken = False
+        self.address, self.port = self._listener.getsockname()[:2]
+        self.url = str(replace(url, host=_reachable(self.address), port=self.port))
+        if not ipaddress.ip_address(self.address.partition("%")[0]).is_loopback:
+            _log.warning(_OPEN_TO_OTHERS, self.port, self.address)
+
+    @property
+    def due_us(self) -> int:
+        """Unknown to anybody but the host."""
+        return NEVER
+
+    @property
+    def lost(self) -> int:
+        """Bytes dropped because a host did not read."""
+        return self._lost + (self._host.lost if self._host else 0)
+
+    @property
+    def host_setting(self) -> str:
+        """What the host has set it to, as `9600 8N1`; empty if that is the device's, or unknown."""
+        return self._setting.differing if self._setting else ""
+
+    def watch_setting(self, baud: int, notify: Callable[[str], None]) -> None:
+        """Set it as the device is, and tell when a host sets it otherwise; see `HostSetting`.
+
+        Args:
+            baud: the device's rate in bit/s, with 8N1; above 4 Mbit/s it is not watched.
+            notify: called with a setting as `9600 8N1` that is not the device's.
+        """
+        self._baud = baud
+        if baud <= _MAX_BAUD:
+            own = f"{baud} 8N1"
+            self._setting = HostSetting(lambda: self._present_setting or own, own, notify)
+
+    def poll(self, now_us: int, /) -> bytes:
+        """Take some of what the host sent; let hosts come and go."""
+        data = self._host.poll(now_us) if self._host else b""
+        self.spoken |= bool(data)
+        if self._host and self._host.mistake:
+            self._leave(self._host, self._peer, now_us)
+            self._forget(self._host)
+        elif self._host and self._host.over:
+            self._hang_up()
+        self.attend(now_us)
+        self._let_in(now_us)
+        return data
+
+    def attend(self, now_us: int, /) -> None:
+        """Let hosts come and go, and give them what is kept for them, but take nothing.
+
+        It is called between polls as long as the line has no room for what was taken before.
+        """
+        if self._host is not None:
+            self._host.flush(now_us)
+        self._dismissed = [host for host in self._dismissed if not host.is_gone(now_us)]
+        self._attend_next(now_us)
+        if self._setting is not None:
+            self._setting.look(now_us)
+
+    def send(self, now_us: int, traffic: bytes, /) -> None:
+        """Send to the host, if there is one, as much as fits; keep the rest for later."""
+        if self._host is not None:
+            self._host.send(now_us, traffic)
+
+    def close(self) -> None:
+        """Hang up, and listen no more."""
+        self._hang_up()
+        for host in self._dismissed:
+            host.close()
+        if self._next is not None:
+            self._next[0].close()
+        self._listener.close()
+        self._setting = None
+
+    @property
+    def _present_setting(self) -> str:
+        return self._host.setting if self._host else ""
+
+    def _attend_next(self, now_us: int) -> None:
+        """Accept the next host, and listen to it until the line is its own."""
+        if self._next is None:
+            with suppress(OSError):  # nobody, or gone again, or no descriptor is left
+                connection, address = self._listener.accept()
+                self._next = self._connected(connection), "{}:{}".format(*address[:2])
+            return
+        host, peer = self._next
+        host.hold(now_us)
+        if host.mistake:
+            self._leave(host, peer, now_us)
+        elif host.over:
+            host.close()
+        else:
+            return
+        self._next = None
+
+    def _let_in(self, now_us: int) -> None:
+        """Give the line to the next host, or refuse it, as soon as it is known which."""
+        if self._next is None:
+            return
+        host, peer = self._next
+        if self._host is None or self._host.has_ended(now_us):
+            self._hang_up()
+            self._host, self._peer = host, peer
+            _log.info("%s: host %s", self.url, peer)
+        elif self._host.is_idle:
+            self._refuse(host.connection, peer, now_us)
+        else:
+            return
+        self._next = None
+
+    def _connected(self, connection: socket.socket) -> HostConnection:
+        if self.url.startswith("socket:"):
+            return HostConnection(connection, self._buffer_bytes)
+        # slow to load, and only wanted here
+
+        return Rfc2217Connection(connection, self._buffer_bytes, self._baud)
+
+    def _refuse(self, connection: socket.socket, peer: str, now_us: int) -> None:
+        """Send a second host away."""
+        reason = f"{self.url} has a host already: {self._peer}"
+        self._warn(now_us, f"{reason}; {peer} was refused")
+        self._dismiss(connection, now_us, reason)
+
+    def _leave(self, host: HostConnection, peer: str, now_us: int) -> None:
+        """Send a host away that cannot be understood."""
+        self._warn(now_us, f"{self.url}: host {peer} was left: {host.mistake}")
+        self._dismiss(host.connection, now_us, host.mistake)
+
+    def _dismiss(self, connection: socket.socket, now_us: int, reason: str) -> None:
+        self._dismissed.append(DismissedHost(connection, now_us, reason))
+        if len(self._dismissed) > MAX_DISMISSED:
+            self._dismissed.pop(0).close()
+
+    def _hang_up(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._forget(self._host)
+
+    def _forget(self, host: HostConnection) -> None:
+        self._lost += host.lost
+        self._host = None
+
+    def _warn(self, now_us: int, text: str) -> None:
+        """Tell people, but not all that a host does over and over."""
+        if now_us >= self._quiet_until_us:
+            self._quiet_until_us = now_us + QUIET_US
+            _log.warning("%s", text)
+
+
+def _listen(url: ServeUrl) -> socket.socket:
+    """Return a listening socket, non-blocking; OSError names the URL."""
+    try:
+        family, kind, protocol, address = _resolve(url)
+        listener = socket.socket(family, kind, protocol)
+        try:
+            if os.name == "posix":  # else somebody could take the same port
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            with suppress(OSError):
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
+            listener.bind(address)
+            listener.listen()
+        except OSError:
+            listener.close()
+            raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(url)) from error
+    listener.setblocking(False)
+    return listener
+
+
+def _resolve(url: ServeUrl) -> tuple[int, int, int, Any]:
+    """Return family, kind, protocol and address of where to listen."""
+    try:
+        found = socket.getaddrinfo(url.host, url.port, type=socket.SOCK_STREAM)
+    except ValueError as error:  # what IDNA cannot take, as a..b
+        raise OSError(errno.EINVAL, f"{url.host!r} is no name of a host") from error
+    family, kind, protocol, _, address = found[0]
+    return family, kind, protocol, address
+
+
+def _reachable(address: str) -> str:
+    """Return the address at which this machine reaches itself."""
+    every = {"0.0.0.0": _LOOPBACK, "::": "::1"}
+    return every.get(address, address)

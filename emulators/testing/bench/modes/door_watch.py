@@ -1,0 +1,160 @@
+"""A link of a host, with a watch at it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from time import monotonic_ns
+from typing import Any, Generic, Protocol
+
+from tickrig.emulators.testing.bench.errors import PortGone
+from tickrig.host.links.link import Link, LinkClosed, StampedFrames, StampedLink, W
+from tickrig.host.text.trace import Mark
+from tickrig.wire.can import CanFrame, ErrorFrame, Frames
+
+# What the doors of a bench tell of the host that goes through them.
+
+Seen = tuple[CanFrame | ErrorFrame, ...]
+"""What passes a door of a bus."""
+
+
+class DoorWatch(Protocol):
+    """Who is told what passes a door, and how the host keeps time."""
+
+    def used(self) -> None:
+        """Take note that the host is about to send or to wait; may forbid it by raising."""
+
+    def waited(self, wanted_us: int, took_us: int) -> None:
+        """Take note of a wait in vain: how long it was to take, and how long it took."""
+
+    def sending(self, traffic: Any) -> AbstractContextManager[object]:
+        """Return what is entered while bytes or frames are sent, which other doors may see."""
+        ...
+
+    def passed(self, mark: Mark, traffic: Any) -> None:
+        """Take note of bytes or frames."""
+
+
+def _now_us() -> int:
+    return monotonic_ns() // 1_000
+
+
+class HostPace:
+    """How late a host was in its waits.
+
+    Attributes:
+        late_us: the worst so far.
+    """
+
+    def __init__(self, now_us: Callable[[], int] = _now_us) -> None:
+        self._now_us, self.late_us = now_us, 0
+
+    def waited(self, wanted_us: int, took_us: int) -> None:
+        """Take note of a wait in vain."""
+        self.late_us = max(self.late_us, took_us - wanted_us)
+
+    def sending(self, traffic: object) -> AbstractContextManager[object]:
+        """Nothing: it is of no matter here who sees what is sent."""
+        return nullcontext()
+
+    @contextmanager
+    def waiting(self, wanted_us: int) -> Iterator[None]:
+        """Take note of what is waited for inside, which ends by itself in time."""
+        begun_us = self._now_us()
+        yield
+        self.waited(wanted_us, self._now_us() - begun_us)
+
+
+class LinkGone(PortGone, LinkClosed):
+    """The port of a link is there no more; for hosts, the line is closed."""
+
+
+class WatchedLink(Generic[W]):
+    """A `Link` that tells what passes, and how long its waits in vain took.
+
+    Args:
+        link: the link behind it.
+        watch: is told.
+    """
+
+    def __init__(self, link: Link[W], watch: DoorWatch) -> None:
+        self._link, self._watch, self._closed = link, watch, False
+
+    @property
+    def now_us(self) -> int:
+        """The clock of the link behind it."""
+        return self._link.now_us
+
+    def send(self, traffic: W, /) -> None:
+        """Send traffic.
+
+        Raises:
+            LinkGone: the port is there no more.
+            LinkClosed: the link was closed.
+        """
+        self._watch.used()
+        with self._told_if_gone(), self._watch.sending(traffic):
+            self._link.send(traffic)
+        self._watch.passed(Mark.TO_DEVICE, traffic)
+
+    def receive(self, timeout_us: int, /) -> W:
+        """Return what arrived, or empty traffic after `timeout_us`.
+
+        Raises:
+            LinkGone: the port is there no more.
+            LinkClosed: the link was closed.
+        """
+        self._watch.used()
+        begun_us = self.now_us
+        with self._told_if_gone():
+            traffic = self._link.receive(timeout_us)
+        self._took(timeout_us, begun_us, traffic)
+        return traffic
+
+    def close(self) -> None:
+        """Close the link behind it."""
+        self._closed = True
+        self._link.close()
+
+    def _took(self, wanted_us: int, begun_us: int, traffic: W) -> None:
+        if traffic:
+            self._watch.passed(Mark.FROM_DEVICE, traffic)
+        else:
+            self._watch.waited(wanted_us, self.now_us - begun_us)
+
+    @contextmanager
+    def _told_if_gone(self) -> Iterator[None]:
+        """Tell a port that is gone from a line that the host has closed."""
+        try:
+            yield
+        except LinkClosed as error:
+            if self._closed:
+                raise
+            raise LinkGone(str(error)) from error
+
+
+class WatchedFrameLink(WatchedLink[Frames]):
+    """A `StampedLink` with a watch at it.
+
+    Args:
+        link: the link behind it.
+        watch: is told.
+    """
+
+    def __init__(self, link: StampedLink, watch: DoorWatch) -> None:
+        super().__init__(link, watch)
+        self._stamped = link
+
+    def receive_stamped(self, timeout_us: int, /) -> tuple[int, StampedFrames]:
+        """Wait for a first frame; return a time, and all that had arrived by then.
+
+        Raises:
+            LinkGone: the bus is there no more.
+            LinkClosed: the link was closed.
+        """
+        self._watch.used()
+        begun_us = self.now_us
+        with self._told_if_gone():
+            now_us, received = self._stamped.receive_stamped(timeout_us)
+        self._took(timeout_us, begun_us, tuple(frame for _, frame in received))
+        return now_us, received

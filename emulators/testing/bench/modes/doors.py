@@ -1,0 +1,259 @@
+"""The outside ends of an emulated bench: ptys, TCP ports, and buses of python-can."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from tickrig.emulators.rig.port import OutsideBridge
+from tickrig.emulators.serial.bridge import Bridge
+from tickrig.emulators.serial.emulator import SerialHub
+from tickrig.emulators.serial.network import NetworkPort, parse_serve_url
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.modes.door_watch import (
+    DoorWatch,
+    LinkGone,
+    WatchedFrameLink,
+    WatchedLink,
+)
+from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
+from tickrig.emulators.testing.rig_file.plan import BusPlan, DoorPlan, RealPlan
+from tickrig.host.control.clock import ServingClock
+from tickrig.host.links.link import LinkClosed
+from tickrig.host.text.trace import Mark
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import can
+    import canopen
+    import serial
+
+    from tickrig.emulators.serial.pty_port import PtyPort
+    from tickrig.host.links.link import Link, StampedLink
+
+
+# The doors that hosts come in by: ports and buses of this machine.
+
+_NOTIFIER_S: Final = 0.1
+"""How often the canopen library looks whether it is to end."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinePlace:
+    """Where a serial line is.
+
+    Attributes:
+        url: device path, or URL of pyserial.
+        baud: in bit/s.
+        framing: data bits, parity, stop bits.
+    """
+
+    url: str
+    baud: int = 115_200
+    framing: str = "8N1"
+
+
+class Doors:
+    """Opens doors for hosts; what a host leaves open is closed with them.
+
+    Args:
+        places: where the wires are, by name.
+        watch_of: returns who watches the doors of a wire.
+    """
+
+    def __init__(
+        self, places: Mapping[str, LinePlace | BusPlan], watch_of: Callable[[str], DoorWatch]
+    ) -> None:
+        self._places, self._watch_of = places, watch_of
+        self._opened = ExitStack()
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a link; see `BenchMode`."""
+        place, watch = self._place(wire), self._watch_of(wire)
+        link: WatchedLink[Any]
+        if isinstance(place, BusPlan):
+            link = WatchedFrameLink(_frame_link(place, watch), watch)
+        else:
+            link = WatchedLink(_line_link(place), watch)
+        self._opened.callback(link.close)
+        return link
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a line by pyserial; see `BenchMode`."""
+        from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415 - slow
+            open_watched_serial,
+        )
+
+        place = self._place(wire)
+        if isinstance(place, BusPlan):
+            raise ValueError(f"{wire} is a CAN bus, not a serial line")
+        data, parity, stop = int(place.framing[0]), place.framing[1], float(place.framing[2:])
+        own = {"baudrate": place.baud, "bytesize": data, "parity": parity, "stopbits": stop}
+        locked = {"exclusive": True}  # a second host takes bytes away from the first
+        port = open_watched_serial(place.url, self._watch_of(wire), {**own, **locked, **options})
+        self._opened.callback(port.close)
+        return port
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can; see `BenchMode`."""
+        from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415 - slow
+            open_watched_bus,
+        )
+        from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
+
+        bus = open_watched_bus(self._bus(wire), self._watch_of(wire), options)
+        self._opened.callback(close_bus, bus)
+        return bus
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus; see `BenchMode`."""
+        import canopen  # noqa: PLC0415 - slow
+
+        network = canopen.Network(self.can_bus(wire, {}))
+        network.NOTIFIER_CYCLE = _NOTIFIER_S
+        self._opened.callback(network.disconnect)
+        return network.connect()
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself; see `BenchMode`."""
+        place = self._places[wire]
+        if isinstance(place, LinePlace):
+            return place.url
+        rate = {} if place.bit_rate is None else {"bitrate": place.bit_rate}
+        return {"interface": place.interface, "channel": place.channel, **rate, **place.options}
+
+    def close(self) -> None:
+        """Close what is still open."""
+        self._opened.close()
+
+    def _place(self, wire: str) -> LinePlace | BusPlan:
+        if wire not in self._places:
+            raise NotOnThisBench(f"nobody has said where {wire} is")
+        return self._places[wire]
+
+    def _bus(self, wire: str) -> BusPlan:
+        place = self._place(wire)
+        if isinstance(place, LinePlace):
+            raise ValueError(f"{wire} is a serial line, not a CAN bus")
+        return place
+
+
+def _line_link(place: LinePlace) -> Link[bytes]:
+    from tickrig.host.links.serial_link import SerialLink  # noqa: PLC0415 - pyserial is slow
+
+    try:
+        return SerialLink(place.url, place.baud)
+    except LinkClosed as error:
+        raise LinkGone(str(error)) from error
+
+
+def _frame_link(place: BusPlan, watch: DoorWatch) -> StampedLink:
+    from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415 - slow
+        name_of,
+        open_bus,
+    )
+    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
+    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
+
+    link = CanLink(open_bus(place, {}), name_of(place))
+    link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
+    return free_of_echo(link, place.interface)
+
+
+_IN_PROCESS: Final = "virtual"
+"""The bus of python-can that has both ends in one process."""
+
+_WITHOUT_PTYS: Final = "socket://0"
+"""Where a line is on a system without ptys, for this machine alone."""
+
+
+class OutsideEnds:
+    """Where hosts find the wires of a bench in real time.
+
+    A serial line is at a pty, on a system without ptys at a TCP port, and at what it is served by
+    too. A CAN bus is joined with one of
+    python-can: unless told otherwise one in this process, on a channel of its own.
+
+    Args:
+        mounts: the wires.
+        plan: where they are to be.
+
+    Attributes:
+        clock: of the rig.
+        bridges: between the wires and the outside, for the rig.
+        places: where hosts of this process come in, by the name of the wire.
+        ports: of the lines, by the name of the wire.
+
+    Raises:
+        BusGone: a bus cannot be opened.
+        OSError: no port is to be had, or no link can be made.
+    """
+
+    def __init__(self, mounts: Iterable[Mount], plan: RealPlan | None = None) -> None:
+        doors = {} if plan is None else plan.doors
+        self.clock, self._stack = ServingClock(), ExitStack()
+        self.bridges: list[OutsideBridge] = []
+        self.places: dict[str, LinePlace | BusPlan] = {}
+        self.ports: dict[str, list[PtyPort | NetworkPort]] = {}
+        with ExitStack() as undo:
+            undo.callback(self.close)
+            for mount in mounts:
+                door = doors.get(mount.name, DoorPlan())
+                if isinstance(mount, LineMount):
+                    self._open_line(mount, door)
+                else:
+                    self._open_bus(mount, door.bus or _own_bus(mount))
+            undo.pop_all()
+
+    def _open_line(self, mount: LineMount, door: DoorPlan) -> None:
+        own = self._own_port(door.link)
+        served = [self._serve(url) for url in door.serve]
+        self.ports[mount.name] = [own, *served]
+        hub = SerialHub([own, *served])
+        self.bridges.append(Bridge(mount.line.b, hub, hub.attend))
+        url = own.url if isinstance(own, NetworkPort) else own.path
+        self.places[mount.name] = LinePlace(url, mount.settings.baud)
+
+    def _own_port(self, link: Path | None) -> PtyPort | NetworkPort:
+        """Open the port for hosts of this process: a TCP port where there are no ptys."""
+        try:
+            from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
+        except ImportError:
+            return self._serve(_WITHOUT_PTYS)
+        pty = PtyPort(link)
+        self._stack.callback(pty.close)
+        return pty
+
+    def _serve(self, url: str) -> NetworkPort:
+        port = NetworkPort(parse_serve_url(url))
+        self._stack.callback(port.close)
+        return port
+
+    def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
+        from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow
+        from tickrig.emulators.can.outside.bus_port import port_on  # noqa: PLC0415 - slow
+        from tickrig.emulators.testing.bench.modes.door_watch import LinkGone  # noqa: PLC0415
+        from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415
+            name_of,
+            open_bus,
+        )
+        from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
+
+        bus = open_bus(plan, {})
+        self._stack.callback(close_bus, bus)
+        port = port_on(bus, plan.interface, name_of(plan), LinkGone)
+        self.bridges.append(CanBridge(mount.open_end(), port))
+        self.places[mount.name] = plan
+
+    def close(self) -> None:
+        """Give everything back."""
+        self._stack.close()
+
+
+def _own_bus(mount: BusMount) -> BusPlan:
+    """Return a bus that nobody else has."""
+    return BusPlan(interface=_IN_PROCESS, channel=f"{mount.name} {id(mount)}")

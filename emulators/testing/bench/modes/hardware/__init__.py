@@ -1,1 +1,0 @@
-"""Real devices at their ports, with an operator who does what no program can."""

@@ -1,0 +1,287 @@
+"""A bench of real devices: ports, buses, and an operator."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
+
+from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
+from tickrig.emulators.bench.running_emulator import keeping_time
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.testing.bench.bench_rig import BenchDescription, BenchRig, RigState
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.modes.door_journal import DoorJournal, PortRecord
+from tickrig.emulators.testing.bench.modes.door_watch import HostPace
+from tickrig.emulators.testing.bench.modes.doors import Doors, LinePlace
+from tickrig.emulators.testing.bench.modes.human_operator import Terminal
+from tickrig.emulators.testing.bench.modes.lateness import CpuWaits, too_slow
+from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.modes.operators import Operators
+from tickrig.emulators.testing.bench.mounts import LineMount, Mount
+from tickrig.emulators.testing.bench.plan_parts import parts_of
+from tickrig.emulators.testing.bench.tasks import Condition, text_of
+from tickrig.emulators.testing.rig_file.plan import BusPlan, HardwarePlan, RigPlan, Tolerances
+from tickrig.host.control.requests import Object
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.host.links.link import Link
+
+
+# Where the wires of real devices are.
+
+
+def _places_of(
+    plan: RigPlan, hardware: HardwarePlan, mounts: Mapping[str, Mount]
+) -> dict[str, LinePlace | BusPlan]:
+    """Return where the wires are, by name; those that nobody has told are left out.
+
+    Args:
+        plan: the rig file.
+        hardware: what it says of real devices.
+        mounts: such wires, which know the rate of their devices.
+    """
+    places: dict[str, LinePlace | BusPlan] = dict(hardware.buses)
+    for wire, port in hardware.ports.items():
+        mount = mounts[wire]
+        assert isinstance(mount, LineMount)
+        baud = port.baud or mount.settings.baud
+        places[wire] = LinePlace(port.port, baud, plan.wires[wire].framing)
+    return places
+
+
+T = TypeVar("T")
+
+_Begin = Callable[[int], None]
+"""Does what has waited, at a time."""
+
+_POLL_US: Final = 5_000
+"""How often a condition is asked."""
+
+
+class HardwareMode:
+    """A `BenchMode` of real devices. What the rig file says of them is not made, but believed.
+
+    A device is at a port or on a bus; its operator is a human at the terminal, or the control
+    socket of an emulator that plays the device. Conditions are asked whenever something passes
+    a door, and while the bench waits.
+
+    Args:
+        plan: what the rig file says, `[hardware]` included.
+        terminal: where the human is.
+
+    Raises:
+        ValueError: the plan does not say where the devices are.
+        Refused: it names a device that there is not.
+        PortGone: an emulator is not there.
+    """
+
+    name = "hardware"
+
+    def __init__(self, plan: RigPlan, terminal: Terminal | None = None) -> None:
+        if plan.hardware is None:
+            raise ValueError("the rig file has no [hardware], which says where the devices are")
+        self._plan, self._where = plan, plan.hardware
+        self._terminal, self._begun_ns = terminal or Terminal(), time.monotonic_ns()
+        self._like = BenchRig("bench", RigState(parts_of(_without_stores(plan)), keeps=False))
+        self._pace, self._pending = HostPace(), list[tuple[Condition, _Begin]]()
+        self._looking = self._begun = False
+        self.orders = list[FaultOrder]()
+        mounts = self._like.state.mounts
+        self._record = PortRecord(plan, mounts, lambda: self.now_us)
+        self._journal = DoorJournal(lambda: self.now_us, self._look, self._record)
+        places = _places_of(plan, self._where, mounts)
+        self._doors = Doors(places, lambda wire: self._journal.watch(mounts[wire], self._pace))
+        self._waits = CpuWaits()
+        self._operators = Operators(plan, self._where, self._like, self._terminal, self._journal)
+        self._stack = ExitStack()
+        self._stack.enter_context(keeping_time())
+        for close in (self._operators.close, self._doors.close):
+            self._stack.callback(close)
+
+    @property
+    def devices(self) -> tuple[str, ...]:
+        """The names of all devices."""
+        return tuple(self._plan.devices)
+
+    @property
+    def wires(self) -> tuple[str, ...]:
+        """The names of all wires."""
+        return tuple(self._plan.wires)
+
+    @property
+    def now_us(self) -> int:
+        """The time since the bench was opened."""
+        return (time.monotonic_ns() - self._begun_ns) // 1_000
+
+    @property
+    def tolerance(self) -> Tolerances:
+        """What the rig file says of the operator and the devices."""
+        return self._where.tolerance
+
+    def wire_of(self, device: str) -> str:
+        """Return the name of the wire that a device is on."""
+        return self._like.state.wire_of(device)
+
+    def request(self, do: str, **fields: Any) -> Object:
+        """Have the operator do what a control socket would; ValueError if it is refused."""
+        return self._operators.request(do, fields)
+
+    def fault(
+        self, owner: str, spec: FaultSpec, condition: Condition | None, for_us: int | None
+    ) -> None:
+        """Have a fault made, or note that it shall be."""
+        text = "" if condition is None else text_of(condition)
+        order = FaultOrder(spec, self.now_us, for_us, text)
+        begin = self._operators.fault(owner, order)
+        self.orders.append(order)
+        if condition is None:
+            begin(self.now_us)
+        else:
+            self._pending.append((condition, begin))
+            self._look()
+
+    def check_fault(self, owner: str, name: str) -> None:
+        """Raise ValueError unless the devices that these are like have a fault of this name."""
+        self._like.state.full_fault_name(owner, name)
+
+    def describe(self, owner: str) -> BenchDescription:
+        """Return what there is at the devices that these are like."""
+        return self._like.describe(owner)
+
+    def clear(self, owner: str, fault: str) -> None:
+        """Have a fault mended."""
+        self._operators.clear(owner, fault)
+
+    def switch_power(self, owner: str, *, on: bool) -> None:
+        """Have the supply of a device switched, of all if it is empty."""
+        self._operators.switch_power(owner, on=on)
+
+    def hear(self, listener: Callable[[WireLine], None]) -> None:
+        """Tell of each line and frame from now on."""
+        self._journal.listeners.append(listener)
+
+    def observe(self, owner: str, text: str, seen: Condition, within_us: int) -> bool:
+        """Ask the human at a device whether something is seen; an emulator is looked at."""
+        answer = self._operators.sees(owner, text)
+        if answer is not None:
+            return answer
+        return self.wait_until(seen, within_us + self.tolerance.time_us)
+
+    def perform(self, owner: str, text: str, do: Callable[[], object]) -> None:
+        """Have something done that is more than one act."""
+        if not self._operators.have_done(owner, text):
+            do()
+
+    def meanwhile(self, host: Callable[[int], object]) -> None:
+        """Let a host go on while a human is asked."""
+        self._terminal.hosts.append(host)
+
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+        self.wait_until(lambda: False, duration_us)
+
+    def wait_until(self, done: Condition, within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time."""
+        self._begin_with(None)
+        until_us = self.now_us + within_us
+        while True:
+            left_us = until_us - self.now_us
+            self._look()
+            if done():
+                return True
+            if left_us <= 0:
+                return False
+            wait_us = min(left_us, _POLL_US)
+            with self._pace.waiting(wait_us):
+                time.sleep(wait_us / 1e6)
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a host: bytes on a serial line, frames on a bus."""
+        return self._begin_with(self._doors.link(wire))
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a serial line by pyserial."""
+        return self._begin_with(self._doors.serial(wire, options))
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        return self._begin_with(self._doors.can_bus(wire, options))
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        return self._begin_with(self._doors.canopen_network(wire))
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        return self._begin_with(self._doors.address(wire))
+
+    def journal(self) -> tuple[WireLine, ...]:
+        """Return what passed the doors last, and what the operator did."""
+        return self._journal.lines()
+
+    def mappings(self) -> tuple[WireLine, ...]:
+        """Return the frames before the journal's which say what PDOs carry."""
+        return self._journal.mappings()
+
+    def unfinished(self) -> tuple[WireLine, ...]:
+        """Return what has begun at the doors of serial lines and did not end."""
+        return self._journal.unfinished()
+
+    def too_slow(self) -> str:
+        """Say why no failure is to be believed; empty if one is, or a human has said no."""
+        if self._operators.said_no:
+            return ""
+        host_us = max(self._pace.late_us, self._waits.worst_us)
+        return too_slow(host=host_us, emulator=self._operators.late_us)
+
+    def act(self, action: Callable[[BenchRig], T]) -> NoReturn:
+        """Refuse: there is no rig."""
+        raise NotOnThisBench("this works on emulated devices alone: here are real ones")
+
+    def save_trace(self, path: Path) -> None:
+        """Write what passed the ports and was done by hand; OSError if it cannot be."""
+        self._record.save(path)
+
+    def fork(self) -> NoReturn:
+        """Refuse: real devices cannot be copied."""
+        raise NotOnThisBench("real devices have no twins")
+
+    def close(self) -> None:
+        """Close all ports, and let the operator go."""
+        self._stack.close()
+
+    def _begin_with(self, door: T) -> T:
+        """Give the devices their power, now that somebody hears them."""
+        if not self._begun:
+            self._begun = True
+            self._operators.begin()
+        return door
+
+    def _look(self) -> None:
+        """Do what has waited for a condition that is true now."""
+        self._waits.look(self.now_us)
+        if self._looking:
+            return
+        self._looking = True
+        try:
+            for entry in tuple(self._pending):
+                condition, begin = entry
+                if condition():
+                    self._pending.remove(entry)
+                    begin(self.now_us)
+        finally:
+            self._looking = False
+
+
+def _without_stores(plan: RigPlan) -> RigPlan:
+    """Return the plan of devices that keep nothing: real ones have their own memory."""
+    devices = {name: replace(device, store=None) for name, device in plan.devices.items()}
+    return replace(plan, devices=devices)

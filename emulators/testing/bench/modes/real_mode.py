@@ -1,0 +1,285 @@
+"""A bench in real time: the rig runs in a thread of its own, hosts are at ptys and buses."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NoReturn, Self, TypeVar
+
+from tickrig.emulators.bench.control import EmulatorControl
+from tickrig.emulators.bench.running_emulator import keeping_time
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.modes.door_watch import HostPace
+from tickrig.emulators.testing.bench.modes.doors import Doors, OutsideEnds
+from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
+from tickrig.emulators.testing.bench.modes.lateness import CpuWaits, too_slow
+from tickrig.emulators.testing.bench.modes.mode import Address
+from tickrig.emulators.testing.bench.modes.rig_thread import RigThread
+from tickrig.emulators.testing.bench.mounts import LineMount, Mount
+from tickrig.emulators.testing.rig_file.plan import RealPlan, Tolerances
+from tickrig.host.control.requests import RequestDispatcher
+from tickrig.host.control.server import ControlServer
+from tickrig.host.text.trace import Mark
+
+if TYPE_CHECKING:
+    import can
+    import canopen
+    import serial
+
+    from tickrig.host.links.link import Link
+
+
+# The control socket of a bench, in a thread of its own.
+
+_LOOK_US: Final = 100_000
+"""How often it looks whether it is to end."""
+
+_Call = Callable[[Callable[[], bytes]], bytes]
+"""Does something between two ticks."""
+
+
+class ControlThread:
+    """Serves a control socket, and has each request answered between two ticks of the rig.
+
+    Args:
+        path: of the socket.
+        control: answers.
+        call: does something between two ticks.
+
+    Raises:
+        OSError: no socket can be made there.
+    """
+
+    def __init__(self, path: Path, control: EmulatorControl, call: _Call) -> None:
+        self._server = ControlServer(path, _Answers(control, call))
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name="tickrig control", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Hang up, and remove the socket."""
+        self._closing = True
+        self._thread.join()
+        self._server.close()
+
+    def _run(self) -> None:
+        while not self._closing:
+            self._server.serve(_LOOK_US)
+
+
+class _Answers(RequestDispatcher):
+    """Has requests answered elsewhere."""
+
+    def __init__(self, control: EmulatorControl, call: _Call) -> None:
+        super().__init__({})
+        self._control, self._call = control, call
+
+    def answer_line(self, line: bytes) -> bytes:
+        return self._call(lambda: self._control.answer_line(line))
+
+
+T = TypeVar("T")
+
+_IN_REAL_TIME: Final = Tolerances(stick_pct=0, time_us=100_000)
+
+
+class HostInCondition(BaseException):
+    """A condition that is asked between two ticks cannot wait for a device."""
+
+
+class _Watch(HostPace):
+    """Knows how late the host is, and keeps it out of the rig's thread."""
+
+    def __init__(self, thread: RigThread) -> None:
+        super().__init__()
+        self._thread = thread
+
+    def used(self) -> None:
+        if self._thread.here:
+            raise HostInCondition
+
+    def passed(self, mark: Mark, traffic: Any) -> None:
+        """The rig hears it itself."""
+
+
+class RealMode(EmulatedMode):
+    """A `BenchMode` whose time is that of this machine; it begins with the first door or wait.
+
+    Args:
+        rig: the rig, with the clock and the bridges of `outside`.
+        outside: where hosts find its wires; closed in the end.
+    """
+
+    name = "real"
+
+    def __init__(self, rig: BenchRig, outside: OutsideEnds) -> None:
+        super().__init__(rig, _IN_REAL_TIME)
+        self._clock, self._stack = outside.clock, ExitStack()
+        self._begun = self._judging = False
+        self._thread = RigThread(rig, outside.clock)
+        self._pace, self._waits = _Watch(self._thread), CpuWaits(spares_looker=True)
+        self._doors = Doors(outside.places, lambda wire: self._pace)
+        rig.rig.watchers.append(self._waits.look)
+        rig.ports = outside.ports
+        self._watch_settings(outside)
+        for close in (outside.close, self._thread.stop, self._doors.close):
+            self._stack.callback(close)
+
+    @classmethod
+    def open(
+        cls, mounts: Sequence[Mount], plan: RealPlan, rig_at: Callable[[OutsideEnds], BenchRig]
+    ) -> Self:
+        """Return the mode of devices on their wires.
+
+        Args:
+            mounts: the wires with their devices.
+            plan: where hosts find them.
+            rig_at: makes the rig, with the clock and the bridges of the outside.
+
+        Raises:
+            PortGone: a bus cannot be opened.
+            OSError: no port is to be had, or no link or socket can be made.
+        """
+        outside = OutsideEnds(mounts, plan)
+        with ExitStack() as undo:
+            undo.callback(outside.close)
+            mode = cls(rig_at(outside), outside)
+            if plan.control is not None:
+                server = ControlThread(plan.control, mode._control, mode._thread.call)
+                mode._stack.callback(server.close)
+            undo.pop_all()
+        return mode
+
+    @property
+    def now_us(self) -> int:
+        """The time of the rig; between two ticks that of this machine."""
+        rig = self._rig.rig
+        if self._thread.here and rig.acting_us is not None:
+            return rig.acting_us
+        if not self._thread.running:
+            return rig.now_us
+        return min(self._clock.now_us, rig.now_us + self._tick_us)
+
+    @property
+    def _tick_us(self) -> int:
+        return self._rig.state.assembly.tick_us
+
+    def act(self, action: Callable[[BenchRig], T]) -> T:
+        """Do something to the rig between two ticks."""
+        return self._thread.call(partial(action, self._rig))
+
+    def run_for(self, duration_us: int) -> None:
+        """Let time pass."""
+        self.wait_until(lambda: False, duration_us)
+
+    def wait_until(self, done: Callable[[], bool], within_us: int) -> bool:
+        """Let time pass until something is so; False if it was not in time.
+
+        It is asked between the ticks. If it wants to hear a device it is asked in the thread of
+        the caller instead, once a tick.
+        """
+        if self._judging and self._thread.here:
+            raise HostInCondition
+        self._begin()
+        until_us = self.now_us + within_us
+        ask = partial(self._judge, done)
+        try:
+            if self._thread.wait_until(ask, until_us - self._tick_us):
+                return True
+            self._sleep_until(until_us)
+            return self._thread.call(ask)
+        except HostInCondition:
+            return self._ask_until(done, until_us)
+
+    def _judge(self, done: Callable[[], bool]) -> bool:
+        """Ask a condition in the thread of the rig, where it cannot wait."""
+        self._judging = True
+        try:
+            return done()
+        finally:
+            self._judging = False
+
+    def _ask_until(self, done: Callable[[], bool], until_us: int) -> bool:
+        while not done():
+            if self.now_us >= until_us:
+                return False
+            self.run_for(min(self._tick_us, until_us - self.now_us))
+        return True
+
+    def _sleep_until(self, until_us: int) -> None:
+        while (left_us := until_us - self.now_us) > 0 and self._thread.running:
+            with self._pace.waiting(left_us):
+                time.sleep(left_us / 1e6)
+
+    def _begin(self) -> None:
+        """Let time pass from now on."""
+        if not self._begun:
+            self._begun = True
+            self._stack.enter_context(keeping_time())
+            self._thread.start()
+
+    def link(self, wire: str) -> Link[Any]:
+        """Connect a host: bytes on a serial line, frames on a bus."""
+        link = self._doors.link(wire)
+        self._begin()
+        return link
+
+    def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
+        """Open a serial line by pyserial."""
+        port = self._doors.serial(wire, options)
+        self._begin()
+        return port
+
+    def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
+        """Open a bus by python-can."""
+        bus = self._doors.can_bus(wire, options)
+        self._begin()
+        return bus
+
+    def canopen_network(self, wire: str) -> canopen.Network:
+        """Connect the canopen library to a bus."""
+        network = self._doors.canopen_network(wire)
+        self._begin()
+        return network
+
+    def address(self, wire: str) -> Address:
+        """Return where a program opens a wire by itself."""
+        self._begin()
+        return self._doors.address(wire)
+
+    def too_slow(self) -> str:
+        """Say why no failure is to be believed: real time was not kept; empty if it was."""
+        rig, behind_us = self._rig.rig, 0
+        if self._thread.running:
+            behind_us = self._clock.now_us - rig.now_us - self._tick_us
+            self._thread.call(lambda: self._waits.look(rig.now_us))
+        return too_slow(
+            host=max(self._pace.late_us, self._waits.worst_us),
+            emulator=max(rig.worst_late_us, behind_us),
+        )
+
+    def fork(self) -> NoReturn:
+        """Refuse: what is outside cannot be copied."""
+        raise NotOnThisBench("a twin goes on in virtual time: this bench is in real time")
+
+    def close(self) -> None:
+        """Give everything back; raise what a device raised, unless it was raised before."""
+        self._begun = True
+        self._stack.close()
+
+    def _watch_settings(self, outside: OutsideEnds) -> None:
+        """Note what a host sets its port to, if the device is not like that."""
+        for wire, ports in outside.ports.items():
+            mount = self._rig.state.mounts[wire]
+            assert isinstance(mount, LineMount)
+            for port in ports:
+                port.watch_setting(mount.settings.baud, partial(self._note_setting, wire))
+
+    def _note_setting(self, wire: str, setting: str) -> None:
+        text = f"the host has set its port to {setting}"
+        self._rig.journal.add(self._rig.effective_us, Mark.PHYSICAL, text.encode(), wire)

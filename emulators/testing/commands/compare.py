@@ -1,0 +1,395 @@
+"""What tickrig compare does: both runs of a device or a bus, and what it prints of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from typing import Final
+
+from tickrig.device.canopen.slave import CanopenSlave
+from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.commands.device_type import ConfiguredDevice
+from tickrig.emulators.record.comparison import Pair, Said, Tolerance, compare
+from tickrig.emulators.record.replay import BenchRecording, do, play_device, traffic_of
+from tickrig.emulators.record.wire_log import Splitter, WireLine, line_splitter
+from tickrig.emulators.rig.rig import Rig
+from tickrig.emulators.rig.station import Station
+from tickrig.emulators.serial.emulator import Emulator
+from tickrig.host.text.bench_record import BenchRecord
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import counted, format_time
+from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.instant import NEVER
+
+# What a device on a serial line said, and what an emulator says to the same host.
+
+_SEARCHED_US: Final = 10_000_000
+"""So long after it was switched on an emulator may say the first that was recorded."""
+
+_PHASES: Final = 8
+"""So many places of the emulator's ticks are tried; a port does not show where they begin."""
+
+
+@dataclass(frozen=True, slots=True)
+class ComparedRun:
+    """Two runs of a device, in the time of the recording.
+
+    Attributes:
+        recorded: what was recorded.
+        emulated: what the emulator says.
+    """
+
+    recorded: list[Said]
+    emulated: list[Said]
+
+
+def compare_ticks(
+    recording: BenchRecording, name: str, configured: ConfiguredDevice
+) -> ComparedRun:
+    """Feed the emulator tick by tick, as the recorded device was.
+
+    Args:
+        recording: recorded at the device.
+        name: of the device.
+        configured: a fresh one.
+    """
+    split = configured.type.line.splitter or line_splitter
+    said = traffic_of(recording.of(name), Mark.FROM_DEVICE)
+    played = ((at, data, 0) for at, data in play_device(recording, name, configured.device))
+    return ComparedRun(
+        list(cut(split(Mark.FROM_DEVICE), said)), list(cut(split(Mark.FROM_DEVICE), played))
+    )
+
+
+def compare_port(
+    recording: BenchRecording,
+    name: str,
+    make: Callable[[], ConfiguredDevice],
+    tolerance: Tolerance,
+    settle_us: int,
+) -> ComparedRun:
+    """Let the recorded host talk to the emulator over a line, at its times.
+
+    Args:
+        recording: recorded at the host's port.
+        name: of the device.
+        make: makes the device.
+        tolerance: how long after the end the emulator may still answer.
+        settle_us: how long the emulator has been on when the recording begins. If what the
+            device said first is what it says by itself when it is switched on, that is tried
+            too; so are other places of its ticks where something was set for less than one.
+            The closest counts.
+    """
+    records, device = recording.of(name), make().device
+    until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
+    split = make().type.line.splitter or line_splitter
+    recorded = list(cut(split(Mark.FROM_DEVICE), traffic_of(records, Mark.FROM_DEVICE)))
+
+    def run(begin_us: int) -> ComparedRun:
+        emulated = _play(make(), records, begin_us, begin_us + until_us)
+        return ComparedRun(recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+
+    phases = _PHASES if _has_short_change(records, device.tick_us) else 1
+    begins = [settle_us + device.tick_us * phase // phases for phase in range(phases)]
+    if recorded:
+        begins += _begin_with(recorded[0], _play(make(), (), 0, _SEARCHED_US), tolerance)
+    return _closest(map(run, begins), recording.until_us, tolerance)
+
+
+def _has_short_change(records: Iterable[BenchRecord], tick_us: int) -> bool:
+    """Say whether an input was set twice within a tick: only some ticks see what was between."""
+    latest: dict[str, int] = {}
+    for record in records:
+        if record.mark is Mark.PHYSICAL and (change := record.change) is not None:
+            if record.at_us - latest.get(change[0], -NEVER) < tick_us:
+                return True
+            latest[change[0]] = record.at_us
+    return False
+
+
+def _begin_with(first: Said, alone: Iterable[Said], tolerance: Tolerance) -> list[int]:
+    """Return when a recording began, if the device said that by itself.
+
+    Args:
+        first: what it said first.
+        alone: what the emulator says since it was switched on, if nobody does anything.
+        tolerance: what counts as the same.
+    """
+    found = (said.at_us for said in alone if tolerance.same(first.text, said.text))
+    return [at_us - first.at_us for at_us in islice(found, 1)]
+
+
+def _closest(runs: Iterable[ComparedRun], until_us: int, tolerance: Tolerance) -> ComparedRun:
+    """Return the run with the fewest differences, the first of them."""
+
+    def differences(run: ComparedRun) -> int:
+        pairs = compare(run.recorded, run.emulated, until_us, tolerance)
+        return sum(bool(pair.difference) for pair in pairs)
+
+    return min(runs, key=differences)
+
+
+def _play(
+    configured: ConfiguredDevice, records: Iterable[BenchRecord], begin_us: int, end_us: int
+) -> list[Said]:
+    """Return what the emulator says, from the begin of the recording."""
+    emulator = Emulator(configured.type.name, configured.device, line=configured.type.line)
+    said: list[Said] = []
+
+    def hear(line: WireLine) -> None:
+        if line.mark is Mark.FROM_DEVICE:
+            said.append(Said(line.at_us - begin_us, escape(line.data)))
+
+    emulator.log.listeners.append(hear)
+    for number, record in enumerate(records):
+        at_us = begin_us + record.at_us
+        if record.mark is Mark.PHYSICAL or (record.mark is Mark.TO_DEVICE and at_us >= 0):
+            emulator.event_queue.put(number, max(0, at_us), partial(_act, emulator, record))
+    emulator.event_queue.put("end", end_us, lambda now_us: emulator.stop())
+    while emulator.running and emulator.rig.now_us < NEVER:
+        emulator.step()
+    return said
+
+
+def _act(emulator: Emulator, record: BenchRecord, now_us: int) -> None:
+    """Do what the recorded host did, or the hand at the device."""
+    if isinstance(record.traffic, bytes) and record.mark is Mark.TO_DEVICE:
+        emulator.send(now_us, record.traffic)
+    else:
+        do(emulator.device, record)
+
+
+def cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator[Said]:
+    """Give the lines of what passed, each with the time and the line of its end."""
+    for at_us, data, line in traffic:
+        assert isinstance(data, bytes)
+        for whole in split(at_us, data):
+            yield Said(at_us, escape(whole), line)
+
+
+# What nodes on a CAN bus said, and what emulated nodes say to the same master.
+
+_ALWAYS: Final = (0x080, 0x580, 0x700)
+"""CAN-IDs that a node has without an object: EMCY, answers of its SDO server, heartbeat."""
+
+EMCY: Final = (0x1014, 0)
+_SDO_SERVERS: Final = range(0x1200, 0x1280)
+_TPDOS: Final = range(0x1800, 0x1A00)
+_UNUSED: Final = 1 << 31
+_CAN_ID: Final = 0x1FFF_FFFF
+
+
+def compare_node_ticks(recording: BenchRecording, name: str, node: Node) -> ComparedRun:
+    """Feed a node tick by tick, as the recorded one was.
+
+    Args:
+        recording: recorded at the device.
+        name: of the node.
+        node: a fresh one.
+    """
+    recorded = [
+        Said(at_us, str(frame), line)
+        for at_us, frames, line in traffic_of(recording.of(name), Mark.FROM_DEVICE)
+        for frame in frames
+    ]
+    emulated = [
+        Said(at_us, str(frame))
+        for at_us, frames in play_device(recording, name, node)
+        for frame in frames
+    ]
+    return ComparedRun(recorded, emulated)
+
+
+def compare_bus(
+    recording: BenchRecording,
+    make: Callable[[CanWire], Sequence[Node]],
+    tolerance: Tolerance,
+    settle_us: int,
+    bit_rate: int,
+) -> ComparedRun:
+    """Put the recorded frames of all others on a bus with emulated nodes, at their times.
+
+    What a node sends is known by its CAN-IDs, as its dictionary has them at that time.
+
+    Args:
+        recording: recorded at a port of the bus.
+        make: makes the nodes on a bus.
+        tolerance: how long after the end they may still answer.
+        settle_us: how long the nodes have been on when the recording begins. If what was said
+            first is what one of them says by itself when it is switched on, that is tried too,
+            and the closer one counts.
+        bit_rate: of the bus in bit/s.
+    """
+    records = [x for x in recording.records if isinstance(x.traffic, CanFrame) or x.text]
+    until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
+
+    def run(begin_us: int) -> ComparedRun:
+        bus = _Bus(make, bit_rate, begin_us)
+        emulated = bus.play(records, begin_us + until_us)
+        return ComparedRun(bus.recorded, [x for x in emulated if x.at_us >= -tolerance.time_us])
+
+    settled = run(settle_us)
+    begins = []
+    if settled.recorded:
+        alone = _Bus(make, bit_rate, 0).play((), _SEARCHED_US)
+        begins = _begin_with(settled.recorded[0], alone, tolerance)
+    return _closest([settled, *map(run, begins)], recording.until_us, tolerance)
+
+
+class _Bus:
+    """Emulated nodes, and all others as they were recorded."""
+
+    def __init__(
+        self, make: Callable[[CanWire], Sequence[Node]], bit_rate: int, begin_us: int
+    ) -> None:
+        self._wire, self._begin_us = CanWire(bit_rate), begin_us
+        self._nodes = {node.name: node for node in make(self._wire)}
+        self._rig = Rig(*(Station(node, node.port) for node in self._nodes.values()))
+        self._host = self._wire.end(frozenset())
+        self._host.auto_recovery = True
+        self._wire.end(frozenset())  # one that acknowledges what the host sends
+        self._ids = {name: _Produced(node.slave) for name, node in self._nodes.items()}
+        self._wire.observers.append(self._hear)
+        self.recorded: list[Said] = []
+        self._said: list[Said] = []
+
+    def play(self, records: Iterable[BenchRecord], end_us: int) -> list[Said]:
+        """Return what the nodes say up to a time, from the begin of the recording."""
+        for number, record in enumerate(records):
+            at_us = max(0, self._begin_us + record.at_us)
+            early = self._begin_us + record.at_us < 0
+            self._rig.event_queue.put(number, at_us, partial(self._act, record, early))
+        self._rig.run_to(end_us)
+        return self._said
+
+    def owns(self, traffic: object) -> bool:
+        """Say whether an emulated node sends such a frame."""
+        return isinstance(traffic, CanFrame) and any(x.has(traffic) for x in self._ids.values())
+
+    def _act(self, record: BenchRecord, early: bool, now_us: int) -> None:
+        """Do what the host or a hand did; `early` is before the nodes were switched on."""
+        frame = record.traffic
+        if not isinstance(frame, CanFrame):
+            self._do(record)
+        elif record.mark is Mark.FROM_DEVICE and self.owns(frame):
+            self.recorded.append(Said(record.at_us, str(frame), record.line))
+        elif not early:
+            self._host.send(now_us, (frame,))
+
+    def _do(self, record: BenchRecord) -> None:
+        """Do what was done to a node by hand: `5/power_off=1`, or to the only one."""
+        prefix, slash, text = record.text.partition("/")
+        node = self._nodes.get(prefix) if slash else next(iter(self._nodes.values()))
+        if node is None:
+            raise ValueError(f"line {record.line}: no node {prefix!r:.60}")
+        do(node, record._replace(text=text if slash else record.text))
+
+    def _hear(self, at_us: int, passed: CanFrame | ErrorFrame) -> None:
+        if self.owns(passed):
+            self._said.append(Said(at_us - self._begin_us, str(passed)))
+
+
+class _Produced:
+    """Which frames a slave sends."""
+
+    def __init__(self, slave: CanopenSlave) -> None:
+        self._slave = slave
+        wanted = [EMCY, *((x, 2) for x in _SDO_SERVERS), *((x, 1) for x in _TPDOS)]
+        found = [slave.dictionary.find(*each) for each in wanted]
+        self._entries = [entry for entry in found if entry is not None]
+
+    def has(self, frame: CanFrame) -> bool:
+        if frame.can_id - self._slave.node_id in _ALWAYS:
+            return not frame.remote
+        numbers = (entry.number for entry in self._entries)
+        return not frame.remote and any(
+            number & _CAN_ID == frame.can_id and not number & _UNUSED for number in numbers
+        )
+
+
+# What `tickrig compare` prints: the first difference, the others, and a table of all.
+
+_SHOWN: Final = 20
+"""So many differences are listed."""
+
+_HEAD: Final = ("", "recorded", "emulated", "different", "worst")
+
+
+def report(
+    file: str, pairs: Mapping[str, Sequence[Pair]], tolerance_us: int, *, everything: bool
+) -> tuple[list[str], bool]:
+    """Return the lines of a comparison, and whether all is the same.
+
+    Args:
+        file: name of the trace.
+        pairs: what was said, by device.
+        tolerance_us: of the times.
+        everything: list what is the same too.
+    """
+    rows = sorted(
+        ((name, pair) for name, said in pairs.items() for pair in said),
+        key=lambda row: row[1].at_us,
+    )
+    different = [row for row in rows if row[1].difference]
+    listed = rows if everything else different[:_SHOWN] if len(different) > 1 else []
+    left = len(different) - len(listed) if listed and not everything else 0
+    count = sum(pair.recorded is not None for _, pair in rows)
+    result = f"different: {len(different)} of" if different else "same:"
+    sections = (
+        list(_first(file, *different[0])) if different else [],
+        [_row(name, pair) for name, pair in listed] + [f"... and {left} more"] * bool(left),
+        list(_table(pairs)),
+        [f"{result} {counted(count, 'line')}, within {tolerance_us / 1_000:g} ms"],
+    )
+    lines = [line for section in sections if section for line in ("", *section)]
+    return lines[1:], not different
+
+
+def _first(file: str, name: str, pair: Pair) -> Iterator[str]:
+    place = f" ({file}:{pair.recorded.line})" if pair.recorded and pair.recorded.line else ""
+    yield f"different at {format_time(max(0, pair.at_us))} {name}{place}: {pair.difference}"
+    yield f"  recorded < {_text(pair.recorded)}"
+    yield f"  emulated < {_text(pair.emulated)}"
+
+
+def _text(said: Said | None) -> str:
+    return f"{said.text}  at {format_time(max(0, said.at_us))}" if said else "(nothing)"
+
+
+def _row(name: str, pair: Pair) -> str:
+    old, new = pair.recorded, pair.emulated
+    late = f"{pair.late_us / 1_000:+9.1f}" if old and new else " " * 9
+    sign = "!" if pair.difference else " "
+    text = old.text if old else new.text if new else ""
+    if old and new and old.text != new.text:
+        text = f"{old.text} | {new.text}"
+    missing = "" if old and new else "  (emulator alone)" if new else "  (recorded alone)"
+    return f"{sign} {format_time(max(0, pair.at_us))} {late} ms  {name} {text}{missing}"
+
+
+def _table(pairs: Mapping[str, Sequence[Pair]]) -> Iterator[str]:
+    rows = [_HEAD]
+    for name, said in pairs.items():
+        kinds: dict[str, list[Pair]] = {}
+        for pair in said:
+            kinds.setdefault(pair.kind, []).append(pair)
+        rows += [_counts(f"{name} {kind}".strip(), kinds[kind]) for kind in sorted(kinds)]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(_HEAD))]
+    for first, *numbers in rows:
+        cells = (f"{cell:>{width}}" for cell, width in zip(numbers, widths[1:], strict=True))
+        yield f"{first:<{widths[0]}}  {'  '.join(cells)}".rstrip()
+
+
+def _counts(name: str, pairs: Sequence[Pair]) -> tuple[str, str, str, str, str]:
+    worst_us = max((abs(pair.late_us) for pair in pairs), default=0)
+    return (
+        name,
+        str(sum(pair.recorded is not None for pair in pairs)),
+        str(sum(pair.emulated is not None for pair in pairs)),
+        str(sum(bool(pair.difference) for pair in pairs)),
+        f"{worst_us / 1_000:.1f} ms",
+    )

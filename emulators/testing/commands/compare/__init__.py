@@ -1,1 +1,0 @@
-"""What tickrig compare does: both runs of a device or a bus, and what it prints."""

@@ -1,1 +1,0 @@
-"""Slaves of other stacks in virtual time: LocalNode of the canopen library, durand."""

@@ -1,1 +1,0 @@
-"""What fails a test that has passed its own asserts."""

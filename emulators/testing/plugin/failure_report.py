@@ -1,0 +1,195 @@
+"""What is told after a failure: what was asked, what happened last, and how to repeat it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable, Sequence
+from hashlib import sha256
+from os.path import relpath
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import pytest
+
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.journal import missing_of
+from tickrig.emulators.testing.plugin.journal_text import buses_of, frame_of, last_lines
+from tickrig.emulators.testing.plugin.parameters import words_of
+from tickrig.emulators.testing.plugin.settings import SETTINGS
+from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.emulators.testing.report.bench_report import Outcome
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import format_time
+from tickrig.host.text.whole_file import write_whole
+from tickrig.wire.can import LogLine
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.plugin.benched_test import BenchedTest
+
+
+# What is kept of a test: its trace, the frames of its buses, its transcript.
+
+_TRACE: Final = ".trace"
+_MOST: Final = 80
+"""Characters of a name that are of the test."""
+
+
+def stem_of(nodeid: str) -> str:
+    """Return what files of a test are called: no path, and no two tests have the same.
+
+    >>> stem_of("tests/test_stop.py::test_it_stops[../fast]")
+    'tests_test_stop.py_test_it_stops_fast-24cfca'
+    """
+    words = re.sub(r"[^A-Za-z0-9.-]+", "_", nodeid.replace("..", "")).strip("._-")
+    return f"{words[-_MOST:].lstrip('._-') or 'test'}-{sha256(nodeid.encode()).hexdigest()[:6]}"
+
+
+def keep(bench: Bench, folder: Path, nodeid: str) -> tuple[list[Path], list[str]]:
+    """Write what is kept of a test.
+
+    Args:
+        bench: its bench, still open.
+        folder: where to; it is made.
+        nodeid: of the test.
+
+    Returns:
+        The files, and why others are not there, or not whole, each in a line.
+    """
+    kept: list[Path] = []
+    failed: list[str] = []
+    for suffix, write in _WRITERS.items():
+        path = folder / f"{stem_of(nodeid)}{suffix}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            if write(bench, path):
+                kept.append(path)
+                failed += _cut(bench, path)
+        except NotOnThisBench:
+            continue
+        except OSError as error:
+            failed.append(f"{path} was not written: {error.strerror or error}")
+    return kept, failed
+
+
+def _cut(bench: Bench, path: Path) -> list[str]:
+    """Say that a file has the latest alone; a trace has all."""
+    missing = "" if path.suffix == _TRACE else missing_of(bench._mode.journal())
+    return [f"{path} is not whole: {missing}"] if missing else []
+
+
+def _trace(bench: Bench, path: Path) -> bool:
+    bench.save_trace(path)
+    return True
+
+
+def _candump(bench: Bench, path: Path) -> bool:
+    buses = buses_of(bench)
+    frames = [
+        f"{LogLine(line.at_us, line.source, frame_of(line))}\n"
+        for line in bench._mode.journal()
+        if line.source in buses and line.mark is not Mark.PHYSICAL
+    ]
+    if frames:
+        write_whole(path, "".join(frames))
+    return bool(frames)
+
+
+def _transcript(bench: Bench, path: Path) -> bool:
+    write_whole(path, f"{bench.transcript()}\n")
+    return True
+
+
+_WRITERS: Final[dict[str, Callable[[Bench, Path], bool]]] = {
+    _TRACE: _trace,
+    ".log": _candump,
+    ".txt": _transcript,
+}
+"""By suffix; each says whether there was something to write."""
+
+
+# How a test ended, and why, of the reports of its phases.
+
+
+def outcome_of(item: pytest.Item, reports: Sequence[pytest.TestReport]) -> tuple[Outcome, str, str]:
+    """Return how a test ended, why in a line, and what pytest says of it.
+
+    Args:
+        item: the test.
+        reports: of all its phases.
+    """
+    test = item.stash.get(BENCHED, None)
+    for report in reports:
+        if report.failed:
+            crash = getattr(report.longrepr, "reprcrash", None)
+            reason = crash.message if crash else report.longreprtext
+            if test is not None and test.blocked:
+                return Outcome.BLOCKED, test.blocked, report.longreprtext
+            outcome = Outcome.FAILED if report.when == "call" else Outcome.ERROR
+            return outcome, reason.partition("\n")[0], report.longreprtext
+        if report.skipped:
+            return Outcome.SKIPPED, _why_skipped(report), ""
+    return Outcome.PASSED, "", ""
+
+
+def _why_skipped(report: pytest.TestReport) -> str:
+    if hasattr(report, "wasxfail"):
+        return f"expected to fail: {report.wasxfail}".rstrip(": ")
+    if isinstance(report.longrepr, tuple):
+        return report.longrepr[2].removeprefix("Skipped: ")
+    return report.longreprtext
+
+
+_LINES: Final = 20
+"""So many lines and frames are told."""
+
+
+def sections_of(test: BenchedTest) -> list[tuple[str, str]]:
+    """Return the sections of a report, each with its title."""
+    command = ("bench: repeat it with", repeat_command(test.item))
+    if test.bench is None:
+        return [("bench", f"none was opened; {test.wanted.mode}"), command]
+    last = last_lines(test.bench, _LINES) or "nothing happened"
+    sections = [("bench", _wanted(test)), ("bench: what happened last", last), command]
+    if unheard := test.take_unheard():
+        sections.insert(1, ("bench: beside the test", "\n".join(unheard)))
+    if test.kept or test.not_kept:
+        sections.append(("bench: what was kept", _kept(test)))
+    return sections
+
+
+def repeat_command(item: pytest.Item) -> str:
+    """Return the command that runs a test again, for a shell."""
+    config = item.config
+    file, *names = str(item.nodeid).split("::")
+    seed = config.stash[SETTINGS].seed
+    words = [
+        "pytest",
+        "::".join([relpath(config.rootpath / file, config.invocation_params.dir), *names]),
+    ]
+    for flag, value in (
+        ("--bench", config.getoption("bench")),
+        ("--bench-mode", config.getoption("bench_mode")),
+        ("--bench-seed", None if seed is None else str(seed)),
+    ):
+        words += [] if value is None else [flag, value]
+    for name, word in words_of(item).items():
+        words += ["--bench-param", f"{name}={word}"]
+    return shlex.join(words)
+
+
+def _wanted(test: BenchedTest) -> str:
+    bench = test.bench
+    assert bench is not None
+    what = test.wanted.text
+    devices = ", ".join(bench.devices)
+    named = what if what == devices else f"{what} with {devices}"
+    return f"{named}; {bench.mode}, seed {test.wanted.seed_used}, {format_time(bench.now_us)} s old"
+
+
+def _kept(test: BenchedTest) -> str:
+    """Return the files that were kept; a trace is a command."""
+    paths = [shlex.quote(relpath(path)) for path in test.kept]
+    lines = [f"tickrig replay {path}" if path.endswith(_TRACE) else path for path in paths]
+    return "\n".join([*lines, *test.not_kept])

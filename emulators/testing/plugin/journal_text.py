@@ -1,0 +1,104 @@
+"""What happened on a bench, for people: CAN frames with what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rig.emulated import HasSignals, read_signal
+from tickrig.emulators.testing.bench.bench import Bench
+from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.errors import NotOnThisBench
+from tickrig.emulators.testing.bench.mounts import BusMount
+from tickrig.host.text.byte_text import escape
+from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import Setting, format_time
+from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.errors import FramingError
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.decode.decoder import Decoder
+
+
+# Names of signals of a bench, without the objects of dictionaries: these are many; of faults.
+
+_OBJECT = "0x"
+
+
+def names_of(part: HasSignals) -> list[str]:
+    """Return the names of the inputs and outputs of a device."""
+    return [name for name in (*part.inputs.table, *part.outputs) if not name.startswith(_OBJECT)]
+
+
+def signals_of(rig: BenchRig) -> dict[str, Callable[[], Setting]]:
+    """Return what reads each signal, by its full name."""
+    assembly = rig.state.assembly
+    return {
+        assembly.full_name(device, name): partial(read_signal, part, name)
+        for device, part in assembly.parts.items()
+        for name in names_of(part)
+    }
+
+
+def fault_names(bench: Bench) -> tuple[set[str], set[str]]:
+    """Return the names of the faults of all wires, and of those of all devices."""
+    described = bench.describe()
+    physical = {name for name in described.faults if name in described.inputs}
+    return described.faults.keys() - physical, physical
+
+
+def buses_of(bench: Bench) -> tuple[str, ...]:
+    """Return the names of its CAN buses."""
+    mode = bench._mode
+    try:
+        mounts = mode.act(lambda rig: rig.state.mounts)
+    except NotOnThisBench:
+        return tuple(wire for wire in mode.wires if isinstance(mode.address(wire), dict))
+    return tuple(name for name, mount in mounts.items() if isinstance(mount, BusMount))
+
+
+def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
+    """Return each line of its journal with its text; frames have their meaning behind them.
+
+    What PDOs carry is known, too, if it was written before the lines that are kept.
+    """
+    from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - not for each test
+
+    decoder, buses = Decoder(), buses_of(bench)
+    for line in bench._mode.mappings():
+        _meaning(decoder, line)
+    for line in bench._mode.journal():
+        text = escape(line.data)
+        if line.source in buses and line.mark is not Mark.PHYSICAL:
+            text = f"{text}  {_meaning(decoder, line)}".rstrip()
+        yield line, text
+
+
+def last_lines(bench: Bench, count: int) -> str:
+    """Return the last that happened on a bench: time, where, direction, text.
+
+    Lines that have begun and did not end stand below.
+    """
+    described = list(decoded(bench))[-count:]
+    begun = [(line, f"{escape(line.data)}  (not ended)") for line in bench._mode.unfinished()]
+    return "\n".join(
+        f"{format_time(line.at_us)} {line.source} {line.mark} {text}"
+        for line, text in [*described, *begun]
+    )
+
+
+def frame_of(line: WireLine) -> CanFrame | ErrorFrame:
+    """Return the frame that a line of a CAN bus says."""
+    text = line.data.decode()
+    with suppress(FramingError):
+        return ErrorFrame.parse(text)
+    return CanFrame.parse(text)
+
+
+def _meaning(decoder: Decoder, line: WireLine) -> str:
+    from tickrig.host.canmon.model.frames import Record  # noqa: PLC0415 - as the decoder
+
+    return decoder.take(Record(line.at_us, line.source, frame_of(line))).text

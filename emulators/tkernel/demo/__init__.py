@@ -1,1 +1,0 @@
-"""The demonstration `tickrig demo tkernel`: a robot keeps its position through an outage."""

@@ -1,0 +1,748 @@
+"""Demands on frames: how often, in which form, when, and with what values."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from tickrig.host.canmon.model.decode.decoded import Decoded, Signal, TransferOutcome
+from tickrig.host.canmon.model.decode.filter_terms import Test, signal_reader
+from tickrig.host.canmon.model.frames import ERROR, Record, any_ident, ms_text
+from tickrig.host.text.values import counted
+from tickrig.wire.can import CanFrame, ErrorFrame
+from tickrig.wire.instant import NEVER
+
+# The frames that a rule speaks of.
+
+
+@dataclass(frozen=True, slots=True)
+class RuleEvent:
+    """Frames that pass a filter.
+
+    Attributes:
+        text: as it is written.
+        matches: says whether a frame is one.
+        paths: the signals that it names.
+        is_signal: it is one signal, and nothing that this is compared with.
+        has_node: it names a node.
+    """
+
+    text: str
+    matches: Test
+    paths: tuple[str, ...] = ()
+    is_signal: bool = False
+    has_node: bool = False
+
+    def carriers(self) -> Callable[[Decoded], bool]:
+        """Return what says whether a frame carries a signal that is named."""
+        finders = [signal_reader(path) for path in self.paths]
+        return lambda decoded: any(find(decoded) is not None for find in finders)
+
+    def value_of(self) -> Callable[[Record, Decoded], Signal | None]:
+        """Return what finds the value of a frame: the signal, or the first one of its kind."""
+        matches = self.matches
+        if self.is_signal:
+            finders = [signal_reader(path) for path in self.paths]
+            return lambda record, decoded: next(filter(None, (f(decoded) for f in finders)), None)
+        return lambda record, decoded: (
+            decoded.signals[0] if decoded.signals and matches(record, decoded) else None
+        )
+
+
+EVERY: Final = RuleEvent("all frames", lambda record, decoded: True)
+
+_Sender = tuple[str, int]
+"""A bus and an identifier on it."""
+
+
+def _sender_of(record: Record) -> _Sender:
+    """Return where a frame came from; error frames are one."""
+    frame = record.frame
+    return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
+
+
+def _said(decoded: Decoded) -> str:
+    """Write what a frame says, for a finding."""
+    node = "" if decoded.node is None else f" of node {decoded.node}"
+    return f"{decoded.kind}{node}: {decoded.text}".removesuffix(": ")
+
+
+# What is demanded of frames, while the scope of its rule holds.
+
+
+class RuleBreach(NamedTuple):
+    """What is wrong, and when.
+
+    Attributes:
+        at_us: when it was seen.
+        text: what is wrong, in words.
+        record: the frame that shows it, None if none does.
+    """
+
+    at_us: int
+    text: str
+    record: Record | None = None
+
+
+class RuleDemand:
+    """One demand; this one is always met. What it keeps grows with identifiers at most.
+
+    Attributes:
+        due_us: until when something must have come.
+        came: a frame came that it counts; where it counts none, False.
+        judged: something was compared with what is demanded.
+        timed: it is about time: where all frames have one, nothing is judged.
+        doubt: why nothing was judged, where nothing was.
+    """
+
+    due_us: int = NEVER
+    came: bool = False
+    judged: bool = False
+    timed: bool = False
+    doubt: str = "no frame came while it was in force"
+
+    def begin(self, at_us: int) -> None:
+        """Begin, or begin anew after a pause."""
+
+    def pause(self) -> None:
+        """Demand nothing until `begin`."""
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Say what is wrong with a frame."""
+        return None
+
+    def expire(self) -> Iterable[RuleBreach]:
+        """Say what has not come until `due_us`, once."""
+        return ()
+
+    def end(self, end_us: int, running: bool) -> Iterable[str]:
+        """Say what is missing.
+
+        Args:
+            end_us: when listening ended, or the time where it goes on.
+            running: the scope holds.
+        """
+        return ()
+
+
+# Demands on how often something comes.
+
+MOST_COUNTED: Final = 10_000
+"""So many frames of a time may be allowed: their times are kept."""
+
+
+class Truth(RuleDemand):
+    """A condition on signals never holds, or always.
+
+    It is told when it begins to be wrong, not with each frame.
+
+    Args:
+        event: the condition.
+        wanted: what it must be.
+    """
+
+    def __init__(self, event: RuleEvent, wanted: bool) -> None:
+        self._matches, self._carries, self._wanted = event.matches, event.carriers(), wanted
+        self._wrong: set[_Sender] = set()
+        self.doubt = f"nothing with {event.text} came while it was in force"
+
+    def pause(self) -> None:
+        """Tell it again."""
+        self._wrong.clear()
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare the condition."""
+        if not self._carries(decoded):
+            return None
+        self.judged = True
+        sender = _sender_of(record)
+        if self._matches(record, decoded) is self._wanted:
+            self._wrong.discard(sender)
+        elif sender not in self._wrong:
+            self._wrong.add(sender)
+            return _said(decoded)
+        return None
+
+
+class Never(RuleDemand):
+    """No such frame comes; each one is told.
+
+    Args:
+        event: the frames.
+    """
+
+    def __init__(self, event: RuleEvent) -> None:
+        self._matches = event.matches
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Tell it."""
+        self.judged = True
+        return _said(decoded) if self._matches(record, decoded) else None
+
+
+class Count(RuleDemand):
+    """So many frames come.
+
+    Args:
+        event: the frames.
+        least: at least so many; told at the end.
+        most: at most so many; what comes too much is told, once. None for any number.
+    """
+
+    def __init__(self, event: RuleEvent, least: int, most: int | None) -> None:
+        self._event, self._least, self._most, self._count = event, least, most, 0
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Count a frame."""
+        self.judged = True
+        if not self._event.matches(record, decoded):
+            return None
+        self._count, self.came = self._count + 1, True
+        if self._most is None or self._count != self._most + 1:
+            return None
+        return (
+            f"{self._event.text} came {counted(self._count, 'time')}, at most {self._most} is right"
+        )
+
+    def end(self, end_us: int, running: bool) -> Iterable[str]:
+        """Say that too few came."""
+        if self._count < self._least:
+            came = f"{self._event.text} came {counted(self._count, 'time')}"
+            yield f"{came}, at least {self._least} is right"
+
+
+class Rate(RuleDemand):
+    """At most so many frames come in any span of time.
+
+    Args:
+        event: the frames.
+        most: how many, up to `MOST_COUNTED`.
+        span_us: the span.
+    """
+
+    timed = True
+
+    def __init__(self, event: RuleEvent, most: int, span_us: int) -> None:
+        self._event, self._most, self._span_us = event, most, span_us
+        self._times_us: deque[int] = deque(maxlen=most + 1)
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Look how long ago the frame was that must be out of the span; then count anew."""
+        self.judged = True
+        if not self._event.matches(record, decoded):
+            return None
+        times_us = self._times_us
+        times_us.append(record.at_us)
+        took_us = record.at_us - times_us[0]
+        if len(times_us) <= self._most or took_us >= self._span_us:
+            return None
+        came = f"{self._event.text} came {counted(len(times_us), 'time')} in {ms_text(took_us)} ms"
+        times_us.clear()
+        return f"{came}, at most {self._most} in {ms_text(self._span_us)} is right"
+
+
+# Demands on the form of frames: their length, the toggle bit of guarding.
+
+_LENGTHS: Final = {
+    "nmt": (2,),
+    "sync": (0, 1),
+    "time": (6,),
+    "emcy": (8,),
+    "sdo": (8,),
+    "boot-up": (1,),
+    "heartbeat": (1,),
+    "guard": (1,),
+    "lss": (8,),
+}
+"""Bytes of the data frames of a kind (CiA 301; CiA 305)."""
+
+
+_NodeOnBus = tuple[str, int | None]
+"""A bus and a node."""
+
+
+class Dlc(RuleDemand):
+    """Frames are as long as CiA 301, or the mapping of a PDO, says; remote frames are free.
+
+    A PDO whose mapping nobody told is not judged.
+
+    Args:
+        event: the frames.
+    """
+
+    def __init__(self, event: RuleEvent) -> None:
+        self._matches = event.matches
+        self.doubt = f"no frame of {event.text} came whose length is known"
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare the length."""
+        frame = record.frame
+        if not isinstance(frame, CanFrame) or frame.remote:
+            return None
+        size = decoded.size
+        right = _LENGTHS.get(decoded.kind, ()) if size is None else (size,)
+        length = len(frame.data)
+        if not right or (length in right and self.judged) or not self._matches(record, decoded):
+            return None
+        self.judged = True
+        if length in right:
+            return None
+        node = "" if decoded.node is None else f" of node {decoded.node}"
+        wanted, why = " or ".join(map(str, right)), "" if size is None else " by its mapping"
+        return f"{decoded.kind}{node} has {length} B, {wanted} is right{why}"
+
+
+_UNASKED: Final = 2
+"""So many heartbeats without a request: the node produces them, and answers none."""
+
+
+@dataclass(slots=True)
+class _Guarding:
+    """What is known of the guarding of a node.
+
+    Attributes:
+        last: toggle bit of its latest answer; None before the first.
+        requested: a request waits for its answer; None where none was heard.
+    """
+
+    last: int | None = None
+    requested: bool | None = None
+
+
+class Toggle(RuleDemand):
+    """The toggle bit of guarding changes with each answer, from 0 after a boot-up on.
+
+    An answer follows a request. Where a log has no requests, what follows a frame with the bit
+    set is an answer. A node that produces heartbeats answers none.
+
+    Args:
+        event: the answers; those of a node that was guarded before belong to them.
+    """
+
+    def __init__(self, event: RuleEvent) -> None:
+        self._matches = event.matches
+        self._nodes: dict[_NodeOnBus, _Guarding] = {}
+        self._unasked: Counter[_NodeOnBus] = Counter()
+        self.doubt = f"no two answers of {event.text} to guarding came"
+
+    def begin(self, at_us: int) -> None:
+        """Forget what was before."""
+        self._nodes.clear()
+        self._unasked.clear()
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare the bit with the one before."""
+        frame, key = record.frame, (record.channel, decoded.node)
+        if decoded.kind == "boot-up":
+            self._boot(key)
+        if decoded.kind not in ("guard", "heartbeat") or not isinstance(frame, CanFrame):
+            return None
+        if key not in self._nodes and self._matches(record, decoded):
+            self._nodes[key] = _Guarding()
+        node = self._nodes.get(key)
+        if frame.remote:
+            if node is not None:
+                node.requested = True
+        elif len(frame.data) == 1 and self._is_answer(key, node, frame.data[0] >> 7):
+            return self._compare(self._nodes[key], frame.data[0] >> 7, decoded)
+        return None
+
+    def _boot(self, key: _NodeOnBus) -> None:
+        self._unasked[key] = 0
+        if key in self._nodes:
+            requested = None if self._nodes[key].requested is None else False
+            self._nodes[key] = _Guarding(1, requested)
+
+    def _is_answer(self, key: _NodeOnBus, node: _Guarding | None, toggle: int) -> bool:
+        """Say whether a frame with this bit answers a request; the request is gone then."""
+        requested = False if node is None else node.requested
+        if node is not None and requested:
+            node.requested = False
+        if toggle:
+            self._unasked[key] = 0
+        elif requested is False:
+            self._unasked[key] += 1
+        return node is not None and (
+            bool(toggle) or requested is None or (requested and self._unasked[key] < _UNASKED)
+        )
+
+    def _compare(self, node: _Guarding, toggle: int, decoded: Decoded) -> str | None:
+        last, node.last = node.last, toggle
+        self.judged |= last is not None
+        return f"{_said(decoded)}: toggle {1 - toggle} is right" if toggle == last else None
+
+
+# Demands on when something comes.
+
+
+class Every(RuleDemand):
+    """Frames of an identifier come again in time; the first after a boot-up when it likes.
+
+    Args:
+        event: the frames.
+        low_us: no sooner.
+        high_us: no later; None for any time.
+    """
+
+    timed = True
+
+    def __init__(self, event: RuleEvent, low_us: int, high_us: int | None) -> None:
+        self._event, self._low_us, self._high_us = event, low_us, high_us
+        self.doubt = f"{event.text} did not come twice from one sender while it was in force"
+        self._last: dict[_Sender, tuple[int, int | None]] = {}
+
+    def begin(self, at_us: int) -> None:
+        """Measure from the next frame."""
+        self._last.clear()
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare the gap."""
+        if decoded.kind == "boot-up":
+            self._forget(record.channel, decoded.node)
+        if not self._event.matches(record, decoded):
+            return None
+        self.came = True
+        sender = _sender_of(record)
+        before = self._last.get(sender)
+        self._last[sender] = record.at_us, decoded.node
+        if before is None:
+            return None
+        self.judged = True
+        gap_us = max(0, record.at_us - before[0])
+        return self._wrong(gap_us, decoded.node, "after the one before")
+
+    def end(self, end_us: int, running: bool) -> Iterable[str]:
+        """Say that it stopped or never came."""
+        if not running or self._high_us is None:
+            return
+        if not self.came:
+            yield f"{self._event.text} never came"
+        for at_us, node in self._last.values():
+            if end_us - at_us > self._high_us:
+                yield self._wrong(end_us - at_us, node, "without another") or ""
+
+    def _forget(self, channel: str, node: int | None) -> None:
+        last = self._last.items()
+        self._last = {key: one for key, one in last if (key[0], one[1]) != (channel, node)}
+
+    def _wrong(self, gap_us: int, node: int | None, how: str) -> str | None:
+        high_us = self._high_us
+        if self._low_us <= gap_us and (high_us is None or gap_us <= high_us):
+            return None
+        right = f"{ms_text(self._low_us)} to {ms_text(high_us)}" if high_us is not None else ""
+        right = right or f"at least {ms_text(self._low_us)}"
+        whose = "" if node is None else f"node {node}: "
+        return f"{whose}{ms_text(gap_us)} ms {how}, {right} is right"
+
+
+class FirstWithin(RuleDemand):
+    """A frame comes in time after the beginning: of the traffic, or of the scope.
+
+    Args:
+        event: the frame.
+        most_us: how long it may take.
+    """
+
+    timed = True
+
+    def __init__(self, event: RuleEvent, most_us: int) -> None:
+        self._event, self._most_us, self.due_us = event, most_us, NEVER
+        self.doubt = f"it ends before {ms_text(most_us)} ms have passed, without {event.text}"
+
+    def begin(self, at_us: int) -> None:
+        """Wait for it."""
+        self.due_us = at_us + self._most_us
+
+    def pause(self) -> None:
+        """Wait no longer."""
+        self.due_us = NEVER
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """See whether it has come."""
+        if self.due_us != NEVER and self._event.matches(record, decoded):
+            self.due_us, self.judged = NEVER, True
+        return None
+
+    def expire(self) -> Iterable[RuleBreach]:
+        """Say that it has not."""
+        due_us, self.due_us, self.judged = self.due_us, NEVER, True
+        yield RuleBreach(due_us, f"no {self._event.text} in {ms_text(self._most_us)} ms")
+
+
+_Pair = tuple[str, int | None]
+"""A bus, and a node where those that belong together are told by it."""
+
+
+class DeadlineDemand(RuleDemand):
+    """Something comes in time after each frame that it belongs to.
+
+    Args:
+        most_us: how long it may take.
+    """
+
+    timed = True
+
+    def __init__(self, most_us: int) -> None:
+        self._most_us, self.due_us = most_us, NEVER
+        self._open: dict[_Pair, tuple[Record, str]] = {}
+
+    def begin(self, at_us: int) -> None:
+        """Wait for nothing yet."""
+        self._close_all()
+
+    def pause(self) -> None:
+        """Wait no longer."""
+        self._close_all()
+
+    def expire(self) -> Iterable[RuleBreach]:
+        """Say what has not come."""
+        due_us, self.judged = self.due_us, True
+        late = [pair for pair, (record, _) in self._open.items() if self._due(record) <= due_us]
+        for pair in late:
+            record, text = self._open[pair]
+            self._close(pair)
+            yield RuleBreach(due_us, f"{text} in {ms_text(self._most_us)} ms", record)
+
+    def _await(self, pair: _Pair, record: Record, text: str) -> None:
+        if pair not in self._open:
+            self._open[pair] = record, text
+            self.due_us = min(self.due_us, self._due(record))
+
+    def _close(self, pair: _Pair) -> None:
+        if self._open.pop(pair, None) is not None:
+            self.judged = True
+            dues = (self._due(record) for record, _ in self._open.values())
+            self.due_us = min(dues, default=NEVER)
+
+    def _close_all(self) -> None:
+        self._open.clear()
+        self.due_us = NEVER
+
+    def _due(self, record: Record) -> int:
+        return record.at_us + self._most_us
+
+
+class Latency(DeadlineDemand):
+    """One event follows another in time.
+
+    Where the first comes again meanwhile, the time since the earlier one counts. Events that
+    name no node belong together by the nodes of their frames.
+
+    Args:
+        first: what begins it.
+        second: what must follow.
+        most_us: how long it may take.
+    """
+
+    def __init__(self, first: RuleEvent, second: RuleEvent, most_us: int) -> None:
+        super().__init__(most_us)
+        self._first, self._second = first, second
+        self._by_node = not (first.has_node or second.has_node)
+        self.doubt = f"no {first.text} came that has {ms_text(most_us)} ms behind it"
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Close what has followed, then begin."""
+        node = decoded.node if self._by_node else None
+        if self._second.matches(record, decoded):
+            self._close((record.channel, node))
+            self._close((record.channel, None))
+        if self._first.matches(record, decoded):
+            self._await((record.channel, node), record, f"{_said(decoded)}: no {self._second.text}")
+        return None
+
+
+class Answered(DeadlineDemand):
+    """Requests are answered in time: of an SDO client, and of a master that guards.
+
+    One that is sent again is measured from the first.
+
+    Args:
+        event: the requests.
+        most_us: how long it may take.
+    """
+
+    def __init__(self, event: RuleEvent, most_us: int) -> None:
+        super().__init__(most_us)
+        self._event = event
+        self.doubt = f"no request of {event.text} came that has {ms_text(most_us)} ms behind it"
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Close what is answered, or left for another request; then begin."""
+        is_sdo = decoded.kind == "sdo"
+        if not (is_sdo or decoded.kind in ("guard", "heartbeat", "boot-up")):
+            return None
+        pair = f"{record.channel} {'sdo' if is_sdo else 'guard'}", decoded.node
+        left = any(one.outcome is TransferOutcome.UNANSWERED for one in decoded.transfers)
+        before = self._open.get(pair) if left else None
+        if left or not decoded.asks:
+            self._close(pair)
+        if decoded.asks and self._event.matches(record, decoded):
+            self._await(pair, record, f"{_said(decoded)}: not answered")
+        return f"{before[1]} before the next request" if before else None
+
+
+# Demands on the values of signals.
+
+EMCY: Final = "emcy"
+
+
+@dataclass(frozen=True, slots=True)
+class Values:
+    """Values that are right.
+
+    Attributes:
+        text: as they are written.
+        holds: says whether a signal has one of them.
+    """
+
+    text: str
+    holds: Callable[[Signal], bool]
+
+
+class In(RuleDemand):
+    """A value is one of those that are right.
+
+    A signal is told when it begins to be wrong; of other events each frame is. An EMCY of code
+    0000h takes an error back, and is right.
+
+    Args:
+        event: a signal, or frames of a kind, whose first value counts.
+        values: what is right.
+    """
+
+    def __init__(self, event: RuleEvent, values: Values) -> None:
+        self._event, self._value_of, self._values = event, event.value_of(), values
+        self._once = event.is_signal
+        self.doubt = f"no value of {event.text} came while it was in force"
+        self._wrong: set[_Sender] = set()
+
+    def pause(self) -> None:
+        """Tell it again."""
+        self._wrong.clear()
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare the value."""
+        signal = self._value_of(record, decoded)
+        if signal is None:
+            return None
+        self.judged = True
+        sender = _sender_of(record)
+        if self._values.holds(signal) or (decoded.kind == EMCY and not signal.value):
+            self._wrong.discard(sender)
+            return None
+        if self._once and sender in self._wrong:
+            return None
+        self._wrong.add(sender)
+        return f"{_said(decoded)}; {self._event.text} in {self._values.text} is right"
+
+
+class Follow(RuleDemand):
+    """Each value is compared with the one before it, of the same identifier.
+
+    Args:
+        event: as of `In`.
+    """
+
+    def __init__(self, event: RuleEvent) -> None:
+        self._value_of = event.value_of()
+        self._last: dict[_Sender, tuple[float, int | None]] = {}
+        self.doubt = f"no two values of {event.text} came from one sender while it was in force"
+
+    def begin(self, at_us: int) -> None:
+        """Forget what was before."""
+        self._last.clear()
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare it; a boot-up begins anew."""
+        if decoded.kind == "boot-up":
+            self._last = {
+                sender: last
+                for sender, last in self._last.items()
+                if (sender[0], last[1]) != (record.channel, decoded.node)
+            }
+        signal = self._value_of(record, decoded)
+        if signal is None or not isinstance(signal.value, int | float):
+            return None
+        sender = _sender_of(record)
+        before = self._last.get(sender)
+        self._last[sender] = signal.value, decoded.node
+        self.judged |= before is not None
+        return None if before is None else self._compare(sender, before[0], signal)
+
+    def _compare(self, sender: _Sender, before: float, signal: Signal) -> str | None:
+        raise NotImplementedError
+
+
+class Counts(Follow):
+    """A counter goes up by one, and round to 0 or 1 from the highest value that it had."""
+
+    def __init__(self, event: RuleEvent) -> None:
+        super().__init__(event)
+        self._highest: dict[_Sender, float] = {}
+
+    def _compare(self, sender: _Sender, before: float, signal: Signal) -> str | None:
+        value = signal.value
+        assert isinstance(value, int | float)
+        highest = self._highest[sender] = max(before, self._highest.get(sender, before))
+        if value == before + 1 or (value in (0, 1) and before == highest):
+            return None
+        return f"{signal.name} is {value:g} after {before:g}, one more is right"
+
+
+class Steps(Follow):
+    """A value changes from frame to frame by so much at most.
+
+    Args:
+        event: as of `In`.
+        most: the largest change.
+    """
+
+    def __init__(self, event: RuleEvent, most: float) -> None:
+        super().__init__(event)
+        self._most = most
+
+    def _compare(self, sender: _Sender, before: float, signal: Signal) -> str | None:
+        value = signal.value
+        assert isinstance(value, int | float)
+        if abs(value - before) <= self._most:
+            return None
+        return f"{signal.name} is {value:g} after {before:g}, a step of {self._most:g} is right"
+
+
+class Changes(RuleDemand):
+    """A value does not stay the same for too long; it is told once.
+
+    Args:
+        event: as of `In`.
+        most_us: how long it may stay the same.
+    """
+
+    timed = True
+
+    def __init__(self, event: RuleEvent, most_us: int) -> None:
+        self._value_of, self._most_us = event.value_of(), most_us
+        self.doubt = f"no two values of {event.text} came from one sender while it was in force"
+        self._since: dict[_Sender, tuple[object, int, bool]] = {}
+
+    def begin(self, at_us: int) -> None:
+        """Forget what was before."""
+        self._since.clear()
+
+    def judge(self, record: Record, decoded: Decoded) -> str | None:
+        """Compare it with the one before."""
+        signal = self._value_of(record, decoded)
+        if signal is None:
+            return None
+        sender, at_us = _sender_of(record), record.at_us
+        value, since_us, told = self._since.get(sender, (None, at_us, False))
+        self.judged |= sender in self._since
+        if sender not in self._since or value != signal.value:
+            self._since[sender] = signal.value, at_us, False
+            return None
+        if told or at_us - since_us <= self._most_us:
+            return None
+        self._since[sender] = value, since_us, True
+        stayed = f"{signal} has not changed for {ms_text(at_us - since_us)} ms"
+        return f"{stayed}, at most {ms_text(self._most_us)} is right"

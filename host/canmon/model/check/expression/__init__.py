@@ -1,1 +1,0 @@
-"""Rules of `canmon check` as filter expressions with time: what is demanded of which frames."""

@@ -1,0 +1,491 @@
+"""Rules as people write them: an event in the words of `-F`, what is demanded of it, and when.
+
+```
+rule   = event demand (scope) ...
+event  = a filter, see `decode.filter`, with 181[2:4] or 181[0.3] as a signal, see
+         `graph.signal_spec`; `dlc` alone is `all frames dlc`
+demand = never | always | once | at most 3 [per 1s] | at least 3
+       | in {1, 8130h, 5..9, word} | in 1..5 | steps under 5 | counts | changes within 1s
+       | every 10ms ±10% | every 9ms..11ms | every 5ms.. | every ..20ms
+       | within 2s [after event] | to event under 2ms | answered within 50ms
+       | dlc | toggle
+scope  = after event | before event | while condition on signals
+```
+
+>>> [made.name for made in parse_rule("tpdo1 of 3-4 every 10ms ±10%").make()]
+['tpdo1 of 3-4 every 10ms ±10%', 'tpdo1 of 3-4 every 10ms ±10%']
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.host.canmon.model.check.demands import (
+    EVERY,
+    MOST_COUNTED,
+    Answered,
+    Changes,
+    Count,
+    Counts,
+    Dlc,
+    Every,
+    FirstWithin,
+    In,
+    Latency,
+    Never,
+    Rate,
+    RuleDemand,
+    RuleEvent,
+    Steps,
+    Toggle,
+    Truth,
+    Values,
+)
+from tickrig.host.canmon.model.check.expression_rule import (
+    After,
+    Before,
+    ExpressionRule,
+    RuleScope,
+    Slice,
+    SliceParser,
+    While,
+)
+from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
+from tickrig.host.canmon.model.decode.filter import FilterError, Token
+from tickrig.host.canmon.model.decode.filter_terms import (
+    COMPARISONS,
+    NMT_STATES,
+    Test,
+    comparison,
+    number,
+)
+from tickrig.host.text.names import closest
+from tickrig.host.text.values import parse_time_us
+
+# Times, tolerances and sets of values, as rules have them.
+
+_TIME: Final = re.compile(r"[0-9]{1,9}(?:\.[0-9]{1,9})?(?:s|ms|us)")
+_SHARE: Final = re.compile(r"([0-9]{1,6}(?:\.[0-9]{1,6})?)%")
+
+
+def _time_us(text: str) -> int | None:
+    """Read a time with its unit; None if it is none.
+
+    >>> _time_us("1.5ms"), _time_us("2")
+    (1500, None)
+    """
+    return parse_time_us(text) if _TIME.fullmatch(text) else None
+
+
+def _tolerance_us(text: str, period_us: int) -> int | None:
+    """Read a share of a period, or a time; None if it is neither.
+
+    >>> _tolerance_us("10%", 10_000), _tolerance_us("250us", 10_000)
+    (1000, 250)
+    """
+    share = _SHARE.fullmatch(text)
+    return int(period_us * float(share[1]) / 100) if share else _time_us(text)
+
+
+def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
+    """Return what says whether a signal has one of some values.
+
+    Args:
+        parts: a value each, or the ends of a range, of which one may be empty.
+
+    Raises:
+        ValueError: an end is no number, or the lower one is above the other.
+
+    >>> holds = _values_of([("7",), ("", "5")])
+    >>> [holds(Signal("speed", value)) for value in (5, 6, 7)]
+    [True, False, True]
+    """
+    tests = [comparison("=", part[0]) if len(part) == 1 else _within(*part) for part in parts]
+    return lambda signal: any(test(signal) for test in tests)
+
+
+def _within(low: str, high: str) -> Callable[[Signal], bool]:
+    least, most = number(low or "-inf"), number(high or "inf")
+    for text, end in ((low, least), (high, most)):
+        if end is None or end != end:  # noqa: PLR0124 - what is no number
+            raise ValueError(f"{text!r} is no number, as an end of a range is")
+    assert least is not None
+    assert most is not None
+    if not (low or high) or least > most:
+        raise ValueError(f"{low}..{high} is no range of values, as -5..5, 0.. or ..100")
+
+    def holds(signal: Signal) -> bool:
+        value = signal.value
+        return isinstance(value, int | float) and least <= value <= most
+
+    return holds
+
+
+# What stands behind a demand: times, spans, counts and sets of values.
+
+
+class RuleError(FilterError):
+    """Text that is no rule."""
+
+    what = "rule"
+
+
+SCOPES: Final = ("after", "before", "while")
+_UNITS: Final = ("s", "ms", "us", "%")
+"""Of what has no blank before its unit."""
+
+_COUNT: Final = re.compile(r"[0-9]{1,9}")
+
+
+class QuantityParser(SliceParser):
+    """Takes quantities from the words of a rule.
+
+    Args:
+        text: the rule.
+    """
+
+    wrong = RuleError
+    _word_column = 1
+
+    def _whole(self) -> int:
+        if not _COUNT.fullmatch(self._next.text):
+            raise self._error(f"{self._came()} is no count, as 3")
+        return int(self._tokens.pop(0).text)
+
+    def _number(self) -> float:
+        found = number(self._next.text)
+        if found is None or found != found:  # noqa: PLR0124 - what is no number
+            raise self._error(f"{self._came()} is no number")
+        del self._tokens[0]
+        return found
+
+    def _under(self) -> int:
+        """Take a limit of time."""
+        if not self._take("under", "within"):
+            raise self._error(f"{self._came()} where 'under' or 'within' and a time are wanted")
+        return self._time()
+
+    def _time(self) -> int:
+        found = _time_us(self._next.text)
+        if found is None:
+            raise self._error(f"{self._came()} is no time, as 2s, 50ms or 250us{self._blank()}")
+        del self._tokens[0]
+        return found
+
+    def _blank(self) -> str:
+        """Say so where a blank stands between a number and its unit."""
+        value, unit = self._tokens[0].text, self._tokens[1:2]
+        if number(value) is None or not unit or unit[0].text not in _UNITS:
+            return ""
+        return f"; without a blank, as {value}{unit[0].text}"
+
+    def _span(self) -> tuple[int, int | None]:
+        """Take how far frames may be apart: `10ms ±10%`, `9ms..11ms`, `5ms..`, `..20ms`."""
+        if self._take(".."):
+            return 0, self._time()
+        low_us = self._time()
+        if self._take(".."):
+            is_open = _time_us(self._next.text) is None and not self._next.text[:1].isdecimal()
+            return self._ordered(low_us, None if is_open else self._time())
+        if not self._take("±", "+-"):
+            wanted = "wanted how far off is right, as ±10%, ±500us or 9ms..11ms"
+            raise self._error(f"{self._came()} behind the time; {wanted}")
+        off_us = _tolerance_us(self._next.text, low_us)
+        if off_us is None:
+            wanted = "neither a share, as 10%, nor a time, as 500us"
+            raise self._error(f"{self._came()} is {wanted}{self._blank()}")
+        del self._tokens[0]
+        return max(0, low_us - off_us), low_us + off_us
+
+    def _ordered(self, low_us: int, high_us: int | None) -> tuple[int, int | None]:
+        if high_us is not None and high_us < low_us:
+            raise self._error("the time before '..' is above the one behind it")
+        return low_us, high_us
+
+    def _values(self) -> Values:
+        """Take what is right: `{1, 8130h, 5..9, stopped}`, or `1..5` alone."""
+        begin = self._next.column - 1
+        parts = [self._value()] if not self._take("{") else self._members()
+        text = self._text[begin : self._next.column - 1].strip()
+        try:
+            return Values(text, _values_of(parts))
+        except ValueError as error:
+            raise self._error(str(error)) from None
+
+    def _members(self) -> list[tuple[str, ...]]:
+        parts = [self._value()]
+        while self._take(","):
+            parts.append(self._value())
+        self._expect("}")
+        return parts
+
+    def _value(self) -> tuple[str, ...]:
+        """Take a value, or both ends of a range; an end that is open is empty."""
+        low = "" if self._next.text == ".." else self._word()
+        if not self._take(".."):
+            return (low,)
+        is_open = not self._next.text or self._next.text in (*SCOPES, ",", "}")
+        return low, "" if is_open else self._word()
+
+    def _word(self) -> str:
+        if not re.match(r"[\w.+-]", self._next.text):
+            raise self._error(f"{self._came()} where a value is wanted, as 8130h, 5..9 or {{1, 2}}")
+        return self._tokens.pop(0).text
+
+    def _take_one(self, *words: str) -> str:
+        """Take the next token if it is one of these; return it, or nothing."""
+        word, column = self._next
+        if not self._take(*words):
+            return ""
+        self._word_column = column
+        return word
+
+    def _refuse_word(self, reason: str) -> RuleError:
+        """Return the error of the word that `_take_one` took."""
+        return RuleError(self._text, self._word_column, reason)
+
+    def _came(self) -> str:
+        return repr(self._next.text) if self._next.text else "the end"
+
+
+# EMCYs that take an error back: where errors are looked for they are none.
+
+EMCY: Final = "emcy"
+_OTHERS: Final = frozenset(["not", "!", "!="])
+
+
+def errors_alone(test: Test, tokens: Iterable[Token], signals: Collection[str]) -> Test:
+    """Return the test of frames as events: an EMCY of code 0000h is none.
+
+    It stays one where the filter does not name `emcy`, has a `not`, or names a signal, as
+    `emcy and code = 0`.
+
+    Args:
+        test: of the filter.
+        tokens: its words.
+        signals: that it asks for.
+    """
+    words = {token.text for token in tokens}
+    if signals or EMCY not in words or words & _OTHERS:
+        return test
+    return lambda record, decoded: test(record, decoded) and not _is_reset(decoded)
+
+
+def _is_reset(decoded: Decoded) -> bool:
+    return decoded.kind == EMCY and bool(decoded.signals) and not decoded.signals[0].value
+
+
+DEMANDS: Final = (
+    *("never", "always", "once", "at most", "at least", "in", "every", "within", "to"),
+    *("answered", "dlc", "toggle", "counts", "steps", "changes"),
+)
+_SCOPE: Final[dict[str, Callable[[RuleEvent], RuleScope]]] = {
+    "after": After,
+    "before": Before,
+    "while": While,
+}
+_PLAIN: Final[dict[str, Callable[[RuleEvent], RuleDemand]]] = {
+    "once": lambda event: Count(event, 1, 1),
+    "dlc": Dlc,
+    "toggle": Toggle,
+}
+BEHIND: Final = {
+    "after": "the demand, as tpdo1 of 3 within 2ms after sync",
+    "before": "the demand, as emcy never before sync",
+    "while": "the demand, as emcy never while node 3 stopped",
+    **dict.fromkeys(NMT_STATES, "a node, as node 3 stopped"),
+}
+"""Words that are no demand, and what they stand behind."""
+
+_EACH_NODE: Final = (Every, FirstWithin, Latency, Count, Rate)
+"""Demands that are made of each node where several are named; the others tell them apart."""
+
+_NODES: Final = re.compile(r"\b(of|node)(\s+)([0-9]{1,3}-[0-9]{1,3})(?![\w.])")
+_OF: Final = re.compile(r"(?<!\s)\s++of\s")
+_OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
+
+
+class RuleParser(QuantityParser):
+    """Recursive descent over the grammar above.
+
+    Args:
+        text: the rule.
+    """
+
+    def rule(self) -> tuple[RuleDemand, list[RuleScope], set[str], list[Slice]]:
+        """Return demand, scopes, signals and slices that are named; RuleError if it is no rule."""
+        self._named: set[str] = set()
+        demand = self._demand(self._subject())
+        scopes = []
+        while word := self._take_one(*SCOPES):
+            scopes.append(_SCOPE[word](self._condition() if word == "while" else self._event()))
+        if self._next.text:
+            raise self._error(
+                f"{self._came()} behind the end; wanted {', '.join(SCOPES)}, or no more"
+            )
+        return demand, scopes, self._named, list(self._slices.items())
+
+    def _subject(self) -> RuleEvent:
+        if self._next.text != "dlc" or self._tokens[1].text in COMPARISONS:
+            return self._event()
+        if self._tokens[1].text != "of":
+            return EVERY
+        del self._tokens[1]
+        nodes = self._nodes_behind()
+        return RuleEvent(EVERY.text, lambda record, decoded: decoded.node in nodes)
+
+    def _nodes_behind(self) -> range:
+        """Take node-IDs that stand behind the next token."""
+        word = self._tokens.pop(0)
+        nodes = self._node_ids()
+        self._tokens.insert(0, word)
+        return nodes
+
+    def _event(self) -> RuleEvent:
+        """Take a filter, as far as it goes."""
+        tokens, signals, nodes = list(self._tokens), self._signals, self._nodes
+        self._signals, self._nodes = set(), set()
+        test = self._or()
+        taken = tokens[: len(tokens) - len(self._tokens)]
+        paths, words = tuple(sorted(self._signals)), [token.text for token in taken]
+        self._named |= self._signals
+        has_node = bool(self._nodes) or "node" in words or any(map(_OWN_NODE.match, paths))
+        self._signals, self._nodes = self._signals | signals, self._nodes | nodes
+        last = taken[-1]
+        text = self._text[taken[0].column - 1 : last.column - 1 + len(last.text)]
+        name = _OF.split(text)[0]
+        is_signal = any(path == name or path.endswith(f".{name}") for path in paths)
+        if self._next.text != "dlc":  # of an error reset, too
+            test = errors_alone(test, taken, paths)
+        return RuleEvent(text, test, paths, is_signal, has_node)
+
+    def _condition(self) -> RuleEvent:
+        return self._with_signals(self._event(), "while")
+
+    def _with_signals(self, event: RuleEvent, word: str) -> RuleEvent:
+        if not event.paths:
+            reason = f"{word!r} wants a signal or a state, as 3.statusword.fault or node 3 stopped"
+            raise self._refuse_word(f"{reason}; {event.text!r} names none")
+        return event
+
+    def _demand(self, event: RuleEvent) -> RuleDemand:
+        word = self._take_one("at") or self._take_one(*DEMANDS)
+        if word in _PLAIN:
+            return _PLAIN[word](event)
+        match word:
+            case "never":
+                return Truth(event, wanted=False) if event.paths else Never(event)
+            case "always":
+                return Truth(self._with_signals(event, word), wanted=True)
+            case "at":
+                return self._count(event)
+            case "in" | "steps" | "counts" | "changes":
+                return self._value_demand(event, word)
+            case _:
+                return self._time_demand(event, word)
+
+    def _time_demand(self, event: RuleEvent, word: str) -> RuleDemand:
+        match word:
+            case "every":
+                return Every(event, *self._span())
+            case "within":
+                most_us = self._time()
+                first = self._event() if self._take("after") else None
+                return Latency(first, event, most_us) if first else FirstWithin(event, most_us)
+            case "to":
+                second = self._event()
+                return Latency(event, second, self._under())
+            case "answered":
+                return Answered(event, self._under())
+            case _:
+                raise self._error(f"{self._came()} is no demand; {self._allowed()}")
+
+    def _value_demand(self, event: RuleEvent, word: str) -> RuleDemand:
+        if len(event.paths) > 1 or (event.paths and not event.is_signal):
+            reason = f"{word!r} is about one signal, as 3.position, or about one kind"
+            raise self._refuse_word(reason)
+        match word:
+            case "in":
+                return In(event, self._values())
+            case "steps":
+                self._expect("under")
+                return Steps(event, self._number())
+            case "changes":
+                return Changes(event, self._under())
+            case _:
+                return Counts(event)
+
+    def _count(self, event: RuleEvent) -> RuleDemand:
+        word = self._take_one("most", "least")
+        if not word:
+            raise self._error(f"{self._came()} behind 'at'; wanted most or least")
+        count = self._whole()
+        if word == "least":
+            return Count(event, count, None)
+        if not self._take("per"):
+            return Count(event, 0, count)
+        if count > MOST_COUNTED:
+            raise self._error(f"at most {count}: at most {MOST_COUNTED} can be counted in a time")
+        return Rate(event, count, self._time())
+
+    def _allowed(self) -> str:
+        word = self._next.text
+        if word in BEHIND:
+            return f"it stands behind {BEHIND[word]}"
+        near = closest(word, [*DEMANDS, *SCOPES, *NMT_STATES]) if word else []
+        meant = f"; did you mean {near[0]!r}?" if near else ""
+        return f"wanted {', '.join(DEMANDS)}, or 'and', 'or'{meant}"
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """A rule that was read.
+
+    Attributes:
+        name: as findings and reports have it.
+        texts: the rule, once for each node that it is demanded of.
+    """
+
+    name: str
+    texts: tuple[str, ...]
+
+    def make(self) -> list[ExpressionRule]:
+        """Return new rules that have seen nothing yet."""
+        return [_made(self.name, text) for text in self.texts]
+
+
+def _made(name: str, text: str) -> ExpressionRule:
+    demand, scopes, paths, slices = RuleParser(text).rule()
+    mapped = "pdo" in text or any("." in path for path in paths)
+    return ExpressionRule(name, demand, scopes, paths, slices, mapped=mapped)
+
+
+def parse_rule(text: str, name: str = "") -> Expression:
+    """Read a rule.
+
+    Args:
+        text: the rule.
+        name: what findings call it; empty for the rule itself.
+
+    Raises:
+        RuleError: it is none; says the column.
+    """
+    demand, *_ = RuleParser(text).rule()
+    name = name or " ".join(text.split())
+    if not name.isprintable():
+        raise RuleError(text, 1, f"its name {name!r} cannot be printed")
+    ranges = {match[3] for match in _NODES.finditer(text)}
+    if not isinstance(demand, _EACH_NODE) or not ranges or re.search(r"\bnot\b|!", text):
+        return Expression(name, (text,))
+    if len(ranges) > 1:
+        said = " and ".join(sorted(ranges))
+        raise RuleError(text, 1, f"nodes {said}: a rule that is made for each node names one range")
+    first, _, last = next(iter(ranges)).partition("-")
+    nodes = range(int(first), int(last) + 1)
+    return Expression(
+        name,
+        tuple(_NODES.sub(rf"\g<1>\g<2>{node}", text) for node in nodes),
+    )

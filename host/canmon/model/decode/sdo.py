@@ -1,0 +1,535 @@
+"""SDO frames put together to transfers, as a third party hears them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Final, NamedTuple
+
+from tickrig.host.canmon.model.decode.decoded import (
+    Transfer,
+    TransferDirection,
+    TransferMode,
+    TransferOutcome,
+    write_entry,
+)
+from tickrig.wire.canopen.sdo import (
+    Abort,
+    DownloadInitiateRequest,
+    DownloadInitiateResponse,
+    DownloadSegmentResponse,
+    Request,
+    Response,
+    Segment,
+    UploadInitiateRequest,
+    UploadInitiateResponse,
+    UploadSegmentRequest,
+    parse_request,
+    parse_response,
+)
+from tickrig.wire.canopen.sdo_frame import (
+    BLOCK_END,
+    BLOCK_SEQNO,
+    FRAME_BYTES,
+    BlockAcknowledge,
+    BlockDownloadInitiateRequest,
+    BlockDownloadInitiateResponse,
+    BlockEnd,
+    BlockEnded,
+    BlockSegment,
+    BlockStart,
+    BlockUploadInitiateRequest,
+    BlockUploadInitiateResponse,
+    crc16,
+)
+from tickrig.wire.errors import WireError
+
+# An SDO transfer while it runs.
+
+
+class TransferPhase(Enum):
+    """What is expected next."""
+
+    ASKED = auto()  # the answer to the request that began it
+    SEGMENTS = auto()
+    BLOCK_READY = auto()  # block upload: the client's start
+    BLOCK = auto()  # segments of a block
+    BLOCK_ENDING = auto()  # the last segment has its receipt
+    BLOCK_ENDED = auto()  # end was said, the answer is expected
+
+
+@dataclass(slots=True)
+class OpenTransfer:
+    """What was heard of a transfer so far.
+
+    Args:
+        at_us: when it began.
+        node: the server.
+        direction: which way the value goes.
+        mode: as the request wants it.
+        index: None where the beginning was not heard.
+        sub: likewise.
+        begun_by: the request, to tell when it is sent again.
+
+    Attributes:
+        phase: what is expected next.
+        size: number of bytes, None if it was not said.
+        sized: what came says how many bytes it has.
+        crc: both sides can do the CRC.
+        sent: the segment of a download that has no receipt yet.
+        requested_toggle: toggle bit of the segment of an upload that was asked for.
+        taken: toggle bit of the latest segment that was taken.
+        block_last: place of the last segment in its block, once it was heard.
+        block_size: segments of a block, as its receiver wants it; 0 while it has not said so.
+        done: nothing more is expected.
+    """
+
+    at_us: int
+    node: int
+    direction: TransferDirection
+    mode: TransferMode
+    index: int | None = None
+    sub: int | None = None
+    begun_by: bytes = b""
+    phase: TransferPhase = TransferPhase.ASKED
+    size: int | None = None
+    sized: bool = True
+    retries: int = 0
+    partial: bool = False
+    crc: bool = False
+    data: bytearray = field(default_factory=bytearray)
+    flaws: list[str] = field(default_factory=list)
+    sent: Segment | None = None
+    requested_toggle: bool | None = None
+    taken: bool | None = None
+    block_last: int | None = None
+    block_size: int = 0
+    done: bool = False
+    _block: dict[int, bytes] = field(default_factory=dict)
+
+    @property
+    def entry(self) -> tuple[int, int] | None:
+        """Index and sub-index; None where they were not heard."""
+        return None if self.index is None or self.sub is None else (self.index, self.sub)
+
+    @property
+    def progress(self) -> str:
+        """How many bytes have come."""
+        return f"{len(self.data)} of {self.size} B" if self.size else f"{len(self.data)} B"
+
+    @property
+    def is_block_over(self) -> bool:
+        """Whether all segments of a block have come."""
+        heard = max(self._block, default=0)
+        return heard in (self.block_last, self.block_size) and heard > 0
+
+    def take_block_segment(self, segment: BlockSegment) -> None:
+        """Keep a segment until its receipt says that it counts."""
+        self._block[segment.seqno] = segment.data
+        if segment.last:
+            self.block_last = segment.seqno
+
+    def acknowledge_block(self, ackseq: int) -> None:
+        """Take the segments that came in sequence; the others are sent again."""
+        if any(seqno not in self._block for seqno in range(1, ackseq + 1)):
+            self.add_flaw("segments not heard")
+        self.data += b"".join(self._block.get(seqno, b"") for seqno in range(1, ackseq + 1))
+        self.retries += max(self._block, default=0) > ackseq
+        if self.block_last == ackseq:
+            self.phase = TransferPhase.BLOCK_ENDING
+        self.block_last = None
+        self._block.clear()
+
+    def end_block(self, end: BlockEnd) -> None:
+        """Cut the fill of the last segment off, and compare the CRC."""
+        if end.fill:
+            del self.data[-end.fill :]
+        if self.crc and not self.flaws and crc16(bytes(self.data)) != end.crc:
+            self.add_flaw("wrong CRC")
+        self.phase = TransferPhase.BLOCK_ENDED
+
+    def add_flaw(self, text: str) -> None:
+        """Note what does not fit, once."""
+        if text not in self.flaws:
+            self.flaws.append(text)
+
+    def close(
+        self, now_us: int, outcome: TransferOutcome, *, code: int = 0, by_client: bool = False
+    ) -> Transfer:
+        """Return it as a value."""
+        done = outcome is TransferOutcome.DONE
+        if done and not self.partial and self.size not in (None, len(self.data)):
+            self.add_flaw(f"size {self.size} was said")
+        return Transfer(
+            *(self.at_us, now_us - self.at_us, self.node, self.direction, self.mode),
+            *(self.index, self.sub, outcome),
+            data=bytes(self.data) if self.data or done else None,
+            abort_code=code,
+            by_client=by_client,
+            retries=self.retries,
+            partial=self.partial,
+            flaws=tuple(self.flaws),
+            sized=self.sized,
+        )
+
+
+# Frames of SDO transfers, initiation, segments and blocks, as a third party hears them.
+
+_Initiate = (
+    UploadInitiateRequest
+    | DownloadInitiateRequest
+    | BlockUploadInitiateRequest
+    | BlockDownloadInitiateRequest
+)
+_Answer = UploadInitiateResponse | DownloadInitiateResponse
+
+
+def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> OpenTransfer:
+    """Open a transfer with the request that began it."""
+    uploads = isinstance(request, UploadInitiateRequest | BlockUploadInitiateRequest)
+    direction = TransferDirection.UPLOAD if uploads else TransferDirection.DOWNLOAD
+    opened = OpenTransfer(
+        at_us, node, direction, TransferMode.EXPEDITED, request.index, request.sub, data
+    )
+    match request:
+        case DownloadInitiateRequest(data=None, size=size):
+            opened.mode, opened.size = TransferMode.SEGMENTED, size
+        case DownloadInitiateRequest(data=bytes(value), size=size):
+            opened.data += value
+            opened.sized = size is not None
+        case BlockUploadInitiateRequest(crc=crc):
+            opened.mode, opened.crc = TransferMode.BLOCK, crc
+        case BlockDownloadInitiateRequest(crc=crc, size=size):
+            opened.mode, opened.crc, opened.size = TransferMode.BLOCK, crc, size
+    return opened
+
+
+def answers(running: OpenTransfer, answer: _Answer) -> bool:
+    """Say whether this is the answer to the request; block upload may be switched to another."""
+    upload = isinstance(answer, UploadInitiateResponse)
+    return (
+        running.phase is TransferPhase.ASKED
+        and running.entry == (answer.index, answer.sub)
+        and running.direction
+        is (TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD)
+        and (upload or running.mode is not TransferMode.BLOCK)
+    )
+
+
+def _take_answer(running: OpenTransfer, answer: _Answer) -> str:
+    """Take the answer: the value itself, or leave for segments."""
+    if isinstance(answer, DownloadInitiateResponse):
+        running.done = running.mode is TransferMode.EXPEDITED and not running.partial
+        running.phase = TransferPhase.SEGMENTS
+        return (
+            "ready for segments" if running.mode is TransferMode.SEGMENTED else "download confirmed"
+        )
+    if answer.data is not None:
+        running.mode, running.done = TransferMode.EXPEDITED, True
+        running.data += answer.data
+        running.sized = answer.size is not None
+        return "upload"
+    running.mode, running.phase, running.size = (
+        TransferMode.SEGMENTED,
+        TransferPhase.SEGMENTS,
+        answer.size,
+    )
+    size = "their size is not told" if answer.size is None else running.progress
+    return f"segments follow, {size}"
+
+
+def _unheard(at_us: int, node: int, answer: _Answer) -> OpenTransfer:
+    """Open a transfer whose request was not heard."""
+    upload = isinstance(answer, UploadInitiateResponse)
+    direction = TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD
+    opened = OpenTransfer(at_us, node, direction, TransferMode.SEGMENTED, answer.index, answer.sub)
+    opened.partial = True
+    return opened
+
+
+def _request_segment(running: OpenTransfer, request: UploadSegmentRequest) -> str:
+    """Take what a client of an upload asks for."""
+    running.retries += running.requested_toggle == request.toggle
+    running.requested_toggle = request.toggle
+    return f"asks for a segment, {running.progress} so far"
+
+
+def _take_segment(running: OpenTransfer, segment: Segment) -> str:
+    """Take a segment of an upload, unless it was sent twice or a toggle bit is wrong."""
+    if segment.toggle != running.requested_toggle or segment.toggle == running.taken:
+        return "segment with the wrong toggle bit, or sent again"
+    running.taken = segment.toggle
+    running.data += segment.data
+    running.done = segment.last
+    return f"segment, {running.progress}"
+
+
+def _send_segment(running: OpenTransfer, segment: Segment) -> str:
+    """Take a segment of a download; it counts when the server has confirmed it."""
+    again = running.sent is not None and running.sent.toggle == segment.toggle
+    running.retries += again or segment.toggle == running.taken
+    running.sent = segment
+    return f"segment of {len(segment.data)} B, {running.progress} so far"
+
+
+def _confirm_segment(running: OpenTransfer, response: DownloadSegmentResponse) -> str:
+    """Take the receipt of a segment."""
+    sent = running.sent
+    if sent is None or sent.toggle != response.toggle or sent.toggle == running.taken:
+        return "receipt of no segment that was heard, or of one sent again"
+    running.taken, running.sent = sent.toggle, None
+    running.data += sent.data
+    running.done = sent.last
+    return f"segment confirmed, {running.progress}"
+
+
+_ORPHAN: Final = "of a block transfer whose beginning was not heard"
+
+_END_MASK: Final = 0xE3
+
+
+def _is_block_segment(running: OpenTransfer, sender: TransferDirection, data: bytes) -> bool:
+    """Tell a segment of a block from anything else: only the state can."""
+    if running.phase is not TransferPhase.BLOCK or running.direction is not sender:
+        return False
+    if len(data) != FRAME_BYTES or not data[0] & BLOCK_SEQNO:
+        return False  # 80h, an abort: no segment has the number 0
+    return running.block_last is None or data[0] & _END_MASK != BLOCK_END
+
+
+def _take_block_segment(running: OpenTransfer, data: bytes) -> str:
+    """Keep a segment until its receipt."""
+    segment = BlockSegment.parse(data)
+    running.take_block_segment(segment)
+    return f"segment {segment.seqno} of a block"
+
+
+def _take_block_frame(running: OpenTransfer, message: Request | Response) -> str:
+    """Take any other frame of a block transfer."""
+    upload = running.direction is TransferDirection.UPLOAD
+    match message, running.phase:
+        case (
+            (BlockDownloadInitiateResponse() | BlockUploadInitiateResponse()),
+            TransferPhase.ASKED,
+        ):
+            return _answer(running, message)
+        case BlockStart(), TransferPhase.BLOCK_READY:
+            running.phase = TransferPhase.BLOCK
+            return "start of a block upload"
+        case BlockAcknowledge(ackseq=ackseq, block_size=block_size), TransferPhase.BLOCK:
+            running.acknowledge_block(ackseq)
+            running.block_size = block_size
+            return f"segments to {ackseq} confirmed, {running.progress}"
+        case BlockEnd(), (TransferPhase.BLOCK | TransferPhase.BLOCK_ENDING):
+            return _end(running, message)
+        case BlockEnded(), TransferPhase.BLOCK_ENDED:
+            running.done = True
+            return "end of a block upload confirmed" if upload else "block download confirmed"
+        case _:
+            return _ORPHAN
+
+
+def _answer(
+    running: OpenTransfer, answer: BlockDownloadInitiateResponse | BlockUploadInitiateResponse
+) -> str:
+    running.crc = running.crc and answer.crc
+    if isinstance(answer, BlockUploadInitiateResponse):
+        running.size = answer.size
+        running.phase = TransferPhase.BLOCK_READY
+        return f"block upload of {'unknown size' if answer.size is None else f'{answer.size} B'}"
+    running.phase, running.block_size = TransferPhase.BLOCK, answer.block_size
+    return f"ready for blocks of {answer.block_size} segments"
+
+
+def _end(running: OpenTransfer, end: BlockEnd) -> str:
+    if running.phase is TransferPhase.BLOCK:
+        running.add_flaw("a receipt was not heard")
+    running.end_block(end)
+    return f"end of the blocks, {running.progress}"
+
+
+# SDO frames of one client and one server, put together to transfers.
+
+
+class SdoStep(NamedTuple):
+    """What one SDO frame did.
+
+    Attributes:
+        text: the step, where no transfer ended with it.
+        entry: index and sub-index it is about, as far as known.
+        ended: the transfers that ended with it.
+        asks: the client waits for an answer to it.
+    """
+
+    text: str
+    entry: tuple[int, int] | None = None
+    ended: tuple[Transfer, ...] = ()
+    asks: bool = False
+
+
+class SdoChannel:
+    """Follows the transfers between one client and one server, as a third party hears them.
+
+    It takes up a transfer in the middle: what can be told of it is told, and marked as
+    partial. It knows no time-outs, which are the client's own: a transfer is unanswered
+    when its client begins another one or the trace ends.
+
+    Args:
+        node: the server's node-ID.
+    """
+
+    def __init__(self, node: int) -> None:
+        self.node = node
+        self._running: OpenTransfer | None = None
+        self._latest: Transfer | None = None
+        self._ended: list[Transfer] = []
+
+    def pending(self, now_us: int) -> Transfer | None:
+        """Return the transfer that runs, as it would end now."""
+        running = self._running
+        return None if running is None or running.partial else _given_up(running, now_us)
+
+    def request(self, at_us: int, data: bytes) -> SdoStep:
+        """Take a frame of the client."""
+        running = self._running
+        if running and _is_block_segment(running, TransferDirection.DOWNLOAD, data):
+            text = _take_block_segment(running, data)
+            return SdoStep(text, running.entry, asks=running.is_block_over)
+        try:
+            message = parse_request(data)
+        except WireError as error:
+            return SdoStep(str(error))
+        step = self._step(at_us, self._take_request(at_us, message, data), message)
+        return step._replace(asks=not isinstance(message, Abort | BlockEnded))
+
+    def response(self, at_us: int, data: bytes) -> SdoStep:
+        """Take a frame of the server."""
+        running = self._running
+        if running and _is_block_segment(running, TransferDirection.UPLOAD, data):
+            return SdoStep(_take_block_segment(running, data), running.entry)
+        try:
+            message = parse_response(data)
+        except WireError as error:
+            return SdoStep(str(error))
+        return self._step(at_us, self._take_response(at_us, message), message)
+
+    def _step(self, at_us: int, text: str, message: Request | Response) -> SdoStep:
+        """Close what is done, and tell what ended."""
+        running = self._running
+        if running and running.done:
+            self._end(running.close(at_us, TransferOutcome.DONE))
+        ended, self._ended = tuple(self._ended), []
+        entry = _named(message)
+        if entry is None and ended:
+            entry = ended[-1].entry
+        elif entry is None and running:
+            entry = running.entry
+        return SdoStep(text, entry, ended)
+
+    def _end(self, transfer: Transfer) -> None:
+        self._latest, self._running = transfer, None
+        self._ended.append(transfer)
+
+    def _take_request(self, at_us: int, message: Request, data: bytes) -> str:
+        match message:
+            case (
+                UploadInitiateRequest()
+                | DownloadInitiateRequest()
+                | BlockUploadInitiateRequest()
+                | BlockDownloadInitiateRequest()
+            ):
+                return self._begin(at_us, message, data)
+            case Abort():
+                return self._abort(at_us, message, by_client=True)
+            case UploadSegmentRequest():
+                return _request_segment(self._segmented(at_us, TransferDirection.UPLOAD), message)
+            case Segment():
+                return _send_segment(self._segmented(at_us, TransferDirection.DOWNLOAD), message)
+            case _:
+                return _take_block_frame(self._running, message) if self._running else _ORPHAN
+
+    def _take_response(self, at_us: int, message: Response) -> str:
+        running = self._running
+        match message:
+            case UploadInitiateResponse() | DownloadInitiateResponse():
+                return self._answer(at_us, message)
+            case Abort():
+                return self._abort(at_us, message, by_client=False)
+            case _ if running is None:
+                return _ORPHAN
+            case Segment():
+                return _take_segment(running, message)
+            case DownloadSegmentResponse():
+                return _confirm_segment(running, message)
+            case _:
+                return _take_block_frame(running, message)
+
+    def _begin(self, at_us: int, message: _Initiate, data: bytes) -> str:
+        running = self._running
+        if running and running.begun_by == data and running.phase is TransferPhase.ASKED:
+            running.retries += 1
+            return f"{running.direction} of {write_entry(running.entry)} asked for again"
+        self._give_up(at_us)
+        self._running = begin(at_us, self.node, message, data)
+        return f"{self._running.direction} of {write_entry(self._running.entry)} asked for"
+
+    def _give_up(self, at_us: int) -> None:
+        if self._running and not self._running.partial:
+            self._end(_given_up(self._running, at_us))
+
+    def _answer(self, at_us: int, message: _Answer) -> str:
+        running = self._running
+        if running and answers(running, message):
+            return _take_answer(running, message)
+        latest = self._latest
+        if latest and latest.retries and latest.entry == (message.index, message.sub):
+            return "answered again"
+        opened = _unheard(at_us, self.node, message)
+        text = f"{_take_answer(opened, message)}, request not heard"
+        if opened.done:
+            self._ended.append(opened.close(at_us, TransferOutcome.DONE))
+        elif running is None or running.partial:
+            self._running = opened
+        return text
+
+    def _segmented(self, at_us: int, direction: TransferDirection) -> OpenTransfer:
+        """Return the segmented transfer that runs, or one whose beginning was not heard."""
+        running = self._running
+        if running and running.direction is direction and running.phase is TransferPhase.SEGMENTS:
+            return running
+        self._give_up(at_us)
+        self._running = opened = OpenTransfer(at_us, self.node, direction, TransferMode.SEGMENTED)
+        opened.phase, opened.partial = TransferPhase.SEGMENTS, True
+        return opened
+
+    def _abort(self, at_us: int, message: Abort, *, by_client: bool) -> str:
+        """End the transfer that runs; an abort of another object ends one that was not heard."""
+        running, entry, code = self._running, _named(message), message.code
+        if running and (entry is None or running.entry in (None, entry)):
+            if entry is not None:
+                running.index, running.sub = entry
+            self._end(running.close(at_us, TransferOutcome.ABORTED, code=code, by_client=by_client))
+            return "aborted"
+        other = OpenTransfer(at_us, self.node, TransferDirection.UNKNOWN, TransferMode.EXPEDITED)
+        other.index, other.sub = entry or (None, None)
+        other.partial = True
+        self._ended.append(
+            other.close(at_us, TransferOutcome.ABORTED, code=code, by_client=by_client)
+        )
+        return "aborted"
+
+
+def _named(message: Request | Response) -> tuple[int, int] | None:
+    """Return the index and sub-index that a frame names itself.
+
+    Some clients name none with an abort: 0000h:00 is no object.
+    """
+    if isinstance(message, Abort) and not (message.index or message.sub):
+        return None
+    index, sub = getattr(message, "index", None), getattr(message, "sub", None)
+    return None if index is None or sub is None else (index, sub)
+
+
+def _given_up(running: OpenTransfer, at_us: int) -> Transfer:
+    asked = running.phase is TransferPhase.ASKED
+    return running.close(at_us, TransferOutcome.UNANSWERED if asked else TransferOutcome.BROKEN)

@@ -1,1 +1,0 @@
-"""SDO frames put together to transfers, as a third party hears them."""

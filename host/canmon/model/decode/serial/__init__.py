@@ -1,1 +1,0 @@
-"""Lines of serial ports, decoded into the trace of the buses."""

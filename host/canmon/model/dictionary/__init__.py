@@ -1,1 +1,0 @@
-"""The objects of a node: what its EDS names and what was heard of them."""

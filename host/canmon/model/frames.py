@@ -1,0 +1,407 @@
+"""What a monitor takes in: frames and lines of serial ports, their identifiers, and their text.
+
+One number for each kind of frame, the CAN-ID with flags above it, and candump's filters of it.
+
+>>> chosen = CandumpFilter.parse("123:7FF,400~700,#FF")
+>>> [chosen.passes(ident) for ident in (0x123, 0x400, 0x501, ERROR_FLAG | 0x20, ERROR_FLAG | 0x100)]
+[True, False, True, True, False]
+
+Frames as lines of text, as candump shows them.
+
+>>> lines = DumpLines(Stamp.ZERO)
+>>> lines.line(Record(1_000_000, "can0", CanFrame.parse("705#7F")))
+' (000.000000)  can0  705   [1]  7F'
+>>> lines.line(Record(1_250_000, "can0", CanFrame.parse("185#R5")))
+' (000.250000)  can0  185   [5]  remote request'
+>>> DumpLines(extra=True).line(Record(0, "can0", FdFrame.parse("185##1AABB")))
+'  can0  RX B -  185  [02]  AA BB'
+
+>>> from tickrig.host.canmon.model.decode.decoded import Decoded
+>>> from tickrig.host.canmon.model.frames import LineRecord
+>>> line = LineRecord(1_500_000, "ttyS0", False, b"EV:PowerOn", Decoded("rrc", None, "event"))
+>>> line_text(line, "rrc event")
+'ttyS0  <  EV:PowerOn                     rrc event'
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Final, NamedTuple, assert_never
+
+from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, CanFrame, ErrorFrame, FdFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+
+
+# What a monitor takes in: frames and lines of serial ports, with when and where.
+
+ARROWS: Final = {True: ">", False: "<"}
+"""How a line is shown that is sent to the device, and one from it."""
+
+
+AnyFrame = CanFrame | ErrorFrame | FdFrame
+
+
+class Record(NamedTuple):
+    """One frame, CAN FD frame or error frame, as it was on the bus.
+
+    Attributes:
+        at_us: when it had ended, microseconds; since the epoch in logs and on real buses.
+        channel: name of the bus, without blanks.
+        frame: the frame.
+        sent: this program sent it.
+    """
+
+    at_us: int
+    channel: str
+    frame: AnyFrame
+    sent: bool = False
+
+
+class LineRecord(NamedTuple):
+    """A message of a serial line, beside `Record` in one trace; filters take both.
+
+    Attributes:
+        at_us: when its last byte was heard.
+        channel: name of the line.
+        sent: the host sent it, to the device.
+        data: its bytes, without line end or header.
+        decoded: what it says.
+    """
+
+    at_us: int
+    channel: str
+    sent: bool
+    data: bytes
+    decoded: Decoded
+
+    @property
+    def frame(self) -> None:
+        """No frame of a CAN bus."""
+        return None
+
+
+AnyRecord = Record | LineRecord
+"""What a trace of buses and serial lines is made of."""
+
+
+EXTENDED: Final = 1 << 31
+REMOTE: Final = 1 << 30
+ERROR: Final = 1 << 29
+FD: Final = 1 << 33
+"""Above what an identifier with flags of struct can_frame takes."""
+
+
+def ident_of(frame: CanFrame) -> int:
+    """Return the CAN-ID with a bit each for an extended and for a remote frame.
+
+    >>> hex(ident_of(CanFrame.parse("00000605#R")))
+    '0xc0000605'
+    """
+    return frame.can_id | frame.extended << 31 | frame.remote << 30
+
+
+def fd_ident(frame: FdFrame) -> int:
+    """Return the CAN-ID with a bit each for an extended and for a CAN FD frame.
+
+    >>> hex(fd_ident(FdFrame.parse("00000605##1")))
+    '0x280000605'
+    """
+    return frame.can_id | frame.extended << 31 | FD
+
+
+def any_ident(frame: CanFrame | FdFrame) -> int:
+    """Return the CAN-ID with its flags."""
+    return fd_ident(frame) if isinstance(frame, FdFrame) else ident_of(frame)
+
+
+def ident_text(ident: int) -> str:
+    """Write it as candump does, with an R for remote frames and a # for those of CAN FD.
+
+    >>> ident_text(0x181), ident_text(0xC000_0605), ident_text(FD | 0x181)
+    ('181', '00000605R', '181#')
+    """
+    can_id, mark = ident & EXTENDED_MAX, "R" if ident & REMOTE else "#" if ident & FD else ""
+    return (f"{can_id:08X}" if ident & EXTENDED else f"{can_id:03X}") + mark
+
+
+def parse_ident(text: str) -> int:
+    """Read what `ident_text` writes: 3 digits for 11-bit identifiers, 8 for 29-bit ones.
+
+    Raises:
+        ValueError: not an identifier.
+
+    >>> parse_ident("181"), parse_ident("181R") == 0x181 | REMOTE, parse_ident("181#") == 0x181 | FD
+    (385, True, True)
+    """
+    digits = text.removesuffix("R") if text.endswith("R") else text.removesuffix("#")
+    most = {3: 0x7FF, 8: EXTENDED_MAX}.get(len(digits))
+    if most is None or not set(digits) <= set("0123456789abcdefABCDEF") or int(digits, 16) > most:
+        raise ValueError(f"{text!r} is not a CAN-ID: write 3 or 8 hex digits, as 181 or 00000605")
+    flags = EXTENDED * (len(digits) == 8) | REMOTE * text.endswith("R") | FD * text.endswith("#")
+    return int(digits, 16) | flags
+
+
+_NODE_BITS: Final = 7
+_NODE_MASK: Final = 0x7F
+
+_FUNCTIONS: Final = frozenset([1, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 14])
+"""Function codes that go with a node-ID: EMCY, PDO1 to PDO4, SDO, error control."""
+
+_SENDING: Final = frozenset([1, 3, 5, 7, 9, 11, 14])
+"""Those of them that the node itself sends with: EMCY, TPDO1 to TPDO4, SDO, error control."""
+
+
+def node_of(ident: int) -> int | None:
+    """Return the node-ID; None where the identifier has none by default.
+
+    A COB-ID that was configured may belong to another node.
+
+    >>> node_of(0x181), node_of(0x701), node_of(0x080), node_of(0x7E5)
+    (1, 1, None, None)
+    """
+    can_id = ident & ~REMOTE
+    node = can_id & _NODE_MASK
+    return node if node and can_id >> _NODE_BITS in _FUNCTIONS else None
+
+
+def sender_of(ident: int) -> int | None:
+    """Return the node-ID that sends with an identifier; None where others do, or nobody by default.
+
+    >>> sender_of(0x181), sender_of(0x581), sender_of(0x201), sender_of(0x701 | REMOTE)
+    (1, 1, None, None)
+    """
+    node = ident & _NODE_MASK
+    return node if node and ident >> _NODE_BITS in _SENDING else None
+
+
+_RULE: Final = re.compile(r"([0-9A-Fa-f]{1,8})([:~])([0-9A-Fa-f]{1,8})")
+_ERRORS: Final = re.compile(r"#([0-9A-Fa-f]{1,8})")
+
+
+def flagged_id(record: Record) -> int:
+    """Return the identifier with its flags, as struct can_frame has it (linux/can.h)."""
+    frame = record.frame
+    if isinstance(frame, ErrorFrame):
+        return ERROR_FLAG | frame.error_class
+    return any_ident(frame) & ~FD
+
+
+@dataclass(frozen=True, slots=True)
+class CandumpFilter:
+    """Which frames are wanted.
+
+    As in candump, frames pass if one rule holds, with `j` among the words if all
+    do; without a rule all frames pass. Error frames pass by `#MASK` alone.
+
+    Attributes:
+        rules: identifier, mask, and whether the rule is inverse.
+        error_mask: classes of error frames that are wanted.
+        joined: all rules must hold.
+    """
+
+    rules: tuple[tuple[int, int, bool], ...] = ()
+    error_mask: int = 0
+    joined: bool = False
+
+    @classmethod
+    def parse(cls, text: str) -> CandumpFilter:
+        """Read the words behind a bus; ValueError if one is no filter."""
+        rules, error_mask, joined = [], 0, False
+        for word in text.split(","):
+            if rule := _RULE.fullmatch(word):
+                flag = EXTENDED if len(rule[1]) == 8 else 0
+                mask = int(rule[3], 16) & ~ERROR_FLAG
+                rules.append((int(rule[1], 16) | flag, mask, rule[2] == "~"))
+            elif errors := _ERRORS.fullmatch(word):
+                error_mask = int(errors[1], 16)
+            elif word in ("j", "J"):
+                joined = True
+            else:
+                raise ValueError(f"{word!r} is no filter like 123:7FF, 400~700 or #FF")
+        return cls(tuple(rules), error_mask, joined)
+
+    def passes(self, flagged: int) -> bool:
+        """Say whether a frame is wanted, by its identifier with flags."""
+        if flagged & ERROR_FLAG and not flagged & EXTENDED:
+            return bool(flagged & self.error_mask & ~ERROR_FLAG)
+        held = ((flagged & mask == ident & mask) != inverse for ident, mask, inverse in self.rules)
+        return not self.rules or (all(held) if self.joined else any(held))
+
+
+# Numbers as tables show them: as many digits as a column has room for.
+
+
+def ms_text(time_us: int | None) -> str:
+    """Write a time in milliseconds, no more than 8 characters below 11 days.
+
+    >>> ms_text(None), ms_text(1_234), ms_text(999_999), ms_text(12_345_678)
+    ('-', '1.234', '999.999', '12345.7')
+    """
+    if time_us is None:
+        return "-"
+    if time_us < 1_000_000:
+        return f"{time_us / 1e3:.3f}"
+    return f"{time_us / 1e3:.1f}" if time_us < 100_000_000 else f"{time_us // 1_000}"
+
+
+def s_text(time_us: int) -> str:
+    """Write an age in seconds; what lies in the future has none.
+
+    >>> s_text(-5), s_text(12_340_000), s_text(123_456_000_000)
+    ('0.0', '12.3', '123456')
+    """
+    return f"{max(0, time_us) / 1e6:.1f}" if time_us < 10_000_000_000 else f"{time_us // 1_000_000}"
+
+
+def rate_text(per_s: float) -> str:
+    """Write a rate, no more than 7 characters.
+
+    >>> rate_text(0.0), rate_text(9.987), rate_text(12345.6)
+    ('0.00', '9.99', '12346')
+    """
+    return f"{per_s:.2f}" if per_s < 1_000 else f"{per_s:.0f}"
+
+
+def load_text(bits_s: int, bit_rate: int | None) -> str:
+    """Write a load: a share of the bit rate if that is known, else bits a second.
+
+    >>> load_text(123_456, 1_000_000), load_text(123_456, None)
+    ('12.3 %', '123.5 kbit/s')
+    """
+    if bit_rate is None:
+        return f"{bits_s / 1e3:.1f} kbit/s"
+    return f"{bits_s * 100 / bit_rate:.1f} %"
+
+
+def count_text(count: int | None) -> str:
+    """Write a count, a dash where there is none."""
+    return "-" if count is None else str(count)
+
+
+_DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
+
+
+class Stamp(StrEnum):
+    """What stands before a frame, as candump's `-t` names it."""
+
+    NONE = ""
+    ABSOLUTE = "a"
+    DELTA = "d"
+    ZERO = "z"
+    DATE = "A"
+
+
+class DumpLines:
+    """Writes one line for each frame.
+
+    Identifiers of 11 bits are indented once one of 29 bits was there.
+
+    Args:
+        stamp: what stands before a frame.
+        extra: show whether the frame was received or sent, with B and E for BRS and ESI.
+    """
+
+    def __init__(self, stamp: Stamp = Stamp.NONE, extra: bool = False) -> None:
+        self._stamp, self._extra = stamp, extra
+        self._first_us: int | None = None
+        self._last_us, self._width = 0, 3
+
+    def line(self, record: Record, text: str = "") -> str:
+        """Return the line, with what the frame means behind it."""
+        ident = _ident(record.frame)
+        self._width = max(self._width, len(ident))
+        direction = ""
+        if self._extra:
+            direction = f"  {'TX' if record.sent else 'RX'} {_flags(record.frame)}"
+        stamp = self.stamp(record.at_us)
+        data = f"{_data(record.frame):<{_DATA_WIDTH + 1}}   {text}" if text else _data(record.frame)
+        return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}  {data}"
+
+    def stamp(self, at_us: int) -> str:
+        """Return what stands before what was heard at this time."""
+        if self._stamp is Stamp.NONE:
+            return ""
+        if self._first_us is None:
+            self._first_us = self._last_us = at_us
+        last_us, self._last_us = self._last_us, at_us
+        match self._stamp:
+            case Stamp.ABSOLUTE:
+                return f" ({seconds_text(at_us, 10)})"
+            case Stamp.DATE:
+                return f" ({date_text(at_us)})"
+            case Stamp.ZERO:
+                return f" ({seconds_text(at_us - self._first_us, 3)})"
+            case Stamp.DELTA:
+                return f" ({seconds_text(at_us - last_us, 3)})"
+            case _:
+                assert_never(self._stamp)
+
+
+def _flags(frame: AnyFrame) -> str:
+    if not isinstance(frame, FdFrame):
+        return "- -"
+    return f"{'B' if frame.brs else '-'} {'E' if frame.esi else '-'}"
+
+
+def _ident(frame: AnyFrame) -> str:
+    if isinstance(frame, ErrorFrame):
+        return f"{ERROR_FLAG | frame.error_class:08X}"
+    return f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
+
+
+def _data(frame: AnyFrame) -> str:
+    """Return length and data; a length of two digits begins a column earlier."""
+    data = frame.data.hex(" ").upper()
+    if isinstance(frame, CanFrame):
+        if frame.remote:
+            return f" [{frame.dlc}]  remote request"
+        return f" [{len(frame.data)}] {' ' * bool(data)}{data}"
+    if isinstance(frame, ErrorFrame):
+        return f" [{len(frame.data)}]  {data}   ERRORFRAME"
+    return f"[{len(frame.data):02d}] {' ' * bool(data)}{data}"
+
+
+def seconds_text(span_us: int, digits: int) -> str:
+    """Write seconds; a time that runs backwards has a sign."""
+    seconds, micros = divmod(abs(span_us), 1_000_000)
+    return f"{'-' * (span_us < 0)}{seconds:0{digits}d}.{micros:06d}"
+
+
+def date_text(at_us: int) -> str:
+    """Write a time since the epoch as the local date and time; without a date after 9999."""
+    from datetime import datetime  # noqa: PLC0415 - seldom wanted
+
+    seconds, micros = divmod(at_us, 1_000_000)
+    try:
+        return f"{datetime.fromtimestamp(seconds):%Y-%m-%d %H:%M:%S}.{micros:06d}"
+    except (ValueError, OverflowError, OSError):
+        return seconds_text(at_us, 10)
+
+
+def line_text(line: LineRecord, text: str) -> str:
+    """Write the line, with what it means behind it."""
+    data = bytes_text(line.data)
+    shown = f"{data:<{_DATA_WIDTH}}   {text}" if text else data
+    return f"{line.channel}  {ARROWS[line.sent]}  {shown}"
+
+
+def decoded_text(decoded: Decoded | None) -> str:
+    """Write what a frame means: node, kind, and what it says."""
+    if decoded is None or decoded.kind == "raw":
+        return ""
+    node = "" if decoded.node is None else f"{decoded.node} "
+    return f"{node}{decoded.kind} {decoded.text}".rstrip()
+
+
+def bytes_text(data: bytes) -> str:
+    r"""Write bytes as text where they are all printable, else in hex.
+
+    >>> bytes_text(b"SA:64"), bytes_text(b"\x01A")
+    ('SA:64', '01 41')
+    """
+    text = data.decode("latin-1")
+    return text if text.isascii() and text.isprintable() else data.hex(" ").upper()

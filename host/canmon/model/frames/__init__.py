@@ -1,1 +1,0 @@
-"""One frame: what was taken in, its identifier, its text."""

@@ -1,0 +1,582 @@
+"""Captures of Wireshark, tshark and tcpdump: pcapng read and written, pcap read.
+
+Blocks and options of a pcapng file (draft-ietf-opsawg-pcapng).
+
+>>> _option(_COMMENT, b"hi").hex(), list(options("<", _option(_COMMENT, b"hi") + _END))
+('0100020068690000', [(1, b'hi')])
+
+Frames as packets of a capture, as LINKTYPE_CAN_SOCKETCAN has them (tcpdump.org).
+
+A packet is a struct can_frame or canfd_frame of Linux with the identifier in network byte order.
+
+>>> packet(CanFrame.parse("705#7F")).hex()
+'00000705010000007f00000000000000'
+>>> str(_parse_packet(packet(FdFrame.parse("00000123##1AABB"))))
+'00000123##1AABB'
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BufferedReader
+from pathlib import Path
+from typing import BinaryIO, Final, NamedTuple, cast
+
+from tickrig.host.canmon.model.frames import AnyFrame, Record
+from tickrig.host.canmon.model.logs.log_file import END_S, LogError, LogFormat, open_log
+from tickrig.host.canmon.model.logs.log_reader import Item
+from tickrig.host.canmon.model.logs.mark import (
+    BAD_PACKETS,
+    CAN_XL,
+    DROP,
+    NO_TIME,
+    OTHER_PACKETS,
+    LogTally,
+    Mark,
+    dropped,
+    read_mark,
+)
+from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
+from tickrig.wire.can import (
+    BRS,
+    ERROR_CLASS_MASK,
+    ERROR_FLAG,
+    ESI,
+    EXTENDED_MAX,
+    MAX_DATA_BYTES,
+    MAX_FD_BYTES,
+    STANDARD_MAX,
+    CanFrame,
+    ErrorFrame,
+    FdFrame,
+)
+
+SECTION: Final = 0x0A0D_0D0A
+_ORDER_MAGIC: Final = 0x1A2B_3C4D
+INTERFACE: Final = 1
+_OBSOLETE_PACKET: Final = 2
+_SIMPLE_PACKET: Final = 3
+STATISTICS: Final = 5
+PACKET: Final = 6
+"""Types of blocks."""
+
+_COMMENT: Final = 1
+_APPLICATION: Final = 4
+"""Options of any block, and of a section: what wrote it."""
+
+_IF_NAME: Final = 2
+_TIME_RESOLUTION: Final = 9
+_TIME_OFFSET: Final = 14
+"""Options of an interface."""
+
+_PACKET_FLAGS: Final = 2
+_DROP_COUNT: Final = 4
+"""Options of a packet."""
+
+_DIRECTION: Final = 3
+_OUTBOUND: Final = 2
+"""Of the flags of a packet: the mask of its direction, and which it is."""
+
+_BLOCK_BYTES: Final = 12
+"""Of a block without content."""
+
+_END: Final = bytes(4)
+"""Ends options."""
+
+
+def _block(kind: int, content: bytes) -> bytes:
+    """Return a block in little-endian order; its content is a multiple of 4 bytes."""
+    size = len(content) + _BLOCK_BYTES
+    return struct.pack("<II", kind, size) + content + struct.pack("<I", size)
+
+
+def _option(code: int, value: bytes) -> bytes:
+    """Return an option in little-endian order."""
+    return struct.pack("<HH", code, len(value)) + value + bytes(-len(value) % 4)
+
+
+def options(order: str, data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield codes and values, as far as they are whole; `order` is `<` or `>`."""
+    head, at = struct.Struct(f"{order}HH"), 0
+    while at + head.size <= len(data):
+        code, size = head.unpack_from(data, at)
+        at += head.size
+        if not code or at + size > len(data):
+            return
+        yield code, data[at : at + size]
+        at += size + -size % 4
+
+
+_LINK_TYPE: Final = 227
+"""LINKTYPE_CAN_SOCKETCAN."""
+
+_EXTENDED: Final = 0x8000_0000
+_REMOTE: Final = 0x4000_0000
+_FDF: Final = 0x4
+"""Flag of a packet: it is of CAN FD, however short it was cut."""
+_XL: Final = 0x80
+
+_CLASSIC_BYTES: Final = 16
+_FD_BYTES: Final = 72
+_CLASSIC: Final = struct.Struct(">IB3x8s")
+_FD: Final = struct.Struct(">IBB2x64s")
+_HEAD: Final = struct.Struct(">IBB")
+_LENGTH_AT: Final = 4
+_DATA_AT: Final = 8
+
+
+def packet(frame: AnyFrame) -> bytes:
+    """Return the packet of a frame: 16 bytes, of CAN FD 72."""
+    if isinstance(frame, FdFrame):
+        flagged = frame.can_id | _EXTENDED * frame.extended
+        return _FD.pack(flagged, len(frame.data), _FDF | frame.flags, frame.data)
+    if isinstance(frame, ErrorFrame):
+        return _CLASSIC.pack(ERROR_FLAG | frame.error_class, len(frame.data), frame.data)
+    flagged = frame.can_id | _EXTENDED * frame.extended | _REMOTE * frame.remote
+    return _CLASSIC.pack(flagged, frame.dlc, frame.data)
+
+
+def _parse_packet(data: bytes) -> AnyFrame | str | None:
+    """Return the frame of a packet, `CAN_XL`, or None for what is no frame or was cut."""
+    if len(data) < _DATA_AT or data[_LENGTH_AT] & _XL:
+        return None if len(data) < _DATA_AT else CAN_XL
+    flagged, length, flags = _HEAD.unpack_from(data)
+    content = data[_DATA_AT : _DATA_AT + length]
+    if flagged & ERROR_FLAG:
+        return ErrorFrame(flagged & ERROR_CLASS_MASK, content[:8].ljust(8, b"\0"))
+    extended = bool(flagged & _EXTENDED)
+    can_id = flagged & (EXTENDED_MAX if extended else STANDARD_MAX)
+    if flagged & _REMOTE:
+        return CanFrame(can_id, b"", True, extended, min(length, MAX_DATA_BYTES))
+    is_fd = flags & _FDF or len(data) == _FD_BYTES
+    if len(content) < length or length > (MAX_FD_BYTES if is_fd else MAX_DATA_BYTES):
+        return None
+    if is_fd:
+        return FdFrame(can_id, content, extended, flags & (BRS | ESI)).checked()
+    return CanFrame(can_id, content, False, extended)
+
+
+# The frames in a pcapng file (draft-ietf-opsawg-pcapng), in either byte order.
+#
+# Read are sections, interfaces, and packets in enhanced, simple and the obsolete blocks; others
+# are passed over. Times of any resolution are cut to microseconds.
+
+_MOST_BYTES: Final = 1 << 24
+"""Of a block: more is damage."""
+
+_CUT: Final = "it is cut"
+_READ_BYTES: Final = 1 << 16
+_MICROS: Final = 1_000_000
+_USUAL_BYTES: Final = 48
+_END_US: Final = END_S * _MICROS
+_END_HIGH: Final = _END_US >> 32
+
+
+class Interface(NamedTuple):
+    """Where packets were captured.
+
+    Attributes:
+        name: of the bus.
+        is_can: its packets are frames.
+        parts: parts of a second that its times count.
+        offset_us: what is added to them.
+        snap_bytes: packets are cut to so many; 0 for no limit.
+    """
+
+    name: str
+    is_can: bool
+    parts: int
+    offset_us: int
+    snap_bytes: int
+
+
+class _Usual(NamedTuple):
+    """How a block with a classic data frame without options is taken apart, and what it has."""
+
+    layout: struct.Struct
+    head: bytes
+    sizes: bytes
+    tail: bytes
+
+
+class PcapngReader:
+    """Takes blocks apart, one file.
+
+    Args:
+        name: what the file is called.
+        tally: takes what is no frame.
+        marks: give marks among the frames, too: a comment of a frame is in front of it.
+    """
+
+    def __init__(self, name: str, tally: LogTally, marks: bool = False) -> None:
+        self._name, self._tally, self._marks = name, tally, marks
+        self._order, self._interfaces = "<", list[Interface]()
+        self._usual: _Usual | None = None
+        self._idents: dict[bytes, tuple[int, bool]] = {}
+        self._names: list[str] = []
+        self._blocks, self._wanted, self._at_us, self._damage = 0, _READ_BYTES, 0, ""
+
+    def frames(self, file: BinaryIO, begun: bytes) -> Iterator[Item]:
+        """Yield frames.
+
+        Args:
+            file: the file.
+            begun: what was read of it.
+
+        Raises:
+            LogError: it is cut or damaged, after all frames before that.
+        """
+        more, some = True, cast("BufferedReader", file).read1  # `read` loses the end of a cut log
+        while more:
+            data = some(self._wanted)
+            begun += data
+            records: list[Item] = []
+            begun = begun[self._take(begun, records) :]
+            yield from records
+            more = bool(data) and not self._damage
+        if begun:
+            raise LogError(f"{self._name}: {self._damage or _CUT} after {self._blocks} blocks")
+
+    def _take(self, data: bytes, records: list[Item]) -> int:
+        """Add the frames of the blocks that are whole; return where the next one begins."""
+        at, self._wanted = 0, _READ_BYTES
+        while len(data) - (at := self._take_usual(data, at, records)) >= _BLOCK_BYTES:
+            if data.startswith(SECTION.to_bytes(4, "big"), at):
+                self._begin(data[at + 8 : at + _BLOCK_BYTES])
+            kind, size = struct.unpack_from(f"{self._order}II", data, at)
+            rest = len(data) - at
+            self._damage = self._damage or _damage_of(size, rest, data[at : at + size])
+            if self._damage or rest < size:
+                self._wanted = max(_READ_BYTES, size - rest)
+                break
+            self._take_block(kind, data[at + 8 : at + size - 4], records)
+            self._blocks += 1
+            at += size
+        return at
+
+    def _take_usual(self, data: bytes, at: int, records: list[Item]) -> int:
+        """Take classic data frames without options that follow each other: nearly all are so."""
+        usual, idents, names, at_us = self._usual, self._idents, self._names, -1
+        if usual is None:
+            return at
+        layout, usual_head, usual_sizes, usual_tail = usual
+        end = at + (len(data) - at) // _USUAL_BYTES * _USUAL_BYTES
+        add, new, none, first = records.append, tuple.__new__, bytes(3), at
+        for parts in layout.iter_unpack(memoryview(data)[at:end]):
+            head, number, high, low, sizes, ident, length, flags, content, tail = parts
+            if head != usual_head or sizes != usual_sizes or tail != usual_tail or flags != none:
+                break
+            known = idents.get(ident) or self._ident(ident)
+            if known is None or length > MAX_DATA_BYTES or number >= len(names):
+                break
+            if high >= _END_HIGH:
+                break
+            at_us = high << 32 | low
+            frame = new(CanFrame, (known[0], content[:length], False, known[1], 0))
+            add(new(Record, (at_us, names[number], frame, False)))
+            at += _USUAL_BYTES
+        self._blocks += (at - first) // _USUAL_BYTES
+        self._at_us = self._at_us if at_us < 0 else at_us
+        return at
+
+    def _ident(self, ident: bytes) -> tuple[int, bool] | None:
+        """Return the identifier of a data frame, and whether it is extended; None for others."""
+        frame = _parse_packet(ident + bytes(12))
+        if not isinstance(frame, CanFrame) or frame.remote:
+            return None
+        known = self._idents[ident] = frame.can_id, frame.extended
+        return known
+
+    def _begin(self, magic: bytes) -> None:
+        """Begin a section, in its byte order."""
+        orders = {_ORDER_MAGIC.to_bytes(4, "little"): "<", _ORDER_MAGIC.to_bytes(4, "big"): ">"}
+        if magic not in orders:
+            self._damage = f"it has a section of no byte order ({magic.hex()})"
+        self._order = orders.get(magic, "<")
+        self._interfaces, self._names, self._usual = [], [], None
+
+    def _take_block(self, kind: int, content: bytes, records: list[Item]) -> None:
+        order = self._order
+        try:
+            if kind == INTERFACE:
+                self._add_interface(content)
+            elif kind == PACKET:
+                number, high, low, size, _ = struct.unpack_from(f"{order}5I", content)
+                self._add(number, high << 32 | low, content[20:], size, records)
+            elif kind == _OBSOLETE_PACKET:
+                number, drops, high, low, size, _ = struct.unpack_from(f"{order}HH4I", content)
+                self._drop(drops if drops < 0xFFFF else 0, records)
+                self._add(number, high << 32 | low, content[20:], size, records)
+            elif kind == _SIMPLE_PACKET:
+                (size,) = struct.unpack_from(f"{order}I", content)
+                snap = self._interfaces[0].snap_bytes if self._interfaces else 0
+                self._tally.untimed += 1
+                self._add(0, None, content[4:], min(size, snap or size), records)
+            elif kind == STATISTICS:
+                self._comment(options(order, content[12:]), records)
+        except struct.error:
+            self._tally.passed_over[BAD_PACKETS] += 1
+
+    def _add_interface(self, content: bytes) -> None:
+        link_type, _, snap = struct.unpack_from(f"{self._order}HHI", content)
+        told = dict(options(self._order, content[8:]))
+        name = "_".join(told.get(_IF_NAME, b"").decode("utf-8", "replace").split())[:LONGEST_NAME]
+        resolution = told.get(_TIME_RESOLUTION, b"\x06")[:1] or b"\x06"
+        power, binary = resolution[0] & 0x7F, resolution[0] & 0x80
+        offset = told.get(_TIME_OFFSET, b"")
+        offset_s = struct.unpack(f"{self._order}q", offset)[0] if len(offset) == 8 else 0
+        self._interfaces.append(
+            Interface(
+                name or f"can{len(self._interfaces)}",
+                link_type == _LINK_TYPE,
+                1 << power if binary else 10**power,
+                offset_s * _MICROS,
+                snap,
+            )
+        )
+        self._names = [one.name for one in self._interfaces]
+        plain = all(
+            one.is_can and one.parts == _MICROS and not one.offset_us for one in self._interfaces
+        )
+        self._usual = _usual(self._order) if plain else None
+
+    def _add(
+        self, number: int, count: int | None, data: bytes, size: int, records: list[Item]
+    ) -> None:
+        """Add the frame of a packet; without a time it has that of the packet before."""
+        if number >= len(self._interfaces) or size > len(data):
+            self._tally.passed_over[BAD_PACKETS] += 1
+            return
+        where = self._interfaces[number]
+        if not where.is_can:
+            self._tally.passed_over[OTHER_PACKETS] += 1
+            return
+        told = dict(options(self._order, data[size + -size % 4 :]))
+        drops = int.from_bytes(
+            told.get(_DROP_COUNT, b""), "little" if self._order == "<" else "big"
+        )
+        if count is not None:
+            self._at_us = max(0, count * _MICROS // where.parts + where.offset_us)
+        self._drop(drops, records)
+        self._comment(options(self._order, data[size + -size % 4 :]), records)
+        if self._at_us >= _END_US:
+            self._tally.passed_over[NO_TIME] += 1
+            return
+        frame = _parse_packet(data[:size])
+        if frame is None or isinstance(frame, str):
+            self._tally.passed_over[frame or BAD_PACKETS] += 1
+            return
+        flags = told.get(_PACKET_FLAGS, b"")
+        sent = int.from_bytes(flags, "little" if self._order == "<" else "big") & _DIRECTION
+        records.append(Record(self._at_us, where.name, frame, sent == _OUTBOUND))
+
+    def _drop(self, frames: int, records: list[Item]) -> None:
+        """Count frames that were lost."""
+        self._tally.lost += frames
+        if frames and self._marks:
+            records.append(dropped(self._at_us, frames))
+
+    def _comment(self, given: Iterator[tuple[int, bytes]], records: list[Item]) -> None:
+        """Add the marks that comments are; frames that were lost have a number, too."""
+        if not self._marks:
+            return
+        texts = (value.decode("utf-8", "replace") for code, value in given if code == _COMMENT)
+        marks = (read_mark(self._at_us, text) for text in texts)
+        records += [mark for mark in marks if mark and mark.event != DROP]
+
+
+def _damage_of(size: int, rest: int, block: bytes) -> str:
+    """Say what is wrong with a block of which so many bytes are there; empty if nothing is."""
+    if size < _BLOCK_BYTES or size % 4 or size > _MOST_BYTES:
+        return f"it has a block of {size} bytes"
+    return "it has a block whose sizes differ" if rest >= size and block[4:8] != block[-4:] else ""
+
+
+def _usual(order: str) -> _Usual:
+    sizes = struct.pack(f"{order}II", 16, 16)
+    head = struct.pack(f"{order}II", PACKET, _USUAL_BYTES)
+    return _Usual(struct.Struct(f"{order}8s3I8s4sB3s8s4s"), head, sizes, head[4:])
+
+
+# Frames in captures of Wireshark, tshark and tcpdump: pcapng, and pcap before it.
+#
+# Which of the two a file is, its first bytes tell, not its name.
+
+_PCAP: Final = {
+    bytes.fromhex("d4c3b2a1"): ("<", 1),
+    bytes.fromhex("a1b2c3d4"): (">", 1),
+    bytes.fromhex("4d3cb2a1"): ("<", 1_000),
+    bytes.fromhex("a1b23c4d"): (">", 1_000),
+}
+"""First bytes of a pcap file: byte order, and fractions of a second in a microsecond."""
+
+_HEAD_BYTES: Final = 24
+_LINK_TYPE_AT: Final = 20
+
+
+class PcapReader:
+    """A reader of the frames in a capture."""
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        self._path, self.tally = path, LogTally()
+
+    def __iter__(self) -> Iterator[Record]:
+        """Read the file."""
+        return cast("Iterator[Record]", self._items(marks=False))
+
+    def items(self) -> Iterator[Item]:
+        """Read the file, with the marks among its frames."""
+        return self._items(marks=True)
+
+    def _items(self, *, marks: bool) -> Iterator[Item]:
+        self.tally = LogTally()
+        try:
+            with open_log(self._path) as file:
+                yield from self._frames(file, marks)
+        except (EOFError, zlib.error, OSError) as error:
+            if isinstance(error, OSError) and error.errno is not None:
+                raise
+            raise LogError(f"{self._path}: {error}") from error
+
+    def _frames(self, file: BinaryIO, marks: bool) -> Iterator[Item]:
+        first = file.read(4)
+        if first == SECTION.to_bytes(4, "little"):
+            yield from PcapngReader(str(self._path), self.tally, marks).frames(file, first)
+        elif first in _PCAP:
+            yield from self._packets(file, *_PCAP[first])
+        else:
+            raise LogError(f"{self._path} is no capture: it begins with {first.hex() or 'nothing'}")
+
+    def _packets(self, file: BinaryIO, order: str, parts: int) -> Iterator[Record]:
+        """Yield the frames of a pcap file, which names no bus."""
+        head = file.read(_HEAD_BYTES - 4)
+        if len(head) < _HEAD_BYTES - 4:
+            raise LogError(f"{self._path}: it is cut in its header")
+        (link_type,) = struct.unpack_from(f"{order}I", head, _LINK_TYPE_AT - 4)
+        heading, count = struct.Struct(f"{order}4I"), 0
+        while begun := file.read(heading.size):
+            size = heading.unpack(begun)[2] if len(begun) == heading.size else 0
+            if size > _MOST_BYTES:
+                raise LogError(f"{self._path}: a packet of {size} bytes behind {count} packets")
+            data = file.read(size)
+            if len(begun) < heading.size or len(data) < size:
+                raise LogError(f"{self._path}: it is cut after {count} packets")
+            count += 1
+            seconds, fraction, _, _ = heading.unpack(begun)
+            if link_type & 0xFFFF != _LINK_TYPE:
+                self.tally.passed_over[OTHER_PACKETS] += 1
+                continue
+            frame = _parse_packet(data)
+            if frame is None or isinstance(frame, str):
+                self.tally.passed_over[frame or BAD_PACKETS] += 1
+            else:
+                yield Record(seconds * 1_000_000 + fraction // parts, UNNAMED, frame)
+
+
+# Frames into a pcapng file, as Wireshark writes it (draft-ietf-opsawg-pcapng).
+#
+# A section in little-endian order, an interface for each bus, an enhanced packet for each frame.
+
+_SECTION: Final = struct.Struct("<IHHq")
+_INTERFACE: Final = struct.Struct("<HHI")
+_PACKET: Final = struct.Struct("<IIIII")
+_STATISTICS: Final = struct.Struct("<III")
+_USUAL: Final = struct.Struct("<7IIB3x8sI")
+_USUAL_BLOCK_BYTES: Final = _USUAL.size
+_LOW: Final = 0xFFFF_FFFF
+_BLOCK_FRAMES: Final = 256
+
+
+class PcapngWriter:
+    """A capture. A mark is a comment of the frame behind it, where Wireshark shows it.
+
+    Raises:
+        LogError: a file of pcap, the format before it, which does not name its buses.
+        OSError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, kind: LogFormat) -> None:
+        if kind is LogFormat.PCAP:
+            raise LogError(f"{path}: pcap is read alone; a name in .pcapng is written")
+        self._file, self._blocks = open_log(path, "wb"), list[bytes]()
+        self._interfaces: dict[str, int] = {}
+        self._options = self._comments = b""  # of the frame that comes next
+        self._at_us = 0
+        content = _SECTION.pack(_ORDER_MAGIC, 1, 0, -1)
+        self._blocks.append(
+            _block(SECTION, content + _option(_APPLICATION, b"tickrig canmon") + _END)
+        )
+
+    def write(self, record: Record, /) -> None:
+        """Add a frame."""
+        at_us, channel, frame, sent = record
+        number = self._interfaces.get(channel)
+        if number is None:
+            number = self._begin(channel)
+        if isinstance(frame, CanFrame) and not (sent or self._comments or frame.remote):
+            # without the steps below: as quick as a line of candump
+            size, length = _USUAL_BLOCK_BYTES, len(frame.data)
+            ident = frame.can_id | _EXTENDED if frame.extended else frame.can_id
+            self._blocks.append(
+                _USUAL.pack(
+                    *(PACKET, size, number, at_us >> 32, at_us & _LOW, _CLASSIC_BYTES),
+                    *(_CLASSIC_BYTES, _swapped(ident), length, frame.data, size),
+                )
+            )
+        else:
+            self._add(at_us, number, packet(frame), sent)
+        self._at_us = at_us
+        if len(self._blocks) >= _BLOCK_FRAMES:
+            self._give()
+
+    def mark(self, mark: Mark, /) -> None:
+        """Note it at the next frame, frames that were lost as a number too."""
+        if mark.event == DROP:
+            self._options += _option(_DROP_COUNT, struct.pack("<Q", mark.frames))
+        self._comments += _option(_COMMENT, mark.text.encode())
+
+    def flush(self) -> None:
+        """Give what was added to the operating system."""
+        self._give()
+        self._file.flush()
+
+    def close(self) -> None:
+        """End the capture; marks behind the last frame are in statistics of the first bus."""
+        if self._file.closed:
+            return
+        try:
+            if self._comments and self._interfaces:
+                content = _STATISTICS.pack(0, self._at_us >> 32, self._at_us & _LOW)
+                self._blocks.append(_block(STATISTICS, content + self._comments + _END))
+            self._give()
+        finally:
+            self._file.close()
+
+    def messages(self) -> list[str]:
+        """Nothing: it holds all there is."""
+        return []
+
+    def _begin(self, channel: str) -> int:
+        options = _option(_IF_NAME, channel.encode()) + _option(_TIME_RESOLUTION, b"\x06") + _END
+        self._blocks.append(_block(INTERFACE, _INTERFACE.pack(_LINK_TYPE, 0, 0) + options))
+        number = self._interfaces[channel] = len(self._interfaces)
+        return number
+
+    def _add(self, at_us: int, number: int, data: bytes, sent: bool) -> None:
+        options = self._options + self._comments
+        self._options = self._comments = b""
+        if sent:
+            options = _option(_PACKET_FLAGS, struct.pack("<I", _OUTBOUND)) + options
+        head = _PACKET.pack(number, at_us >> 32, at_us & _LOW, len(data), len(data))
+        self._blocks.append(_block(PACKET, head + data + (options + _END if options else b"")))
+
+    def _give(self) -> None:
+        self._file.write(b"".join(self._blocks))
+        self._blocks.clear()
+
+
+def _swapped(number: int) -> int:
+    """Return a number whose little-endian bytes are those of another one in network order."""
+    return int.from_bytes(number.to_bytes(4, "big"), "little")

@@ -1,1 +1,0 @@
-"""Captures of Wireshark, tshark and tcpdump: pcapng read and written, pcap read."""

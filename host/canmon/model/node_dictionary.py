@@ -1,0 +1,252 @@
+"""The objects of one node with the latest values that were heard.
+
+>>> encode_value(ObjectText("target_velocity", DataType.INTEGER32), "-2").hex()
+'feffffff'
+>>> encode_value(ObjectText("angle", DataType.INTEGER16, "deg", 0.1), "1.5").hex()
+'0f00'
+>>> encode_value(ObjectText(), "37 02").hex()
+'3702'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from math import isfinite
+from typing import Final, NamedTuple
+
+from tickrig.host.canmon.model.decode.decoded import Decoded, Transfer, TransferOutcome, write_entry
+from tickrig.host.canmon.model.decode.node_memory import Entry, NodeMemory
+from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.frames import s_text
+from tickrig.host.text.values import parse_setting
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject
+from tickrig.wire.canopen.sdo_frame import describe_abort
+from tickrig.wire.errors import FieldError
+
+
+class Origin(StrEnum):
+    """Where a value was seen last."""
+
+    NONE = ""
+    EDS = "eds"  # its power-on value
+    SDO = "sdo"
+    PDO = "pdo"
+
+
+class ObjectRow(NamedTuple):
+    """An object and its latest value.
+
+    Attributes:
+        entry: index and sub-index.
+        text: its name, type and unit.
+        value: for people; empty where none is known.
+        origin: where that was seen.
+        at_us: when; None for that of the EDS.
+        trouble: why the latest transfer failed, empty if it did not.
+    """
+
+    entry: tuple[int, int]
+    text: ObjectText
+    value: str = ""
+    origin: Origin = Origin.NONE
+    at_us: int | None = None
+    trouble: str = ""
+
+    @property
+    def kind(self) -> str:
+        """Its data type, empty where nobody said it."""
+        return "" if self.text.kind is None else self.text.kind.name
+
+    def matches(self, wanted: str) -> bool:
+        """Say whether a part of its name, or the begin of its index, is wanted.
+
+        >>> row = ObjectRow((0x6041, 0), ObjectText("statusword"))
+        >>> [row.matches(wanted) for wanted in ("", "604", "Status", "6041h:00", "word 6", "41")]
+        [True, True, True, True, False, False]
+        """
+        wanted = wanted.lower()
+        return write_entry(self.entry).lower().startswith(wanted) or wanted in self.text.name
+
+
+_FIRST_OBJECT: Final = 0x1000
+"""Below it are data types (CiA 301, structure of the object dictionary)."""
+
+_MAPPINGS: Final = {"tpdo": 0x1A00, "rpdo": 0x1600}
+
+
+class _Observed(NamedTuple):
+    """A value, and how it came."""
+
+    at_us: int
+    value: str
+    origin: Origin
+
+
+class NodeDictionary:
+    """Keeps what was heard of the objects of one node.
+
+    Args:
+        memory: what is known of them by the EDS and by SDO traffic.
+    """
+
+    def __init__(self, memory: NodeMemory) -> None:
+        self.memory = memory
+        self._values: dict[Entry, _Observed] = {}
+        self._troubles: dict[Entry, str] = {}
+        self._pdos: dict[str, tuple[int, Decoded]] = {}
+
+    def take(self, at_us: int, decoded: Decoded) -> None:
+        """Take a decoded frame of this node."""
+        for transfer in decoded.transfers:
+            self._transfer(at_us, transfer)
+        if decoded.kind[:4] in _MAPPINGS:
+            self._pdos[decoded.kind] = at_us, decoded
+
+    def rows(self, wanted: str = "") -> list[ObjectRow]:
+        """Return the objects that are meant, by index; all for an empty text."""
+        seen = self._latest()
+        entries = sorted({*self.memory.eds.texts, *seen, *self._troubles})
+        objects = (entry for entry in entries if entry[0] >= _FIRST_OBJECT)
+        rows = (self._row(entry, seen.get(entry)) for entry in objects)
+        return [row for row in rows if row.matches(wanted)]
+
+    def _transfer(self, at_us: int, transfer: Transfer) -> None:
+        entry = transfer.entry
+        if entry is None:
+            return
+        if transfer.outcome is TransferOutcome.DONE:
+            self._troubles.pop(entry, None)
+            value = f"{transfer.text}{transfer.unit}"
+            self._values[entry] = _Observed(at_us, value, Origin.SDO)
+        elif transfer.outcome is TransferOutcome.ABORTED:
+            self._troubles[entry] = describe_abort(transfer.abort_code)
+        else:
+            self._troubles[entry] = transfer.outcome
+
+    def _latest(self) -> dict[Entry, _Observed]:
+        """Return the latest values, those of PDOs among them."""
+        seen = dict(self._values)
+        for kind, (at_us, decoded) in self._pdos.items():
+            mapped = self._mapped(kind)
+            for signal in decoded.signals:
+                entry = mapped.get(signal.name)
+                if entry is not None and (entry not in seen or seen[entry].at_us <= at_us):
+                    value = f"{signal.text or str(signal.value)}{signal.unit}"
+                    seen[entry] = _Observed(at_us, value, Origin.PDO)
+        return seen
+
+    def _mapped(self, kind: str) -> dict[str, Entry]:
+        """Return what is mapped to a PDO, by the names that the decoder gives."""
+        index = _MAPPINGS[kind[:4]] + int(kind[4:]) - 1
+        count = min(self.memory.number(index, 0) or 0, MAX_MAPPED_OBJECTS)
+        found = (
+            MappedObject.parse(self.memory.number(index, sub + 1) or 0) for sub in range(count)
+        )
+        entries = ((one.index, one.sub) for one in found)
+        return {self.memory.describe(*one).name or write_entry(one): one for one in entries}
+
+    def _row(self, entry: Entry, seen: _Observed | None) -> ObjectRow:
+        text, trouble = self.memory.describe(*entry), self._troubles.get(entry, "")
+        if seen is not None:
+            return ObjectRow(entry, text, seen.value, seen.origin, seen.at_us, trouble)
+        power_on = self.memory.eds.values.get(entry)
+        if power_on is None:
+            return ObjectRow(entry, text, trouble=trouble)
+        value = f"{text.read(power_on)[1]}{text.unit}"
+        return ObjectRow(entry, text, value, Origin.EDS, trouble=trouble)
+
+
+_LEAST_NAME: Final = 12
+_SHORT_NAME: Final = 16
+"""Names are made no shorter than this, however narrow the screen is."""
+_MOST_NAME: Final = 36
+VALUE: Final = 20
+_BESIDE_NAME: Final = 60
+"""What the other columns take."""
+
+
+def render_dictionary(rows: Sequence[ObjectRow], now_us: int, width: int = 0) -> list[str]:
+    """Return a head, and a line for each object; what went wrong stands in the place of its type.
+
+    Args:
+        rows: the objects.
+        now_us: the time for which ages are told.
+        width: columns of the screen, which say how long names may be; 0 for any.
+    """
+    longest = max((len(row.text.name) for row in rows), default=0)
+    most = max(_SHORT_NAME, width - _BESIDE_NAME) if width else _MOST_NAME
+    name = min(most, max(_LEAST_NAME, longest))
+    head = f"{'OBJECT':<9} {'NAME':<{name}} {'VALUE':<{VALUE}} {'FROM':<4} {'AGE':>7}  TYPE"
+    return [head, *(_line(row, name, now_us) for row in rows)]
+
+
+def _shortened(name: str, width: int) -> str:
+    """Return a name of at most so many characters; its end tells entries apart, so it is kept.
+
+    >>> _shortened("pre_defined_error_field.error_1", 20)
+    'pre_defin…ld.error_1'
+    """
+    if len(name) <= width:
+        return name
+    begin = (width - 1) // 2
+    return f"{name[:begin]}…{name[len(name) - (width - 1 - begin) :]}"
+
+
+def _line(row: ObjectRow, name: int, now_us: int) -> str:
+    age = "" if row.at_us is None else f"{s_text(now_us - row.at_us)} s"
+    cells = [
+        f"{write_entry(row.entry):<9}",
+        f"{_shortened(row.text.name, name):<{name}}",
+        f"{row.value:<{VALUE}}",
+        f"{row.origin:<4}",
+        f"{age:>7}",
+        f" {row.trouble or row.kind}",
+    ]
+    return " ".join(cells).rstrip()
+
+
+_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.UNICODE_STRING, DataType.VISIBLE_CHAR)
+_TRUTH: Final = {"true": 1, "false": 0}
+
+
+def encode_value(text: ObjectText, words: str) -> bytes:
+    """Return the bytes of a value, written as the table shows it: in the unit of the object.
+
+    Args:
+        text: what is known of the object; where no type is, bytes are written.
+        words: the value; bytes in hex.
+
+    Raises:
+        ValueError: not a value of this object.
+    """
+    kind = text.kind
+    if kind in _TEXTS:
+        return kind.encode(words)
+    if kind is None or not (kind.is_integer or kind in (DataType.REAL32, DataType.REAL64)):
+        return _bytes(words)
+    value = _TRUTH.get(words.lower(), parse_setting(words))
+    if isinstance(value, str):
+        raise ValueError(f"{words!r} is no number; {text.name} is {kind.name}")
+    try:
+        return kind.encode(_on_the_wire(text, kind, value))
+    except (FieldError, OverflowError):
+        raise ValueError(f"{words} is not in the range of {kind.name}") from None
+
+
+def _on_the_wire(text: ObjectText, kind: DataType, value: float) -> float:
+    """Return the number that is sent: the nearest step, where the object has a factor."""
+    if text.factor == 1 or text.in_hex:
+        return value
+    scaled = value / text.factor
+    return round(scaled) if kind.is_integer and isfinite(scaled) else scaled
+
+
+def _bytes(words: str) -> bytes:
+    try:
+        return bytes.fromhex(words)
+    except ValueError:
+        raise ValueError(
+            f"{words!r} is not bytes in hex, as 37 02; the type is not known"
+        ) from None

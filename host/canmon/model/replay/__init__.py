@@ -1,1 +1,0 @@
-"""A log sent again: what is due when, and how late it went out."""

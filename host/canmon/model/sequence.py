@@ -1,0 +1,486 @@
+"""Sequences: frames to send and frames to expect, step by step, told the time.
+
+A sequence as it is carried out, and what it waits for: frames by a pattern or a filter.
+
+>>> from tickrig.wire.can import CanFrame
+>>> frames = map(CanFrame.parse, ("585#6041", "585#60F1AA", "585#6042"))
+>>> [parse_pattern("585#60?1*").matches(Record(0, "can0", frame)) for frame in frames]
+[True, True, False]
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from typing import Any, Final, NamedTuple
+
+from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.filter import parse_filter
+from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.sequence_variables import fill_in
+from tickrig.host.text.steps import FOREVER, Condition, Place, Step, StepError, content_lines
+from tickrig.host.text.toml_reader import load_toml, read_toml
+from tickrig.host.text.values import format_time, parse_time_with_unit_us
+from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.errors import WireError
+from tickrig.wire.instant import NEVER
+
+_NOTATION: Final = re.compile(
+    r"([0-9A-Fa-f?]{3}|[0-9A-Fa-f?]{8})#(R[0-8]?|(?:[0-9A-Fa-f?]{2}\.?){0,8}\*?)"
+)
+
+
+FrameCondition = Condition[Record]
+
+
+def parse_pattern(text: str) -> FrameCondition:
+    """Read a frame in candump notation, with `?` for any hex digit and `*` for any more bytes.
+
+    Raises:
+        ValueError: it is none.
+    """
+    match = _NOTATION.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(f"{text!r} is not a frame like 705#05, 585#60??????* or 705#R")
+    can_id, data = (part.upper().replace(".", "") for part in match.groups())
+    body = data.replace("?", "[0-9A-F]").replace("*", "[0-9A-F]*")
+    regex = re.compile(f"{can_id.replace('?', '[0-9A-F]')}#{body}")
+    return Condition(text, lambda record: regex.fullmatch(str(record.frame)) is not None)
+
+
+class DecodedCondition:
+    """Keeps the latest frame with its meaning, for the conditions of a sequence."""
+
+    def __init__(self) -> None:
+        self._latest: tuple[Record, Decoded] | None = None
+
+    def take(self, record: Record, decoded: Decoded) -> None:
+        """Take a frame; conditions are asked about it next."""
+        self._latest = record, decoded
+
+    def condition(self, text: str) -> FrameCondition:
+        """Return the condition of a filter expression; ValueError if it is none."""
+        chosen = parse_filter(text)
+
+        def matches(record: Record) -> bool:
+            latest = self._latest
+            return latest is not None and latest[0] is record and chosen.matches(*latest)
+
+        return Condition(text, matches)
+
+
+_FrameStep = Step[Frames, Record]
+"""Sends frames, waits, expects frames, or repeats other steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sequence:
+    """Steps, and how a place in them is told.
+
+    Attributes:
+        steps: in their order.
+        locate: returns `FILE:LINE` of a place.
+    """
+
+    steps: tuple[_FrameStep, ...]
+    locate: Callable[[Place], str]
+
+
+class EventType(StrEnum):
+    """What a note is about."""
+
+    SENT = ">"
+    MET = "ok"
+    MISSED = "?"
+    END = "."
+
+
+class SequenceEvent(NamedTuple):
+    """What happened when."""
+
+    at_us: int
+    mark: EventType
+    text: str
+
+
+class _Pause(NamedTuple):
+    until_us: int
+    conditions: tuple[FrameCondition, ...] = ()
+
+
+_Play = Generator[_Pause, bool, bool]
+"""Yields pauses, is sent whether they were met, and returns whether to carry on."""
+
+
+class SequenceRun:
+    """Carries out a sequence as time passes.
+
+    Waits are counted from when the step before was due, so they do not drift. Frames that one
+    call brings are taken before its time runs out.
+
+    Args:
+        sequence: what to do.
+
+    Attributes:
+        done: it has ended.
+        met: how many expectations were met.
+        missed: how many were not.
+        events: what happened; whoever shows them may take them out.
+    """
+
+    def __init__(self, sequence: Sequence) -> None:
+        self._sequence = sequence
+        self._begun, self._at_us = False, 0
+        self._play = self._all(sequence.steps)
+        self._pause = _Pause(0)
+        self._out: list[CanFrame] = []
+        self.done = False
+        self.met = self.missed = 0
+        self.events: list[SequenceEvent] = []
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called without a frame."""
+        return self._pause.until_us
+
+    def tick(self, now_us: int, records: Iterable[Record] = ()) -> Frames:
+        """Take in what was heard, carry out what is due, and return what to send.
+
+        Args:
+            now_us: the time; the first call begins the sequence.
+            records: frames since the last call; those that this program sent are passed over.
+        """
+        if not self._begun:
+            self._begun, self._at_us = True, now_us
+            self._resume(now_us, None)
+        for one in records:
+            if self._pause.conditions and not one.sent:
+                self._receive(one, now_us)
+        while self.due_us <= now_us:
+            self._resume(self._pause.until_us, not self._pause.conditions)
+        out, self._out = tuple(self._out), []
+        return out
+
+    def _receive(self, record: Record, now_us: int) -> None:
+        conditions = self._pause.conditions
+        for number, condition in enumerate(conditions):
+            if condition.matches(record):
+                left = conditions[:number] + conditions[number + 1 :]
+                self._pause = _Pause(self._pause.until_us, left)
+                if not left:
+                    self._resume(now_us, True)
+                return
+
+    def _resume(self, at_us: int, met: bool | None) -> None:
+        """Carry on at a time up to the next pause; None begins."""
+        self._at_us = at_us
+        try:
+            self._pause = next(self._play) if met is None else self._play.send(met)
+        except StopIteration:
+            self.done, self._pause = True, _Pause(NEVER)
+            self._report(EventType.END, f"{self.met} met, {self.missed} missed")
+
+    def _all(self, steps: tuple[_FrameStep, ...]) -> _Play:
+        for step in steps:
+            if not (yield from self._one(step)):
+                return False
+        return True
+
+    def _one(self, step: _FrameStep) -> _Play:
+        if step.at_us is not None:
+            yield _Pause(self._at_us + step.at_us)
+        self._send(step.what or ())
+        if step.wanted:
+            return (yield from self._expect(step))
+        count = 0
+        while step.steps and (not step.times or count < step.times):
+            if not (yield from self._all(step.steps)):
+                return False
+            count += 1
+        return True
+
+    def _send(self, frames: Frames) -> None:
+        self._out += frames
+        for frame in frames:
+            self._report(EventType.SENT, str(frame))
+
+    def _expect(self, step: _FrameStep) -> _Play:
+        wanted = " and ".join(condition.text for condition in step.wanted)
+        if (yield _Pause(self._at_us + step.within_us, step.wanted)):
+            self.met += 1
+            self._report(EventType.MET, wanted)
+            return True
+        self.missed += 1
+        missing = " and ".join(condition.text for condition in self._pause.conditions)
+        place = self._sequence.locate(step.place)
+        self._report(
+            EventType.MISSED, f"{place}: no {missing} within {step.within_us / 1_000:g} ms"
+        )
+        return (yield from self._all(step.on_fail)) and step.goes_on
+
+    def _report(self, mark: EventType, text: str) -> None:
+        self.events.append(SequenceEvent(self._at_us, mark, text))
+
+
+def event_line(event: SequenceEvent) -> str:
+    """Write a note: seconds, mark, and what happened.
+
+    >>> from tickrig.host.canmon.model.sequence import EventType
+    >>> event_line(SequenceEvent(4_718, EventType.MET, "703#05"))
+    '0.004718 ok 703#05'
+    """
+    return f"{format_time(event.at_us)} {event.mark} {event.text}"
+
+
+def outline(steps: tuple[_FrameStep, ...], depth: int = 0) -> list[str]:
+    """Return the steps as lines for people, indented where they are repeated."""
+    lines = []
+    for step in steps:
+        lines += ["  " * depth + text for text in _step_texts(step)]
+        lines += outline(step.steps or step.on_fail, depth + 1)
+    return lines
+
+
+def _step_texts(step: _FrameStep) -> Iterator[str]:
+    if step.at_us is not None:
+        yield f"wait {step.at_us / 1_000:g} ms"
+    if step.what:
+        yield "send " + " ".join(map(str, step.what))
+    if step.wanted:
+        wanted = " and ".join(condition.text for condition in step.wanted)
+        then = "go on" if step.goes_on else "stop"
+        yield f"expect {wanted} within {step.within_us / 1_000:g} ms, else {then}"
+    if step.times is not None:
+        yield f"repeat {step.times or 'forever'}"
+
+
+# Sequences as files: TOML with steps that send, wait, expect and repeat, or plain lines.
+
+_LOOP: Final = re.compile(r"loop\s+([0-9]{1,9}|forever)")
+_FRAME: Final = re.compile(r"\+([0-9]{1,9}(?:\.[0-9]{1,3})?)\s+(\S+)")
+
+
+def parse_lines(text: str, file: str) -> Sequence:
+    """Read a sequence of lines.
+
+    `+10 123#DEADBEEF` sends a frame 10 ms after the line above; `loop 3` as the first line does
+    all of it three times, `loop forever` until it is stopped; `#` begins a comment.
+
+    Raises:
+        StepError: `FILE:LINE: what came, what is allowed`.
+    """
+    steps: list[_FrameStep] = []
+    times = 1
+    for number, content in content_lines(text):
+        try:
+            if loop := _LOOP.fullmatch(content):
+                times = _times(loop[1], first=not steps)
+            else:
+                steps.append(_line(content, number))
+        except (ValueError, WireError) as error:
+            raise StepError(f"{file}:{number}: {error}") from None
+    if not steps:
+        raise StepError(f"{file}:1: no frame, as '+10 123#DEADBEEF'")
+    whole = _FrameStep(place=(1,), times=times, steps=tuple(steps))
+    if times == FOREVER and not whole.takes_time:
+        raise StepError(f"{file}:1: loop forever takes no time: write +10 before a frame")
+    return Sequence((whole,), partial(_place, file))
+
+
+def _times(word: str, *, first: bool) -> int:
+    if not first:
+        raise ValueError("loop stands before the first frame")
+    if word == "forever":
+        return FOREVER
+    if not (times := int(word)):
+        raise ValueError("loop takes 1 or more, or forever; got 0")
+    return times
+
+
+def _line(content: str, number: int) -> _FrameStep:
+    match = _FRAME.fullmatch(content)
+    if match is None:
+        raise ValueError(f"{content!r} is not '+MS ID#DATA', as '+10 123#DEADBEEF', nor 'loop N'")
+    frame = CanFrame.parse(match[2])
+    return _FrameStep(place=(number,), at_us=round(float(match[1]) * 1_000), what=(frame,))
+
+
+def _place(file: str, place: Place) -> str:
+    return f"{file}:{place[0]}"
+
+
+_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
+    "send": (),
+    "wait": (),
+    "expect": ("within", "on-fail"),
+    "repeat": ("steps",),
+}
+"""What a step does, and what else it may say."""
+
+_WITHIN: Final = "1s"
+"""How long an expectation waits that does not say."""
+
+_TOP: Final = ("name", "vars", "step")
+_LINE: Final = re.compile(r"line ([0-9]+)")  # else it is the end of the document
+
+
+class _Wrong(Exception):  # noqa: N818 - never leaves this file
+    def __init__(self, path: Place, text: str) -> None:
+        super().__init__(text)
+        self.path = path
+
+
+class TomlSequence:
+    """Reads one file.
+
+    Args:
+        text: the file.
+        file: its name, for messages.
+        variables: values that go before those of `[vars]`.
+        resolve: makes a frame of what a step sends, where it is no frame in candump notation.
+        condition: makes a condition of what a step expects, where it is no pattern of a frame.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        file: str,
+        variables: Mapping[str, int] | None = None,
+        *,
+        resolve: Callable[[str], CanFrame] = CanFrame.parse,
+        condition: Callable[[str], FrameCondition] | None = None,
+    ) -> None:
+        self._text, self._file = text, file
+        self._given = dict(variables or {})
+        self._resolve = resolve
+        self._condition = condition or parse_pattern
+        self._variables: dict[str, int] = {}
+
+    def parse(self) -> Sequence:
+        """Read it.
+
+        Raises:
+            StepError: `FILE:LINE: what came, what is allowed`.
+        """
+        try:
+            top = load_toml(self._text)
+        except tomllib.TOMLDecodeError as error:
+            raise StepError(self._syntax(str(error))) from None
+        try:
+            self._variables = {**self._vars(top.get("vars", {})), **self._given}
+            _check_keys(top, _TOP, ())
+            if not top.get("step"):
+                raise _Wrong((), "no [[step]]")
+            steps = self._steps(top["step"], ("step",))
+        except _Wrong as error:
+            raise StepError(f"{self._locate(error.path)}: {error}") from None
+        return Sequence(steps, self._locate)
+
+    def _locate(self, place: Place) -> str:
+        return f"{self._file}:{read_toml(self._text).line_of(place)}"
+
+    def _syntax(self, text: str) -> str:
+        reason, _, place = text.rpartition(" (at ")
+        found = _LINE.search(place)
+        number = found[1] if found else max(1, len(self._text.splitlines()))
+        return f"{self._file}:{number}: {reason or place}"
+
+    def _vars(self, table: Any) -> dict[str, int]:
+        if not isinstance(table, dict):
+            raise _Wrong(("vars",), f"vars = {table!r} is no table")
+        for name, value in table.items():
+            if type(value) is not int:
+                raise _Wrong(("vars", name), f"{name} = {value!r} is no whole number")
+        return table
+
+    def _steps(self, value: Any, path: Place) -> tuple[_FrameStep, ...]:
+        if not isinstance(value, list) or not all(isinstance(step, dict) for step in value):
+            raise _Wrong(path, f"{path[-1]} = {value!r:.60} is no list of steps")
+        return tuple(self._step(step, (*path, number)) for number, step in enumerate(value))
+
+    def _step(self, step: dict[str, Any], path: Place) -> _FrameStep:
+        verbs = [key for key in step if key in _KEYS]
+        if len(verbs) != 1:
+            came = " and ".join(verbs) or ", ".join(step) or "nothing"
+            raise _Wrong(path, f"a step has one of {', '.join(_KEYS)}; this one has {came}")
+        verb = verbs[0]
+        _check_keys(step, (verb, *_KEYS[verb]), path)
+        try:
+            return _READERS[verb](self, step, path)
+        except (ValueError, WireError) as error:
+            raise _Wrong((*path, verb), str(error)) from None
+
+    def _send(self, step: dict[str, Any], path: Place) -> _FrameStep:
+        return _FrameStep(place=path, what=tuple(map(self._frame, _texts(step["send"], "send"))))
+
+    def _frame(self, text: str) -> CanFrame:
+        filled = fill_in(text, self._variables)
+        return CanFrame.parse(filled) if "#" in filled else self._resolve(filled)
+
+    def _wait(self, step: dict[str, Any], path: Place) -> _FrameStep:
+        return _FrameStep(place=path, at_us=self._time(step["wait"]))
+
+    def _expect(self, step: dict[str, Any], path: Place) -> _FrameStep:
+        texts = (fill_in(text, self._variables) for text in _texts(step["expect"], "expect"))
+        wanted = tuple(
+            parse_pattern(text) if "#" in text else self._condition(text) for text in texts
+        )
+        within_us = self._time(step.get("within", _WITHIN))
+        if not within_us:
+            raise ValueError("within takes a time above 0")
+        on_fail = step.get("on-fail", "stop")
+        steps: tuple[_FrameStep, ...] = ()
+        if isinstance(on_fail, list):
+            steps = self._steps(on_fail, (*path, "on-fail"))
+        elif on_fail not in ("stop", "go-on"):
+            raise ValueError(f"on-fail is 'stop', 'go-on' or a list of steps, got {on_fail!r}")
+        return _FrameStep(
+            place=(*path, "expect"),
+            wanted=wanted,
+            within_us=within_us,
+            goes_on=on_fail == "go-on",
+            on_fail=steps,
+        )
+
+    def _repeat(self, step: dict[str, Any], path: Place) -> _FrameStep:
+        times = FOREVER if step["repeat"] == "forever" else step["repeat"]
+        if type(times) is not int or (times < 1 and step["repeat"] != "forever"):
+            raise ValueError(f"repeat takes 1 or more, or 'forever'; got {step['repeat']!r}")
+        if "steps" not in step:
+            raise ValueError("repeat has no steps")
+        steps = self._steps(step["steps"], (*path, "steps"))
+        repeat = _FrameStep(place=path, times=times, steps=steps)
+        if times == FOREVER and not repeat.takes_time:
+            raise ValueError("repeat = 'forever' takes no time: add a wait or an expect")
+        return repeat
+
+    def _time(self, value: Any) -> int:
+        if not isinstance(value, str):
+            raise ValueError(f"{value!r} is not a time: write '1.5s', '200ms' or '250us'")
+        return parse_time_with_unit_us(value)
+
+
+_Reader = Callable[[TomlSequence, dict[str, Any], Place], _FrameStep]
+_READERS: Final[Mapping[str, _Reader]] = {
+    "send": TomlSequence._send,
+    "wait": TomlSequence._wait,
+    "expect": TomlSequence._expect,
+    "repeat": TomlSequence._repeat,
+}
+
+
+def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], path: Place) -> None:
+    for key in table:
+        if key not in known:
+            raise _Wrong((*path, key), f"no key {key!r} here; known: {', '.join(known)}")
+
+
+def _texts(value: Any, key: str) -> list[str]:
+    texts = [value] if isinstance(value, str) else value
+    if not isinstance(texts, list) or not texts or not all(isinstance(t, str) for t in texts):
+        raise ValueError(f"{key} takes a text or a list of texts, got {value!r:.60}")
+    return texts

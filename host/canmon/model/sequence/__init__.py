@@ -1,1 +1,0 @@
-"""Sequences: frames to send and frames to expect, step by step, told the time."""

@@ -1,0 +1,535 @@
+"""The table of all identifiers that `canmon top` paints, driven by frames, keys and the time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tickrig.host.canmon.model.frames import (
+    ARROWS,
+    Record,
+    any_ident,
+    count_text,
+    ident_text,
+    load_text,
+    ms_text,
+    rate_text,
+    s_text,
+)
+from tickrig.host.canmon.model.traffic import (
+    NO_RATES,
+    BitRates,
+    BitRow,
+    BusRow,
+    IdRow,
+    Traffic,
+    TrafficSnapshot,
+)
+from tickrig.host.text.page_text import in_cells
+from tickrig.wire.can import ErrorFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.frames import AnyRecord, LineRecord
+
+
+# The columns of the table of identifiers, and which of them a narrow screen leaves out.
+
+REVERSE: Final = "\x1b[7m"
+PLAIN: Final = "\x1b[0m"
+
+_UNCHANGED: Final = "·"
+_NOTCHED: Final = " "
+_HEAT: Final = "▁▂▃▄▅▆▇█"
+"""From a bit that changes seldom to one that changes with each frame."""
+
+
+def _data_text(row: IdRow, styled: bool) -> str:
+    """Write the bytes of the latest frame; those that it changed are shown in reverse."""
+    if row.frame.remote:
+        return f"remote request for {row.frame.dlc}"
+    latest = row.changed.latest & ~row.changed.notched
+    cells = [
+        _marked(f"{byte:02X}", styled and bool(latest >> 8 * place & 0xFF))
+        for place, byte in enumerate(row.frame.data)
+    ]
+    return " ".join(cells)
+
+
+def _heat_text(row: IdRow, styled: bool) -> str:
+    """Write a character for each bit, bit 7 of a byte first."""
+    heats = _heats(row.changed, row.frames)
+    latest = row.changed.latest & ~row.changed.notched
+    cells = []
+    for place in range(len(row.frame.data)):
+        bits = [
+            _marked(
+                heats[bit] if bit < len(heats) else _UNCHANGED, styled and bool(latest >> bit & 1)
+            )
+            for bit in reversed(range(8 * place, 8 * place + 8))
+        ]
+        cells.append("".join(bits))
+    return " ".join(cells)
+
+
+def _heats(changed: BitRow, frames: int) -> list[str]:
+    shown = changed.changed
+    return [
+        _NOTCHED
+        if changed.notched >> bit & 1
+        else _heat(count, frames)
+        if shown >> bit & 1
+        else _UNCHANGED
+        for bit, count in enumerate(changed.counts())
+    ]
+
+
+def _heat(count: int, frames: int) -> str:
+    """Return the character of a bit that changed so often in so many frames, 2 or more."""
+    return _HEAT[-(-count * len(_HEAT) // (frames - 1)) - 1]
+
+
+def _marked(text: str, marked: bool) -> str:
+    return f"{REVERSE}{text}{PLAIN}" if marked else text
+
+
+class TopColumn(NamedTuple):
+    """A column of numbers.
+
+    Attributes:
+        title: its head.
+        width: characters.
+        rank: the highest goes first where there is no room.
+        text: what it says of a row at a time.
+    """
+
+    title: str
+    width: int
+    rank: int
+    text: Callable[[IdRow, int], str]
+
+
+def _gap(name: str) -> Callable[[IdRow, int], str]:
+    return lambda row, now_us: ms_text(getattr(row.gaps, name, None))
+
+
+_COLUMNS: Final = (
+    TopColumn("frames", 8, 1, lambda row, now_us: str(row.frames)),
+    TopColumn("1/s", 7, 0, lambda row, now_us: rate_text(row.rate_hz)),
+    TopColumn("gap ms", 8, 3, lambda row, now_us: ms_text(row.gap_us)),
+    TopColumn("min", 8, 6, _gap("min_us")),
+    TopColumn("avg", 8, 2, _gap("mean_us")),
+    TopColumn("p99", 8, 7, _gap("p99_us")),
+    TopColumn("max", 8, 4, _gap("max_us")),
+    TopColumn("jitter", 8, 8, _gap("jitter_us")),
+    TopColumn("missed", 6, 5, lambda row, now_us: count_text(getattr(row.gaps, "missed", None))),
+    TopColumn("age s", 7, 9, lambda row, now_us: s_text(now_us - row.last_us)),
+)
+
+
+class IdText(NamedTuple):
+    """The leading column: bus, if there are several, and identifier.
+
+    Attributes:
+        channel_width: characters of the bus; 0 for none.
+    """
+
+    channel_width: int
+
+    @property
+    def width(self) -> int:
+        """Characters in all."""
+        return self.channel_width + (1 if self.channel_width else 0) + 9
+
+    def of(self, row: IdRow) -> str:
+        """Return what it says of a row."""
+        return self._joined(row.channel, ident_text(row.ident))
+
+    def title(self) -> str:
+        """Return its head."""
+        return self._joined("bus", "CAN-ID")
+
+    def _joined(self, channel: str, ident: str) -> str:
+        channel = in_cells(channel)
+        return (
+            f"{channel:<{self.channel_width}.{self.channel_width}} " * bool(self.channel_width)
+            + f"{ident:<9}"
+        )
+
+
+def _fitting(width: int) -> tuple[TopColumn, ...]:
+    """Return the columns that fit beside each other into so many characters."""
+    kept = list(_COLUMNS)
+    while len(kept) > 1 and sum(column.width + 1 for column in kept) > width:
+        kept.remove(max(kept, key=lambda column: column.rank))
+    return tuple(kept)
+
+
+# The traffic of serial lines: one row for each kind of message, and its table for `canmon top`.
+
+_ANSWERS: Final = ("ok", "refused", "event")
+"""Signals that name a kind of answer."""
+
+_COMMAND: Final = "command"
+_STATUS: Final = "status"
+_OTHER: Final = "other"
+
+
+class LineRow(NamedTuple):
+    """One kind of message on one line, in one direction.
+
+    Attributes:
+        channel: name of the line.
+        sent: to the device.
+        word: what kind of message.
+        messages: how many.
+        first_us: when the first came.
+        last_us: when the latest came.
+        gap_us: since the one before it; None for the first.
+        text: what the latest says.
+    """
+
+    channel: str
+    sent: bool
+    word: str
+    messages: int
+    first_us: int
+    last_us: int
+    gap_us: int | None
+    text: str
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages a second, on average; 0 of one alone."""
+        span_us = self.last_us - self.first_us
+        return (self.messages - 1) * 1e6 / span_us if span_us > 0 else 0.0
+
+
+class LineTraffic:
+    """Counts messages; what it keeps grows with their kinds, not with their number."""
+
+    def __init__(self) -> None:
+        self._rows: dict[tuple[str, bool, str], LineRow] = {}
+
+    def take(self, line: LineRecord) -> None:
+        """Count a message."""
+        at_us, decoded = line.at_us, line.decoded
+        key = line.channel, line.sent, _word_of(decoded)
+        row = self._rows.get(key)
+        self._rows[key] = (
+            LineRow(*key, 1, at_us, at_us, None, decoded.text)
+            if row is None
+            else LineRow(
+                *key, row.messages + 1, row.first_us, at_us, at_us - row.last_us, decoded.text
+            )
+        )
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._rows.clear()
+
+    def rows(self) -> tuple[LineRow, ...]:
+        """Return the rows by line, direction and kind."""
+        return tuple(self._rows[key] for key in sorted(self._rows))
+
+
+def _word_of(decoded: Decoded) -> str:
+    """Return the kind of a message: its command, or what kind of answer it is."""
+    if not decoded.signals:
+        return _OTHER
+    first = decoded.signals[0]
+    if first.name == _COMMAND:
+        return str(first.value)
+    return first.name if first.name in _ANSWERS else _STATUS
+
+
+def line_table(rows: tuple[LineRow, ...], now_us: int, width: int) -> list[str]:
+    """Return the table; nothing where there are no rows."""
+    if not rows:
+        return []
+    names = [f"{row.channel} {ARROWS[row.sent]} {row.word}" for row in rows]
+    first = max(map(len, (*names, "line")))
+    head = f"{'line':<{first}} {'count':>8} {'1/s':>7} {'gap ms':>8} {'age s':>7} meaning"
+    lines = [
+        f"{name:<{first}} {row.messages:>8} {rate_text(row.rate_hz):>7} {ms_text(row.gap_us):>8}"
+        f" {s_text(now_us - row.last_us):>7} {row.text}"
+        for name, row in zip(names, rows, strict=True)
+    ]
+    return [in_cells(line)[:width] for line in ("", head, *lines)]
+
+
+# The table of all identifiers that `canmon top` paints, driven by frames, keys and the time.
+
+_DATA_WIDTH: Final = 23
+_HEAT_WIDTH: Final = 71
+_MEANING_WIDTH: Final = 50
+_CHANNEL_MAX: Final = 12
+KEYS: Final = "  q quit, space hold, b bits, d decode, n notch, s sort, c clear"
+_UNRATED: Final = "load at most (no --data-bitrate)"
+UNBOUNDED: Final = 1 << 16
+"""A width or height that everything fits into."""
+
+
+class RowOrder(StrEnum):
+    """By what the rows are sorted."""
+
+    ID = "id"
+    RATE = "rate"
+    JITTER = "jitter"
+    GAP = "gap"
+    AGE = "age"
+
+
+_KEYS: Final[dict[RowOrder, Callable[[IdRow], float]]] = {
+    RowOrder.ID: lambda row: 0,
+    RowOrder.RATE: lambda row: -row.rate_hz,
+    RowOrder.JITTER: lambda row: -row.gaps.jitter_us if row.gaps else 1,
+    RowOrder.GAP: lambda row: -row.gaps.max_us if row.gaps else 1,
+    RowOrder.AGE: lambda row: row.last_us,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class TableView:
+    """How the table is shown.
+
+    Attributes:
+        order: of its rows.
+        bits: bits instead of bytes.
+        held: the picture stands still.
+        top: rows that are scrolled past.
+        styled: changes are marked; text of a file is not.
+        bit_rate: of the buses, None if it is not known.
+        keys: a line tells the keys.
+        meaning: what the latest frame of a row means, shown instead of its bytes.
+        unread: what came and is no frame of CAN or CAN FD.
+    """
+
+    order: RowOrder = RowOrder.ID
+    bits: bool = False
+    held: bool = False
+    top: int = 0
+    styled: bool = False
+    bit_rate: int | None = None
+    keys: bool = False
+    meaning: Callable[[IdRow], str] | None = None
+    unread: int = 0
+
+
+def render(
+    snapshot: TrafficSnapshot,
+    view: TableView,
+    lost: int = 0,
+    width: int = UNBOUNDED,
+    height: int = UNBOUNDED,
+) -> list[str]:
+    """Return the lines, no more than `height`, none wider than `width`.
+
+    Args:
+        snapshot: what there is to show.
+        view: how.
+        lost: frames that did not get here.
+        width: characters of the screen.
+        height: lines of the screen.
+    """
+    head = [_bus_line(bus, view.bit_rate)[:width] for bus in snapshot.buses]
+    head.append(_state_line(snapshot, view, lost)[:width])
+    table = _Table.of(snapshot, view, width)
+    head.append(table.titles())
+    room = max(0, height - len(head))
+    rows = sorted(snapshot.rows, key=_KEYS[view.order])[view.top : view.top + room]
+    return (head + [table.line(row, snapshot.at_us) for row in rows])[:height]
+
+
+def _bus_line(bus: BusRow, bit_rate: int | None) -> str:
+    """Write what a bus did in one line."""
+    load, errors = bus.load, bus.errors
+    words = [
+        f"{in_cells(bus.channel)}: {bus.frames} frames",
+        f"load {load_text(load.latest.bits, bit_rate)}",
+        f"error frames {errors.frames}",
+    ]
+    if errors.state is not None:
+        words.append(f"controller {errors.state.name.lower().replace('_', '-')}")
+    if errors.tec is not None:
+        words.append(f"TEC {errors.tec} REC {errors.rec}")
+    words += [f"overflows {errors.overflows}"] * bool(errors.overflows)
+    words += [f"back in time {bus.went_back}"] * bool(bus.went_back)
+    words += [f"CAN FD {bus.fd}"] * bool(bus.fd)
+    words += [_UNRATED] * bool(bus.unrated)
+    words.append(f"mean {load_text(load.mean_bit_s, bit_rate)}")
+    words.append(f"peak {load_text(load.peak.bits, bit_rate)}")
+    return ", ".join(words)
+
+
+def _state_line(snapshot: TrafficSnapshot, view: TableView, lost: int) -> str:
+    words = [f"lost {lost}", *[f"passed over {view.unread}"] * bool(view.unread)]
+    words += [f"{len(snapshot.rows)} identifiers by {view.order}"]
+    words += ["held"] * view.held
+    keys = KEYS if view.keys else ""
+    return ", ".join(words) + keys
+
+
+class _Table(NamedTuple):
+    """What of the rows has room.
+
+    Attributes:
+        ids: the leading column.
+        columns: of numbers.
+        payload: the last cell of a row, and its title.
+        styled: what changed is marked, in lines that are not cut: a style may not be.
+        width: characters of the screen.
+    """
+
+    ids: IdText
+    columns: tuple[TopColumn, ...]
+    payload: tuple[Callable[[IdRow, bool], str], str]
+    styled: bool
+    width: int
+
+    @classmethod
+    def of(cls, snapshot: TrafficSnapshot, view: TableView, width: int) -> _Table:
+        """Choose the columns."""
+        longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
+        ids = IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
+        room = width - ids.width - _payload_width(view) - 1
+        columns = _fitting(room)
+        fits = room >= sum(column.width + 1 for column in columns)
+        styled = view.styled and fits and (view.bits or view.meaning is None)
+        return cls(ids, columns, _payload(view), styled, width)
+
+    def titles(self) -> str:
+        """Return the head."""
+        cells = [f"{column.title:>{column.width}}" for column in self.columns]
+        return " ".join([self.ids.title(), *cells, self.payload[1]])[: self.width]
+
+    def line(self, row: IdRow, now_us: int) -> str:
+        """Return a row."""
+        cells = [f"{column.text(row, now_us):>{column.width}}" for column in self.columns]
+        line = " ".join([self.ids.of(row), *cells, self.payload[0](row, self.styled)])
+        return (line if self.styled else line[: self.width]).rstrip()
+
+
+def _payload_width(view: TableView) -> int:
+    if view.bits:
+        return _HEAT_WIDTH
+    return _DATA_WIDTH if view.meaning is None else _MEANING_WIDTH
+
+
+def _payload(view: TableView) -> tuple[Callable[[IdRow, bool], str], str]:
+    meaning = view.meaning
+    if view.bits:
+        return _heat_text, "bits that change"
+    if meaning is None:
+        return _data_text, "data"
+    return lambda row, styled: meaning(row), "meaning"
+
+
+_PAGE: Final = 10
+"""Rows that a key for a page goes."""
+
+_ORDERS: Final = tuple(RowOrder)
+
+
+class TopModel:
+    """Traffic and the view of it.
+
+    Args:
+        rates: bit rates of the buses.
+
+    Attributes:
+        traffic: what was heard.
+        view: how it is shown.
+    """
+
+    def __init__(self, rates: BitRates = NO_RATES) -> None:
+        self.traffic, self._serial, self.rates = Traffic(rates), LineTraffic(), rates
+        self.view = TableView(styled=True, bit_rate=rates.nominal, keys=True)
+        self._held: tuple[TrafficSnapshot, tuple[LineRow, ...]] | None = None
+        self._now_us = 0
+        self._meanings: dict[tuple[str, int], Decoded] = {}
+        self._acts: dict[str, Callable[[], None]] = {
+            " ": self._hold,
+            "b": lambda: self._show(bits=not self.view.bits),
+            "d": lambda: self._show(meaning=None if self.view.meaning else self._meaning),
+            "n": self.traffic.notch,
+            "s": lambda: self._show(order=_next(self.view.order)),
+            "c": self._clear,
+            "j": lambda: self._scroll(1),
+            "k": lambda: self._scroll(-1),
+            "f": lambda: self._scroll(_PAGE),
+            "p": lambda: self._scroll(-_PAGE),
+        }
+
+    def take(self, records: Iterable[AnyRecord]) -> None:
+        """Count frames, and lines of serial ports, whatever is shown."""
+        for record in records:
+            if isinstance(record, Record):
+                self.traffic.take(record)
+            else:
+                self._serial.take(record)
+
+    def take_decoded(self, decoded_frames: Iterable[tuple[AnyRecord, Decoded | None]]) -> None:
+        """Count frames, and keep what the latest of each identifier means."""
+        for record, decoded in decoded_frames:
+            self.take((record,))
+            frame = record.frame
+            if decoded is not None and frame is not None and not isinstance(frame, ErrorFrame):
+                self._meanings[record.channel, any_ident(frame)] = decoded
+
+    def press(self, key: str) -> None:
+        """Act on a key; one without a meaning does nothing."""
+        if key in self._acts:
+            self._acts[key]()
+
+    def lines(self, now_us: int, lost: int, width: int, height: int, unread: int = 0) -> list[str]:
+        """Return what a screen shows at a time."""
+        self._now_us = now_us
+        snapshot, rows = self._held or self._snapshot()
+        below = line_table(rows, snapshot.at_us, width)[: height // 2]
+        view = replace(self.view, unread=unread)
+        return render(snapshot, view, lost, width, height - len(below)) + below
+
+    def final(self, lost: int, snapshot: TrafficSnapshot | None = None) -> list[str]:
+        """Return the whole table of all that came, or of a snapshot, as plain text."""
+        view = replace(self.view, held=False, top=0, styled=False, keys=False)
+        rows = self._serial.rows()
+        snapshot = snapshot or self.traffic.snapshot()
+        now_us = max([snapshot.at_us, *(row.last_us for row in rows)])
+        below = line_table(rows, now_us, UNBOUNDED)
+        return render(snapshot, view, lost, UNBOUNDED, UNBOUNDED) + below
+
+    def _meaning(self, row: IdRow) -> str:
+        decoded = self._meanings.get((row.channel, row.ident))
+        return _data_text(row, False) if decoded is None else meaning_text(decoded)
+
+    def _snapshot(self) -> tuple[TrafficSnapshot, tuple[LineRow, ...]]:
+        return self.traffic.snapshot(self._now_us), self._serial.rows()
+
+    def _clear(self) -> None:
+        self.traffic.clear()
+        self._serial.clear()
+
+    def _hold(self) -> None:
+        self._held = None if self._held else self._snapshot()
+        self._show(held=self._held is not None)
+
+    def _scroll(self, rows: int) -> None:
+        last = max(0, len(self.traffic.snapshot(self._now_us).rows) - 1)
+        self._show(top=min(last, max(0, self.view.top + rows)))
+
+    def _show(self, **changes: object) -> None:
+        self.view = replace(self.view, **changes)  # type: ignore[arg-type]  # fields of View
+
+
+def meaning_text(decoded: Decoded) -> str:
+    """Write what a frame means, with the node and where the names are from."""
+    node = "" if decoded.node is None else f"{decoded.node} "
+    source = f" ({decoded.source})" if decoded.source else ""
+    return in_cells(f"{node}{decoded.kind} {decoded.text}".rstrip() + source)
+
+
+def _next(order: RowOrder) -> RowOrder:
+    return _ORDERS[(_ORDERS.index(order) + 1) % len(_ORDERS)]

@@ -1,0 +1,204 @@
+"""The latest frames one below the other, with the times between them."""
+
+from __future__ import annotations
+
+from collections import deque
+from itertools import islice
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from tickrig.host.canmon.model.decode.filter import Filter
+from tickrig.host.canmon.model.frames import ERROR, Record, any_ident
+from tickrig.wire.can import ErrorFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.decode.decoded import Decoded
+    from tickrig.host.canmon.model.frames import AnyRecord
+
+
+_LINE: Final = 1 << 32
+"""In a key: a line of a serial port; 1 above it for those to the device."""
+
+_CAPACITY: Final = 100_000
+
+_Key = tuple[str, int]
+"""Bus and identifier."""
+
+
+class TraceRow(NamedTuple):
+    """One frame of the trace, or one line of a serial port.
+
+    Attributes:
+        number: of the frame since the trace began, from 0.
+        record: the frame.
+        since_us: since the frame before it on any bus; None for the first.
+        gap_us: since the frame before it with this identifier on this bus; None for the first.
+        changed: bits in which its payload differs from that one's; see `BitRow`.
+        decoded: what it means, where that was asked.
+    """
+
+    number: int
+    record: AnyRecord
+    since_us: int | None
+    gap_us: int | None
+    changed: int = 0
+    decoded: Decoded | None = None
+
+
+class Ring:
+    """Rows with running numbers, the latest kept.
+
+    Args:
+        capacity: how many are kept.
+    """
+
+    def __init__(self, capacity: int = _CAPACITY) -> None:
+        self._rows: deque[TraceRow] = deque(maxlen=capacity)
+        self._count = 0
+
+    @property
+    def count(self) -> int:
+        """How many rows were taken."""
+        return self._count
+
+    @property
+    def first(self) -> int:
+        """The number of the oldest row that is kept."""
+        return self._count - len(self._rows)
+
+    def append(self, row: TraceRow) -> None:
+        """Add a row at the end."""
+        self._rows.append(row)
+        self._count += 1
+
+    def rows(self, begin: int, count: int) -> list[TraceRow]:
+        """Return rows by number; those that are given up or not there yet are left out."""
+        first = min(max(begin, self.first), self._count)
+        end = min(max(begin + count, first), self._count)
+        if first - self.first < self._count - end:
+            return list(islice(self._rows, first - self.first, end - self.first))
+        found = islice(reversed(self._rows), self._count - end, self._count - first)
+        return list(found)[::-1]  # the latest are near this end
+
+    def tail(self, count: int) -> list[TraceRow]:
+        """Return the latest rows."""
+        return self.rows(self._count - count, count)
+
+    def copy(self) -> Ring:
+        """Return one that no further row is added to."""
+        found = Ring(self._rows.maxlen or _CAPACITY)
+        found._rows.extend(self._rows)
+        found._count = self._count
+        return found
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._rows.clear()
+        self._count = 0
+
+
+class FrameTrace(Ring):
+    """Keeps the latest frames; what is older is given up, and counted.
+
+    Times that go back count as 0.
+
+    Args:
+        capacity: how many frames are kept.
+    """
+
+    def __init__(self, capacity: int = _CAPACITY) -> None:
+        super().__init__(capacity)
+        self._latest: dict[_Key, tuple[int, int]] = {}
+        self._last_us: int | None = None
+
+    def take(self, record: AnyRecord, decoded: Decoded | None = None) -> TraceRow:
+        """Add a frame or a line at the end."""
+        at_us, key = record.at_us, _key_of(record)
+        data = record.frame.data if isinstance(record, Record) else record.data
+        payload = int.from_bytes(data, "little")
+        before_us, before = self._latest.get(key, (None, payload))
+        row = TraceRow(
+            self.count,
+            record,
+            _since(at_us, self._last_us),
+            _since(at_us, before_us),
+            payload ^ before,
+            decoded,
+        )
+        self.append(row)
+        self._latest[key] = at_us, payload
+        self._last_us = at_us
+        return row
+
+    def clear(self) -> None:
+        """Begin anew."""
+        super().clear()
+        self._latest.clear()
+        self._last_us = None
+
+
+def _key_of(record: AnyRecord) -> _Key:
+    """Return bus and identifier; error frames are a kind of their own, and so are lines."""
+    if not isinstance(record, Record):
+        return record.channel, _LINE + record.sent
+    frame = record.frame
+    return record.channel, ERROR if isinstance(frame, ErrorFrame) else any_ident(frame)
+
+
+def _since(at_us: int, before_us: int | None) -> int | None:
+    return None if before_us is None else max(0, at_us - before_us)
+
+
+class Latest(NamedTuple):
+    """One identifier of one bus.
+
+    Attributes:
+        row: its latest frame that passed.
+        frames: how many passed.
+    """
+
+    row: TraceRow
+    frames: int
+
+
+class DisplayFilter:
+    """Follows a trace.
+
+    Args:
+        trace: where rows come from; those that it keeps already are taken.
+        wanted: which rows pass; None for all.
+
+    Attributes:
+        passed: rows that passed; the trace itself if all do.
+    """
+
+    def __init__(self, trace: FrameTrace, wanted: Filter | None = None) -> None:
+        self._trace, self.wanted = trace, wanted
+        self.passed: Ring = trace if wanted is None else Ring()
+        self._latest: dict[_Key, Latest] = {}
+        self._seen = 0
+        self.follow()
+
+    def follow(self) -> None:
+        """Take the rows that the trace has got since."""
+        wanted = self.wanted
+        for row in self._trace.rows(self._seen, self._trace.count - self._seen):
+            decoded = row.decoded
+            if wanted is not None:
+                if decoded is None or not wanted.matches(row.record, decoded):
+                    continue
+                self.passed.append(row)
+            key = _key_of(row.record)
+            before = self._latest.get(key)
+            self._latest[key] = Latest(row, 1 if before is None else before.frames + 1)
+        self._seen = self._trace.count
+
+    def latest(self) -> list[Latest]:
+        """Return the latest row of each identifier, by bus and identifier."""
+        return [self._latest[key] for key in sorted(self._latest)]
+
+    def clear(self) -> None:
+        """Begin anew, the trace too."""
+        self._trace.clear()
+        self.passed.clear()
+        self._latest.clear()
+        self._seen = 0

@@ -1,0 +1,702 @@
+"""The traffic of all buses: one row for each identifier, one for each bus.
+
+>>> traffic = Traffic()
+>>> traffic.take(Record(0, "can0", CanFrame.parse("705#7F")))
+>>> traffic.take(Record(100_000, "can0", CanFrame.parse("705#05")))
+>>> row = traffic.snapshot().rows[0]
+>>> row.frames, row.gap_us, row.changed.latest == 0x7F ^ 0x05
+(2, 100000, True)
+
+The times between frames of one identifier.
+
+>>> bucket_of(100), bucket_of(10_000), bucket_range(bucket_of(10_000))
+(100, 526, (9984, 10111))
+
+The bit rates of a bus, and how long a CAN FD frame is at both of them.
+
+>>> frame = FdFrame.parse("123##1AABB")
+>>> BitRates(500_000, 2_000_000).bits(frame), BitRates().bits(frame)
+(42, 78)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache, reduce
+from operator import or_
+from typing import Any, Final, NamedTuple
+
+from tickrig.host.canmon.model.frames import AnyFrame, Record, fd_ident, ident_of
+from tickrig.wire.can import (
+    CONTROLLER_BYTE,
+    REC_BYTE,
+    TEC_BYTE,
+    CanFrame,
+    ControllerFlag,
+    ErrorClass,
+    ErrorFrame,
+    ErrorState,
+    FdFrame,
+    describe_error_frame,
+    fd_bits,
+    frame_bits,
+)
+
+SUB_BITS: Final = 6
+EXACT_US: Final = 1 << SUB_BITS + 1
+"""Times below it have a bucket each."""
+
+_KEPT: Final = 2_048
+"""Buckets whose middle need not be computed again: all there are below an hour."""
+
+
+def bucket_of(time_us: int) -> int:
+    """Return the bucket of a time, 0 or more."""
+    if time_us < EXACT_US:
+        return time_us
+    shift = time_us.bit_length() - SUB_BITS - 1
+    return (shift << SUB_BITS) + (time_us >> shift)
+
+
+def bucket_range(bucket: int) -> tuple[int, int]:
+    """Return the shortest and the longest time of a bucket."""
+    if bucket < EXACT_US:
+        return bucket, bucket
+    shift = (bucket >> SUB_BITS) - 1
+    low = (bucket & (1 << SUB_BITS) - 1 | 1 << SUB_BITS) << shift
+    return low, low + (1 << shift) - 1
+
+
+@lru_cache(maxsize=_KEPT)
+def middle_us(bucket: int) -> int:
+    """Return the time in the middle of a bucket."""
+    low, high = bucket_range(bucket)
+    return (low + high) // 2
+
+
+def quantile(counts: Mapping[int, int], per_mille: int) -> int:
+    """Return the bucket that holds the value at a share of all, counted from the lowest.
+
+    Args:
+        counts: how many values each bucket has, at least one in all.
+        per_mille: the share, 1 to 1000.
+    """
+    rank = -(-sum(counts.values()) * per_mille // 1_000)
+    for bucket in sorted(counts):
+        rank -= counts[bucket]
+        if rank <= 0:
+            return bucket
+    raise ValueError("no values")
+
+
+_MEDIAN: Final = 500
+_P99: Final = 990
+
+_NEAR_CYCLE: Final = 4
+"""A gap is near the cycle if it differs from it by no more than this part of it."""
+
+_CYCLIC_PERCENT: Final = 75
+"""So many gaps must be near the cycle, else there is none."""
+
+
+class GapRow(NamedTuple):
+    """What the gaps of one identifier were, all of them.
+
+    Attributes:
+        min_us: the shortest.
+        mean_us: rounded down.
+        p99_us: no more than 1 % were longer; it is at most one part in 64 too long.
+        max_us: the longest.
+        jitter_us: mean of how much a gap differs from the one before, rounded down.
+        cycle_us: of frames that came and frames that missed; None unless three quarters of the
+            gaps are within a quarter of the median.
+        missed: frames of that cycle that did not come, at most; None without a cycle.
+    """
+
+    min_us: int
+    mean_us: int
+    p99_us: int
+    max_us: int
+    jitter_us: int
+    cycle_us: int | None
+    missed: int | None
+
+
+class Gaps:
+    """Counts gaps; what it keeps does not grow with their number.
+
+    Attributes:
+        count: how many gaps.
+        total_us: their sum.
+        min_us: the shortest.
+        max_us: the longest.
+        wander_us: the sum of how much each differs from the one before.
+        buckets: how many gaps each bucket has.
+    """
+
+    __slots__ = ("_last_us", "buckets", "count", "max_us", "min_us", "total_us", "wander_us")
+
+    def __init__(self) -> None:
+        self.count = self.total_us = self.min_us = self.max_us = self.wander_us = 0
+        self.buckets: dict[int, int] = {}
+        self._last_us = 0
+
+    def take(self, gap_us: int) -> None:
+        """Count a gap, 0 or more."""
+        if not self.count:
+            self.min_us = self.max_us = self._last_us = gap_us
+        elif gap_us < self.min_us:
+            self.min_us = gap_us
+        elif gap_us > self.max_us:
+            self.max_us = gap_us
+        self.count += 1
+        self.total_us += gap_us
+        self.wander_us += abs(gap_us - self._last_us)
+        self._last_us = gap_us
+        bucket = bucket_of(gap_us)
+        self.buckets[bucket] = self.buckets.get(bucket, 0) + 1
+
+    def row(self) -> GapRow | None:
+        """Return what they were; None before the first."""
+        if not self.count:
+            return None
+        p99_us = min(self.max_us, bucket_range(quantile(self.buckets, _P99))[1])
+        about_us = self._median_if_cyclic()
+        missed = None if about_us is None else self._missed(about_us)
+        return GapRow(
+            self.min_us,
+            self.total_us // self.count,
+            p99_us,
+            self.max_us,
+            self.wander_us // max(1, self.count - 1),
+            None if missed is None else self.total_us // (self.count + missed),
+            missed,
+        )
+
+    def _median_if_cyclic(self) -> int | None:
+        cycle_us = middle_us(quantile(self.buckets, _MEDIAN))
+        near = sum(
+            count
+            for bucket, count in self.buckets.items()
+            if abs(middle_us(bucket) - cycle_us) * _NEAR_CYCLE <= cycle_us
+        )
+        return cycle_us if cycle_us and near * 100 >= self.count * _CYCLIC_PERCENT else None
+
+    def _missed(self, cycle_us: int) -> int:
+        """Count whole cycles in which nothing came: a gap of 1.5 to 2.5 cycles missed one."""
+        return sum(
+            count * max(0, (2 * middle_us(bucket) + cycle_us) // (2 * cycle_us) - 1)
+            for bucket, count in self.buckets.items()
+        )
+
+
+# All that is counted of the frames of one identifier.
+
+PAYLOAD_BITS: Final = 64
+
+
+class BitRow(NamedTuple):
+    """What changed in the payloads of one identifier.
+
+    A payload is a number here: bit 0 of byte 0 is bit 0, bit 7 of byte 7 is bit 63; in CAN FD
+    it goes on to bit 511.
+
+    Attributes:
+        latest: bits in which the latest payload differs from the one before.
+        planes: plane n holds bit n of each payload bit's count of changes.
+        notched: bits whose changes are known and not shown.
+    """
+
+    latest: int = 0
+    planes: tuple[int, ...] = ()
+    notched: int = 0
+
+    @property
+    def changed(self) -> int:
+        """All bits that ever changed and are not notched."""
+        return reduce(or_, self.planes, 0) & ~self.notched
+
+    def counts(self) -> tuple[int, ...]:
+        """Return how often each bit changed: of 64 bits, in CAN FD of as many as changed.
+
+        >>> BitRow(planes=(0b01, 0b11)).counts()[:3]
+        (3, 2, 0)
+        """
+        highest = max(map(int.bit_length, self.planes), default=0)
+        return tuple(
+            sum((plane >> bit & 1) << place for place, plane in enumerate(self.planes))
+            for bit in range(max(PAYLOAD_BITS, -(-highest // 8) * 8))
+        )
+
+
+class BitMemory:
+    """Counts the changes of each bit, all bits at once: the counts lie across big numbers.
+
+    A payload that is shorter than the one before counts as filled up with zeros.
+
+    Attributes:
+        notched: bits whose changes are known.
+    """
+
+    __slots__ = ("_latest", "_payload", "_planes", "notched")
+
+    def __init__(self, payload: int) -> None:
+        self._payload, self._latest, self.notched = payload, 0, 0
+        self._planes: list[int] = []
+
+    def take(self, payload: int) -> None:
+        """Compare a payload with the one before."""
+        self._latest = carry = payload ^ self._payload
+        self._payload = payload
+        planes, place = self._planes, 0
+        while carry:
+            if place == len(planes):
+                planes.append(0)
+            planes[place], carry = planes[place] ^ carry, planes[place] & carry
+            place += 1
+
+    def same(self) -> None:
+        """Note that the payload came again as it was."""
+        self._latest = 0
+
+    def notch(self) -> None:
+        """Take all bits that have changed as known."""
+        self.notched |= reduce(or_, self._planes, 0)
+
+    def row(self) -> BitRow:
+        """Return what changed."""
+        return BitRow(self._latest, tuple(self._planes), self.notched)
+
+
+class IdRow(NamedTuple):
+    """What one identifier did on one bus.
+
+    Attributes:
+        channel: the bus.
+        ident: see `ident_of` and `fd_ident`.
+        frames: how many.
+        first_us: when the first of them came.
+        last_us: when the latest came.
+        frame: the latest.
+        gap_us: the latest gap, None before the second frame.
+        gaps: all gaps, None before the second frame.
+        bits: bits of all frames on the bus; those of CAN FD as `BitRates` has it.
+        changed: which payload bits change.
+    """
+
+    channel: str
+    ident: int
+    frames: int
+    first_us: int
+    last_us: int
+    frame: CanFrame | FdFrame
+    gap_us: int | None
+    gaps: GapRow | None
+    bits: int
+    changed: BitRow
+
+    @property
+    def rate_hz(self) -> float:
+        """Frames a second, from the first to the latest; 0 if that took no time."""
+        span_us = self.last_us - self.first_us
+        return (self.frames - 1) * 1e6 / span_us if span_us > 0 else 0.0
+
+
+class IdTally:
+    """Counts the frames of one identifier on one bus.
+
+    A frame with an earlier time than the one before it has a gap of 0.
+
+    Args:
+        at_us: when the first frame came.
+        frame: the frame; those that follow are of its kind.
+        measure: tells its bits on the bus.
+
+    Attributes:
+        length: bits of the latest frame on the bus.
+        memory: which payload bits change.
+    """
+
+    __slots__ = (
+        *("_bits", "_first_us", "_frame", "_gap_us", "_gaps", "_last_us", "_measure"),
+        *("length", "memory"),
+    )
+
+    def __init__(
+        self, at_us: int, frame: CanFrame | FdFrame, measure: Callable[[Any], int] = frame_bits
+    ) -> None:
+        self._first_us = self._last_us = at_us
+        self._frame, self._gaps, self._measure = frame, Gaps(), measure
+        self.length = self._bits = measure(frame)
+        self._gap_us: int | None = None
+        self.memory = BitMemory(int.from_bytes(frame.data, "little"))
+
+    def take(self, at_us: int, frame: CanFrame | FdFrame) -> None:
+        """Count a frame after the first."""
+        gap_us = self._gap_us = max(0, at_us - self._last_us)
+        self._last_us = at_us
+        self._gaps.take(gap_us)
+        if frame == self._frame:
+            self.memory.same()
+        else:
+            self._frame, self.length = frame, self._measure(frame)
+            self.memory.take(int.from_bytes(frame.data, "little"))
+        self._bits += self.length
+
+    def row(self, channel: str, ident: int) -> IdRow:
+        """Return what was counted."""
+        return IdRow(
+            channel,
+            ident,
+            self._gaps.count + 1,
+            self._first_us,
+            self._last_us,
+            self._frame,
+            self._gap_us,
+            self._gaps.row(),
+            self._bits,
+            self.memory.row(),
+        )
+
+
+class BitRates(NamedTuple):
+    """Bit rates in bit/s; None where nobody told.
+
+    Attributes:
+        nominal: of arbitration, and of all of a classic frame.
+        fast: of the data of CAN FD frames with BRS.
+    """
+
+    nominal: int | None = None
+    fast: int | None = None
+
+    def tells(self, frame: FdFrame) -> bool:
+        """Say whether the rates of all parts of a frame are known."""
+        return not frame.brs or bool(self.nominal and self.fast)
+
+    def bits(self, frame: FdFrame) -> int:
+        """Return how long a frame takes, in bits of the nominal rate, rounded up.
+
+        Fast bits count as nominal ones where a rate is not known: then it takes less.
+        """
+        nominal, fast = fd_bits(frame)
+        if self.nominal and self.fast:
+            return nominal - (-fast * self.nominal // self.fast)
+        return nominal + fast
+
+
+NO_RATES: Final = BitRates()
+
+
+# What error frames say about a bus and about our own controller.
+
+_OVERFLOW: Final = ControllerFlag.RECEIVE_OVERFLOW
+_PASSIVE: Final = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
+
+
+class ErrorRow(NamedTuple):
+    """What the error frames of a bus were.
+
+    Attributes:
+        frames: how many.
+        state: of our controller as the latest of them says; None if none says it.
+        tec: its transmit error counter, None if never told.
+        rec: its receive error counter, None if never told.
+        overflows: how often its receive buffer ran over: frames were lost.
+        kinds: what they said and how often, the most frequent first.
+    """
+
+    frames: int = 0
+    state: ErrorState | None = None
+    tec: int | None = None
+    rec: int | None = None
+    overflows: int = 0
+    kinds: tuple[tuple[str, int], ...] = ()
+
+
+class ErrorStatistics:
+    """Follows the error frames of a bus."""
+
+    __slots__ = ("_frames", "_kinds", "_overflows", "_rec", "_state", "_tec")
+
+    def __init__(self) -> None:
+        self._frames = self._overflows = 0
+        self._state: ErrorState | None = None
+        self._tec: int | None = None
+        self._rec: int | None = None
+        self._kinds: dict[str, int] = {}
+
+    def take(self, frame: ErrorFrame) -> None:
+        """Count an error frame."""
+        self._frames += 1
+        kind = describe_error_frame(frame)
+        self._kinds[kind] = self._kinds.get(kind, 0) + 1
+        state = _state_after(frame)
+        self._state = self._state if state is None else state
+        if frame.error_class & ErrorClass.COUNTERS:
+            self._tec, self._rec = frame.data[TEC_BYTE], frame.data[REC_BYTE]
+        if _is_overflow(frame):
+            self._overflows += 1
+
+    def row(self) -> ErrorRow:
+        """Return what they were."""
+        kinds = sorted(self._kinds.items(), key=lambda item: (-item[1], item[0]))
+        return ErrorRow(
+            self._frames, self._state, self._tec, self._rec, self._overflows, tuple(kinds)
+        )
+
+
+def _is_overflow(frame: ErrorFrame) -> bool:
+    """Say whether our controller lost frames."""
+    return bool(
+        frame.error_class & ErrorClass.CONTROLLER and frame.data[CONTROLLER_BYTE] & _OVERFLOW
+    )
+
+
+def _state_after(frame: ErrorFrame) -> ErrorState | None:
+    """Return the state of our controller after an error frame; None if it does not say."""
+    if frame.error_class & ErrorClass.BUS_OFF:
+        return ErrorState.BUS_OFF
+    flags = frame.data[CONTROLLER_BYTE] if frame.error_class & ErrorClass.CONTROLLER else 0
+    if flags & _PASSIVE:
+        return ErrorState.PASSIVE
+    if flags & ControllerFlag.ACTIVE or frame.error_class & ErrorClass.RESTARTED:
+        return ErrorState.ACTIVE
+    return None
+
+
+WINDOW_US: Final = 1_000_000
+
+
+class BusSecond(NamedTuple):
+    """A second of a bus.
+
+    Attributes:
+        at_us: its begin.
+        bits: how many bits of frames ended in it.
+    """
+
+    at_us: int
+    bits: int
+
+
+class LoadRow(NamedTuple):
+    """How busy a bus was. Error frames and broken frames are not in it: nobody tells their length.
+
+    Attributes:
+        bits: of all frames.
+        latest: the latest second that is over, or the first one while it is not.
+        peak: the busiest second, the first of them.
+        mean_bit_s: bits a second from the first window to the one with the latest frame.
+    """
+
+    bits: int
+    latest: BusSecond
+    peak: BusSecond
+    mean_bit_s: int
+
+
+class Load:
+    """Adds up the bits of each second, counted from the first frame.
+
+    A frame with an earlier time than one before it counts for the window that is open.
+    """
+
+    __slots__ = ("_bits", "_ended", "_first_us", "_open", "_peak")
+
+    def __init__(self, first_us: int) -> None:
+        self._first_us, self._bits = first_us, 0
+        self._open = self._ended = self._peak = BusSecond(first_us, 0)
+
+    def take(self, at_us: int, bits: int) -> BusSecond | None:
+        """Count a frame.
+
+        Returns:
+            The window that its time has ended, if any.
+        """
+        self._bits += bits
+        begin_us, before = self._open
+        if at_us < begin_us + WINDOW_US:
+            self._open = BusSecond(begin_us, before + bits)
+            return None
+        ended = self._ended = self._open
+        self._peak = _busier(self._peak, ended)
+        self._open = BusSecond(_window_begin(self._first_us, at_us), bits)
+        return ended
+
+    def end(self) -> BusSecond:
+        """Return the window that is open."""
+        return self._open
+
+    def row(self, now_us: int) -> LoadRow:
+        """Return how busy the bus was until now."""
+        windows = (self._open.at_us - self._first_us) // WINDOW_US + 1
+        return LoadRow(
+            self._bits,
+            self._latest(now_us),
+            _busier(self._peak, self._open),
+            self._bits * 1_000_000 // (windows * WINDOW_US),
+        )
+
+    def _latest(self, now_us: int) -> BusSecond:
+        begin_us = _window_begin(self._first_us, now_us) - WINDOW_US
+        if begin_us < self._first_us:
+            return self._open
+        kept = (window for window in (self._open, self._ended) if window.at_us == begin_us)
+        return next(kept, BusSecond(begin_us, 0))
+
+
+def _window_begin(first_us: int, at_us: int) -> int:
+    """Return the begin of the window of a time."""
+    return at_us - (at_us - first_us) % WINDOW_US
+
+
+def _busier(first: BusSecond, second: BusSecond) -> BusSecond:
+    """Return the window with more bits, the first if they have the same."""
+    return second if second.bits > first.bits else first
+
+
+class BusRow(NamedTuple):
+    """What one bus did.
+
+    Attributes:
+        channel: its name.
+        frames: data and remote frames.
+        first_us: when the first came, or the first error frame.
+        last_us: when the latest came.
+        load: how busy it was.
+        errors: what error frames said.
+        went_back: how many frames had an earlier time than the one before.
+        fd: how many of the frames are of CAN FD.
+        unrated: how many of these have data at a bit rate that nobody told: the load is less.
+    """
+
+    channel: str
+    frames: int
+    first_us: int
+    last_us: int
+    load: LoadRow
+    errors: ErrorRow
+    went_back: int
+    fd: int = 0
+    unrated: int = 0
+
+
+class TrafficSnapshot(NamedTuple):
+    """All rows at one moment; they never change.
+
+    Attributes:
+        at_us: the moment.
+        buses: by name.
+        rows: by bus and identifier.
+    """
+
+    at_us: int = 0
+    buses: tuple[BusRow, ...] = ()
+    rows: tuple[IdRow, ...] = ()
+
+
+class BusTally:
+    """Counts one bus."""
+
+    def __init__(self, channel: str, first_us: int, rates: BitRates) -> None:
+        self._channel = channel
+        self._first_us = self._last_us = first_us
+        self._ids: dict[int, IdTally] = {}
+        self._load, self._errors = Load(first_us), ErrorStatistics()
+        self._frames = self._went_back = self._fd = self._unrated = 0
+        self._rates = rates
+
+    def take(self, at_us: int, frame: AnyFrame) -> None:
+        """Count a frame."""
+        if at_us < self._last_us:
+            self._went_back += 1
+        self._last_us = at_us
+        measure: Callable[[Any], int] = frame_bits
+        if isinstance(frame, CanFrame):
+            ident = ident_of(frame)
+        elif isinstance(frame, ErrorFrame):
+            self._errors.take(frame)
+            return
+        else:
+            ident, measure = fd_ident(frame), self._rates.bits
+            self._fd += 1
+            self._unrated += not self._rates.tells(frame)
+        self._frames += 1
+        tally = self._ids.get(ident)
+        if tally is None:
+            tally = self._ids[ident] = IdTally(at_us, frame, measure)
+        else:
+            tally.take(at_us, frame)
+        self._load.take(at_us, tally.length)
+
+    def notch(self) -> None:
+        """Take all bits that have changed as known."""
+        for tally in self._ids.values():
+            tally.memory.notch()
+
+    def row(self, now_us: int) -> BusRow:
+        """Return what the bus did."""
+        return BusRow(
+            self._channel,
+            self._frames,
+            self._first_us,
+            self._last_us,
+            self._load.row(now_us),
+            self._errors.row(),
+            self._went_back,
+            self._fd,
+            self._unrated,
+        )
+
+    def id_rows(self) -> list[IdRow]:
+        """Return what its identifiers did, in their order."""
+        return [tally.row(self._channel, ident) for ident, tally in sorted(self._ids.items())]
+
+
+class Traffic:
+    """Counts all frames of all buses; what it keeps grows with identifiers, not with frames.
+
+    Not counted: what was lost before it was heard; see `Loss`.
+
+    Args:
+        rates: bit rates of all buses, for CAN FD.
+    """
+
+    def __init__(self, rates: BitRates = NO_RATES) -> None:
+        self._buses: dict[str, BusTally] = {}
+        self._rates = rates
+        self._last_us = 0
+
+    def take(self, record: Record) -> None:
+        """Count a frame or an error frame."""
+        at_us, channel, frame, _ = record
+        bus = self._buses.get(channel)
+        if bus is None:
+            bus = self._buses[channel] = BusTally(channel, at_us, self._rates)
+        bus.take(at_us, frame)
+        self._last_us = at_us
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._buses.clear()
+
+    def notch(self) -> None:
+        """Take all bits that have changed as known: only others are shown from now on."""
+        for bus in self._buses.values():
+            bus.notch()
+
+    def snapshot(self, now_us: int | None = None) -> TrafficSnapshot:
+        """Return all rows.
+
+        Args:
+            now_us: the time; that of the latest frame if it is not given.
+        """
+        at_us = self._last_us if now_us is None else now_us
+        buses = [self._buses[name] for name in sorted(self._buses)]
+        rows = tuple(row for bus in buses for row in bus.id_rows())
+        return TrafficSnapshot(at_us, self.buses(at_us), rows)
+
+    def buses(self, now_us: int) -> tuple[BusRow, ...]:
+        """Return the rows of the buses alone, which takes less time."""
+        return tuple(self._buses[name].row(now_us) for name in sorted(self._buses))

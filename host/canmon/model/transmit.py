@@ -1,0 +1,513 @@
+"""Frames that somebody at a panel sends: one by one, or cyclically, and only while it is armed.
+
+>>> words = parse_row_text("123#00 --every 10ms --counter 0:0..14 --name alive")
+>>> words.every, words.counters, words.name, str(words)
+('10ms', ('0:0..14',), 'alive', '123#00 --every 10ms --counter 0:0..14 --name alive')
+
+Fields of a cyclic frame that change each time: a counter and a checksum.
+
+>>> counter, checksum = parse_counter("0:0..3"), parse_checksum("3:xor")
+>>> [checksum.put(counter.put(bytes(4), n)).hex() for n in range(5)]
+['00000000', '01000001', '02000002', '03000003', '00000000']
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import xor
+from typing import Final, NamedTuple
+
+import crcmod
+
+from tickrig.host.canmon.model.decode.decoded import write_entry
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects, NodeMemory
+from tickrig.host.canmon.model.decode.object_text import ObjectText
+from tickrig.host.canmon.model.decode.pdos import PDOS, NodePdo, can_id_of
+from tickrig.host.text.values import Setting, parse_setting, parse_time_with_unit_us
+from tickrig.wire.can import CanFrame, FdFrame
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.pdo import MAX_MAPPED_OBJECTS, MappedObject, pack_bits
+from tickrig.wire.errors import FieldError
+from tickrig.wire.instant import NEVER
+
+_COUNTER: Final = re.compile(
+    r"([0-9]{1,2})(?:\.([0-7])\+([1-8]))?:([0-9]{1,3})\.\.([0-9]{1,3})", re.ASCII
+)
+_CHECKSUM: Final = re.compile(
+    r"([0-9]{1,2}):([a-z0-9-]+)(?::([0-9]{1,2})\.\.([0-9]{1,2}))?", re.ASCII
+)
+
+ALGORITHMS: Final[Mapping[str, Callable[[bytes], int]]] = {
+    "xor": lambda data: reduce(xor, data, 0),
+    "sum8": lambda data: sum(data) & 0xFF,
+    "neg8": lambda data: -sum(data) & 0xFF,
+    "crc8": crcmod.mkCrcFun(0x11D, initCrc=0x00, rev=False, xorOut=0xFF),
+    "crc8-2f": crcmod.mkCrcFun(0x12F, initCrc=0x00, rev=False, xorOut=0xFF),
+    "crc8-07": crcmod.mkCrcFun(0x107, initCrc=0x00, rev=False, xorOut=0x00),
+}
+"""By name. `neg8` makes the sum of all bytes 0. The CRCs are SAE J1850, AUTOSAR 8H2F and SMBus;
+the first two begin with 0xFF, which crcmod wants as it is after the final xor.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Counter:
+    """Bits of one byte that count up and begin again.
+
+    Attributes:
+        byte: which byte.
+        shift: its lowest bit there.
+        bits: how many.
+        low: what it begins with.
+        high: what it ends with.
+    """
+
+    byte: int
+    shift: int
+    bits: int
+    low: int
+    high: int
+
+    def put(self, data: bytes, number: int) -> bytes:
+        """Return the data of the frame with this number, counted from 0."""
+        value = self.low + number % (self.high - self.low + 1)
+        mask = (1 << self.bits) - 1 << self.shift
+        byte = data[self.byte] & ~mask | value << self.shift
+        return data[: self.byte] + bytes([byte]) + data[self.byte + 1 :]
+
+
+@dataclass(frozen=True, slots=True)
+class ChecksumField:
+    """One byte that is computed from others.
+
+    Attributes:
+        byte: which byte.
+        algorithm: a name of `ALGORITHMS`.
+        first: first byte that is covered.
+        last: last byte that is covered, None for that of the frame; `byte` itself never is.
+    """
+
+    byte: int
+    algorithm: str
+    first: int = 0
+    last: int | None = None
+
+    def put(self, data: bytes) -> bytes:
+        """Return the data with its checksum."""
+        end = len(data) if self.last is None else self.last + 1
+        covered = bytes(data[at] for at in range(self.first, end) if at != self.byte)
+        value = ALGORITHMS[self.algorithm](covered)
+        return data[: self.byte] + bytes([value]) + data[self.byte + 1 :]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFields:
+    """The changing fields of a frame; checksums come after counters, in their order."""
+
+    counters: tuple[Counter, ...] = ()
+    checksums: tuple[ChecksumField, ...] = ()
+
+    def check(self, size: int) -> None:
+        """Raise ValueError where a field is not in data of so many bytes."""
+        places = [counter.byte for counter in self.counters]
+        for checksum in self.checksums:
+            places += checksum.byte, checksum.last or 0
+        if places and max(places) >= size:
+            raise ValueError(
+                f"no byte {max(places)} for a counter or checksum: {size} bytes are sent"
+            )
+
+    def put(self, data: bytes, number: int) -> bytes:
+        """Return the data of the frame with this number, counted from 0."""
+        for counter in self.counters:
+            data = counter.put(data, number)
+        for checksum in self.checksums:
+            data = checksum.put(data)
+        return data
+
+
+def parse_counter(text: str) -> Counter:
+    """Read `BYTE:LOW..HIGH`, as `0:0..255`, or of some bits `0.4+4:0..14`.
+
+    Raises:
+        ValueError: not a counter, or one that its bits do not hold.
+    """
+    match = _COUNTER.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is not BYTE:LOW..HIGH, as 0:0..255, or of bits 0.4+4:0..14")
+    byte, shift, bits, low, high = (int(group or 0) for group in match.groups())
+    bits = bits or 8
+    if shift + bits > 8:
+        raise ValueError(f"{text!r} has {bits} bits from bit {shift} of a byte")
+    if not low < high < 1 << bits:
+        raise ValueError(
+            f"{text!r} counts from {low} to {high}; {bits} bits hold {(1 << bits) - 1}"
+        )
+    return Counter(byte, shift, bits, low, high)
+
+
+def parse_checksum(text: str) -> ChecksumField:
+    """Read `BYTE:ALGORITHM`, as `7:crc8`, or over some bytes `7:crc8:1..6`.
+
+    Raises:
+        ValueError: not a checksum.
+    """
+    match = _CHECKSUM.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is not BYTE:ALGORITHM, as 7:xor, or over bytes 7:crc8:1..6")
+    byte, algorithm, first, last = match.groups()
+    if algorithm not in ALGORITHMS:
+        raise ValueError(f"no checksum {algorithm!r}; known: {', '.join(ALGORITHMS)}")
+    if last is not None and int(first) > int(last):
+        raise ValueError(f"{text!r} covers bytes {first} to {last}")
+    return ChecksumField(int(byte), algorithm, int(first or 0), None if last is None else int(last))
+
+
+# Frames of PDOs by the names of their objects: `5.rpdo1 target_velocity=100`.
+
+_PDO: Final = re.compile(r"([0-9]{1,3})\.([rt])pdo([0-9]{1,3})", re.IGNORECASE | re.ASCII)
+
+
+class _Place(NamedTuple):
+    name: str
+    mapped: MappedObject
+    text: ObjectText
+    power_on: int
+
+
+class PdoFrames:
+    """Makes frames of what people call them.
+
+    An object that is not named has its power-on value, else 0. Values are those on the wire:
+    nothing is scaled.
+
+    Args:
+        eds: what the files say, by node-ID.
+    """
+
+    def __init__(self, eds: Mapping[int, EdsObjects]) -> None:
+        self._nodes = {node: NodeMemory(objects) for node, objects in eds.items()}
+
+    def frame(self, text: str) -> CanFrame:
+        """Return the frame of `NODE.rpdoN NAME=VALUE ...`.
+
+        Raises:
+            ValueError: a node, PDO, object or value that there is not; it names those there are.
+        """
+        pdo, *settings = text.split()
+        match = _PDO.fullmatch(pdo)
+        if match is None:
+            raise ValueError(f"{pdo!r} is neither a frame as 123#DEADBEEF nor a PDO as 5.rpdo1")
+        node, number = int(match[1]), int(match[3])
+        memory = self._nodes.get(node)
+        if memory is None:
+            raise ValueError(f"{pdo}: nobody described node {node}; give --eds {node}=FILE")
+        if not 1 <= number <= PDOS:
+            raise ValueError(f"{pdo}: PDOs are numbered 1 to {PDOS}")
+        sent = NodePdo(match[2].lower() == "r", node, number)
+        places = _places(memory, sent.mapping, pdo)
+        values = _values(places, settings, pdo)
+        fields = [(values[place], place.mapped.bits) for place in places]
+        can_id = can_id_of(sent, memory)
+        if can_id is None:
+            entry = write_entry((sent.parameter, 1))
+            raise ValueError(f"{pdo}: it has no CAN-ID ({entry} is not valid)")
+        return CanFrame(can_id, pack_bits(fields))
+
+
+def _places(memory: NodeMemory, index: int, pdo: str) -> list[_Place]:
+    count = memory.number(index, 0) or 0
+    if not 1 <= count <= MAX_MAPPED_OBJECTS:
+        raise ValueError(f"{pdo}: nothing is mapped to it ({write_entry((index, 0))} is {count})")
+    found = (memory.number(index, sub) or 0 for sub in range(1, count + 1))
+    return [_place(memory, MappedObject.parse(entry)) for entry in found]
+
+
+def _place(memory: NodeMemory, mapped: MappedObject) -> _Place:
+    text = memory.describe(mapped.index, mapped.sub)
+    name = text.name or write_entry((mapped.index, mapped.sub))
+    return _Place(name, mapped, text, memory.number(mapped.index, mapped.sub) or 0)
+
+
+def _values(places: list[_Place], settings: list[str], pdo: str) -> dict[_Place, int]:
+    values = {place: place.power_on for place in places}
+    for setting in settings:
+        name, equals, word = setting.partition("=")
+        if not equals:
+            raise ValueError(f"{pdo}: {setting!r} is not NAME=VALUE")
+        place = _named(places, name, pdo)
+        try:
+            values[place] = _number(place, parse_setting(word))
+        except FieldError:
+            kind = place.text.kind
+            written = kind.name if kind is not None else f"a number of {place.mapped.bits} bits"
+            raise ValueError(f"{pdo}: {place.name} is {written}, {word} is not") from None
+    return values
+
+
+def _named(places: list[_Place], name: str, pdo: str) -> _Place:
+    """Return the object that has this name, or the only one that begins with it."""
+    found = [place for place in places if place.name == name.lower()]
+    found = found or [place for place in places if place.name.startswith(name.lower())]
+    if len(found) != 1:
+        known = ", ".join(place.name for place in places)
+        raise ValueError(
+            f"{pdo}: {'no' if not found else 'more than one'} {name!r}; it has {known}"
+        )
+    return found[0]
+
+
+def _number(place: _Place, value: Setting) -> int:
+    """Return the bits of a value; FieldError if it is none of the object's type."""
+    kind, bits = place.text.kind, place.mapped.bits
+    if kind is None or kind.bits != bits:
+        kind = None
+    if kind in (DataType.REAL32, DataType.REAL64) and not isinstance(value, str):
+        return int.from_bytes(kind.encode(float(value)), "little")
+    if kind is not None and kind is not DataType.BOOLEAN:
+        return int.from_bytes(kind.encode(value), "little")
+    if not isinstance(value, int) or not 0 <= value < 1 << bits:
+        raise FieldError(f"{value!r} does not fit {bits} bits")
+    return value
+
+
+AnyFrames = tuple[CanFrame | FdFrame, ...]
+
+_ONCE: Final = 0
+"""As a period: a row that is sent when somebody says so."""
+
+
+@dataclass(slots=True)
+class TransmitRow:
+    """A frame that is sent by hand, or each period; the deadlines are absolute: it does not drift.
+
+    A period that has passed whole is not made up for, it is counted.
+
+    Args:
+        name: what people call it.
+        frame: what is sent.
+        period_us: of a cyclic row, else `_ONCE`.
+        fields: what changes in it each time.
+        due_us: when it is sent next, `NEVER` while it is not enabled.
+        count: how often it is sent, 0 for ever.
+
+    Attributes:
+        sent: how often it was.
+        missed: how many periods passed without it.
+
+    Raises:
+        ValueError: a period below 0, or a field that is not in the frame.
+    """
+
+    name: str
+    frame: CanFrame | FdFrame
+    period_us: int = _ONCE
+    fields: FrameFields = field(default_factory=FrameFields)
+    due_us: int = NEVER
+    count: int = 0
+    sent: int = field(default=0, init=False)
+    missed: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if self.period_us < 0:
+            raise ValueError(f"{self.name}: a period of {self.period_us} us; 0 is none")
+        self.fields.check(len(self.frame.data))
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it is sent cyclically."""
+        return self.due_us < NEVER
+
+    def enable(self, now_us: int) -> None:
+        """Send it from now on in each period; counters go on where they were.
+
+        Raises:
+            ValueError: it has no period.
+        """
+        if self.period_us == _ONCE:
+            raise ValueError(f"{self.name} has no period")
+        if not self.enabled:
+            self.due_us = now_us
+
+    def disable(self) -> None:
+        """Send it no more."""
+        self.due_us = NEVER
+
+    def once(self) -> AnyFrames:
+        """Return it, to be sent now."""
+        data = self.fields.put(self.frame.data, self.sent)
+        self.sent += 1
+        return (self.frame._replace(data=data),)
+
+    def tick(self, now_us: int) -> AnyFrames:
+        """Return it if it is due."""
+        if now_us < self.due_us:
+            return ()
+        late = (now_us - self.due_us) // self.period_us
+        self.missed += late
+        self.due_us += (late + 1) * self.period_us
+        out = self.once()
+        if self.sent == self.count:
+            self.disable()
+        return out
+
+
+@dataclass(slots=True)
+class TransmitList:
+    """Rows, and the key that arms them.
+
+    Nothing is sent until it is armed; stopping disarms it and disables all rows, so that arming
+    it again sends nothing by itself.
+
+    Args:
+        rows: the frames.
+
+    Attributes:
+        armed: rows may send.
+    """
+
+    rows: list[TransmitRow] = field(default_factory=list)
+    armed: bool = field(default=False, init=False)
+
+    @property
+    def due_us(self) -> int:
+        """When a row is sent next."""
+        return min((row.due_us for row in self.rows), default=NEVER)
+
+    def stop(self) -> None:
+        """Send nothing more, whatever was enabled."""
+        self.armed = False
+        for row in self.rows:
+            row.disable()
+
+    def enable(self, number: int, now_us: int) -> None:
+        """Send a row in each period from now on; ValueError if that must not be."""
+        self._check_armed()
+        self.rows[number].enable(now_us)
+
+    def once(self, number: int) -> AnyFrames:
+        """Return a row, to be sent now; ValueError if it is not armed."""
+        self._check_armed()
+        return self.rows[number].once()
+
+    def tick(self, now_us: int) -> AnyFrames:
+        """Return what is due, in the order of the rows."""
+        return tuple(frame for row in self.rows for frame in row.tick(now_us))
+
+    def _check_armed(self) -> None:
+        if not self.armed:
+            raise ValueError("not armed: nothing is sent")
+
+
+_HEAD: Final = f"{'SENDS':<6} {'FRAME':<26} {'EVERY':>9} {'SENT':>8} {'MISSED':>7}  NAME"
+ON, OFF, BY_HAND = "[x]", "[ ]", " - "
+
+
+def render_transmit(rows: Sequence[TransmitRow]) -> list[str]:
+    """Return a head, and a line for each row."""
+    return [_HEAD, *map(_line, rows)]
+
+
+def _line(row: TransmitRow) -> str:
+    mark = BY_HAND if row.period_us == _ONCE else ON if row.enabled else OFF
+    every = "" if row.period_us == _ONCE else f"{row.period_us / 1_000:g} ms"
+    frame = str(row.frame) + "*" * (row.fields.counters + row.fields.checksums != ())
+    name = "" if row.name == str(row.frame) else row.name
+    line = f"{mark:<6} {frame:<26} {every:>9} {row.sent:>8} {row.missed:>7}  {name}"
+    return line.rstrip()
+
+
+_OPTIONS: Final = ("every", "counter", "checksum", "name")
+
+
+@dataclass(frozen=True, slots=True)
+class RowText:
+    """What a row says.
+
+    Attributes:
+        frame: a frame as `123#DEADBEEF`, or a PDO as `5.rpdo1 target_velocity=100`.
+        every: its period as `10ms`; empty for a row that is sent by hand.
+        counters: bytes that count, as `0:0..255`.
+        checksums: bytes that are computed, as `7:crc8`.
+        name: what people call it; empty for its frame.
+    """
+
+    frame: str
+    every: str = ""
+    counters: tuple[str, ...] = ()
+    checksums: tuple[str, ...] = ()
+    name: str = ""
+
+    def __str__(self) -> str:
+        """Write it in one line."""
+        words = [self.frame]
+        words += ["--every", self.every] if self.every else []
+        words += [word for counter in self.counters for word in ("--counter", counter)]
+        words += [word for checksum in self.checksums for word in ("--checksum", checksum)]
+        words += ["--name", shlex.quote(self.name)] if self.name else []
+        return " ".join(words)
+
+    def row(self, pdos: PdoFrames) -> TransmitRow:
+        """Return what is sent.
+
+        Raises:
+            ValueError: a frame, time or field that is none.
+        """
+        is_frame = "#" in self.frame
+        frame = CanFrame.parse(self.frame) if is_frame else pdos.frame(self.frame)
+        period_us = parse_time_with_unit_us(self.every) if self.every else _ONCE
+        if self.every and period_us == _ONCE:
+            raise ValueError("--every takes a time above 0, as 10ms")
+        fields = FrameFields(
+            tuple(map(parse_counter, self.counters)), tuple(map(parse_checksum, self.checksums))
+        )
+        return TransmitRow(self.name or self.frame, frame, period_us, fields)
+
+
+def parse_row_text(text: str) -> RowText:
+    """Read a row; ValueError if it is none.
+
+    What it says is not checked; `RowText.row` does that.
+    """
+    try:
+        words = iter(shlex.split(text))
+    except ValueError as error:
+        raise ValueError(f"{text!r}: {str(error).lower()}") from None
+    frame: list[str] = []
+    found: Mapping[str, list[str]] = {name: [] for name in _OPTIONS}
+    for word in words:
+        name = word.removeprefix("--")
+        if name == word:
+            frame.append(word)
+        elif name in found:
+            found[name].append(_value(word, next(words, None)))
+        else:
+            raise ValueError(f"no {word!r} here; known: --{', --'.join(_OPTIONS)}")
+    if not frame:
+        raise ValueError("a row needs a frame as 123#DEADBEEF, or a PDO as 5.rpdo1 target=1")
+    if len(frame) > 1 and "#" in frame[0]:
+        raise ValueError(f"{frame[1]!r} behind a frame: a row has one frame")
+    return RowText(
+        " ".join(frame),
+        _one("every", found["every"]),
+        tuple(found["counter"]),
+        tuple(found["checksum"]),
+        _one("name", found["name"]),
+    )
+
+
+def _value(option: str, word: str | None) -> str:
+    if word is None:
+        raise ValueError(f"{option} says nothing")
+    return word
+
+
+def _one(name: str, words: list[str]) -> str:
+    if len(words) > 1:
+        raise ValueError(f"--{name} is given {len(words)} times")
+    return "".join(words)

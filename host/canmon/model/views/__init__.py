@@ -1,1 +1,0 @@
-"""What is shown of traffic: tables, trace and statistics as text, JSON and rows."""

@@ -1,0 +1,315 @@
+"""A source that is read in a thread, and what is sent on its buses."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Protocol
+
+from tickrig.host.canmon.errors import SourceFailed
+from tickrig.host.canmon.extensions import make_decoder
+from tickrig.host.canmon.model.decode.decoded import Decoded
+from tickrig.host.canmon.model.decode.node_board import NodeBoard
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
+from tickrig.host.canmon.model.frames import AnyRecord, Record
+from tickrig.host.canmon.model.logs.mark import Mark
+from tickrig.host.canmon.model.top_model import TopModel
+from tickrig.host.canmon.model.trace import FrameTrace
+from tickrig.host.canmon.model.traffic import BitRates
+from tickrig.host.canmon.model.transmit import AnyFrames
+from tickrig.host.canmon.output.listening import Stopwatch
+from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
+from tickrig.host.canmon.sources.opening import open_any, open_live
+from tickrig.host.canmon.sources.source import AnySource, BusSpec, LineSpec, parse_source
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.wire.can import CanFrame, FdFrame
+from tickrig.wire.instant import NEVER
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.sources.bus_source import OpenBus
+
+
+DecodedFrame = tuple[Record, Decoded]
+"""A frame and what it means."""
+
+
+class Model:
+    """What was heard, decoded and counted.
+
+    Args:
+        eds: what files say, by node-ID.
+        dbc: DBC files.
+        bit_rate: of the buses, None if it is not known.
+        data_bit_rate: of data of CAN FD frames with BRS, likewise.
+
+    Attributes:
+        eds: what files say, by node-ID.
+        decoder: decodes all that is taken here.
+        board: the nodes.
+        top: the traffic, and how the statistics show it.
+        trace: the latest frames.
+        frames: how many were taken, error frames among them.
+        now_us: the time at the source.
+        lost: frames that were there and did not get here.
+        unread: what came and is no frame of CAN or CAN FD.
+        failed: why the source ended before its time; empty if it did not.
+        ended: no more will come.
+        away: buses that went away and are not back.
+    """
+
+    def __init__(
+        self,
+        eds: Mapping[int, EdsObjects] | None = None,
+        dbc: Sequence[Path] = (),
+        bit_rate: int | None = None,
+        data_bit_rate: int | None = None,
+    ) -> None:
+        self.eds = dict(eds or {})
+        self.decoder = make_decoder(self.eds, dbc)
+        self.board = NodeBoard(self.decoder, {node: found.name for node, found in self.eds.items()})
+        self.top = TopModel(BitRates(bit_rate, data_bit_rate))
+        self.trace = FrameTrace()
+        self.frames = self.now_us = self.lost = self.unread = 0
+        self.failed, self.ended = "", False
+        self.away: Sequence[str] = ()
+
+    def take(self, records: Sequence[AnyRecord]) -> list[DecodedFrame]:
+        """Take what was heard; return the frames with what they mean."""
+        decoded_frames: list[DecodedFrame] = []
+        for record in records:
+            if isinstance(record, Record):
+                decoded = self.decoder.take(record)
+                self.board.take(record, decoded)
+                self.trace.take(record, decoded)
+                decoded_frames.append((record, decoded))
+            else:
+                self.trace.take(record, record.decoded)
+                self.top.take((record,))
+        self.top.take_decoded(decoded_frames)
+        self.frames += len(decoded_frames)
+        if records:
+            self.now_us = records[-1].at_us
+        return decoded_frames
+
+
+_POLL_US: Final = 20_000
+_MARKS_KEPT: Final = 1_000
+
+_Send = Callable[[CanFrame | FdFrame], None]
+"""Sends a frame on one bus; SourceFailed if it cannot."""
+
+
+class Task(Protocol):
+    """Something that hears all frames, and may send some. It is called in the session's thread.
+
+    Attributes:
+        channel: the bus it sends on; empty for the first.
+    """
+
+    channel: str = ""
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called without a frame; `NEVER` if not."""
+        return NEVER
+
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
+        """Take what was heard, those that this program sent among it; return what to send.
+
+        Args:
+            now_us: the session's time, not that of the frames.
+            records: frames since the last call.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Send no more: the operator has disarmed."""
+        return
+
+
+class Session:
+    """Reads a source, feeds the model and the tasks, and sends what these want to send.
+
+    Nothing is sent while it is not armed: such frames are withheld, and counted.
+    Whoever reads the model or touches a task holds `lock`.
+
+    Args:
+        source: where frames come from.
+        model: takes them.
+        buses: what sends, by channel; empty for a log.
+        clock: the session's time in microseconds.
+
+    Attributes:
+        lock: of the model and the tasks.
+        tasks: what hears and sends.
+        marks: which buses went away or came back, until a task takes them.
+        armed: frames are sent.
+        sent: how many were.
+        withheld: how many were not, because it was not armed.
+        trouble: why a frame could not be sent; empty if all could.
+    """
+
+    def __init__(
+        self,
+        source: AnySource[AnyRecord],
+        model: Model,
+        buses: Mapping[str, _Send] | None = None,
+        clock: Callable[[], int] = lambda: time.monotonic_ns() // 1_000,
+    ) -> None:
+        self.source, self.model, self.buses = source, model, dict(buses or {})
+        self.lock = threading.RLock()
+        self.tasks: list[Task] = []
+        self.marks: deque[Mark] = deque(maxlen=_MARKS_KEPT)
+        self.armed, self.trouble = False, ""
+        self.sent = self.withheld = 0
+        self._clock, self._watch = clock, Stopwatch()
+        self._echo: list[Record] = []
+        self._stop, self._pool = threading.Event(), ThreadPoolExecutor(1, "canmon")
+        self._thread: Future[None] | None = None
+
+    @property
+    def now_us(self) -> int:
+        """The session's time, for tasks."""
+        return self._clock()
+
+    @property
+    def can_send(self) -> bool:
+        """Whether there is a bus to send on."""
+        return bool(self.buses)
+
+    def next_bus(self, bus: str) -> str:
+        """Return the name of the bus after one, of the first after the last."""
+        names = list(self.buses) or [""]
+        place = names.index(bus) if bus in names else 0
+        return names[(place + 1) % len(names)]
+
+    def arm(self) -> None:
+        """Let tasks send, if there is a bus."""
+        with self.lock:
+            self.armed, self.trouble = self.can_send, ""
+
+    def disarm(self) -> None:
+        """Stop all tasks; nothing is sent from now on."""
+        with self.lock:
+            self.armed = False
+            for task in self.tasks:
+                task.stop()
+
+    def start(self) -> None:
+        """Begin to read, in a thread of its own."""
+        self._thread = self._pool.submit(self._run)
+
+    def check(self) -> None:
+        """Raise what ended the thread, if anything did."""
+        if self._thread is not None and self._thread.done():
+            self._thread.result()
+
+    def close(self) -> None:
+        """End the thread, and send no more; the source stays open for whoever reports on it."""
+        self.armed = False  # else a slow bus would take all that is due first
+        self._stop.set()
+        self._pool.shutdown()
+
+    def step(self, timeout_us: int = 0) -> None:
+        """Wait for a first frame or a task that is due, and take all that is there."""
+        due_us = min((task.due_us for task in self.tasks), default=NEVER)
+        records = self.source.poll(max(0, min(timeout_us, due_us - self._clock())))
+        with self.lock:
+            model, source = self.model, self.source
+            self.marks.extend(source.marks)
+            out = self._take([*self._echo, *records])
+            model.lost, model.unread = source.lost, source.unread
+            model.failed, model.ended = source.failed, source.ended
+            model.away = source.away
+        for channel, frame in out:
+            self._send(channel, frame)
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self.step(_POLL_US)
+            if self.source.ended:
+                self._stop.wait(_POLL_US / 1e6)
+
+    def _take(self, records: Sequence[AnyRecord]) -> list[tuple[str, CanFrame | FdFrame]]:
+        self._echo = []
+        self._watch.take(records)
+        decoded_frames = self.model.take(records)
+        if self.source.live:
+            self.model.now_us = self._source_us()
+        now_us = self._clock()
+        wanted = [
+            (task.channel, frame)
+            for task in self.tasks
+            if decoded_frames or task.due_us <= now_us
+            for frame in task.tick(now_us, decoded_frames)
+        ]
+        if self.armed:
+            return wanted
+        self.withheld += len(wanted)
+        return []
+
+    def _send(self, channel: str, frame: CanFrame | FdFrame) -> None:
+        if not self.armed:  # somebody has stopped all meanwhile
+            self.withheld += 1
+            return
+        name = channel or next(iter(self.buses))
+        try:
+            self.buses[name](frame)
+        except SourceFailed as error:
+            self.disarm()
+            self.trouble = error.message
+            return
+        self.sent += 1
+        self._echo.append(Record(self._source_us(), name, frame, sent=True))
+
+    def _source_us(self) -> int:
+        """Return the time at the source: that of this machine until a frame has told it."""
+        return self._watch.now_us if self._watch.latest_us else time.time_ns() // 1_000
+
+
+_TERMINAL: Final = "/dev/tty"
+
+
+def open_session(words: Sequence[str], options: BusOptions, model: Model) -> Session:
+    """Open what SOURCE words name; nothing is sent until the session is armed.
+
+    Raises:
+        Refused: words that name nothing, or things that do not go together.
+        SourceFailed: a bus or file that cannot be opened.
+    """
+    parsed = [parse_source(word) for word in words]
+    buses = [word for word in parsed if isinstance(word, BusSpec)]
+    lines = [word for word in parsed if isinstance(word, LineSpec)]
+    if parsed == [None]:
+        return Session(StdinSource(_take_pipe()), model)
+    if len(buses) + len(lines) < len(parsed) or not (words or options):
+        return Session(open_any(words, options), model)
+    if not lines:
+        buses = buses or [BusSpec()]
+    source, opened = open_live(buses, lines, options)
+    return Session(source, model, {name: partial(_send, bus) for name, bus in opened.items()})
+
+
+def _send(bus: OpenBus, frame: CanFrame | FdFrame) -> None:
+    """Send on a bus as it was opened last."""
+    from tickrig.host.canmon.output.transmitter import send_on  # noqa: PLC0415 - python-can is slow
+
+    send_on(bus.bus, bus.name, frame)
+
+
+def _take_pipe() -> int:
+    """Let the keys come from the terminal; return where the pipe is now."""
+    try:
+        terminal = os.open(_TERMINAL, os.O_RDWR)
+    except OSError as error:
+        raise SourceFailed(f"{_TERMINAL}: {error.strerror}") from error
+    pipe = os.dup(STDIN)
+    os.dup2(terminal, STDIN)
+    os.close(terminal)
+    return pipe

@@ -1,1 +1,0 @@
-"""What goes on behind the tabs: sources, rules, sequences, SDO; nothing is painted here."""

@@ -1,0 +1,232 @@
+"""SDO frames of a check, one by one: what is said, and what must be answered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Final, TypeVar
+
+from tickrig.host.canopen.conform.bus.exchange import BusExchange, StepFailed
+from tickrig.host.canopen.conform.notation import ANSWER_MS, Address
+from tickrig.host.canopen.dialogue import Dialogue, Script
+from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
+from tickrig.host.canopen.script_run import run_script
+from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.wire.can import data_frame
+from tickrig.wire.canopen.sdo import Abort
+from tickrig.wire.canopen.sdo_frame import (
+    EXPEDITED_BYTES,
+    REQUEST_COB_ID,
+    RESPONSE_COB_ID,
+    SEGMENT_BYTES,
+    AbortCode,
+    index_sub,
+)
+
+# Reads and writes objects of the node under test, beside its checks.
+
+T = TypeVar("T")
+
+SizeOf = Callable[[int, int], int]
+"""Tells the bytes of an object by index and sub-index, 0 where nobody knows."""
+
+
+_NUMBER_BYTES: Final = range(1, 5)
+"""No number that the tester asks for is longer; a node may send anything."""
+_MOST_MISNAMED: Final = 20
+"""So many answers that name another object are kept."""
+
+
+def number_of(data: bytes) -> int | None:
+    """Return an unsigned number of at most 32 bits, None if the bytes are none."""
+    return int.from_bytes(data, "little") if len(data) in _NUMBER_BYTES else None
+
+
+class SdoClient:
+    """The client of the default SDO server of a node, which does nothing else meanwhile.
+
+    Frames that are no answers of the node are passed over.
+
+    Args:
+        exchange: the bus.
+        node_id: of the node, 1..127.
+
+    Attributes:
+        misnamed: answers that name another object than the one that was asked for, one a line.
+        size_of: so many bytes are taken of what the node sends without saying how many.
+    """
+
+    def __init__(self, exchange: BusExchange, node_id: int) -> None:
+        self._exchange, self._node_id = exchange, node_id
+        self._talk = Dialogue(node_id, self._send, on_misnamed=self._keep_misnamed)
+        self.misnamed: dict[str, None] = {}
+        self.size_of: SizeOf = lambda index, sub: 0
+
+    def upload(self, index: int, sub: int) -> bytes:
+        """Read an object; a request that is not answered is sent once more.
+
+        Raises:
+            SdoAborted: the node refuses.
+            SdoTimeout: it does not answer.
+            SdoMisnamed: it answers, and names another object.
+            LinkClosed: the bus is gone.
+        """
+        return self._twice(lambda: upload(index, sub, self.size_of(index, sub)))
+
+    def download(self, index: int, sub: int, data: bytes) -> None:
+        """Write an object, as `upload` reads one; raises the same."""
+        self._twice(lambda: download(index, sub, data))
+
+    def number(self, index: int, sub: int) -> int | None:
+        """Return an unsigned number of at most 32 bits, None if the node gives none."""
+        try:
+            return number_of(self.upload(index, sub))
+        except SdoFailed:
+            return None
+
+    def _twice(self, make: Callable[[], Script[T]]) -> T:
+        """Run a script, and once more if the node did not answer: one frame may be lost."""
+        with suppress(SdoTimeout):
+            return self.run(make())
+        return self.run(make())
+
+    def abort(self) -> None:
+        """End a transfer that a check left open; stacks look which object the abort names."""
+        frame = Abort(*self._exchange.transfer, AbortCode.GENERAL).encode()
+        self._send(REQUEST_COB_ID + self._node_id, frame)
+
+    def run(self, script: Script[T]) -> T:
+        """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
+        exchange, talk = self._exchange, self._talk
+        for at in exchange.unanswered:  # by the check, which talks for itself
+            talk.remember(at)
+        try:
+            return run_script(talk, self._node_id, script, exchange.now_us, exchange.listen)
+        finally:
+            talk.clear()
+            exchange.unanswered.clear()
+
+    def _keep_misnamed(self, at: tuple[int, int], data: bytes) -> None:
+        """Keep an answer that names another object."""
+        asked, named = (f"{index:04X}h:{sub:02X}" for index, sub in (at, index_sub(data)))
+        frame = data_frame(RESPONSE_COB_ID + self._node_id, data)
+        if len(self.misnamed) < _MOST_MISNAMED:
+            self.misnamed[f"{asked} was answered with {frame}, which names {named}"] = None
+
+    def _send(self, can_id: int, data: bytes) -> None:
+        self._exchange.send(data_frame(can_id, data))
+
+
+_UPLOAD: Final = 0x40
+_UPLOADED: Final = 0x43
+_DOWNLOAD: Final = 0x23
+ABORTED: Final = 0x80
+
+
+class SdoFrames:
+    """The default SDO server of a node, as a check sees it.
+
+    Args:
+        exchange: the bus.
+        node_id: of the node, 1..127.
+    """
+
+    def __init__(self, exchange: BusExchange, node_id: int) -> None:
+        self.exchange = exchange
+        self._request, self._response = REQUEST_COB_ID + node_id, f"{RESPONSE_COB_ID + node_id:03X}"
+
+    def say(self, data: bytes) -> None:
+        """Send a request."""
+        self.exchange.send(data_frame(self._request, data))
+
+    def answer(self, *patterns: str) -> bytes:
+        """Wait for a response that matches one of the patterns; return its data."""
+        wanted = [f"{self._response}#{pattern}" for pattern in patterns]
+        return bytes.fromhex(self.exchange.expect(wanted, ANSWER_MS)[4:])
+
+    def write(self, at: Address, data: bytes) -> None:
+        """Write an object; StepFailed if that is not confirmed."""
+        self.download(at, data)
+        self.answer(f"60{multiplexer(at)}00000000")
+        if len(data) > EXPEDITED_BYTES:
+            self.download_segments(data)
+
+    def refuse_write(self, at: Address, data: bytes, codes: Sequence[str]) -> None:
+        """Write an object; StepFailed unless it is refused with one of the codes."""
+        self.download(at, data)
+        self.answer(*_aborts(at, codes))
+
+    def read(self, at: Address, data: str) -> None:
+        """Read an object; StepFailed unless it holds what the pattern says."""
+        size = len(data) // 2
+        self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
+        if 1 <= size <= EXPEDITED_BYTES:
+            self.answer(f"{_uploaded(size)}{multiplexer(at)}{data:.<8}")
+            return
+        self.answer(f"41{multiplexer(at)}{size.to_bytes(4, 'little').hex().upper()}")
+        for number, start in enumerate(range(0, max(1, size), SEGMENT_BYTES)):
+            toggle, part = (number & 1) << 4, data[2 * start : 2 * (start + SEGMENT_BYTES)]
+            self.say(bytes([0x60 | toggle, *bytes(7)]))
+            last = start + SEGMENT_BYTES >= size
+            head = toggle | (SEGMENT_BYTES - len(part) // 2) << 1 | last
+            self.answer(f"{head:02X}{part:.<14}")
+
+    def read_other(self, at: Address, data: str) -> None:
+        """Read an object of at most 4 bytes; StepFailed if it holds what it must not."""
+        if self.read_data(at, len(data) // 2) == bytes.fromhex(data):
+            raise StepFailed(f"{at[0]:04X}h:{at[1]:02X} is still {data}")
+
+    def read_data(self, at: Address, size: int) -> bytes:
+        """Read an object of 1 to 4 bytes, whatever it holds."""
+        self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
+        return self.answer(f"{_uploaded(size)}{multiplexer(at)}........")[4 : 4 + size]
+
+    def refuse_read(self, at: Address, codes: Sequence[str]) -> None:
+        """Read an object; StepFailed unless it is refused with one of the codes."""
+        self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
+        self.answer(*_aborts(at, codes))
+
+    def download(self, at: Address, data: bytes) -> None:
+        """Send the request to write an object: expedited, or how many bytes will come."""
+        mux = bytes.fromhex(multiplexer(at))
+        if 1 <= len(data) <= EXPEDITED_BYTES:
+            self.say(bytes([_sized(_DOWNLOAD, len(data)), *mux]) + data.ljust(4, b"\0"))
+        else:
+            self.say(bytes([0x21, *mux]) + len(data).to_bytes(4, "little"))
+
+    def download_segments(self, data: bytes) -> None:
+        """Send the segments of a download that was begun, each when the one before is confirmed."""
+        for number, start in enumerate(range(0, len(data), SEGMENT_BYTES)):
+            part, toggle = data[start : start + SEGMENT_BYTES], (number & 1) << 4
+            last = start + SEGMENT_BYTES >= len(data)
+            head = toggle | (SEGMENT_BYTES - len(part)) << 1 | last
+            self.say(bytes([head]) + part.ljust(SEGMENT_BYTES, b"\0"))
+            self.answer(f"{0x20 | toggle:02X}00000000000000")
+
+
+def multiplexer(at: Address) -> str:
+    """Return index and sub-index in hex, as an SDO carries them.
+
+    >>> multiplexer((0x1017, 0))
+    '171000'
+    """
+    return f"{at[0] & 0xFF:02X}{at[0] >> 8:02X}{at[1]:02X}"
+
+
+def _aborts(at: Address, codes: Sequence[str]) -> list[str]:
+    """Return the data of abort frames with codes.
+
+    >>> _aborts((0x1000, 0), ["06010002"])
+    ['8000100002000106']
+    """
+    mux = multiplexer(at)
+    return [f"{ABORTED:02X}{mux}{bytes.fromhex(code)[::-1].hex().upper()}" for code in codes]
+
+
+def _uploaded(size: int) -> str:
+    """Return a pattern: a server may leave out how many bytes are data (CiA 301, 7.2.4.3.5)."""
+    return f"4[2{_sized(_UPLOADED, size) & 0xF:X}]"
+
+
+def _sized(command: int, size: int) -> int:
+    return command | (EXPEDITED_BYTES - size) << 2

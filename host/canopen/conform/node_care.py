@@ -1,0 +1,437 @@
+"""Brings the node into the state in which checks begin, gets it back, and leaves it as it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Set
+from contextlib import suppress
+from functools import partial
+from typing import Final, TypeVar
+
+from tickrig.host.canopen.conform.binding.object_reader import PATIENCE
+from tickrig.host.canopen.conform.bus.exchange import MS_US, BusExchange, NotAllowed, StepFailed
+from tickrig.host.canopen.conform.bus.sdo import SdoClient, number_of
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation import Address, BoundCheck
+from tickrig.host.canopen.conform.write_order import Values, Write, in_order, is_standard
+from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoMisnamed, SdoTimeout
+from tickrig.wire.can import data_frame
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, FLAG_30, NMT_COB_ID, NmtCommand, NmtState
+
+# The state in which each check begins, and the one in which the node is left.
+
+T = TypeVar("T")
+
+_SYNC_COB_ID: Final = (0x1005, 0)
+_QUIET: Final = (
+    (0x1006, 0),
+    (0x100C, 0),
+    (0x100D, 0),
+    (0x1015, 0),
+    (0x1017, 0),
+    (0x1019, 0),
+    (0x1029, 1),
+)
+"""Objects that are 0 when a check begins: no SYNC, guarding or heartbeat by itself."""
+_CONSUMERS: Final = 0x1016
+_PDOS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+INHIBIT_TIME, EVENT_TIMER = 3, 5
+_TEXTS: Final = range(0x1008, 0x100B)
+_NUMBERS: Final = range(9)
+"""So many bytes are a number, not a text."""
+
+
+class KnownState:
+    """Values of the node before the run, and in the state in which checks begin.
+
+    Args:
+        exchange: the bus.
+        client: reads and writes the node.
+
+    Attributes:
+        original: what objects held before the run.
+        written: what may have changed, and has not been seen to be as before since.
+        all_written: what was written in this run.
+        unrestored: what could not be written back, one a line.
+        repairs: what to write to restore the rest, in this order.
+    """
+
+    def __init__(self, exchange: BusExchange, client: SdoClient) -> None:
+        self._exchange, self._client = exchange, client
+        self.original: Values = {}
+        self._begin: Values = {}
+        self.written: set[Address] = set()
+        self.all_written: set[Address] = set()
+        self.unrestored: dict[str, None] = {}
+        self.repairs: list[Write] = []
+        self._silent = 0
+
+    def learn(self, addresses: Iterable[Address]) -> None:
+        """Read objects that are not known yet; what cannot be read is not restored."""
+        for at in addresses:
+            if at not in self.original and (value := self._read(at)) is not None:
+                self.original[at] = self._begin[at] = value
+
+    def prepare(self) -> None:
+        """Bring what is known into the state in which checks begin."""
+        for at, value in self.original.items():
+            if at in _QUIET or (at[0] == _CONSUMERS and at[1]) or _is_timer(at):
+                self._begin[at] = bytes(len(value))
+            elif at == _SYNC_COB_ID:
+                number = int.from_bytes(value, "little") & ~FLAG_30
+                self._begin[at] = number.to_bytes(len(value), "little")
+        left = self._write_back(self._begin, self._begin)
+        for at in left:
+            self._begin[at] = self.original[at]
+
+    def is_quieted(self, at: Address) -> bool:
+        """Return whether checks begin with another value than was there before the run."""
+        return self._begin.get(at) != self.original.get(at)
+
+    def write(self, addresses: Collection[Address]) -> None:
+        """Take note of what may change."""
+        self.written.update(addresses)
+        self.all_written.update(addresses)
+
+    def reset(self) -> None:
+        """Take note that all that was written may have other values."""
+        self.written |= self.all_written
+
+    def tidy(self, addresses: Iterable[Address] | None) -> None:
+        """Bring objects into the state in which checks begin; all that are known if None."""
+        touched = self._begin if addresses is None else addresses
+        self._write_back(self._begin, [at for at in touched if at in self._begin])
+
+    def restore(self) -> None:
+        """Bring all objects into the state before the run, and tell what could not be."""
+        left = self._write_back(self.original, self.original)
+        for at in left:
+            self.unrestored[self._was(at)] = None
+        self._repair(left)
+
+    def give_up(self) -> None:
+        """Tell what was written and may not be as it was: the node is gone."""
+        left = [at for at in self.original if at in self.written]
+        for at in left:
+            self.unrestored[f"{self._was(at)}; not verified: the node was lost"] = None
+        self._repair(left)
+
+    def _repair(self, addresses: Iterable[Address]) -> None:
+        """Take note of what a person has to write to restore what is left."""
+
+        def number(at: Address) -> int | None:
+            value = self.original.get(at, b"")
+            return number_of(value) if is_standard(at, value) else None
+
+        self.repairs += in_order({at: self.original[at] for at in addresses}, number)
+
+    def _was(self, at: Address) -> str:
+        value = self.original[at]
+        text = value.decode("latin-1")
+        is_text = at[0] in _TEXTS or (len(value) not in _NUMBERS and text.isprintable())
+        return f"{at[0]:04X}h:{at[1]:02X} was {repr(text) if is_text else value.hex().upper()}"
+
+    def _write_back(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
+        """Write what differs; return what differs still."""
+        wrong = self._differing(target, addresses)
+        if not wrong:
+            return []
+        touched = dict.fromkeys(wrong)
+        writes = in_order({at: target[at] for at in wrong}, lambda at: self._number(at, target))
+        for at, value in writes:
+            touched[at] = None
+            self.write({at})
+            with suppress(SdoAborted, NotAllowed):  # it is reported if it differs still
+                self._patiently(partial(self._client.download, *at, value))
+        return self._differing(target, [at for at in touched if at in target])
+
+    def _differing(self, target: Values, addresses: Iterable[Address]) -> list[Address]:
+        return [at for at in addresses if not self._holds(at, target[at])]
+
+    def _holds(self, at: Address, wanted: bytes) -> bool:
+        held = self._read(at)
+        if held is not None and held == self.original.get(at):
+            self.written.discard(at)
+        return held == wanted
+
+    def _number(self, at: Address, target: Values) -> int | None:
+        """Return what an object holds, or should hold if the node does not tell it well.
+
+        None if it is not known what it should hold: then it is not touched.
+        """
+        if at not in target or not is_standard(at, target[at]):
+            return None
+        held = self._read(at)
+        return number_of(held if held and is_standard(at, held) else target[at])
+
+    def _read(self, at: Address) -> bytes | None:
+        """Read an object; None if the node refuses, or gives no answer about this one."""
+        with suppress(SdoAborted):
+            return self._patiently(partial(self._client.upload, *at))
+        return None
+
+    def _patiently(self, attempt: Callable[[], T]) -> T | None:
+        """Ask the node; None if it gives no answer about this one, SdoTimeout if it is gone."""
+        try:
+            answer = attempt()
+        except SdoTimeout:
+            self._silent += 1
+            if self._silent >= PATIENCE:
+                self._silent = 0
+                raise
+            return None
+        except SdoMisnamed:
+            self._silent = 0
+            return None
+        except SdoAborted:
+            self._silent = 0
+            raise
+        self._silent = 0
+        return answer
+
+
+def _is_timer(at: Address) -> bool:
+    """Return whether an object lets PDOs be sent, or held back, or missed, by themselves."""
+    return at[0] in _PDOS and at[1] in {INHIBIT_TIME, EVENT_TIMER}
+
+
+_SETTLE_MS: Final = 20
+"""So long after an NMT command a node is in its new state."""
+
+_CARE_US: Final = 60_000_000
+"""So long may it take to write everything back."""
+
+_RETURN_MS: Final = 3_000
+"""So long may a node take to come back after a reset."""
+
+_GONE_MS: Final = 10_000
+"""So long is waited at the end for a node that was lost, to restore it."""
+
+_TRIES: Final = 2
+_PROBE_MS: Final = 50
+HEARTBEAT: Final = (0x1017, 0)
+_ERROR_REGISTER: Final = (0x1001, 0)
+_HISTORY: Final = (0x1003, 0)
+_DEVICE_TYPE: Final = (0x1000, 0)
+_STORAGE: Final = frozenset((0x1010, 0x1011))
+_STORE: Final = (0x1010, 1)
+_SAVE: Final = b"save"
+
+_RECOVERY: Final[dict[Level, tuple[NmtCommand | None, ...]]] = {
+    Level.READ_ONLY: (None,),
+    Level.COMMUNICATION: (NmtCommand.RESET_COMMUNICATION,),
+    Level.INTRUSIVE: (NmtCommand.RESET_COMMUNICATION, NmtCommand.RESET_NODE),
+}
+"""What is tried to get a node back that does not answer."""
+
+_TO_STATE: Final = {
+    NmtState.OPERATIONAL: NmtCommand.START,
+    NmtState.STOPPED: NmtCommand.STOP,
+}
+
+
+class NodeCare:
+    """Cares for one node during a run.
+
+    Args:
+        exchange: the bus.
+        client: reads and writes the node.
+        node_id: of the node, 1..127.
+        level: of the run; at READ_ONLY nothing is done but reading.
+
+    Attributes:
+        lost: the node does not answer any more.
+    """
+
+    def __init__(
+        self, exchange: BusExchange, client: SdoClient, node_id: int, level: Level
+    ) -> None:
+        self._exchange, self._client, self._node_id = exchange, client, node_id
+        self._level, self._state = level, KnownState(exchange, client)
+        self._nmt_state: NmtState | None = None
+        self._moved = False  # to another NMT state than it was in
+        self._errors = 0
+        self._stored = self.lost = False
+
+    @property
+    def unrestored(self) -> tuple[str, ...]:
+        """What could not be written back, one a line."""
+        return tuple(self._state.unrestored)
+
+    def prepare(self, addresses: Iterable[Address]) -> None:
+        """Learn how the node is, and bring it into the state in which checks begin.
+
+        Args:
+            addresses: of the objects that may change in the run.
+        """
+        if self._level is Level.READ_ONLY:
+            return
+        self._exchange.begin(_CARE_US)
+        self._state.learn(addresses)
+        self._nmt_state = self._learn_state()
+        self._moved = True
+        self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        self._state.prepare()
+        self._errors = self._client.number(*_ERROR_REGISTER) or 0
+
+    def begin(self, bound: BoundCheck) -> None:
+        """Learn what a check may change, if that is not known yet; `lost` if it cannot be."""
+        if self._level is Level.READ_ONLY:
+            return
+        self._exchange.begin(_CARE_US)
+        self._stored = self._stored or bool(_STORAGE & {index for index, _ in bound.changed})
+        try:
+            self._state.learn(bound.written)
+            self._state.write(bound.written)
+            if bound.resets:
+                self._state.reset()
+        except (SdoFailed, StepFailed):
+            self._recover()
+
+    def unread(self, addresses: Set[Address]) -> list[Address]:
+        """Return which of these could not be read, so that they cannot be written back."""
+        self._exchange.begin(_CARE_US)
+        known = self._state.original
+        try:
+            self._state.learn(at for at in addresses if at[0] not in _STORAGE)
+        except (SdoFailed, StepFailed):
+            return []  # the node is gone, which `begin` will find
+        return sorted(at for at in addresses - known.keys() if at[0] not in _STORAGE)
+
+    @property
+    def repairs(self) -> tuple[Write, ...]:
+        """What to write to restore what could not be, in this order."""
+        return tuple(self._state.repairs)
+
+    @property
+    def errors(self) -> int:
+        """The bits of the error register that were set before the run, and are still."""
+        return self._errors
+
+    def is_quieted(self, at: Address) -> bool:
+        """Return whether the tester has written another value than was there, to begin checks."""
+        return self._state.is_quieted(at)
+
+    def held(self, at: Address) -> bytes:
+        """Return what an object held before the run; nothing if that is not known."""
+        return self._state.original.get(at, b"")
+
+    def give_up(self) -> None:
+        """Tell what is not as it was: nobody can write it back."""
+        self._state.give_up()
+
+    def tidy(self, bound: BoundCheck, boots_before: int) -> bool:
+        """Bring the node back after a check; False, and it is lost, if it cannot be."""
+        changed = bound.resets or self._exchange.boots != boots_before
+        self._exchange.begin(_CARE_US)
+        try:
+            self._tidy(None if changed else bound.written)
+        except (SdoFailed, StepFailed):
+            self._recover()
+        return not self.lost
+
+    def restore(self) -> None:
+        """Leave the node as it was before the run, as far as can be."""
+        if self._level is Level.READ_ONLY:
+            return
+        self._exchange.begin(_CARE_US)
+        if not self._put_back() and not (self._answers(_GONE_MS) and self._put_back()):
+            self._state.give_up()
+
+    def _put_back(self) -> bool:
+        """Write everything back; False if the node does not answer."""
+        try:
+            self._client.abort()
+            if self._moved:
+                self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+            self._state.restore()
+            if self._stored:
+                self._store()
+            if self._nmt_state in _TO_STATE:
+                self._command(_TO_STATE[self._nmt_state])
+        except (SdoFailed, StepFailed):
+            return False
+        return True
+
+    def _store(self) -> None:
+        """Store what was there before, in place of what a check has stored."""
+        try:
+            self._client.download(*_STORE, _SAVE)
+        except (SdoAborted, SdoMisnamed) as error:
+            self._state.unrestored[f"what a check stored is still stored: {error}"] = None
+
+    def _tidy(self, addresses: Iterable[Address] | None) -> None:
+        self._client.abort()
+        if self._level is Level.READ_ONLY:
+            self._exchange.wait(_SETTLE_MS)
+            self._probe()
+            return
+        self._command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        self._state.tidy(addresses)
+        if self._has_errors():
+            self._command(NmtCommand.RESET_COMMUNICATION)
+            self._answers(_RETURN_MS)
+            self._state.tidy(None)
+
+    def _has_errors(self) -> bool:
+        """Say whether a check left an error behind: those of before the run may have gone."""
+        number = self._client.number(*_ERROR_REGISTER)
+        if number is None:
+            self._probe()  # absent, or is the node gone?
+            return False
+        new = number & ~self._errors
+        self._errors &= number
+        return bool(new)
+
+    def _probe(self) -> None:
+        """Raise SdoTimeout if the node is gone; one without 1000h is there."""
+        with suppress(SdoAborted, SdoMisnamed):
+            self._client.upload(*_DEVICE_TYPE)
+
+    def _recover(self) -> None:
+        """Try to get a node back that does not answer."""
+        for command in _RECOVERY[self._level]:
+            self._exchange.begin(_CARE_US)
+            if command is not None:
+                self._command(command)
+            if self._answers(_RETURN_MS):
+                try:
+                    self._tidy(None)
+                except (SdoFailed, StepFailed):
+                    continue
+                return
+        self.lost = True
+
+    def _answers(self, within_ms: int) -> bool:
+        """Wait until the node answers to SDO again."""
+        until_us = self._exchange.now_us + within_ms * MS_US
+        while True:
+            try:
+                self._client.upload(*_DEVICE_TYPE)
+            except (SdoAborted, SdoMisnamed):
+                return True
+            except SdoTimeout:
+                if self._exchange.now_us >= until_us:
+                    return False
+                self._exchange.wait(_PROBE_MS)
+            else:
+                return True
+
+    def _learn_state(self) -> NmtState | None:
+        """Learn the NMT state from a heartbeat, which is switched on for the purpose."""
+        if HEARTBEAT not in self._state.original:  # it could not be written back
+            return None
+        self._state.write({HEARTBEAT})
+        try:
+            self._client.download(*HEARTBEAT, _PROBE_MS.to_bytes(2, "little"))
+            pattern = f"{ERROR_CONTROL_COB_ID + self._node_id:03X}#.."
+            text = self._exchange.expect([pattern], 3 * _PROBE_MS)
+            return NmtState(int(text[-2:], 16) & 0x7F)
+        except (SdoFailed, StepFailed, NotAllowed, ValueError):
+            return None
+
+    def _command(self, command: NmtCommand) -> None:
+        try:
+            self._exchange.send(data_frame(NMT_COB_ID, bytes((command, self._node_id))))
+        except NotAllowed:
+            return
+        self._exchange.wait(_SETTLE_MS)

@@ -1,0 +1,414 @@
+"""The steps that only checks of objects have: what an object holds, and writing it back wrongly."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import groupby
+from operator import attrgetter
+from typing import Any, Final, Protocol
+
+from tickrig.host.canopen.conform.bus.exchange import StepFailed
+from tickrig.host.canopen.conform.bus.frame_pattern import codes_text
+from tickrig.host.canopen.conform.check import Check, Level, Step
+from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_entry import COUNTS
+from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
+from tickrig.wire.canopen.sdo_frame import describe_abort
+
+# The SDO abort codes that are accepted for each kind of refusal.
+#
+# Where CiA 301 leaves a choice, the set is that of CiA's own conformance test tool, as its
+# published log shows it (CCT 3.0.3.10, test cases SDO 03 to SDO 10).
+
+_READ_ONLY: Final = ("06010002", "06010000", "08000000")
+_WRITE_ONLY: Final = ("06010001", "06010000", "08000000")
+_ABSENT_OBJECT: Final = ("06020000",)
+_ABSENT_SUB: Final = ("06090011",)
+_TOO_LONG: Final = ("06070012", "06070010", "08000000")
+_TOO_SHORT: Final = ("06070013", "06070010", "08000000")
+_TOO_HIGH: Final = ("06090031", "06090030")
+_TOO_LOW: Final = ("06090032", "06090030")
+_NO_VALUE_YET: Final = ("08000024", "08000000", "06090011")
+"""What is described and has no value: an error that has not been, a domain that is empty."""
+
+
+# Checks of 1000h: a device has the objects of the profile that it says it has.
+
+_DEVICE_TYPE: Final = 0x1000
+_PROFILE_MASK: Final = 0xFFFF
+
+_IO_BLOCKS: Final[Mapping[int, tuple[int, ...]]] = {
+    16: (0x6000, 0x6020, 0x6100, 0x6120),
+    17: (0x6200, 0x6220, 0x6300, 0x6320),
+    18: (0x6401, 0x6400, 0x6402, 0x6403, 0x6404),
+    19: (0x6411, 0x6410, 0x6412, 0x6413, 0x6414),
+}
+"""Bits of 1000h of a device of CiA 401, and objects of which there is one if a bit is set."""
+
+_DRIVE_OBJECTS: Final = (0x6040, 0x6041)
+"""Controlword and statusword: every drive has them."""
+
+
+def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[Check]:
+    """Give the check of 1000h, if the EDS says what it holds.
+
+    Args:
+        device: what the EDS says.
+        node_id: of the node, 1..127.
+    """
+    entries = {(entry.index, entry.sub): entry for entry in device.entries}
+    head = entries.get((_DEVICE_TYPE, 0))
+    if head is None or not head.has_default:
+        return
+    number = int.from_bytes(head.power_on_data(node_id), "little")
+    wanted, source = _wanted(number, {index for index, _ in entries})
+    if wanted:
+        names = ", ".join(f"{index:04X}h" for index in wanted)
+        title = f"1000h: has the objects of the profile that it names: {names}"
+        clause, steps = f"CiA 301 v4.2.0, 7.5.2.1; {source}", tuple(_reads(entries, wanted))
+        level = Level.READ_ONLY
+        yield Check("OD-1000.00-profile", "OD", title, clause, level, frozenset(), steps)
+
+
+def _wanted(number: int, present: set[int]) -> tuple[tuple[int, ...], str]:
+    """Return the objects that a device type asks for, of several the one that is described."""
+    match number & _PROFILE_MASK:
+        case 401:
+            blocks = [objects for bit, objects in _IO_BLOCKS.items() if number >> bit & 1]
+            found = [[*present.intersection(objects), objects[0]][0] for objects in blocks]
+            return tuple(found), "CiA 401-1, device type"
+        case 402:
+            return _DRIVE_OBJECTS, "CiA 402-2, controlword and statusword"
+    return (), ""
+
+
+def _reads(
+    entries: Mapping[tuple[int, int], EntryDescription], indices: Iterable[int]
+) -> Iterator[Step]:
+    for index in indices:
+        entry = entries.get((index, 0))
+        kind = "UNSIGNED8" if index not in _DRIVE_OBJECTS else "UNSIGNED16"
+        yield {"holds": f"{index:04X}:00", "type": entry.data_type.name if entry else kind}
+
+
+# Checks of every object that an EDS describes: readable and refused as it is declared.
+
+_GROUP: Final = "OD"
+_ABORTS: Final = "CiA 301 v4.2.0, 7.2.4.3.17, table of SDO abort codes"
+_ACCESS: Final = "CiA 301 v4.2.0, 7.4.4, access attributes"
+_TYPES: Final = "CiA 301 v4.2.0, 7.4.7, data types"
+_DEFAULTS: Final = "CiA 306-1, DefaultValue; CiA 301 v4.2.0, 7.5.2"
+
+_COMMUNICATION_AREA: Final = range(0x1000, 0x2000)
+_PROFILE_AREA: Final = range(0x6000, 0xA000)
+_NEVER_WRITTEN: Final = (0x1010, 0x1011, *range(0x1F50, 0x1F5A))
+"""Store, restore and program download: not even with what must be refused."""
+
+_ERROR_FIELD: Final = 0x1003
+_CONSTANTS: Final = (0x1000, 0x1018)
+"""Objects that hold what the EDS says wherever the bus cannot write them."""
+_PDO_PARAMETERS: Final = (*range(0x1400, 0x1600), *range(0x1800, 0x1A00))
+_IN_USE: Final = (*(0x1005, 0x1006, 0x1012, 0x1014), *range(0x1200, 0x1300), *range(0x1400, 0x1C00))
+"""Objects that CiA 301 keeps from being changed while what they set up exists."""
+_KEPT: Final = (
+    *("06010000", "06010001", "06010002", "06040041", "06040042", "06040043", "06040047"),
+    *("06090030", "08000000", "08000021", "08000022"),
+)
+"""Codes of that: a server need not look at the value before."""
+_RESERVED_SUB: Final = 4
+"""Of a PDO parameter: CiA 301 keeps it free, and files describe it."""
+_SERIAL_NUMBER: Final = (0x1018, 4)
+_DATA_TYPES: Final = range(0x0001, 0x1000)
+_HIGHEST_SUB: Final = 0xFF
+_CONFIGURED: Final = "the node may have been configured: stored, or written since its reset"
+
+
+class _Maker:
+    """Makes the checks of one node.
+
+    Args:
+        node_id: of the node, 1..127.
+        allow: indices of the profile area that may be written.
+        never: indices that are never written.
+    """
+
+    def __init__(self, node_id: int, allow: Collection[int], never: Collection[int]) -> None:
+        self._node_id, self._allow, self._never = node_id, allow, never
+
+    def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[Check]:
+        """Make the checks of one entry; `counts` says whether it is the sub-index 0 of a record."""
+        if entry.readable:
+            constant = self._power_on(entry) if _is_constant(entry, counts) else None
+            yield _holds(entry, constant)
+            if constant is None:
+                yield from self._default(entry)
+        else:
+            yield _check(entry, "read", "refused to be read", _ACCESS, _refuse_read(entry))
+        if self._may_write(entry.index):
+            if not entry.writable:
+                yield _refused(entry, "write", "read-only: refused to be written", 0, _READ_ONLY)
+            elif entry.readable:
+                yield from _of_sizes(entry)
+            if entry.writable and entry.data_type.is_integer:
+                yield from _of_limits(entry)
+
+    def _default(self, entry: EntryDescription) -> Iterator[Check]:
+        """Compare what the bus may change with its default, in the communication area."""
+        value = self._power_on(entry)
+        if value is None or not entry.writable or entry.index not in _COMMUNICATION_AREA:
+            return
+        if entry.index != _ERROR_FIELD:
+            title, step = "as its DefaultValue says", _step(entry, value)
+            yield _check(entry, "default", title, _DEFAULTS, step, choice=_CONFIGURED)
+
+    def _power_on(self, entry: EntryDescription) -> str | None:
+        if not entry.has_default:
+            return None
+        return entry.power_on_data(self._node_id).hex().upper()
+
+    def _may_write(self, index: int) -> bool:
+        if index in _NEVER_WRITTEN or index in self._never:
+            return False
+        return index not in _PROFILE_AREA or index in self._allow
+
+
+def object_checks(
+    device: EdsDevice,
+    node_id: int,
+    *,
+    allow: Collection[int] = (),
+    never: Collection[int] = (),
+) -> tuple[Check, ...]:
+    """Make the checks of all objects, sorted by index and sub-index.
+
+    What is not described is read too: in every object the sub-indices between and behind
+    those described, and FEh and FFh; over all objects together each sub-index up to FFh
+    once; behind every row of objects the index that follows.
+
+    Args:
+        device: what the EDS says.
+        node_id: of the node, 1..127; for defaults with $NODEID.
+        allow: indices of the profile area, 6000h to 9FFFh, that may be written.
+        never: indices that are never written.
+    """
+    maker, checks = _Maker(node_id, allow, never), list[Check]()
+    entries = sorted(device.entries, key=attrgetter("key"))
+    objects = [(index, list(rows)) for index, rows in groupby(entries, attrgetter("index"))]
+    for number, (index, rows) in enumerate(objects):
+        for entry in rows:
+            checks += maker.of_entry(entry, counts=entry.sub == 0 and len(rows) > 1)
+        share = range(number % len(objects), _HIGHEST_SUB + 1, len(objects))
+        checks.append(_absent_subs(index, rows, share))
+    checks.append(_absent_objects([index for index, _ in objects]))
+    return (*checks, *_profile_checks(device, node_id))
+
+
+def _check(  # noqa: PLR0913, PLR0917 - a check, by its parts
+    entry: EntryDescription,
+    suffix: str,
+    title: str,
+    source: str,
+    step: Step,
+    level: Level = Level.READ_ONLY,
+    choice: str = "",
+) -> Check:
+    where = f"{entry.index:04X}.{entry.sub:02X}"
+    name = f"{entry.index:04X}h:{entry.sub:02X} {entry.name}"
+    return Check(
+        *(f"OD-{where}-{suffix}", _GROUP, f"{name}: {title}", source, level),
+        *(frozenset(), (step,), choice),
+    )
+
+
+def _holds(entry: EntryDescription, constant: str | None) -> Check:
+    """Make the check of what an entry holds."""
+    step = _step(entry, constant)
+    title = f"holds {entry.data_type.name}"
+    if constant is None:
+        return _check(entry, "type", title, _TYPES, step)
+    return _check(entry, "type", f"{title}, its DefaultValue", f"{_TYPES}; {_DEFAULTS}", step)
+
+
+def _step(entry: EntryDescription, value: str | None) -> dict[str, object]:
+    """Make the step that reads an entry; a value is hexadecimal."""
+    step: dict[str, object] = {"holds": _place(entry), "type": entry.data_type.name}
+    said = {"low": entry.low, "high": entry.high, "value": value}
+    if _may_have_none(entry):
+        step |= {"codes": list(_NO_VALUE_YET)}
+    return step | {key: number for key, number in said.items() if number is not None}
+
+
+def _refused(
+    entry: EntryDescription, suffix: str, title: str, grow: int, codes: Sequence[str]
+) -> Check:
+    """Make a check that writes what it has read, so many bytes longer: it must be refused."""
+    step = {"refuse rewrite": _place(entry), "grow": grow, "codes": _codes(entry, codes)}
+    return _check(entry, suffix, title, _ABORTS, step, Level.COMMUNICATION)
+
+
+def _of_sizes(entry: EntryDescription) -> Iterator[Check]:
+    if entry.size:
+        yield _refused(entry, "long", "a byte too long: refused", 1, _TOO_LONG)
+    if entry.size > 1:
+        yield _refused(entry, "short", "a byte too short: refused", -1, _TOO_SHORT)
+
+
+def _of_limits(entry: EntryDescription) -> Iterator[Check]:
+    """Write the numbers just outside of the limits, as far as the data type has them."""
+    lowest, highest = entry.data_type.limits
+    for suffix, limit, beyond, codes in (
+        ("high", entry.high, 1, _TOO_HIGH),
+        ("low", entry.low, -1, _TOO_LOW),
+    ):
+        if isinstance(limit, int) and lowest <= limit + beyond <= highest:
+            data = (limit + beyond).to_bytes(entry.size, "little", signed=entry.signed)
+            title = f"{limit + beyond} is beyond its limit {limit}: refused"
+            row = {"refuse write": _place(entry), "data": data.hex().upper()}
+            step = {**row, "codes": _codes(entry, codes)}
+            yield _check(entry, suffix, title, _ABORTS, step, Level.COMMUNICATION)
+
+
+def _codes(entry: EntryDescription, codes: Sequence[str]) -> list[str]:
+    """Return the codes with which a write is refused: those of the value, or of what is in use."""
+    return [*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())])]
+
+
+def _refuse_read(entry: EntryDescription) -> Step:
+    return {"refuse read": _place(entry), "codes": list(_WRITE_ONLY)}
+
+
+def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int]) -> Check:
+    """Read sub-indices that are not described."""
+    known = {row.sub for row in rows}
+    behind = max(known) + 1
+    asked = {*range(behind + 1), _HIGHEST_SUB - 1, *share} - known
+    steps: list[Step] = [
+        {"refuse read": f"{index:04X}:{sub:02X}", "codes": list(_ABSENT_SUB)}
+        for sub in sorted(asked)
+        if sub < _HIGHEST_SUB
+    ]
+    if _HIGHEST_SUB not in known:
+        structure = {"holds": f"{index:04X}:FF", "type": "UNSIGNED32"}
+        steps.append({**structure, "codes": list(_ABSENT_SUB)})
+    name = rows[0].name if len(rows) == 1 else "its sub-indices"
+    title = f"{index:04X}h {name}: has no sub-index that is not described"
+    level, source = Level.READ_ONLY, _ABORTS
+    return Check(f"OD-{index:04X}-subs", _GROUP, title, source, level, frozenset(), tuple(steps))
+
+
+def _absent_objects(indices: Collection[int]) -> Check:
+    """Read what is behind each row of objects, and in each area the last."""
+    ends = (0x1FFF, 0x5FFF, 0x9FFF, 0xFFFF)
+    behind = {index + 1 for index in indices if index < 0xFFFF} | set(ends)
+    asked = sorted(behind - set(indices) - set(_DATA_TYPES))
+    steps = tuple(
+        {"refuse read": f"{index:04X}:00", "codes": list(_ABSENT_OBJECT)} for index in asked
+    )
+    title = "objects that are not described are not there"
+    return Check("OD-absent", _GROUP, title, _ABORTS, Level.READ_ONLY, frozenset(), steps)
+
+
+def _place(entry: EntryDescription) -> str:
+    return f"{entry.index:04X}:{entry.sub:02X}"
+
+
+def _is_constant(entry: EntryDescription, counts: bool) -> bool:
+    """Return whether an entry always holds its default."""
+    if entry.writable or (entry.index, entry.sub) == _SERIAL_NUMBER:
+        return False
+    if Access.CONST in entry.access or entry.index in _CONSTANTS:
+        return True
+    return counts and entry.index not in COUNTS and entry.index in _COMMUNICATION_AREA
+
+
+def _may_have_none(entry: EntryDescription) -> bool:
+    """Return whether an entry may hold nothing: no error yet, an empty domain or string."""
+    reserved = entry.index in _PDO_PARAMETERS and entry.sub == _RESERVED_SUB
+    return reserved or entry.index == _ERROR_FIELD or not entry.size
+
+
+class Client(Protocol):
+    """Reads and writes objects of the node under test."""
+
+    def upload(self, index: int, sub: int, /) -> bytes:
+        """Read an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
+        ...
+
+    def download(self, index: int, sub: int, data: bytes, /) -> None:
+        """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
+
+
+def play_object_step(client: Client, step: Mapping[str, Any]) -> bool:
+    """Do a step if it is one of an object.
+
+    `holds` reads an object: it has a size that its data type has, lies within `low` and
+    `high`, is `value`, where these are given; with `codes` it may be refused with one of
+    them. `refuse rewrite` reads an object and writes it again, `grow` bytes longer or
+    shorter: the node refuses that with one of `codes`.
+
+    Args:
+        client: of the node.
+        step: with index and sub-index in place of names.
+
+    Returns:
+        Whether it was one.
+
+    Raises:
+        StepFailed: the node does not do as the step says.
+    """
+    try:
+        match step:
+            case {"holds": (index, sub)}:
+                _hold(client, index, sub, step)
+            case {"refuse rewrite": (index, sub), "grow": grow, "codes": codes}:
+                _rewrite(client, index, sub, grow, codes)
+            case _:
+                return False
+    except (SdoMisnamed, SdoTimeout) as error:
+        raise StepFailed(str(error)) from error
+    return True
+
+
+def _hold(client: Client, index: int, sub: int, step: Mapping[str, Any]) -> None:
+    try:
+        data = client.upload(index, sub)
+    except SdoAborted as error:
+        if f"{error.code:08X}" in step.get("codes", ()):
+            return
+        raise StepFailed(f"refused with {describe_abort(error.code)}, want its value") from error
+    kind = DataType[step["type"]]
+    if kind.size and len(data) != kind.size:
+        raise StepFailed(f"{len(data)} bytes, want {kind.size} of {kind.name}: {data.hex()}")
+    if "value" in step and data.hex().upper() != step["value"]:
+        raise StepFailed(f"holds {data.hex().upper()}, want {step['value']}")
+    _check_limits(kind, data, step)
+
+
+def _check_limits(kind: DataType, data: bytes, step: Mapping[str, Any]) -> None:
+    low, high = step.get("low"), step.get("high")
+    value = kind.decode(data)
+    if not isinstance(value, int | float):
+        return
+    if low is not None and value < low:
+        raise StepFailed(f"{value} is below its lower limit {low}")
+    if high is not None and value > high:
+        raise StepFailed(f"{value} is above its upper limit {high}")
+
+
+def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:
+    wanted = f"abort {codes_text(codes)}"
+    try:
+        data = client.upload(index, sub)
+    except SdoAborted:
+        return  # it holds nothing that could be written; what it should hold is another check
+    data = data[:grow] if grow < 0 else data + bytes(grow)
+    try:
+        client.download(index, sub, data)
+    except SdoAborted as error:
+        if f"{error.code:08X}" not in codes:
+            text = f"{len(data)} bytes refused with {describe_abort(error.code)}, want {wanted}"
+            raise StepFailed(text) from error
+    else:
+        raise StepFailed(f"{len(data)} bytes were taken, want {wanted}")

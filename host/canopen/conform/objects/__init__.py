@@ -1,1 +1,0 @@
-"""The checks that are made for every object of an EDS, and the steps that only they have."""

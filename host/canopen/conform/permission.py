@@ -1,0 +1,138 @@
+"""What a level lets through to the bus: looked at frame by frame, behind all checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import Final
+
+from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed
+from tickrig.host.canopen.conform.check import Level
+from tickrig.host.canopen.conform.notation import NMT_TO_ALL, SYNC_TO_ALL, begins_download
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID
+from tickrig.wire.canopen.nmt import ALL_NODES, NMT_COB_ID, NmtCommand
+from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, SPECIFIER, ClientCommand, index_sub
+
+_UPLOADS: Final = frozenset(
+    {
+        ClientCommand.UPLOAD,
+        ClientCommand.UPLOAD_SEGMENT,
+        ClientCommand.BLOCK_UPLOAD,
+        ClientCommand.ABORT,
+    }
+)
+
+PROFILE: Final = 0x6000
+MANUFACTURER: Final = 0x2000
+PROGRAMS: Final = range(0x1F50, 0x1F5A)
+"""Program download and control: nothing here is for a tester."""
+SWITCH_GLOBAL, CONFIGURATION = 0x04, 0x01
+_CONFIGURES: Final = (0x11, 0x13, 0x15, 0x17)
+"""LSS services that change a node: node-ID, bit timing, its activation, both stored."""
+STORAGE: Final = (0x1010, 0x1011)
+_FRAME_BYTES: Final = 8
+
+_Confirm = Callable[[str], bool]
+
+
+class Permission:
+    """Looks at each frame before it is sent.
+
+    Args:
+        level: of the run.
+        allow: indices of the profile area that may be written.
+        node_id: of the node under test.
+        confirm: is asked, once, before each thing that concerns other nodes or is not undone.
+        never: indices that are never written.
+
+    Attributes:
+        others: node-IDs that were on the bus.
+    """
+
+    def __init__(
+        self,
+        level: Level,
+        allow: Collection[int],
+        node_id: int,
+        confirm: _Confirm,
+        never: Collection[int] = (),
+    ) -> None:
+        self._level, self._allow, self._node_id, self._never = level, allow, node_id, never
+        self._confirm = confirm
+        self._answers: dict[str, bool] = {}
+        self.others: frozenset[int] = frozenset()
+        self._all_configured = False
+
+    def check(self, frame: CanFrame) -> None:
+        """Let a frame pass.
+
+        Raises:
+            NotAllowed: the level does not allow it.
+            Disturbed: it would change other nodes as well.
+        """
+        is_request = frame.can_id == REQUEST_COB_ID + self._node_id and not frame.extended
+        if self._level is Level.READ_ONLY:
+            if not is_request or frame.remote or not _is_upload(frame.data):
+                raise NotAllowed(f"{frame} is more than reading: --communication")
+        elif is_request:
+            self._check_request(frame.data)
+        elif frame.can_id == NMT_COB_ID and not frame.extended:
+            self._check_nmt(frame.data)
+        elif frame.can_id == LSS_MASTER_COB_ID and self._level < Level.INTRUSIVE:
+            raise NotAllowed("LSS may change the node-ID: --intrusive")
+        elif frame.can_id == LSS_MASTER_COB_ID and not frame.extended:
+            self._check_lss(frame.data)
+
+    def check_write(self, index: int, *, refused: bool = False) -> None:
+        """Let an object be written, or raise NotAllowed.
+
+        Args:
+            index: of the object.
+            refused: the node must refuse it.
+        """
+        self._check_never(index)
+        if index in PROGRAMS:
+            raise NotAllowed(f"{index:04X}h is of program download, which is never written")
+        if index >= PROFILE and index not in self._allow:
+            raise NotAllowed(f"{index:04X}h may move something: --allow {index:04X}h")
+        beyond = index in STORAGE or (MANUFACTURER <= index < PROFILE and not refused)
+        if beyond and self._level < Level.INTRUSIVE:
+            raise NotAllowed(f"{index:04X}h would be written with what it takes: --intrusive")
+
+    def check_confirmed(self, question: str) -> None:
+        """Ask a person, once; NotAllowed if the answer is no.
+
+        SYNC is not asked for where nobody else is on the bus.
+        """
+        if question == SYNC_TO_ALL and not self.others:
+            return
+        if question not in self._answers:
+            self._answers[question] = self._confirm(question)
+        if not self._answers[question]:
+            raise NotAllowed(f"would {question}: nobody said yes (--yes)")
+
+    def _check_request(self, data: bytes) -> None:
+        if len(data) == _FRAME_BYTES and begins_download(data[0]):
+            self._check_never(index_sub(data)[0])
+
+    def _check_never(self, index: int) -> None:
+        if index in self._never:
+            raise NotAllowed(f"{index:04X}h must not be written: --never {index:04X}h")
+
+    def _check_nmt(self, data: bytes) -> None:
+        if data[:1] == bytes([NmtCommand.RESET_NODE]) and self._level < Level.INTRUSIVE:
+            raise NotAllowed("resets the node: --intrusive")
+        if data[1:2] == bytes([ALL_NODES]):
+            self.check_confirmed(NMT_TO_ALL)
+
+    def _check_lss(self, data: bytes) -> None:
+        """Keep from the other nodes what all take that are in LSS configuration."""
+        if data[:1] == bytes([SWITCH_GLOBAL]):
+            self._all_configured = data[1:2] == bytes([CONFIGURATION])
+        elif self._all_configured and self.others and data[:1] and data[0] in _CONFIGURES:
+            others = ", ".join(map(str, sorted(self.others)))
+            raise Disturbed(f"the other nodes would take LSS {data[0]:02X}h too: {others}")
+
+
+def _is_upload(data: bytes) -> bool:
+    return bool(data) and data[0] & SPECIFIER in _UPLOADS

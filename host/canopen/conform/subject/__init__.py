@@ -1,1 +1,0 @@
-"""The node under test: what it has, and what stands for the names in checks."""

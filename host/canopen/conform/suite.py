@@ -1,0 +1,104 @@
+"""The checks that are written down: one file a group, in `checks/`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Final, NamedTuple
+
+from tickrig.host.canopen.conform import checks
+from tickrig.host.canopen.conform.check import STIMULUS, Check, Level, Step
+from tickrig.host.canopen.conform.notation import parse_step
+
+_HEAD: Final = re.compile(r"([A-Z0-9]+-\d+) (.+)")
+_KEYWORD: Final = re.compile(r"(source|level|needs|choice): (.+)")
+_GROUP: Final = re.compile(r"group: ([A-Z0-9]+), (.+)")
+
+ORDER: Final = (
+    *("UE", "US", "BU", "DE", "DS", "BD", "SG", "NMT", "HB", "NG"),
+    *("PC", "PR", "SY", "EM", "IO", "D4", "ST", "LS"),
+)
+"""Groups in the order in which they are judged: what may disturb most comes last."""
+
+
+OBJECTS: Final = "OD"
+_OF_EACH_OBJECT: Final = "each object of the EDS"
+"""The group of checks that are made of an EDS."""
+
+
+class Group(NamedTuple):
+    """Checks that belong together."""
+
+    name: str
+    title: str
+    checks: tuple[Check, ...]
+
+
+@cache
+def read_suite() -> tuple[Group, ...]:
+    """Return all groups that come with the package, in the order in which they are judged."""
+    found = [
+        parse_group(path.read_text("utf-8"))
+        for path in files(checks).iterdir()
+        if path.name.endswith(".txt")
+    ]
+    return tuple(sorted(found, key=lambda group: ORDER.index(group.name)))
+
+
+def suite_checks() -> list[Check]:
+    """Return the checks of all groups."""
+    return [check for group in read_suite() for check in group.checks]
+
+
+@cache
+def group_titles() -> Mapping[str, str]:
+    """Return what the groups are about, by name; the last one is that of objects."""
+    titles = {group.name: group.title for group in read_suite()}
+    return {**titles, OBJECTS: _OF_EACH_OBJECT}
+
+
+def parse_group(text: str) -> Group:
+    """Read a file of checks: parted by empty lines; a line that begins with # is a comment.
+
+    Raises:
+        ValueError: a line is none of the notation; it says which.
+    """
+    blocks = re.split(r"\n\s*\n", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).strip())
+    match = _GROUP.fullmatch(blocks[0])
+    if match is None:
+        raise ValueError(f"{blocks[0]!r} is no head like 'group: NMT, what it is about'")
+    return Group(match[1], match[2], tuple(_checks(match[1], blocks[1:])))
+
+
+def _checks(group: str, blocks: list[str]) -> Iterator[Check]:
+    for block in blocks:
+        head, *lines = block.split("\n")
+        match = _HEAD.fullmatch(head)
+        if match is None:
+            raise ValueError(f"{head!r} is no head like 'NMT-03 what conforming means'")
+        words: dict[str, str] = {}
+        steps: list[Step] = []
+        for line in lines:
+            keyword = _KEYWORD.fullmatch(line)
+            if keyword is not None:
+                words[keyword[1]] = keyword[2]
+            else:
+                steps.append(parse_step(line))
+        yield _check(match[1], group, match[2], words, tuple(steps))
+
+
+def _check(
+    check_id: str, group: str, title: str, words: dict[str, str], steps: tuple[Step, ...]
+) -> Check:
+    missing = {"source", "level"} - words.keys()
+    if missing:
+        raise ValueError(f"{check_id} has no {' and no '.join(sorted(missing))}")
+    needs = frozenset(words.get("needs", "").split())
+    if any("app" in step for step in steps):
+        needs |= {STIMULUS}
+    level = Level[words["level"].upper().replace("-", "_")]
+    return Check(
+        check_id, group, title, words["source"], level, needs, steps, words.get("choice", "")
+    )

@@ -1,0 +1,596 @@
+r"""What a gateway does for one client: SDO, NMT and its own settings (CiA 309-3, ASCII mapping).
+
+Lines that a client of a gateway sends (CiA 309-3, syntax of commands).
+
+>>> parse_request('[7] 1 4 w 0x2000 3 vs "Don said ""go"" # 1"  # a comment')
+Request(sequence=7, numbers=(1, 4), verb='w', words=('0x2000', '3', 'vs', 'Don said "go" # 1'))
+>>> parse_request("# nothing") is None
+True
+
+Data types of a gateway: what a client writes for the bytes of an object (CiA 309-3).
+
+>>> encode("i16", ["-2"]).hex(), decode("i16", b"\xfe\xff"), decode("x16", b"\x92\x01")
+('feff', '-2', '0x0192')
+>>> decode("vs", b"abc"), decode("", b"\x01\xAB")
+('"abc"', '01 AB')
+"""
+
+from __future__ import annotations
+
+import re
+from base64 import b64decode, b64encode
+from binascii import Error
+from collections.abc import Callable, Collection, Mapping, Sequence
+from enum import IntEnum
+from math import isnan
+from typing import Final, NamedTuple
+
+from tickrig.host.canopen.commissioning.lss_master import SCAN_US, LssFailed, LssMaster
+from tickrig.host.canopen.commissioning.node_bus import NodeBus
+from tickrig.host.canopen.errors import SdoAborted, SdoTimeout
+from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.host.links.link import LinkClosed
+from tickrig.host.text.names import known
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.lss import BIT_RATES, STANDARD_TABLE, LssAddress, LssCommand, LssMode
+from tickrig.wire.canopen.nmt import NmtCommand
+from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
+from tickrig.wire.errors import FieldError
+
+# Why a gateway does not do what it is asked (CiA 309-3, internal error codes).
+
+
+class GatewayErrorCode(IntEnum):
+    """Internal error code."""
+
+    NOT_SUPPORTED = 100
+    SYNTAX = 101
+    INTERNAL_STATE = 102
+    TIME_OUT = 103
+    NO_DEFAULT_NET = 104
+    NO_DEFAULT_NODE = 105
+    UNSUPPORTED_NET = 106
+    UNSUPPORTED_NODE = 107
+    LOST_CONNECTION = 201
+    LSS_MANUFACTURER = 501
+    LSS_NODE_ID = 502
+    LSS_BIT_RATE = 503
+    LSS_STORE = 504
+
+
+_TEXTS: Final = {
+    GatewayErrorCode.NOT_SUPPORTED: "request not supported",
+    GatewayErrorCode.SYNTAX: "syntax error",
+    GatewayErrorCode.INTERNAL_STATE: "not possible now",
+    GatewayErrorCode.TIME_OUT: "no answer in time",
+    GatewayErrorCode.NO_DEFAULT_NET: "no default net is set",
+    GatewayErrorCode.NO_DEFAULT_NODE: "no default node is set",
+    GatewayErrorCode.UNSUPPORTED_NET: "there is no such net",
+    GatewayErrorCode.UNSUPPORTED_NODE: "there can be no such node",
+    GatewayErrorCode.LOST_CONNECTION: "the bus is gone",
+    GatewayErrorCode.LSS_MANUFACTURER: "LSS: an error of the maker of the slave",
+    GatewayErrorCode.LSS_NODE_ID: "LSS: the slave does not take this node-ID",
+    GatewayErrorCode.LSS_BIT_RATE: "LSS: the slave does not take this bit rate",
+    GatewayErrorCode.LSS_STORE: "LSS: the slave cannot store",
+}
+
+
+class GatewayError(Exception):
+    """A command that is not carried out.
+
+    Args:
+        code: why.
+        text: the same for people; that of the code if empty.
+    """
+
+    def __init__(self, code: GatewayErrorCode, text: str = "") -> None:
+        super().__init__(text or _TEXTS[code])
+        self.code = code
+
+
+_SEQUENCE: Final = re.compile(r"\s*\[([0-9]{1,10})\]")
+_WORD: Final = re.compile(r'\s*(?:"((?:[^"]|"")*)"(?=\s|$)|(#).*|([^\s"]\S*))', re.DOTALL)
+_MAX_NUMBER: Final = 0xFFFF_FFFF
+_MOST_NUMBERS: Final = 2
+
+
+class GatewayRequest(NamedTuple):
+    """A command.
+
+    Attributes:
+        sequence: number that its answer begins with.
+        numbers: what stands before the verb: nothing, a node, or a net and a node.
+        verb: in lower case.
+        words: what stands behind the verb; strings without their quotes.
+    """
+
+    sequence: int
+    numbers: tuple[int, ...]
+    verb: str
+    words: tuple[str, ...]
+
+
+def _sequence_of(line: str) -> int:
+    """Return the number in front of a line, 0 if there is none that could be one."""
+    found = _SEQUENCE.match(line)
+    return int(found[1]) if found and int(found[1]) <= _MAX_NUMBER else 0
+
+
+def parse_request(line: str) -> GatewayRequest | None:
+    """Read a line; None for an empty one and for a comment.
+
+    Raises:
+        GatewayError: it is no command.
+    """
+    if not line.strip() or line.lstrip().startswith("#"):
+        return None
+    head = _SEQUENCE.match(line)
+    if head is None or int(head[1]) > _MAX_NUMBER:
+        raise GatewayError(GatewayErrorCode.SYNTAX, "a command begins with its number, as [1]")
+    words, numbers = _words(line[head.end() :]), list[int]()
+    while words and words[0][:1].isdecimal():
+        if len(numbers) == _MOST_NUMBERS:
+            raise GatewayError(
+                GatewayErrorCode.SYNTAX, "before a command stand net and node, no more"
+            )
+        numbers.append(number(words.pop(0), _MAX_NUMBER, "number"))
+    if not words:
+        raise GatewayError(GatewayErrorCode.SYNTAX, "there is no command")
+    return GatewayRequest(int(head[1]), tuple(numbers), words[0].lower(), tuple(words[1:]))
+
+
+def number(word: str, most: int, what: str, least: int = 0) -> int:
+    """Read a decimal or hexadecimal number; GatewayError says what it is of."""
+    try:
+        value = int(word, 16) if word[:2].lower() == "0x" else int(word)
+    except ValueError:
+        value = -1
+    if not (least <= value <= most and word.isascii() and word.isalnum()):
+        raise GatewayError(GatewayErrorCode.SYNTAX, f"{what} {word!r} is not {least}..{most}")
+    return value
+
+
+def _one_of(word: str, words: Collection[str], what: str) -> str:
+    """Return a word of those that are known, in lower case."""
+    if (lower := word.lower()) not in words:
+        raise GatewayError(GatewayErrorCode.SYNTAX, f"{what} {word!r}; known: {known(words)}")
+    return lower
+
+
+def _check_count(request: GatewayRequest, least: int, most: int | None) -> None:
+    """Refuse a command with fewer words behind it than `least`, or more than `most`."""
+    count = len(request.words)
+    if count < least or (most is not None and count > most):
+        raise GatewayError(
+            GatewayErrorCode.SYNTAX, f"{request.verb} with {count} words behind it; see help"
+        )
+
+
+def _words(text: str) -> list[str]:
+    words, at = list[str](), 0
+    text = text.rstrip()
+    while at < len(text):
+        found = _WORD.match(text, at)
+        if found is None:
+            raise GatewayError(GatewayErrorCode.SYNTAX, "a quote is not closed")
+        if found[2]:
+            break
+        words.append(found[3] if found[1] is None else found[1].replace('""', '"'))
+        at = found.end()
+    return words
+
+
+HEX: Final = "hex"
+"""Bytes; of CANopenNode, and what is shown where no type is said."""
+
+NUMBERS: Final = {
+    "b": DataType.BOOLEAN,
+    "i8": DataType.INTEGER8,
+    "i16": DataType.INTEGER16,
+    "i24": DataType.INTEGER24,
+    "i32": DataType.INTEGER32,
+    "i40": DataType.INTEGER40,
+    "i48": DataType.INTEGER48,
+    "i56": DataType.INTEGER56,
+    "i64": DataType.INTEGER64,
+    "u8": DataType.UNSIGNED8,
+    "u16": DataType.UNSIGNED16,
+    "u24": DataType.UNSIGNED24,
+    "u32": DataType.UNSIGNED32,
+    "u40": DataType.UNSIGNED40,
+    "u48": DataType.UNSIGNED48,
+    "u56": DataType.UNSIGNED56,
+    "u64": DataType.UNSIGNED64,
+    "x8": DataType.UNSIGNED8,
+    "x16": DataType.UNSIGNED16,
+    "x32": DataType.UNSIGNED32,
+    "x64": DataType.UNSIGNED64,
+    "r32": DataType.REAL32,
+    "r64": DataType.REAL64,
+}
+REALS: Final = ("r32", "r64")
+BASE64: Final = ("os", "us", "d")
+_STRING: Final = "vs"
+_NAMES: Final = (*NUMBERS, _STRING, *BASE64, HEX)
+_UNSHOWN: Final = str.maketrans("", "", "\0\r\n")
+
+
+def _data_type(word: str) -> str:
+    """Return the name of a data type, in lower case; GatewayError if it is none."""
+    return _one_of(word, _NAMES, "data type")
+
+
+def encode(name: str, words: Sequence[str]) -> bytes:
+    """Return the bytes of a value.
+
+    Args:
+        name: of `_NAMES`.
+        words: the value as the client has written it; one but for `hex`.
+
+    Raises:
+        GatewayError: it is no value of this type.
+    """
+    text = " ".join(words)
+    try:
+        if name == HEX:
+            return bytes.fromhex(text)
+        (word,) = words
+        if name == _STRING:
+            return word.encode("latin-1")
+        if name in BASE64:
+            return b64decode(word, validate=True)
+        return NUMBERS[name].encode(float(word) if name in REALS else _integer(word))
+    except (ValueError, FieldError, Error):
+        raise GatewayError(
+            GatewayErrorCode.SYNTAX, f"{text!r} is no value of type {name}"
+        ) from None
+
+
+def decode(name: str, data: bytes) -> str:
+    """Return what is shown of the bytes of an object; in hexadecimal if they are not of the type.
+
+    Args:
+        name: of `_NAMES`, empty where the client names none.
+        data: the bytes.
+    """
+    if name == _STRING:
+        return '"' + data.decode("latin-1").translate(_UNSHOWN).replace('"', '""') + '"'
+    if name in BASE64:
+        return b64encode(data).decode("ascii")
+    if name in ("", HEX) or len(data) != NUMBERS[name].size:
+        return data.hex(" ").upper()
+    value = NUMBERS[name].decode(data)
+    if isinstance(value, float):
+        return "nan" if isnan(value) else f"{value:g}"
+    if name.startswith("x") and isinstance(value, int):
+        return f"0x{value:0{2 * len(data)}X}"
+    return str(value)
+
+
+def _integer(word: str) -> int:
+    digits = word.removeprefix("-")
+    if not (digits.isascii() and digits.isalnum()):
+        raise ValueError(word)
+    value = int(digits, 16) if digits[:2].lower() == "0x" else int(digits)
+    return -value if word.startswith("-") else value
+
+
+# LSS over a gateway: node-ID and bit rate of slaves (CiA 309-3, CiA 305).
+
+_LSS_OK: Final = "OK"
+_UNCONFIGURED: Final = 255
+_MOST_NODE_ID: Final = 127
+_MOST_DELAY_MS: Final = 0xFFFF
+_MOST: Final = 0xFFFF_FFFF
+_FAILED: Final = {
+    LssCommand.CONFIGURE_NODE_ID: GatewayErrorCode.LSS_NODE_ID,
+    LssCommand.CONFIGURE_BIT_TIMING: GatewayErrorCode.LSS_BIT_RATE,
+    LssCommand.STORE: GatewayErrorCode.LSS_STORE,
+}
+_SPECIFIC: Final = 0xFF
+_SCANS: Final = ("_lss_fastscan", "lss_allnodes")
+_LSS_HELP: Final = """\
+[SEQUENCE] [NET] lss_switch_glob 0|1                  waiting, configuration
+[SEQUENCE] [NET] lss_switch_sel VENDOR PRODUCT REVISION SERIAL
+[SEQUENCE] [NET] lss_set_node NODE                    1..127, 255 for none
+[SEQUENCE] [NET] lss_conf_bitrate TABLE INDEX         0 1M, 1 800k, 2 500k, 3 250k, 4 125k,
+[SEQUENCE] [NET] lss_activate_bitrate DELAY_MS        6 50k, 7 20k, 8 10k
+[SEQUENCE] [NET] lss_store
+[SEQUENCE] [NET] lss_inquire_addr [0..3]              vendor, product, revision, serial
+[SEQUENCE] [NET] lss_get_node
+[SEQUENCE] [NET] _lss_fastscan [TIMEOUT_MS]           finds a slave without a node-ID
+[SEQUENCE] [NET] lss_allnodes [TIMEOUT_MS [FIRST_NODE STORE]]"""
+
+
+def carry_out(bus: NodeBus, request: GatewayRequest) -> str:
+    """Carry out a command of `LSS_VERBS`, and return what is answered.
+
+    Raises:
+        GatewayError: it is none, or the slave refuses or does not answer.
+        LinkClosed: the bus is gone.
+    """
+    scan_us = SCAN_US
+    if request.verb in _SCANS and request.words:
+        scan_us = 1_000 * number(request.words[0], _MOST_DELAY_MS, "time-out", 1)
+    try:
+        return _CARRIED_OUT[request.verb](LssMaster(bus, scan_us=scan_us), request)
+    except LssFailed as error:
+        code = GatewayErrorCode.TIME_OUT
+        if error.code and error.command is not None:
+            code = _FAILED.get(error.command, GatewayErrorCode.LSS_MANUFACTURER)
+        if error.code == _SPECIFIC:
+            code = GatewayErrorCode.LSS_MANUFACTURER
+        raise GatewayError(code, str(error)) from None
+
+
+def _switch_all(lss: LssMaster, request: GatewayRequest) -> str:
+    (mode,) = _numbers(request, 1)
+    lss.switch_all(LssMode(_within(mode, 0, 1)))
+    return _LSS_OK
+
+
+def _select(lss: LssMaster, request: GatewayRequest) -> str:
+    if not lss.select(LssAddress(*_numbers(request, 4))):
+        raise GatewayError(GatewayErrorCode.TIME_OUT, "no slave has this address")
+    return _LSS_OK
+
+
+def _set_node(lss: LssMaster, request: GatewayRequest) -> str:
+    (node_id,) = _numbers(request, 1)
+    lss.configure_node_id(
+        node_id if node_id == _UNCONFIGURED else _within(node_id, 1, _MOST_NODE_ID)
+    )
+    return _LSS_OK
+
+
+def _configure_bit_rate(lss: LssMaster, request: GatewayRequest) -> str:
+    table, index = _numbers(request, 2)
+    if table != STANDARD_TABLE or index not in BIT_RATES:
+        raise GatewayError(GatewayErrorCode.LSS_BIT_RATE, f"table {table} has no bit rate {index}")
+    lss.configure_bit_rate(BIT_RATES[index])
+    return _LSS_OK
+
+
+def _activate(lss: LssMaster, request: GatewayRequest) -> str:
+    (delay_ms,) = _numbers(request, 1)
+    lss.activate_bit_rate(_within(delay_ms, 0, _MOST_DELAY_MS))
+    return _LSS_OK
+
+
+def _store(lss: LssMaster, request: GatewayRequest) -> str:
+    _numbers(request, 0)
+    lss.store()
+    return _LSS_OK
+
+
+def _address(lss: LssMaster, request: GatewayRequest) -> str:
+    wanted = _numbers(request, 0, 1)
+    address = lss.address()
+    return f"0x{address[_within(wanted[0], 0, 3)]:08X}" if wanted else _text(address)
+
+
+def _node(lss: LssMaster, request: GatewayRequest) -> str:
+    _numbers(request, 0)
+    return f"0x{lss.node_id():02X}"
+
+
+def _scan(lss: LssMaster, request: GatewayRequest) -> str:
+    _numbers(request, 0, 1)
+    if (address := lss.fastscan()) is None:
+        raise GatewayError(GatewayErrorCode.TIME_OUT, "no slave is without a node-ID")
+    return _text(address)
+
+
+def _all_nodes(lss: LssMaster, request: GatewayRequest) -> str:
+    """Give each slave without a node-ID one; what a slave was given stands in front of OK."""
+    words = _numbers(request, 0, 3)
+    if len(words) == 2:
+        raise GatewayError(
+            GatewayErrorCode.SYNTAX, "with the first node stands 0 or 1: store or not"
+        )
+    (node_id, store), said = words[1:] or (2, 1), list[str]()
+    with lss.at_work():
+        while (address := lss.fastscan()) is not None:
+            lss.configure_node_id(_within(node_id, 1, _MOST_NODE_ID))
+            if store:
+                lss.store()
+            lss.switch_all(LssMode.WAITING)
+            said.append(f"# Node-ID {node_id} assigned to: {_text(address)}")
+            node_id += 1
+    return "\n".join([*said, _LSS_OK])
+
+
+_CARRIED_OUT: Final[dict[str, Callable[[LssMaster, GatewayRequest], str]]] = {
+    "lss_switch_glob": _switch_all,
+    "lss_switch_sel": _select,
+    "lss_set_node": _set_node,
+    "lss_conf_bitrate": _configure_bit_rate,
+    "lss_activate_bitrate": _activate,
+    "lss_store": _store,
+    "lss_inquire_addr": _address,
+    "lss_get_node": _node,
+    "_lss_fastscan": _scan,
+    "lss_allnodes": _all_nodes,
+}
+LSS_VERBS: Final = tuple(_CARRIED_OUT)
+
+
+def _numbers(request: GatewayRequest, least: int, most: int | None = None) -> tuple[int, ...]:
+    _check_count(request, least, least if most is None else most)
+    return tuple(number(word, _MOST, "number") for word in request.words)
+
+
+def _within(value: int, least: int, most: int) -> int:
+    if not least <= value <= most:
+        raise GatewayError(GatewayErrorCode.SYNTAX, f"{value} is not {least}..{most}")
+    return value
+
+
+def _text(address: LssAddress) -> str:
+    return " ".join(f"0x{part:08X}" for part in address)
+
+
+OK: Final = "OK"
+_NODES: Final = 127
+_MOST_TIMEOUT_MS: Final = 0xFFFF
+_NMT_VERBS: Final = {
+    "start": NmtCommand.START,
+    "stop": NmtCommand.STOP,
+    "preop": NmtCommand.ENTER_PRE_OPERATIONAL,
+    "preoperational": NmtCommand.ENTER_PRE_OPERATIONAL,
+}
+_RESETS: Final = {
+    "node": NmtCommand.RESET_NODE,
+    "comm": NmtCommand.RESET_COMMUNICATION,
+    "communication": NmtCommand.RESET_COMMUNICATION,
+}
+_SETTINGS: Final = ("network", "node", "sdo_timeout")
+_HELP: Final = """\
+[SEQUENCE] [[NET] NODE] r[ead] INDEX SUBINDEX [TYPE]
+[SEQUENCE] [[NET] NODE] w[rite] INDEX SUBINDEX TYPE VALUE
+[SEQUENCE] [[NET] NODE] start | stop | preop[erational]   NODE 0: all
+[SEQUENCE] [[NET] NODE] reset node | comm[unication]
+[SEQUENCE] [NET] set network | node | sdo_timeout VALUE   ms
+[SEQUENCE] info version
+[SEQUENCE] help [datatype | lss]
+Answers: [SEQUENCE] OK | VALUE | ERROR:CODE #TEXT
+Numbers are decimal, or hexadecimal as 0x1017. What follows # is a comment."""
+_TYPES_HELP: Final = f"""\
+{" ".join(_NAMES)}
+b: 0 or 1; i, u: integers; x: the same as u, shown hexadecimal; r: reals
+vs: visible string, in double quotes; os, us, d: base64; hex: bytes as 01 AB"""
+
+
+class Gateway:
+    """Answers the lines of one client; its settings are its own.
+
+    Not emulated: PDO and emergency commands, device commands such as `set heartbeat`, events
+    that nobody asked for, SDO block transfer.
+
+    Args:
+        bus: the net.
+        net: its number.
+        version: of the gateway, for `info version`.
+    """
+
+    def __init__(self, bus: NodeBus, net: int, version: str) -> None:
+        self._bus, self._net, self._version = bus, net, version
+        self._node: int | None = None
+        self._timeout_us = 500_000
+        self._verbs: Mapping[str, Callable[[GatewayRequest], str]] = {
+            **dict.fromkeys(LSS_VERBS, self._lss),
+            **dict.fromkeys(("r", "read"), self._read),
+            **dict.fromkeys(("w", "write"), self._write),
+            **dict.fromkeys((*_NMT_VERBS, "reset"), self._command),
+            "set": self._set,
+            "info": self._info,
+            "help": self._help,
+        }
+
+    def answer(self, line: str) -> str:
+        """Answer a line; what comes has no end of line. Empty for an empty line and a comment."""
+        try:
+            request = parse_request(line)
+            return "" if request is None else _numbered(request, self._carry_out(request))
+        except GatewayError as error:
+            reason = f"{error.code} #{error}"
+        except SdoAborted as error:
+            reason = f"0x{error.code:08X} #{describe_abort(error.code)}"
+        except SdoTimeout:
+            reason = f"0x{AbortCode.TIMEOUT:08X} #no answer within {self._timeout_us // 1_000} ms"
+        except LinkClosed as error:
+            reason = f"{GatewayErrorCode.LOST_CONNECTION} #{error}"
+        return f"[{_sequence_of(line)}] ERROR:{' '.join(reason.split())}"
+
+    def _carry_out(self, request: GatewayRequest) -> str:
+        verb = self._verbs.get(request.verb)
+        if verb is None:
+            raise GatewayError(GatewayErrorCode.NOT_SUPPORTED, f"{request.verb!r} is not supported")
+        return verb(request)
+
+    def _node_of(self, request: GatewayRequest, least: int) -> int:
+        """Return the node that a command is for; 0 is all of them."""
+        *net, node = request.numbers or (-1,)
+        self._check_net(net)
+        if node == -1:
+            if self._node is None:
+                raise GatewayError(GatewayErrorCode.NO_DEFAULT_NODE)
+            return self._node
+        if not least <= node <= _NODES:
+            text = f"node {node} is not {least}..{_NODES}"
+            raise GatewayError(GatewayErrorCode.UNSUPPORTED_NODE, text)
+        return node
+
+    def _check_net(self, net: list[int]) -> None:
+        if net and net[0] != self._net:
+            text = f"there is no net {net[0]}, this one is {self._net}"
+            raise GatewayError(GatewayErrorCode.UNSUPPORTED_NET, text)
+
+    def _read(self, request: GatewayRequest) -> str:
+        node = self._node_of(request, 1)
+        _check_count(request, 2, 3)
+        index, sub = _object(request)
+        name = _data_type(request.words[2]) if len(request.words) > 2 else ""
+        return decode(name, self._bus.run(node, upload(index, sub), self._timeout_us))
+
+    def _write(self, request: GatewayRequest) -> str:
+        node = self._node_of(request, 1)
+        _check_count(request, 4, None)
+        index, sub = _object(request)
+        data = encode(_data_type(request.words[2]), request.words[3:])
+        self._bus.run(node, download(index, sub, data), self._timeout_us)
+        return OK
+
+    def _command(self, request: GatewayRequest) -> str:
+        node = self._node_of(request, 0)
+        if request.verb == "reset":
+            _check_count(request, 1, 1)
+            command = _RESETS[_one_of(request.words[0], _RESETS, "reset")]
+        else:
+            _check_count(request, 0, 0)
+            command = _NMT_VERBS[request.verb]
+        self._bus.command(command, node)
+        return OK
+
+    def _lss(self, request: GatewayRequest) -> str:
+        self._check_net(list(request.numbers))
+        return carry_out(self._bus, request)
+
+    def _set(self, request: GatewayRequest) -> str:
+        self._check_net(list(request.numbers))
+        _check_count(request, 1, None)
+        if (name := request.words[0].lower()) not in _SETTINGS:
+            raise GatewayError(GatewayErrorCode.NOT_SUPPORTED, f"set {name!r} is not supported")
+        _check_count(request, 2, 2)
+        value = request.words[1]
+        match name:
+            case "network":
+                self._check_net([number(value, 0xFFFF, "net")])
+            case "node":
+                self._node = number(value, _NODES, "node", 1)
+            case _:
+                self._timeout_us = 1_000 * number(value, _MOST_TIMEOUT_MS, "time-out", 1)
+        return OK
+
+    def _info(self, request: GatewayRequest) -> str:
+        """Say vendor-ID, product code, revision, serial number, class, protocol, version."""
+        _check_count(request, 1, 1)
+        _one_of(request.words[0], ("version",), "info")
+        return f"0x00000000 0x00000000 0.0 0 0 3.0 {self._version}"
+
+    def _help(self, request: GatewayRequest) -> str:
+        _check_count(request, 0, 1)
+        what = _one_of(request.words[0], ("datatype", "lss"), "help") if request.words else ""
+        text = {"": _HELP, "datatype": _TYPES_HELP, "lss": _LSS_HELP}[what]
+        return "\n" + text
+
+
+def _numbered(request: GatewayRequest, text: str) -> str:
+    """Return an answer with its number; remarks stand in lines of their own before it."""
+    remarks, end, value = text.rpartition("\n") if text.startswith("#") else ("", "", text)
+    return f"{remarks}{end}[{request.sequence}] {value}"
+
+
+def _object(request: GatewayRequest) -> tuple[int, int]:
+    index, sub, *_ = request.words
+    return number(index, 0xFFFF, "index"), number(sub, 0xFF, "sub-index")

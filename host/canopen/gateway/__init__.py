@@ -1,1 +1,0 @@
-"""A gateway to CANopen in lines of text: CiA 309-3, ASCII mapping."""

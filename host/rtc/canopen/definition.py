@@ -1,0 +1,309 @@
+"""System Definitions: what the server is told, and what it takes from an EDS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+from tickrig.host.canopen.eds import read_sound
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_file import EdsError, Finding
+from tickrig.wire.canopen.pdo import MappedObject
+from tickrig.wire.rtc_canopen import PortDirection
+
+if TYPE_CHECKING:
+    pass
+
+
+# What RTC-CANopen raises where a person is to read it.
+#
+# DefinitionError (ValueError)    a System Definition that cannot be used
+# ServerRefused (ValueError)      a command to the server that cannot be
+
+
+class DefinitionError(ValueError):
+    """A System Definition that cannot be used.
+
+    Attributes:
+        line: where, counted from 1; 0 if it is nowhere in the text.
+    """
+
+    def __init__(self, message: str, line: int = 0) -> None:
+        super().__init__(f"line {line}: {message}" if line else message)
+        self.line = line
+
+
+class ServerRefused(ValueError):  # noqa: N818 - what the server did
+    """A command to the server that cannot be."""
+
+
+# A System Definition: nodes of a bus, and what joins them (NEDO report, Fig. 108; ours: K16).
+
+PDO_COUNT: Final = 512
+"""PDOs in each direction (CiA 301, object dictionary: 1400h to 15FFh, 1800h to 19FFh)."""
+
+
+class Role(StrEnum):
+    """What a node is to its proxy."""
+
+    DEVICE_RTC = "device_rtc"
+    DEVICE = "device"  # off-the-shelf, CiA 301 alone
+    DRIVE = "drive"  # CiA 402
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class PdoName:
+    """A PDO of a node: `16.tpdo2`.
+
+    Attributes:
+        node: node-ID.
+        pdo: `tpdo1`.. or `rpdo1`.., as the device has it.
+    """
+
+    node: int
+    pdo: str
+
+    def __str__(self) -> str:
+        """Write it as a System Definition does."""
+        return f"{self.node}.{self.pdo}"
+
+    @property
+    def index(self) -> int:
+        """The communication parameter: 1400h for `rpdo1`, 1801h for `tpdo2`."""
+        return (0x1800 if self.pdo[0] == "t" else 0x1400) + int(self.pdo[4:]) - 1
+
+
+@dataclass(frozen=True, slots=True)
+class BusEntry:
+    """Which bus, in python-can's words; None leaves it to the command line."""
+
+    channel: str | None = None
+    interface: str | None = None
+    bitrate: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MasterEntry:
+    """The server as a node.
+
+    Attributes:
+        node: its node-ID.
+        heartbeat_ms: its producer heartbeat time, 0 for none.
+        rate_hz: of the execution context of the proxies.
+        remove_after_ms: after how long without a sign of life a proxy is removed.
+        reconnect: whether a proxy that comes back has its connections again.
+        leave: what the server leaves the nodes in: `pre_operational` or `stopped`.
+        sync_ms: communication cycle period, 0 for no SYNC.
+    """
+
+    node: int = 127
+    heartbeat_ms: int = 100
+    rate_hz: float = 100.0
+    remove_after_ms: int = field(default=1_000, metadata={"key": "remove_ms"})
+    reconnect: bool = True
+    leave: str = "pre_operational"
+    sync_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PdoEntry:
+    """Parameters that the server writes into a PDO; None leaves what the device has.
+
+    Attributes:
+        mapping: the objects in it.
+        cob_id: its COB-ID.
+        type: transmission type.
+        inhibit_100us: inhibit time in 100 us.
+        event_ms: event timer.
+    """
+
+    mapping: tuple[MappedObject, ...] | None = None
+    cob_id: int | None = None
+    type: int | None = None
+    inhibit_100us: int | None = None
+    event_ms: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SdoPortEntry:
+    """A port whose object is read or written by SDO.
+
+    Attributes:
+        index: of the object; all elements of an array are one value.
+        direction: `out` gives what is read, `in` writes.
+        type: name in Table 4; None for the one of the data type in the EDS.
+    """
+
+    index: int
+    direction: PortDirection
+    type: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NodeEntry:
+    """A node.
+
+    Attributes:
+        id: node-ID.
+        name: instance name of its proxy.
+        eds: file that describes it, seen from the System Definition.
+        role: what it is.
+        heartbeat_ms: its producer heartbeat time.
+        ports: names of ports by PDO, such as `tpdo2`.
+        pdos: what is written into PDOs, by the same names.
+        restart: how often one after the other it is restarted when it was lost.
+        sdo_ports: ports beside those of PDOs, by name.
+    """
+
+    id: int
+    name: str
+    eds: str
+    role: Role = Role.DEVICE_RTC
+    heartbeat_ms: int = 100
+    ports: Mapping[str, str] = field(default_factory=dict)
+    pdos: Mapping[str, PdoEntry] = field(default_factory=dict)
+    restart: int = 0
+    sdo_ports: Mapping[str, SdoPortEntry] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SdoEntry:
+    """A value that is written while its node boots.
+
+    Attributes:
+        size: bytes: 1, 2, 4 or 8.
+    """
+
+    node: int
+    index: int
+    sub: int
+    value: int
+    size: int
+
+    @property
+    def data(self) -> bytes:
+        """The bytes that are written."""
+        return self.value.to_bytes(self.size, "little", signed=self.value < 0)
+
+
+@dataclass(frozen=True, slots=True)
+class PdoLink:
+    """A TPDO that an RPDO of another node receives without the PC."""
+
+    source: PdoName
+    target: PdoName
+
+
+@dataclass(frozen=True, slots=True)
+class RtConnection:
+    """Ports that are joined through the PC, such as `Palette0.ai` and `Logger0.in`."""
+
+    source: str
+    target: str
+    properties: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class StartEntry:
+    """In which order nodes are activated, and whether by themselves.
+
+    Attributes:
+        order: node-IDs; those that are left out follow in the order of the nodes.
+        autoactivate: activate a node when it is ready and all before it are Active.
+    """
+
+    order: tuple[int, ...] = ()
+    autoactivate: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SystemDefinition:
+    """All that the server is told."""
+
+    nodes: tuple[NodeEntry, ...]
+    bus: BusEntry = BusEntry()
+    master: MasterEntry = MasterEntry()
+    sdo: tuple[SdoEntry, ...] = ()
+    pdo_links: tuple[PdoLink, ...] = ()
+    rt_connections: tuple[RtConnection, ...] = ()
+    start: StartEntry = StartEntry()
+
+    @property
+    def start_order(self) -> tuple[int, ...]:
+        """Node-IDs of all nodes in the order in which they are activated."""
+        ids = (node.id for node in self.nodes)
+        return tuple(dict.fromkeys((*self.start.order, *ids)))
+
+    @property
+    def named_pdos(self) -> Iterator[PdoName]:
+        """PDOs that are given a port name, parameters or a link."""
+        for node in self.nodes:
+            for name in (*node.ports, *node.pdos):
+                yield PdoName(node.id, name)
+        for link in self.pdo_links:
+            yield from (link.source, link.target)
+
+
+_IDENTITY: Final = ((0x1000, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3))
+"""Device type, vendor-ID, product code, revision number; the serial number is of one device."""
+
+_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
+_RPDOS: Final = range(0x1400, 0x1600)
+TPDOS: Final = range(0x1800, 0x1A00)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFile:
+    """A kind of device.
+
+    Attributes:
+        identity: values of `_IDENTITY` that the file gives.
+        defaults: bytes of the power-on values that it gives; a node-ID is not added.
+        data_types: data type by index and sub-index.
+        pdos: communication parameters that it has.
+        relative: those of `defaults` to which a device adds its node-ID.
+        findings: what is wrong in the file, whose objects are then not used.
+    """
+
+    identity: Mapping[tuple[int, int], int]
+    data_types: Mapping[tuple[int, int], int]
+    pdos: tuple[int, ...]
+    defaults: Mapping[tuple[int, int], bytes]
+    relative: frozenset[tuple[int, int]] = frozenset()
+    findings: tuple[Finding, ...] = ()
+
+
+def read_device_file(path: Path) -> DeviceFile:
+    """Read an EDS, DCF, XDD or XDC.
+
+    Raises:
+        DefinitionError: it cannot be read.
+    """
+    device, findings = _read(path)
+    defaults = {
+        (row.index, row.sub): row.default
+        for row in device.entries
+        if row.has_default and row.data_type.is_integer
+    }
+    return DeviceFile(
+        {key: int.from_bytes(defaults[key], "little") for key in _IDENTITY if key in defaults},
+        {(row.index, row.sub): row.data_type for row in device.entries},
+        tuple(index for index in device.objects if index in _RPDOS or index in TPDOS),
+        defaults,
+        frozenset((row.index, row.sub) for row in device.entries if row.relative),
+        findings,
+    )
+
+
+def _read(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
+    if path.suffix.lower() not in _ENDINGS:
+        raise DefinitionError(f"{path}: the name does not end in {', '.join(_ENDINGS)}")
+    try:
+        return read_sound(path)
+    except OSError as error:
+        raise DefinitionError(f"{path}: {error.strerror}") from error
+    except EdsError as error:
+        raise DefinitionError(str(error)) from error

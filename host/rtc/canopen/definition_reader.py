@@ -1,0 +1,426 @@
+r"""Read a System Definition (ours: K16); YAML, so JSON is read as well.
+
+YAML that says in which line it is wrong.
+
+>>> node = _compose("a: 0x10\nb: [1, x]")
+>>> _read_table(node, "file", {"a": whole(0, 99), "b": many(whole(0, 9))})
+Traceback (most recent call last):
+    ...
+tickrig.host.rtc.canopen.definition.DefinitionError: line 2: b: 'x' is not a whole number in 0..9
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+import yaml
+
+from tickrig.host.rtc.canopen.definition import (
+    PDO_COUNT,
+    BusEntry,
+    DefinitionError,
+    MasterEntry,
+    NodeEntry,
+    PdoEntry,
+    PdoLink,
+    PdoName,
+    Role,
+    RtConnection,
+    SdoEntry,
+    SdoPortEntry,
+    StartEntry,
+    SystemDefinition,
+)
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
+from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
+
+_Reader = Callable[[yaml.Node, str], Any]
+"""Reads a node of the tree; the text says what it is of, for people."""
+
+
+def _compose(text: str) -> yaml.Node:
+    """Read a text into its tree; DefinitionError if it is no YAML, or empty."""
+    try:
+        root = yaml.compose(text, yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        raise DefinitionError(f"not YAML: {error.problem}", mark.line + 1 if mark else 0) from error
+    except yaml.YAMLError as error:
+        raise DefinitionError(f"not YAML: {' '.join(str(error).split())}") from error
+    except RecursionError:
+        raise DefinitionError("not YAML that can be read: lists or tables nest too deep") from None
+    if root is None:
+        raise DefinitionError("the file is empty", 1)
+    return root
+
+
+def _refuse(node: yaml.Node, message: str) -> NoReturn:
+    """Raise a DefinitionError with the line of a node."""
+    raise DefinitionError(message, node.start_mark.line + 1)
+
+
+def _read_table(
+    node: yaml.Node, place: str, fields: Mapping[str, _Reader], needed: Collection[str] = ()
+) -> dict[str, Any]:
+    """Read a mapping whose keys are known."""
+    nodes = _children(node, place)
+    for key, (key_node, _) in nodes.items():
+        if key not in fields:
+            _refuse(key_node, f"{place}: {key!r} is none of: {', '.join(fields)}")
+    for key in needed:
+        if key not in nodes:
+            _refuse(node, f"{place} has no {key!r}")
+    return {key: fields[key](value, key) for key, (_, value) in nodes.items()}
+
+
+def _children(node: yaml.Node, place: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
+    """Return keys and values of a mapping by the text of the key."""
+    if not isinstance(node, yaml.MappingNode):
+        _refuse(node, f"{place} is written 'key: value', this is not")
+    nodes: dict[str, tuple[yaml.Node, yaml.Node]] = {}
+    for key_node, value in node.value:
+        key = str(key_node.value)
+        if key in nodes:
+            _refuse(key_node, f"{place}: {key!r} is there twice")
+        nodes[key] = (key_node, value)
+    return nodes
+
+
+def table(fields: Mapping[str, _Reader], *needed: str) -> _Reader:
+    """Read a mapping whose keys are known."""
+    return lambda node, place: _read_table(node, place, fields, needed)
+
+
+def mapping(key: Callable[[yaml.Node, str], str], value: _Reader) -> _Reader:
+    """Read a mapping with checked keys."""
+
+    def read(node: yaml.Node, place: str) -> dict[str, Any]:
+        return {
+            key(key_node, place): value(child, f"{place}.{name}")
+            for name, (key_node, child) in _children(node, place).items()
+        }
+
+    return read
+
+
+def many(item: _Reader) -> _Reader:
+    """Read a list."""
+
+    def read(node: yaml.Node, place: str) -> tuple[Any, ...]:
+        if not isinstance(node, yaml.SequenceNode):
+            _refuse(node, f"{place} is a list, this is not")
+        return tuple(item(child, place) for child in node.value)
+
+    return read
+
+
+def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
+    """Read a list whose items differ in the text that `twice` makes of each: `node 5 is there`."""
+
+    def read(node: yaml.Node, place: str) -> tuple[Any, ...]:
+        seen: set[str] = set()
+
+        def unlike(child: yaml.Node, place: str) -> Any:
+            value = item(child, place)
+            if (words := twice(value)) in seen:
+                _refuse(child, f"{place}: {words} twice")
+            seen.add(words)
+            return value
+
+        values: tuple[Any, ...] = many(unlike)(node, place)
+        return values
+
+    return read
+
+
+def whole(low: int, high: int) -> _Reader:
+    """Read a whole number of a range, decimal or 0x.."""
+
+    def read(node: yaml.Node, place: str) -> int:
+        value = plain(node)
+        if type(value) is not int or not low <= value <= high:
+            _refuse(node, f"{place}: {value!r} is not a whole number in {low}..{high}")
+        return value
+
+    return read
+
+
+def rate(node: yaml.Node, place: str) -> float:
+    """Read a number of Hz, above 0 and up to 1 kHz."""
+    value = plain(node)
+    if type(value) not in (int, float) or not 0 < value <= 1_000:
+        _refuse(node, f"{place}: {value!r} is not a number with 0 < {place} <= 1000")
+    return float(value)
+
+
+def _flag(node: yaml.Node, place: str) -> bool:
+    """Read true or false."""
+    value = plain(node)
+    if type(value) is not bool:
+        _refuse(node, f"{place}: {value!r} is not true or false")
+    return value
+
+
+def text(node: yaml.Node, place: str) -> str:
+    """Read a text, quoted or not."""
+    if not isinstance(node, yaml.ScalarNode) or not node.value:
+        _refuse(node, f"{place} is a text, this is not")
+    return str(node.value)
+
+
+def _matching(pattern: re.Pattern[str], like: str) -> Callable[[yaml.Node, str], str]:
+    """Read a text of a pattern; `like` shows one to people."""
+
+    def read(node: yaml.Node, place: str) -> str:
+        value = text(node, place)
+        if pattern.fullmatch(value) is None:
+            _refuse(node, f"{place}: {value!r} is not like {like}")
+        return value
+
+    return read
+
+
+def _one_of(*words: str) -> _Reader:
+    """Read one of some words."""
+
+    def read(node: yaml.Node, place: str) -> str:
+        if (value := text(node, place)) not in words:
+            _refuse(node, f"{place}: {value!r} is none of: {', '.join(words)}")
+        return value
+
+    return read
+
+
+def plain(node: yaml.Node) -> Any:
+    """Return what YAML makes of a scalar; of anything else, what it is called."""
+    if not isinstance(node, yaml.ScalarNode):
+        return "a list" if isinstance(node, yaml.SequenceNode) else "a table"
+    try:
+        return yaml.SafeLoader("").construct_object(node)
+    except (yaml.YAMLError, ValueError):  # a date that is none, say
+        return node.value
+
+
+_LEAVE: Final = ("pre_operational", "stopped")
+_SIZES: Final = (1, 2, 4, 8)
+
+_U8: Final = whole(0, 0xFF)
+_U16: Final = whole(0, 0xFFFF)
+_NODE_ID: Final = whole(1, 127)
+_NAME: Final = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+_PDO: Final = re.compile(r"[tr]pdo[1-9][0-9]{0,2}", re.ASCII)
+_NODE_PDO: Final = re.compile(r"([1-9][0-9]{0,2})\.([tr]pdo[1-9][0-9]{0,2})", re.ASCII)
+_PORT: Final = re.compile(r"[A-Za-z_]\w*\.\w+", re.ASCII)
+
+
+def read_definition(path: Path) -> SystemDefinition:
+    """Read a System Definition.
+
+    Raises:
+        OSError: the file cannot be read.
+        DefinitionError: it cannot be used; the line says where and why.
+    """
+    try:
+        return parse_definition(path.read_text("utf-8"))
+    except UnicodeDecodeError as error:
+        raise DefinitionError(f"{path}: byte {error.start} is not UTF-8") from error
+    except ValueError as error:
+        raise DefinitionError(f"{path}: {error}") from error
+
+
+def parse_definition(content: str) -> SystemDefinition:
+    """Read a System Definition.
+
+    Raises:
+        DefinitionError: what is wrong, with its line.
+    """
+    root = _compose(content)
+    known = _children(root, "the file")
+    ids: dict[int, NodeEntry] = {}
+    if "nodes" in known:  # first: the rest refers to them
+        for node in _read_nodes(known["nodes"][1]):
+            ids[node.id] = node
+    values = _read_table(root, "the file", _fields(ids), ("nodes",))
+    return SystemDefinition(**{**values, "nodes": tuple(ids.values())})
+
+
+def _fields(ids: Collection[int]) -> dict[str, _Reader]:
+    return {
+        "bus": _bus,
+        "master": lambda node, place: _master(node, place, ids),
+        "nodes": lambda node, place: None,
+        "sdo": many(lambda node, place: _sdo(node, place, ids)),
+        "pdo_links": once(
+            lambda node, place: _link(node, place, ids),
+            lambda link: f"{link.target} is linked",
+        ),
+        "rt_connections": many(_rt_connection),
+        "start": lambda node, place: _start(node, place, ids),
+    }
+
+
+def _bus(node: yaml.Node, place: str) -> BusEntry:
+    fields = {"channel": text, "interface": text, "bitrate": whole(1, 1_000_000)}
+    return BusEntry(**_read_table(node, place, fields))
+
+
+def _master(node: yaml.Node, place: str, ids: Collection[int]) -> MasterEntry:
+    fields: dict[str, _Reader] = {
+        "node": _NODE_ID,
+        "heartbeat_ms": _U16,
+        "sync_ms": _U16,
+        "rate_hz": rate,
+        "remove_ms": whole(0, 3_600_000),
+        "reconnect": _flag,
+        "leave": _one_of(*_LEAVE),
+    }
+    values = _read_table(node, place, fields)
+    if "remove_ms" in values:
+        values["remove_after_ms"] = values.pop("remove_ms")
+    master = MasterEntry(**values)
+    if master.node in ids:
+        _refuse(node, f"{place}: node {master.node} is one of the nodes")
+    return master
+
+
+def _read_nodes(node: yaml.Node) -> tuple[NodeEntry, ...]:
+    seen: set[int | str] = set()
+
+    def read(node: yaml.Node, place: str) -> NodeEntry:
+        entry = _node(node, "a node")
+        for word in (entry.id, entry.name):
+            if word in seen:
+                _refuse(node, f"{place}: {word} is there twice")
+            seen.add(word)
+        return entry
+
+    entries: tuple[NodeEntry, ...] = many(read)(node, "nodes")
+    return entries
+
+
+def _node(node: yaml.Node, place: str) -> NodeEntry:
+    pdo = _matching(_PDO, "tpdo2")
+    fields: dict[str, _Reader] = {
+        "id": _NODE_ID,
+        "name": _matching(_NAME, "Palette0"),
+        "eds": text,
+        "role": _one_of(*Role),
+        "heartbeat_ms": whole(1, 0xFFFF),
+        "restart": _U16,
+        "ports": _ports,
+        "pdos": mapping(pdo, _pdo),
+        "sdo_ports": mapping(_matching(_NAME, "label"), _sdo_port),
+    }
+    values = _read_table(node, place, fields, ("id", "name", "eds"))
+    if "role" in values:
+        values["role"] = Role(values["role"])
+    for name in values.get("sdo_ports", ()):
+        if name in values.get("ports", {}).values():
+            _refuse(node, f"{place}: 2 ports are called {name}")
+    for name in (*values.get("ports", ()), *values.get("pdos", ())):
+        _check_number(node, place, name)
+    return NodeEntry(**values)
+
+
+def _ports(node: yaml.Node, place: str) -> dict[str, str]:
+    names: dict[str, str] = mapping(_matching(_PDO, "tpdo2"), _matching(_NAME, "ai"))(node, place)
+    for name, count in Counter(names.values()).items():
+        if count > 1:
+            _refuse(node, f"{place}: {count} ports are called {name}")
+    return names
+
+
+def _pdo(node: yaml.Node, place: str) -> PdoEntry:
+    fields: dict[str, _Reader] = {
+        "mapping": _mapping,
+        "cob_id": whole(0x181, 0x6DF),
+        "type": _U8,
+        "inhibit_100us": _U16,
+        "event_ms": _U16,
+    }
+    return PdoEntry(**_read_table(node, place, fields))
+
+
+def _sdo_port(node: yaml.Node, place: str) -> SdoPortEntry:
+    fields: dict[str, _Reader] = {
+        "index": whole(0x1000, 0xFFFF),
+        "direction": _one_of(*(item.value for item in PortDirection)),
+        "type": _one_of(*PORT_TYPES),
+    }
+    values = _read_table(node, place, fields, ("index", "direction"))
+    return SdoPortEntry(**{**values, "direction": PortDirection(values["direction"])})
+
+
+def _mapping(node: yaml.Node, place: str) -> tuple[MappedObject, ...]:
+    entries = many(whole(0, 0xFFFF_FFFF))(node, place)
+    mapped = tuple(MappedObject.parse(entry) for entry in entries)
+    if (bits := sum(entry.bits for entry in mapped)) > MAX_PDO_BITS:
+        _refuse(node, f"{place}: {bits} bits, a PDO has {MAX_PDO_BITS}")
+    return mapped
+
+
+def _sdo(node: yaml.Node, place: str, ids: Collection[int]) -> SdoEntry:
+    fields: dict[str, _Reader] = {
+        "node": _NODE_ID,
+        "index": _U16,
+        "sub": _U8,
+        "value": whole(-(1 << 63), (1 << 64) - 1),
+        "size": whole(1, 8),
+    }
+    entry = SdoEntry(**_read_table(node, place, fields, fields))
+    _check_known(node, place, entry.node, ids)
+    if entry.size not in _SIZES:
+        _refuse(node, f"{place}: size {entry.size} is none of: 1, 2, 4, 8")
+    if not -(1 << 8 * entry.size - 1) <= entry.value < 1 << 8 * entry.size:
+        _refuse(node, f"{place}: {entry.value} does not fit into size {entry.size}")
+    return entry
+
+
+def _link(node: yaml.Node, place: str, ids: Collection[int]) -> PdoLink:
+    def end(node: yaml.Node, place: str, kind: str) -> PdoName:
+        match = _NODE_PDO.fullmatch(text(node, place))
+        if match is None or match[2][:4] != kind:
+            _refuse(node, f"{place}: {node.value!r} is not like 16.{kind}2")
+        _check_number(node, place, match[2])
+        name = PdoName(int(match[1]), match[2])
+        _check_known(node, place, name.node, ids)
+        return name
+
+    fields: dict[str, _Reader] = {
+        "from": lambda node, place: end(node, place, "tpdo"),
+        "to": lambda node, place: end(node, place, "rpdo"),
+    }
+    ends = _read_table(node, place, fields, fields)
+    return PdoLink(ends["from"], ends["to"])
+
+
+def _rt_connection(node: yaml.Node, place: str) -> RtConnection:
+    port = _matching(_PORT, "Palette0.ai")
+    properties = mapping(text, text)
+    fields: dict[str, _Reader] = {"from": port, "to": port, "properties": properties}
+    values: dict[str, Any] = _read_table(node, place, fields, ("from", "to"))
+    return RtConnection(values["from"], values["to"], values.get("properties", {}))
+
+
+def _start(node: yaml.Node, place: str, ids: Collection[int]) -> StartEntry:
+    def known(node: yaml.Node, place: str) -> int:
+        node_id: int = _NODE_ID(node, place)
+        _check_known(node, place, node_id, ids)
+        return node_id
+
+    order = once(known, lambda node_id: f"node {node_id} is there")
+    return StartEntry(**table({"order": order, "autoactivate": _flag})(node, place))
+
+
+def _check_number(node: yaml.Node, place: str, pdo: str) -> None:
+    if int(pdo[4:]) > PDO_COUNT:
+        _refuse(node, f"{place}: {pdo}, there are {PDO_COUNT} at most")
+
+
+def _check_known(node: yaml.Node, place: str, node_id: int, ids: Collection[int]) -> None:
+    if node_id not in ids:
+        _refuse(node, f"{place}: node {node_id} is none of: {', '.join(map(str, ids)) or 'none'}")

@@ -1,1 +1,0 @@
-"""One node as the server sees it: boot-up, life cycle, operations, supervision."""

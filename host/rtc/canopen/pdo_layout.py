@@ -1,0 +1,201 @@
+"""A PDO of a device as its proxy has it (NEDO report, Fig. 109, Table 4; ours: K5).
+
+A PDO has room for one 64-bit value: those have no sequence there. INTEGER8, which RTC
+has not, is a short. UNICODE_STRING of 16 bits is a wide character. The canopen library
+reads A0h, VISIBLE_CHAR, as DOMAIN; no other DOMAIN has 8 bits.
+
+>>> PDO_FIELD_TYPES[DataType.INTEGER16, 16].decode(0xFFFE)
+-2
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from tickrig.host.rtc.canopen.definition import TPDOS
+from tickrig.wire import rtc_canopen as table_4
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
+from tickrig.wire.rtc_types import basic
+from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.long_long import (
+    TimedLongLong,
+    TimedLongLongSeq,
+    TimedULongLong,
+    TimedULongLongSeq,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PdoFieldType:
+    """How objects of a data type are seen at ports.
+
+    Attributes:
+        row: of Table 4.
+        one: of a port for one object.
+        many: of a port for several, None if two do not fit into a PDO.
+        bits: of one object in a PDO.
+    """
+
+    row: table_4.CanopenPortType[Any]
+    one: type[Struct]
+    many: type[Struct] | None
+    bits: int
+
+    def decode(self, number: int) -> Value:
+        """Return the value that these bits are."""
+        value: Value = self.row.decode([number.to_bytes((self.bits + 7) // 8, "little")])
+        return value
+
+    def encode(self, value: Value) -> int:
+        """Return the bits; FieldError if the value does not fit."""
+        return int.from_bytes(self.row.encode(value)[0], "little")
+
+
+PORT_KINDS: Final = (
+    (table_4.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq),
+    (table_4.CHARACTER, basic.TimedChar, basic.TimedCharSeq),
+    (table_4.WIDE_CHARACTER, basic.TimedWChar, basic.TimedWCharSeq),
+    (table_4.STRING, basic.TimedString, basic.TimedStringSeq),
+    (table_4.WIDE_STRING, basic.TimedWString, basic.TimedWStringSeq),
+    (table_4.OCTET, basic.TimedOctet, basic.TimedOctetSeq),
+    (table_4.integer(8), basic.TimedShort, basic.TimedShortSeq),
+    (table_4.SHORT, basic.TimedShort, basic.TimedShortSeq),
+    (table_4.UNSIGNED_SHORT, basic.TimedUShort, basic.TimedUShortSeq),
+    (table_4.LONG, basic.TimedLong, basic.TimedLongSeq),
+    (table_4.UNSIGNED_LONG, basic.TimedULong, basic.TimedULongSeq),
+    (table_4.FLOAT, basic.TimedFloat, basic.TimedFloatSeq),
+    (table_4.DOUBLE, basic.TimedDouble, basic.TimedDoubleSeq),
+    (table_4.UNSIGNED_LONG_LONG, TimedULongLong, TimedULongLongSeq),
+    (table_4.LONG_LONG, TimedLongLong, TimedLongLongSeq),
+)
+"""Rows of Table 4, each with the struct of one value and that of several."""
+
+
+def _field_type(
+    row: table_4.CanopenPortType[Any], one: type[Struct], many: type[Struct], bits: int = 0
+) -> PdoFieldType:
+    bits = bits or row.element_bits
+    return PdoFieldType(row, one, many if 2 * bits <= MAX_PDO_BITS else None, bits)
+
+
+_BOOLEAN, _CHARACTER = PORT_KINDS[0], PORT_KINDS[1]
+
+PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], PdoFieldType]] = {
+    **{
+        (row.data_type, row.element_bits): _field_type(row, one, many)
+        for row, one, many in PORT_KINDS
+        if row.element_bits
+    },
+    (DataType.BOOLEAN, 8): _field_type(*_BOOLEAN, 8),
+    (DataType.DOMAIN, 8): _field_type(*_CHARACTER),
+}
+"""By data type and bits in the PDO; strings are not among them."""
+
+
+def sequence_of(kind: type[Any], tm: basic.Time, values: tuple[Value, ...]) -> Struct:
+    """Return a struct with several values."""
+    if isinstance(kind().data, bytes):
+        return kind(tm, bytes(map(int, values)))  # type: ignore[no-any-return]
+    return kind(tm, values)  # type: ignore[no-any-return]
+
+
+_PAIR = 0x400
+"""The proxy of a TPDO is an RPDO 400h below, that of an RPDO a TPDO 400h above."""
+
+PARAMETERS = 0x200
+"""From a communication parameter to its mapping parameter."""
+
+
+def proxy_index(index: int) -> int:
+    """Return the index that an object of a device's PDO has in its proxy.
+
+    >>> f"{proxy_index(0x1801):04X}h {proxy_index(0x1A01):04X}h {proxy_index(0x1400):04X}h"
+    '1401h 1601h 1800h'
+    """
+    return index - _PAIR if index >= TPDOS.start else index + _PAIR
+
+
+@dataclass(frozen=True, slots=True)
+class PdoField:
+    """A mapped object.
+
+    Attributes:
+        shift: bits before it in the PDO.
+        type: how it is seen at a port.
+    """
+
+    mapped: MappedObject
+    shift: int
+    type: PdoFieldType
+
+
+@dataclass(frozen=True)
+class PdoLayout:
+    """What a PDO carries.
+
+    Attributes:
+        index: communication parameter in the device.
+        cob_id: CAN-ID.
+        fields: the mapped objects, without dummies.
+        bits: length of the PDO.
+        unknown: mapped objects of a type that no port has; no ports are made then.
+    """
+
+    index: int
+    cob_id: int
+    fields: tuple[PdoField, ...]
+    bits: int
+    unknown: tuple[MappedObject, ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        """What a System Definition calls it: `tpdo1`."""
+        kind = "t" if self.sends else "r"
+        return f"{kind}pdo{(self.index & 0x1FF) + 1}"
+
+    @property
+    def sends(self) -> bool:
+        """Whether the device sends it."""
+        return self.index in TPDOS
+
+    @property
+    def size(self) -> int:
+        """Bytes in a frame."""
+        return (self.bits + 7) // 8
+
+    def decode(self, data: bytes) -> tuple[Value, ...]:
+        """Return the values in a frame of at least `size` bytes."""
+        number = int.from_bytes(data, "little")
+        return tuple(
+            field.type.decode(number >> field.shift & (1 << field.type.bits) - 1)
+            for field in self.fields
+        )
+
+    def encode(self, values: tuple[Value, ...]) -> bytes:
+        """Return the data of a frame; ValueError if a value does not fit."""
+        number = 0
+        for item, value in zip(self.fields, values, strict=True):
+            number |= item.type.encode(value) << item.shift
+        return number.to_bytes(self.size, "little")
+
+
+def lay_out(
+    index: int,
+    cob_id: int,
+    mapping: tuple[MappedObject, ...],
+    data_types: Mapping[tuple[int, int], int],
+) -> PdoLayout:
+    """Lay a PDO out by its mapping; objects below 20h are dummies, which nobody sees."""
+    fields, unknown, shift = list[PdoField](), list[MappedObject](), 0
+    for mapped in mapping:
+        data_type = data_types.get((mapped.index, mapped.sub), 0)
+        if (kind := PDO_FIELD_TYPES.get((data_type, mapped.bits))) is not None:
+            fields.append(PdoField(mapped, shift, kind))
+        elif mapped.index >= 0x20:
+            unknown.append(mapped)
+        shift += mapped.bits
+    real = tuple(item for item in fields if item.mapped.index >= 0x20)
+    return PdoLayout(index, cob_id, real, shift, tuple(unknown))

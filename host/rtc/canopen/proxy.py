@@ -1,0 +1,409 @@
+"""ProxyRTC: a CANopen device as an RT component (NEDO report, Figs. 108 and 109)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import Any, Final, TypeVar
+
+from tickrig.host.canopen.dialogue import Script
+from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry
+from tickrig.host.rtc.canopen.pdo_decoder import pdo_decoder
+from tickrig.host.rtc.canopen.pdo_layout import PORT_KINDS, PdoField, PdoLayout, sequence_of
+from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.ports.data_port import InPort, OutPort
+from tickrig.host.rtc.states import LifeCycleState, ReturnCode
+from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.rtc_canopen import (
+    MOST_ELEMENTS,
+    WIDE_CHARACTER,
+    CanopenPortType,
+    PortDirection,
+    PortTransport,
+)
+from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.idl import Struct
+
+# Ports of a PDO (ours: K2, K3, K4).
+
+
+class PortShape:
+    """The ports of a PDO: one for all its objects, or one for each if their types differ.
+
+    Args:
+        layout: the PDO.
+        name: of the port, or what those of single objects begin with.
+
+    Attributes:
+        names: of the ports.
+        types: what each carries.
+        single: whether one port has all objects as a sequence.
+    """
+
+    def __init__(self, layout: PdoLayout, name: str) -> None:
+        fields = layout.fields
+        kinds = {field.type.one for field in fields}
+        many = fields[0].type.many if len(kinds) == 1 and len(fields) > 1 else None
+        self.single = many is not None
+        self.names: tuple[str, ...] = (name,)
+        self.types: tuple[type[Struct], ...] = ()
+        if many is not None:
+            self.types = (many,)
+        elif len(fields) == 1:
+            self.types = (fields[0].type.one,)
+        else:
+            self.names = tuple(f"{name}_{_suffix(field)}" for field in fields)
+            self.types = tuple(field.type.one for field in fields)
+
+
+class PdoSource:
+    """A TPDO of the device: each frame is written to its OutPorts.
+
+    Attributes:
+        layout: the PDO.
+        size: bytes that a frame has at least.
+        ports: the OutPorts.
+    """
+
+    def __init__(self, layout: PdoLayout, name: str) -> None:
+        shape = PortShape(layout, name)
+        self.layout, self.size, self._single = layout, layout.size, shape.single
+        self._decode = pdo_decoder(layout)
+        self.ports = tuple(
+            OutPort[Any](port, kind) for port, kind in zip(shape.names, shape.types, strict=True)
+        )
+
+    def receive(self, now_us: int, data: bytes) -> None:
+        """Write what a frame carries; its time stamp is that of reception."""
+        tm, values = Time.from_us(now_us), self._decode(data)
+        if self._single:
+            (port,) = self.ports
+            if port.connectors:
+                port.write(sequence_of(port.data_type, tm, values))
+            return
+        for port, value in zip(self.ports, values, strict=True):
+            if port.connectors:
+                port.write(port.data_type(tm, value))
+
+
+class PdoSink:
+    """An RPDO of the device: each value that comes to an InPort is one frame.
+
+    Where objects have ports of their own, the others are sent as they were last.
+
+    Attributes:
+        layout: the PDO.
+        ports: the InPorts.
+        linked: another device sends this PDO; nothing is sent from here.
+    """
+
+    def __init__(self, layout: PdoLayout, name: str) -> None:
+        shape = PortShape(layout, name)
+        self.layout, self._shape, self.linked = layout, shape, False
+        self.ports = tuple(
+            InPort[Any](port, kind) for port, kind in zip(shape.names, shape.types, strict=True)
+        )
+        self._latest: list[Value] = [field.type.decode(0) for field in layout.fields]
+
+    def preset(self, index: int, value: Value) -> None:
+        """Let an object without a new value be sent as this one."""
+        for place, field in enumerate(self.layout.fields):
+            if field.mapped.index == index:
+                self._latest[place] = value
+
+    def clear(self) -> None:
+        """Drop what has not been sent."""
+        for port in self.ports:
+            port.clear()
+
+    def take(self) -> Iterator[tuple[str, Struct]]:
+        """Take all new values, each with the name of its port."""
+        for port in self.ports:
+            while port.is_new:
+                value = port.read()
+                assert isinstance(value, port.data_type)
+                yield port.name, value
+
+    def encode(self, port: str, value: Struct) -> bytes:
+        """Return the data of the frame that a value makes; ValueError if it does not fit."""
+        data: Any = getattr(value, "data", None)
+        if not self._shape.single:
+            latest = list(self._latest)
+            latest[self._shape.names.index(port)] = data
+        elif len(data) != len(self._latest):
+            raise ValueError(f"{len(data)} values, {self.layout.name} has {len(self._latest)}")
+        else:
+            latest = list(data)
+        encoded = self.layout.encode(tuple(latest))
+        self._latest = latest
+        return encoded
+
+
+def _suffix(field: PdoField) -> str:
+    return f"{field.mapped.index:04X}_{field.mapped.sub:02X}"
+
+
+# Ports that SDO carries: texts, and what is wider than a PDO (ours: K5).
+
+T = TypeVar("T", bound=Struct)
+
+_TRANSPORT: Final = {"transport": PortTransport.SDO.value}
+"""What the profile of such a port says beside what all ports say."""
+
+
+class _SdoOutPort(OutPort[T]):
+    """An OutPort that says in its profile what carries it."""
+
+    def _properties(self) -> Mapping[str, str]:
+        return {**super()._properties(), **_TRANSPORT}
+
+
+class _SdoInPort(InPort[T]):
+    """An InPort that says in its profile what carries it."""
+
+    def _properties(self) -> Mapping[str, str]:
+        return {**super()._properties(), **_TRANSPORT}
+
+
+@dataclass(frozen=True, slots=True)
+class SdoPortLayout:
+    """The objects of a port.
+
+    Attributes:
+        name: of the port.
+        direction: `out` gives what is read, `in` writes.
+        index: of the object.
+        subs: sub-indices of the elements.
+        kind: type of the value, as Table 4 has it.
+        struct: what the port carries.
+    """
+
+    name: str
+    direction: PortDirection
+    index: int
+    subs: tuple[int, ...]
+    kind: CanopenPortType[Any]
+    struct: type[Struct]
+
+    def read(self) -> Script[tuple[bytes, ...]]:
+        """Read all elements in their order; raises as `upload`."""
+        elements = []
+        for sub in self.subs:
+            elements.append((yield from upload(self.index, sub, self.kind.data_type.size)))
+        return tuple(elements)
+
+    def decode(self, tm: Time, elements: Sequence[bytes]) -> Struct:
+        """Return the value of the bytes of all elements; FieldError if they are none."""
+        value: Any = self.kind.decode(elements)
+        if not self.kind.element_bits:  # a string ends before the first 0, in C and in CORBA
+            value = tuple(map(_text, value)) if self.kind.many else _text(value)
+        kind: Any = self.struct
+        return sequence_of(kind, tm, value) if self.kind.many else kind(tm, value)
+
+    def write(self, elements: Sequence[bytes]) -> Script[None]:
+        """Write all elements in their order; raises as `download`."""
+        for sub, data in zip(self.subs, elements, strict=True):
+            yield from download(self.index, sub, data)
+
+    def encode(self, value: Struct) -> tuple[bytes, ...]:
+        """Return the bytes of each element; ValueError or TypeError if the value does not fit."""
+        data: Any = getattr(value, "data", None)
+        return self.kind.encode(tuple(data) if self.kind.many else data)
+
+
+class SdoSource:
+    """An object of the device that an OutPort gives.
+
+    Attributes:
+        layout: the object.
+        port: the OutPort.
+    """
+
+    def __init__(self, layout: SdoPortLayout) -> None:
+        self.layout, self.port = layout, _SdoOutPort[Any](layout.name, layout.struct)
+
+
+class SdoSink:
+    """An object of the device that takes what comes to an InPort; only the newest counts.
+
+    Attributes:
+        layout: the object.
+        port: the InPort.
+        pending: bytes that are to be written, None for nothing.
+    """
+
+    def __init__(self, layout: SdoPortLayout) -> None:
+        self.layout, self.port = layout, _SdoInPort[Any](layout.name, layout.struct)
+        self.pending: tuple[bytes, ...] | None = None
+
+    def take(self) -> Struct | None:
+        """Take the newest value; None without a new one."""
+        value = None
+        while self.port.is_new:
+            value = self.port.read()
+        return value
+
+    def clear(self) -> None:
+        """Drop what has not been written."""
+        self.port.clear()
+        self.pending = None
+
+
+def lay_out_sdo_ports(
+    entry: NodeEntry, data_types: Mapping[tuple[int, int], int]
+) -> tuple[tuple[SdoPortLayout, ...], tuple[str, ...]]:
+    """Return the ports that a node is given, and why others cannot be.
+
+    Args:
+        entry: the node.
+        data_types: of its EDS, by index and sub-index.
+    """
+    made, refused = list[SdoPortLayout](), list[str]()
+    for name, port in entry.sdo_ports.items():
+        try:
+            made.append(_lay_out(name, port, data_types))
+        except ValueError as error:
+            refused.append(f"{name}: {error}")
+    return tuple(made), tuple(refused)
+
+
+def _lay_out(
+    name: str, port: SdoPortEntry, data_types: Mapping[tuple[int, int], int]
+) -> SdoPortLayout:
+    subs: tuple[int, ...] = (0,)
+    if (port.index, 1) in data_types:
+        subs = tuple(sub for sub in range(1, MOST_ELEMENTS + 1) if (port.index, sub) in data_types)
+    found = {data_types.get((port.index, sub)) for sub in subs}
+    if found == {None}:
+        raise ValueError(f"the EDS has no object {port.index:04X}h")
+    data_type = found.pop()
+    if found or data_type is None:
+        raise ValueError(f"the elements of {port.index:04X}h have several data types")
+    for row, one, many in PORT_KINDS:
+        if row.data_type == data_type and (port.type or _usual(row)) == row.name:
+            if len(subs) == 1 and subs == (0,):
+                return SdoPortLayout(name, port.direction, port.index, subs, row, one)
+            kind = row.sequence(len(subs))
+            return SdoPortLayout(name, port.direction, port.index, subs, kind, many)
+    wanted = port.type or "any type of a port"
+    raise ValueError(f"{port.index:04X}h is {DataType(data_type).name} in the EDS, not {wanted}")
+
+
+def _usual(row: CanopenPortType[Any]) -> str:
+    """Return the name of a row that counts without `type`: a Unicode string is a text."""
+    return "" if row is WIDE_CHARACTER else row.name
+
+
+def _text(value: str) -> str:
+    return value.partition("\0")[0]
+
+
+OK: Final = ReturnCode.RTC_OK
+
+
+class ProxyRequest(Enum):
+    """What the RT side asked for and the bus has not been told yet."""
+
+    NOTHING = auto()
+    ACTIVATE = auto()
+    DEACTIVATE = auto()
+    ABORT = auto()
+    RESET = auto()
+
+
+NOTHING: Final = ProxyRequest.NOTHING
+"""Looked up once: it takes 0.1 us, and each proxy is asked in each period."""
+
+
+class ProxyRtc(RtComponent):
+    """An ordinary RT component that stands for a device.
+
+    Its callbacks note what they ask for; the server says it on the bus after the
+    period. A reset is refused by on_reset until the device has booted anew, so
+    Error lasts until then.
+
+    Not emulated: a CANopen node of its own on the bus (`visible_proxies` of K1).
+
+    Args:
+        entry: its node.
+        layouts: PDOs of the device.
+        sdo_layouts: objects of the device that have ports by SDO.
+
+    Attributes:
+        sources: TPDOs of the device, whose data go to OutPorts.
+        sinks: RPDOs of the device, which take data from InPorts.
+        sdo_sources: objects of the device whose values go to OutPorts.
+        sdo_sinks: objects of the device that take values from InPorts.
+        requested: what the callbacks asked for.
+        passing: between on_activated and on_deactivated: data of the device pass.
+        confirmed: the device has reported that it is Operational: data for it pass as well.
+        ready: the device is fit to leave Error.
+    """
+
+    spec = ModuleSpec("ProxyRTC", "A CANopen device", category="RTC-CANopen")
+
+    def __init__(
+        self,
+        entry: NodeEntry,
+        layouts: tuple[PdoLayout, ...],
+        sdo_layouts: tuple[SdoPortLayout, ...] = (),
+    ) -> None:
+        super().__init__(entry.name)
+        self.requested, self.ready = NOTHING, False
+        self.passing = self.confirmed = False
+        named = [(layout, entry.ports.get(layout.name, layout.name)) for layout in layouts]
+        fit = [(layout, name) for layout, name in named if layout.fields and not layout.unknown]
+        self.sources = tuple(PdoSource(layout, name) for layout, name in fit if layout.sends)
+        self.sinks = tuple(PdoSink(layout, name) for layout, name in fit if not layout.sends)
+        for source in self.sources:
+            for out in source.ports:
+                self.add_port(out)
+        for sink in self.sinks:
+            for in_ in sink.ports:
+                self.add_port(in_)
+        outs = [layout for layout in sdo_layouts if layout.direction is PortDirection.OUT]
+        self.sdo_sources = tuple(map(SdoSource, outs))
+        self.sdo_sinks = tuple(SdoSink(layout) for layout in sdo_layouts if layout not in outs)
+        for read in self.sdo_sources:
+            self.add_port(read.port)
+        for written in self.sdo_sinks:
+            self.add_port(written.port)
+
+    @property
+    def state(self) -> LifeCycleState:
+        """Its state in its execution context; Created if it has none."""
+        return self.contexts[0].state_of(self) if self.contexts else LifeCycleState.CREATED
+
+    def take_request(self) -> ProxyRequest:
+        """Take what was asked for."""
+        requested, self.requested = self.requested, NOTHING
+        return requested
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Let data pass; ask for Operational."""
+        self.requested, self.passing, self.confirmed = ProxyRequest.ACTIVATE, True, False
+        for sink in self.sinks:
+            sink.clear()
+        for written in self.sdo_sinks:
+            written.clear()
+        return OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Let no data pass; ask for Pre-operational."""
+        self.requested, self.passing, self.confirmed = ProxyRequest.DEACTIVATE, False, False
+        return OK
+
+    def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
+        """Ask for Stopped, which takes the place of what on_deactivated asked for."""
+        self.requested, self.ready = ProxyRequest.ABORT, False
+        return OK
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Ask for a reset of the device; RTC_OK once it has booted."""
+        if self.ready:
+            return OK
+        self.requested = ProxyRequest.RESET
+        return ReturnCode.RTC_ERROR

@@ -1,0 +1,260 @@
+"""FourX: four driven wheels, a motor core unit each (NEDO report, 3.4.43.3; ours: K20)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from math import radians, tau
+from typing import ClassVar, Final
+
+from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, moved, wheel_speeds
+from tickrig.host.rtc.motion.ports import plausible, read_all, read_newest, to_pose_2d
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedShort
+from tickrig.wire.rtc_types.extended_2d import TimedPose2D, TimedVelocity2D, Velocity2D
+
+# A joystick as an RT component.
+
+_FULL_PCT: Final = 100.0
+
+
+class Joystick(RtComponent):
+    """Writes the velocity that its stick asks for, in each period.
+
+    Attributes:
+        velocity: OutPort; forward in m/s, to the left in rad/s.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("Joystick", "A stick as a velocity")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.full_v = bind("full_v", 0.5, "x>0", unit="m/s")
+        self.full_w = bind("full_w", 1.0, "x>0", unit="rad/s")
+        self.velocity = self.add_port(OutPort("velocity", TimedVelocity2D))
+        self._forward_pct = self._left_pct = 0.0
+
+    def tilt(self, forward_pct: float, left_pct: float = 0.0) -> None:
+        """Hold the stick; -100..100 % each, what is beyond counts as full."""
+        self._forward_pct = clip(forward_pct, _FULL_PCT)
+        self._left_pct = clip(left_pct, _FULL_PCT)
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Write where the stick is."""
+        v = self._forward_pct / _FULL_PCT * self.full_v.value
+        w = self._left_pct / _FULL_PCT * self.full_w.value
+        self.velocity.write(TimedVelocity2D(Time.from_us(ec.now_us), Velocity2D(v, 0.0, w)))
+        return ReturnCode.RTC_OK
+
+
+# What bases on wheels have in common: a velocity in, wheel speeds out, a pose out.
+
+_OK: Final = ReturnCode.RTC_OK
+
+_LOG: Final = log_of(__name__)
+
+
+class WheeledBase(RtComponent, ABC):
+    """Turns a velocity into wheel speeds, and what the wheels did into a pose.
+
+    A velocity to the side, or one with a number that is none, is refused: it is passed over
+    with a line in the log. Without a velocity for `timeout` the wheels stop. Where a wheel
+    would be too fast, both sides are slowed down alike.
+
+    Not emulated: acceleration limits; the drives have their own.
+
+    Args:
+        instance_name: of the component.
+        radius_m: of the wheels.
+        tread_m: between left and right wheels.
+
+    Attributes:
+        velocity: InPort; m/s, rad/s.
+        position: OutPort; where it thinks it is, from where it was activated.
+        pose: the same.
+        refused: how many velocities were.
+    """
+
+    def __init__(self, instance_name: str, radius_m: float, tread_m: float) -> None:
+        super().__init__(instance_name)
+        bind = self.configuration.bind
+        self.radius = bind("wheel_radius", radius_m, "x>0", unit="m")
+        self.tread = bind("tread", tread_m, "x>0", unit="m")
+        self.timeout = bind("timeout", 0.5, "x>0", unit="s")
+        self.velocity = self.add_port(InPort("velocity", TimedVelocity2D))
+        self.position = self.add_port(OutPort("pose", TimedPose2D))
+        self.refused, self.pose, self._twist = 0, Pose(), Twist()
+        self._received_us = self._executed_us = 0
+
+    @property
+    @abstractmethod
+    def fastest(self) -> float:
+        """The speed that a wheel can be told, rad/s."""
+
+    @abstractmethod
+    def command(self, tm: Time, left: float, right: float) -> None:
+        """Tell the drives how fast the wheels of each side are to turn, rad/s."""
+
+    @abstractmethod
+    def turned(self, since_s: float) -> tuple[float, float]:
+        """Return how far the wheels of each side have turned since the last call, rad.
+
+        Args:
+            since_s: how long ago that was.
+        """
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at zero, standing."""
+        self.pose, self._twist = Pose(), Twist()
+        self._received_us = self._executed_us = ec.now_us
+        self.velocity.clear()
+        return _OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Stop the wheels."""
+        self.command(Time.from_us(ec.now_us), 0.0, 0.0)
+        return _OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Command the wheels, and tell where they took it."""
+        for message in read_all(self.velocity):
+            self._take(ec.now_us, message)
+        if ec.now_us - self._received_us > 1e6 * self.timeout.value:
+            self._twist = Twist()
+        tm, radius = Time.from_us(ec.now_us), self.radius.value
+        speeds = wheel_speeds(self._twist, self.tread.value, radius, radius)
+        share = min(1.0, self.fastest / max(1e-9, *map(abs, speeds)))
+        self.command(tm, speeds[0] * share, speeds[1] * share)
+        left, right = self.turned((ec.now_us - self._executed_us) / 1e6)
+        self._executed_us = ec.now_us
+        self.pose = moved(self.pose, left * radius, right * radius, self.tread.value)
+        self.position.write(TimedPose2D(tm, to_pose_2d(self.pose)))
+        return _OK
+
+    def _take(self, now_us: int, message: TimedVelocity2D) -> None:
+        vx, vy, va = message.data.vx, message.data.vy, message.data.va
+        if vy == 0 and plausible(vx, va):
+            self._twist, self._received_us = Twist(vx, va), now_us
+            return
+        self.refused += 1
+        _LOG.warning("%s: cannot drive %s", self.instance_name, message.data)
+
+
+# beego: a differential drive on two EPOS (NEDO report, 3.4.43.3; ours: K21).
+
+_TURN: Final = 2**32
+"""Counts after which a position begins again (6064h is INTEGER32)."""
+
+_FASTEST_RPM: Final = 8_000
+
+
+class Beego(WheeledBase):
+    """Tells two drives their velocity in rpm of the motor, and reads their positions in counts.
+
+    The sizes of its makers are not at hand: those in the configuration are ours, as in
+    `examples/rigs/beego.toml`.
+
+    Attributes:
+        speeds: OutPorts `left_speed`, `right_speed`, for 60FFh.
+        positions: InPorts `left_position`, `right_position`, of 6064h.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("Beego", "Base on two EPOS", category="RTC-CANopen")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name, radius_m=0.078, tread_m=0.33)
+        self.gear = self.configuration.bind("gear", 51.0, "x>0")
+        self.counts = self.configuration.bind("counts", 2_000, "x>0")  # a turn of the motor
+        self.speeds = tuple(
+            self.add_port(OutPort(f"{side}_speed", TimedLong)) for side in ("left", "right")
+        )
+        self.positions = tuple(
+            self.add_port(InPort(f"{side}_position", TimedLong)) for side in ("left", "right")
+        )
+        self._counts: list[int | None] = [None, None]
+
+    @property
+    def fastest(self) -> float:
+        """The speed that a wheel can be told, rad/s."""
+        return _FASTEST_RPM / 60 * tau / self.gear.value
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at zero, wherever the drives are."""
+        self._counts = [None, None]
+        for port in self.positions:
+            port.clear()
+        return super().on_activated(ec)
+
+    def command(self, tm: Time, left: float, right: float) -> None:
+        """Write the speeds in rpm."""
+        for port, speed in zip(self.speeds, (left, right), strict=True):
+            port.write(TimedLong(tm, round(speed * self.gear.value * 60 / tau)))
+
+    def turned(self, since_s: float) -> tuple[float, float]:
+        """Return how far the positions have moved."""
+        left, right = (self._moved(side) for side in (0, 1))
+        return left, right
+
+    def _moved(self, side: int) -> float:
+        if (position := read_newest(self.positions[side])) is None:
+            return 0.0
+        before, self._counts[side] = self._counts[side], position.data
+        if before is None:
+            return 0.0
+        counts = (position.data - before + _TURN // 2) % _TURN - _TURN // 2
+        return counts / (self.counts.value * self.gear.value) * tau
+
+
+WHEELS: Final = ("fl", "rl", "fr", "rr")
+"""Front and rear left, front and rear right."""
+
+_FULL: Final = 32_767
+"""What stands for the full scale, 2010h:02."""
+
+
+class FourX(WheeledBase):
+    """Steers as a tank does, in velocity mode; the pose is added up from measured speeds.
+
+    Where no speed arrives, the last one is thought to last.
+
+    Attributes:
+        references: OutPorts `fl_reference` and so on, for 6411h:01.
+        speeds: InPorts `fl_speed` and so on, of 6401h:02.
+    """
+
+    spec: ClassVar[ModuleSpec] = ModuleSpec("FourX", "Base on four wheels", category="RTC-CANopen")
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name, radius_m=0.1, tread_m=0.4)
+        self.full_scale = self.configuration.bind("full_scale", 360.0, "x>0", unit="deg/s")
+        self.references = tuple(
+            self.add_port(OutPort(f"{wheel}_reference", TimedShort)) for wheel in WHEELS
+        )
+        self.speeds = tuple(self.add_port(InPort(f"{wheel}_speed", TimedShort)) for wheel in WHEELS)
+        self._latest = [0.0] * len(WHEELS)
+
+    @property
+    def fastest(self) -> float:
+        """The speed that a wheel can be told, rad/s."""
+        return radians(self.full_scale.value)
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Begin at zero, standing."""
+        self._latest = [0.0] * len(WHEELS)
+        for port in self.speeds:
+            port.clear()
+        return super().on_activated(ec)
+
+    def command(self, tm: Time, left: float, right: float) -> None:
+        """Write the references."""
+        for port, speed in zip(self.references, (left, left, right, right), strict=True):
+            port.write(TimedShort(tm, round(speed / self.fastest * _FULL)))
+
+    def turned(self, since_s: float) -> tuple[float, float]:
+        """Return how far the wheels turned at the speeds that were measured last, in the mean."""
+        for place, port in enumerate(self.speeds):
+            if (speed := read_newest(port)) is not None:
+                self._latest[place] = speed.data / _FULL * self.fastest
+        front_left, rear_left, front_right, rear_right = self._latest
+        return (front_left + rear_left) / 2 * since_s, (front_right + rear_right) / 2 * since_s

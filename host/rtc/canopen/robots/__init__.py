@@ -1,1 +1,0 @@
-"""Components that drive robots through the proxies of their drives."""

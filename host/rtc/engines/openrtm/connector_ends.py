@@ -1,0 +1,518 @@
+"""Our end of a connector of service ports: calls both ways (OpenRTM-aist 1.x, CorbaPort)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Final, Protocol
+
+from omniORB import CORBA
+from omniORB import any as omni_any
+
+from tickrig.host.rtc.engines.in_port import InPortPullConnector, InPortPushConnector
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
+from tickrig.host.rtc.engines.openrtm.stubs import stubs
+from tickrig.host.rtc.engines.out_port import OutPortPullConnector, OutPortPushConnector
+from tickrig.host.rtc.engines.peer_end import Codec, PeerEnd, PeerWatch, cdr
+from tickrig.host.rtc.ports.connect import connect
+from tickrig.host.rtc.ports.connector import DataflowType
+from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
+from tickrig.host.rtc.ports.port import ConnectorBase, InterfaceProfile
+from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServicePort
+from tickrig.host.rtc.states import PortStatus, RtcRefused
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerThread, PeerThreads
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types.cdr import Endian
+
+# Properties of ports and connectors: NVLists of CORBA, and the texts in them.
+
+_Properties = list[Any]
+"""An NVList: each has a `name` and a `value`, an Any."""
+
+ENDIAN: Final = "dataport.serializer.cdr.endian"
+DATA_TYPE: Final = "dataport.data_type"
+INTERFACE: Final = "dataport.interface_type"
+CORBA_CDR: Final = "corba_cdr"
+_DIRECT: Final = "direct"
+"""Between ports of one process; saved systems have it, and rtresurrect asks for it again."""
+
+_BOTH: Final = ",".join(Endian)
+
+
+def texts(properties: _Properties) -> dict[str, str]:
+    """Return what the properties say that are texts or numbers; others mean nothing here."""
+    found: dict[str, str] = {}
+    for item in properties:
+        value = item.value.value()
+        if isinstance(value, str | int | float):
+            found[item.name] = str(value)
+    return found
+
+
+def changed(properties: _Properties, values: Mapping[str, str]) -> _Properties:
+    """Return properties with some values; all others pass as they came."""
+    kept = [item for item in properties if item.name not in values]
+    return kept + nvlist(values)
+
+
+def nvlist(values: Mapping[str, str]) -> _Properties:
+    """Return properties that are texts."""
+    name_value = stubs().sdo.NameValue
+    return [name_value(name, omni_any.to_any(text)) for name, text in values.items()]
+
+
+def completed(properties: _Properties) -> _Properties:
+    """Return properties of a connector with the byte orders, if nobody named one."""
+    return properties if ENDIAN in texts(properties) else changed(properties, {ENDIAN: _BOTH})
+
+
+def agreed_endian(text: str) -> Endian:
+    """Return the first byte order of a list that is known here, little if none was named.
+
+    Raises:
+        RtcRefused: none of them is known.
+    """
+    words = [word.strip().lower() for word in text.split(",") if word.strip()] or [Endian.LITTLE]
+    known = [endian for word in words for endian in Endian if endian == word]
+    if not known:
+        raise RtcRefused(f"{ENDIAN}: {text!r} is none of: {', '.join(Endian)}")
+    return known[0]
+
+
+def _agreed(port: DataPort[Any], values: dict[str, str]) -> dict[str, str]:
+    """Return what holds for a connector of a data port with a peer.
+
+    Raises:
+        RtcRefused: another interface type than corba_cdr, another data type than the port's, or
+            a byte order that nobody knows.
+    """
+    if (interface := values.get(INTERFACE, CORBA_CDR)) != CORBA_CDR:
+        raise RtcRefused(f"{INTERFACE}: {interface!r} is not {CORBA_CDR}")
+    ours = port.data_type.idl_id()
+    if (theirs := values.get(DATA_TYPE, ours)) not in (ours, port.data_type.__name__):
+        raise RtcRefused(f"{DATA_TYPE}: {theirs!r} is not {ours}")
+    return {**values, INTERFACE: CORBA_CDR, ENDIAN: agreed_endian(values.get(ENDIAN, ""))}
+
+
+def offered(port: DataPort[Any]) -> dict[str, str]:
+    """Return what a data port offers to peers; rtcon compares it with what theirs offers."""
+    subscriptions = "Any" if isinstance(port, InPort) else "flush,new,periodic"
+    return {
+        "port.port_type": port.port_type,
+        DATA_TYPE: port.data_type.idl_id(),
+        INTERFACE: f"{CORBA_CDR},{_DIRECT}",
+        "dataport.dataflow_type": "push,pull",
+        "dataport.subscription_type": subscriptions,
+    }
+
+
+# Our end of a connector with a peer: what it tells the peer, and what it needs of it.
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectorPlace:
+    """Where a connector is made.
+
+    Attributes:
+        orb: of this process.
+        calls: those of the manager's thread.
+        threads: call peers, for all data ports.
+        post: has a call made there before the next tick.
+        connector_id: of the connector.
+        name: of the connector, for people.
+        peer: the peer's port, for people.
+    """
+
+    orb: Orb
+    calls: CallQueue
+    threads: PeerThreads
+    post: Callable[[Callable[[], object]], object]
+    connector_id: str
+    name: str
+    peer: str
+
+    def end(self, properties: dict[str, str]) -> PeerEnd:
+        """Return the peer's end with the properties that hold."""
+        return PeerEnd(self.peer, self.connector_id, properties, self.name)
+
+
+class ConnectorEnd(ABC):
+    """Our end of a connector; all this is in the manager's thread.
+
+    Attributes:
+        thread: calls the peer, one call after the other; None as long as nobody does.
+    """
+
+    def __init__(self, place: ConnectorPlace) -> None:
+        self._place = place
+        self._served: list[Reference] = []
+        self.thread: PeerThread | None = None
+
+    @abstractmethod
+    def publish(self, values: dict[str, str]) -> dict[str, str]:
+        """Serve what the peer is to call.
+
+        Args:
+            values: properties of the connector.
+
+        Returns:
+            Properties that lead the peer there.
+
+        Raises:
+            RtcRefused: the properties cannot be.
+        """
+
+    @abstractmethod
+    def join(self, values: dict[str, str]) -> ConnectorBase:
+        """Take what is to be called at the peer, who is not called yet, and join the connector.
+
+        Args:
+            values: properties of the connector, with those of the peer.
+
+        Raises:
+            RtcRefused: they cannot be.
+        """
+
+    def close(self) -> None:
+        """Serve nobody any more."""
+        for reference in self._served:
+            self._place.orb.withdraw(reference)
+        self._served.clear()
+
+    def calling_thread(self) -> PeerThread:
+        """Return the thread that calls the peer."""
+        if self.thread is None:
+            self.thread = PeerThread(self._place.peer)
+        return self.thread
+
+    def serve(self, interface: str, answers: object) -> str:
+        """Serve an object until the end; return its IOR."""
+        self._served.append(self._place.orb.serve(stubs().skeleton(interface), answers))
+        return self._place.orb.text(self._served[-1])
+
+    def reference(self, ior: str, kind: Any) -> Reference:
+        """Return the reference that an IOR stands for, as one of an interface.
+
+        The peer is not asked whether it has this interface: it says so in the IOR, and who lies
+        answers its first call with an error.
+
+        Raises:
+            RtcRefused: it is no reference.
+        """
+        try:
+            found = self._place.orb.reference(ior)
+        except ValueError as error:
+            raise RtcRefused(str(error)) from error
+        if found is None:
+            raise RtcRefused("the peer gives no reference")
+        return found._unchecked_narrow(kind)
+
+
+# InPortCdr and OutPortCdr: what calls them at a peer, and what answers here.
+
+_LOG: Final = log_of(__name__)
+
+_GONE: Final = (
+    CORBA.TRANSIENT,
+    CORBA.TIMEOUT,
+    CORBA.COMM_FAILURE,
+    CORBA.OBJECT_NOT_EXIST,
+)
+"""With these a peer gave no answer; all else that it raises is one."""
+
+_EMPTY: Final = (PortStatus.BUFFER_EMPTY, PortStatus.BUFFER_TIMEOUT)
+
+
+class NoAnswerError(Exception):
+    """A peer is not there, hangs, or has no such object any more."""
+
+
+class _Complaints:
+    """Logs the first of what a peer does wrong, and again after it did something right."""
+
+    def __init__(self, peer: str) -> None:
+        self._peer, self._complained = peer, False
+
+    def wrong(self, what: str) -> None:
+        if not self._complained:
+            _LOG.warning("%s: %s", self._peer, what)
+        self._complained = True
+
+    def right(self) -> None:
+        self._complained = False
+
+    def raised(self, error: CORBA.SystemException) -> None:
+        """Take what a call raised; NoAnswerError if that is no answer."""
+        if isinstance(error, _GONE):
+            raise NoAnswerError(explain(error)) from None
+        self.wrong(f"the peer answers with {type(error).__name__}")
+
+
+class InPortClient:
+    """Puts values into the InPort of a peer (OpenRTM-aist, InPortCorbaCdrConsumer).
+
+    Args:
+        reference: of an InPortCdr.
+        peer: its port, for people.
+    """
+
+    def __init__(self, reference: Reference, peer: str) -> None:
+        self._put: Callable[[bytes], Any] = reference.put
+        self._complaints = _Complaints(peer)
+
+    def put(self, payload: bytes) -> PortStatus:
+        """Put a value; NoAnswerError if there was none."""
+        try:
+            status = self._put(payload)
+        except CORBA.SystemException as error:
+            self._complaints.raised(error)
+            return PortStatus.PORT_ERROR
+        self._complaints.right()
+        return _ours(status)
+
+
+class OutPortClient:
+    """Gets values from the OutPort of a peer (OpenRTM-aist, OutPortCorbaCdrConsumer).
+
+    Args:
+        reference: of an OutPortCdr.
+        peer: its port, for people.
+    """
+
+    def __init__(self, reference: Reference, peer: str) -> None:
+        self._get: Callable[[], tuple[Any, bytes]] = reference.get
+        self._complaints = _Complaints(peer)
+
+    def get(self) -> bytes | None:
+        """Get a value, None if there is none; NoAnswerError without an answer."""
+        try:
+            status, payload = self._get()
+        except CORBA.BAD_PARAM:  # OpenRTM-aist-Python 2.1.0 returns "" for an empty buffer
+            return None
+        except CORBA.SystemException as error:
+            self._complaints.raised(error)
+            return None
+        if _ours(status) is PortStatus.PORT_OK:
+            self._complaints.right()
+            return payload
+        if _ours(status) not in _EMPTY:
+            self._complaints.wrong(f"the peer answers with {status}")
+        return None
+
+
+class _Put(Protocol):
+    def put(self, payload: bytes, /) -> PortStatus: ...
+
+
+class _Get(Protocol):
+    def get(self) -> tuple[PortStatus, bytes | None]: ...
+
+
+class InPortAnswers:
+    """The operations of InPortCdr, carried out by a connector."""
+
+    def __init__(self, connector: _Put) -> None:
+        self._put, self._theirs = connector.put, _theirs()
+
+    def put(self, data: bytes) -> Any:
+        """Take a value from a peer."""
+        return self._theirs[self._put(data)]
+
+
+class OutPortAnswers:
+    """The operations of OutPortCdr, carried out by a connector."""
+
+    def __init__(self, connector: _Get) -> None:
+        self._get, self._theirs = connector.get, _theirs()
+
+    def get(self) -> tuple[Any, bytes]:
+        """Give a value to a peer."""
+        status, payload = self._get()
+        return self._theirs[status], payload or b""
+
+
+def _theirs() -> dict[PortStatus, Any]:
+    """Return OpenRTM's status for each of ours; it has no word for some."""
+    openrtm = stubs().openrtm
+    return {one: getattr(openrtm, one.name, openrtm.UNKNOWN_ERROR) for one in PortStatus}
+
+
+def _ours(status: Any) -> PortStatus:
+    """Return our status for one of OpenRTM's; `UNKNOWN_ERROR` is an error."""
+    return PortStatus.__members__.get(str(status), PortStatus.PORT_ERROR)
+
+
+# Our end of a connector of data ports, by corba_cdr (OpenRTM-aist 1.x).
+
+INPORT_IOR: Final = "dataport.corba_cdr.inport_ior"
+_OUTPORT_IOR: Final = "dataport.corba_cdr.outport_ior"
+
+
+class DataEnd(ConnectorEnd):
+    """The end of a data connector.
+
+    Who is called by the peer publishes: an InPort that is pushed into, an OutPort that is
+    pulled from. Who calls subscribes.
+
+    Args:
+        place: where it is.
+        port: of ours.
+    """
+
+    def __init__(self, place: ConnectorPlace, port: InPort[Any] | OutPort[Any]) -> None:
+        super().__init__(place)
+        self._port = port
+        self._connector: ConnectorBase | None = None
+
+    def publish(self, values: dict[str, str]) -> dict[str, str]:
+        """Serve InPortCdr or OutPortCdr, if the peer calls."""
+        end, codec = self._agree(values)
+        port, pulls = self._port, end.options.dataflow is DataflowType.PULL
+        if isinstance(port, InPort) and not pulls:
+            self._connector = put_into = InPortPushConnector(
+                port, end, codec, self._place.calls, self._place.post
+            )
+            put_into.begin()  # the peer may push before its answer is here
+            return {INPORT_IOR: self.serve("OpenRTM.InPortCdr", InPortAnswers(put_into))}
+        if isinstance(port, OutPort) and pulls:
+            self._connector = held = OutPortPullConnector(port, end, codec)
+            held.begin()
+            return {_OUTPORT_IOR: self.serve("OpenRTM.OutPortCdr", OutPortAnswers(held))}
+        return {}
+
+    def join(self, values: dict[str, str]) -> ConnectorBase:
+        """Reach the peer's InPortCdr or OutPortCdr, if we call."""
+        if self._connector is None:
+            self._connector = self._calling(values)
+            self._connector.begin()
+        return self._connector
+
+    def _calling(self, values: dict[str, str]) -> ConnectorBase:
+        end, codec = self._agree(values)
+        place, port, openrtm = self._place, self._port, stubs().openrtm
+        key = INPORT_IOR if isinstance(port, OutPort) else _OUTPORT_IOR
+        if (ior := values.get(key)) is None:
+            raise RtcRefused(f"{place.peer} says no {key}")
+        if isinstance(port, OutPort):
+            put = InPortClient(self.reference(ior, openrtm.InPortCdr), place.peer)
+            return OutPortPushConnector(port, end, codec, put, place.threads)
+        get = OutPortClient(self.reference(ior, openrtm.OutPortCdr), place.peer)
+        return InPortPullConnector(port, end, codec, get, place.threads, place.calls)
+
+    def _agree(self, values: dict[str, str]) -> tuple[PeerEnd, Codec[Any, bytes]]:
+        values = _agreed(self._port, values)
+        return self._place.end(values), cdr(self._port.data_type, Endian(values[ENDIAN]))
+
+
+_OPERATIONS: Final[Mapping[str, tuple[str, ...]]] = {"RefHard": ("Go", "Stop")}
+"""Interface types of our IDL: operations without arguments and without a result."""
+
+
+class ServiceEnd(ConnectorEnd):
+    """The end of a connector of service ports.
+
+    A call of a peer is carried out in the manager's thread. A call of ours returns at once and
+    is made in the thread of the peer; one that has no answer is a line in the log and not
+    made again.
+
+    Not there: interfaces whose operations have arguments or results.
+
+    Args:
+        place: where it is.
+        port: of ours.
+    """
+
+    def __init__(self, place: ConnectorPlace, port: ServicePort) -> None:
+        super().__init__(place)
+        self._port = port
+
+    def publish(self, values: dict[str, str]) -> dict[str, str]:
+        """Serve what our port provides, under the names that OpenRTM 1.0 and later look for."""
+        found: dict[str, str] = {}
+        for provider in self._port.providers:
+            if (operations := _OPERATIONS.get(provider.profile.type_name)) is not None:
+                answers = _Answers(provider.servant, operations, self._place.calls)
+                ior = self.serve(provider.profile.type_name, answers)
+                found[self._name("provided", provider.profile)] = ior
+                found[_old_name(provider.profile)] = ior
+        return found
+
+    def join(self, values: dict[str, str]) -> ConnectorBase:
+        """Join a port that stands for the peer's: it provides what was published, and calls."""
+        peer = ServicePort(self._place.peer)
+        for provider in self._port.providers:
+            wanted = provider.profile
+            peer.require(Consumer[Any](wanted.instance_name, wanted.type_name))
+        for consumer in self._port.consumers:
+            wanted = consumer.profile
+            if wanted.type_name in _OPERATIONS and (ior := self._ior(wanted, values)):
+                calls = self._calls(self.reference(ior, _interface(wanted.type_name)), wanted)
+                peer.provide(Provider[Any](wanted.instance_name, wanted.type_name, calls))
+        names = {"name": self._place.name, "connector_id": self._place.connector_id}
+        return connect(self._port, peer, values, **names)
+
+    def _calls(self, reference: Reference, wanted: InterfaceProfile) -> object:
+        watch = PeerWatch(f"{self._port.full_name} to {self._place.peer}")
+        return _Calls(reference, _OPERATIONS[wanted.type_name], self.calling_thread(), watch)
+
+    def _ior(self, wanted: InterfaceProfile, values: dict[str, str]) -> str:
+        """Return the reference for an interface that our port requires, empty without one."""
+        for text in self._candidates(wanted, values):
+            if text and text not in {"null", "nil"}:
+                return text
+        return ""
+
+    def _candidates(self, wanted: InterfaceProfile, values: dict[str, str]) -> Iterator[str]:
+        mapped = values.get(self._name("required", wanted), "")  # what a tool mapped it to
+        yield values.get(mapped, "")
+        yield values.get(_old_name(wanted), "")
+        kind = f".provided.{wanted.type_name}."
+        yield from (text for name, text in values.items() if kind in name)
+
+    def _name(self, polarity: str, interface: InterfaceProfile) -> str:
+        port, kind = self._port, f"{interface.type_name}.{interface.instance_name}"
+        return f"{port.owner}.port.{port.name}.{polarity}.{kind}"
+
+
+class _Answers:
+    """Carries operations out in the manager's thread."""
+
+    def __init__(self, servant: object, operations: tuple[str, ...], calls: CallQueue) -> None:
+        for name in operations:
+            setattr(self, name, partial(calls.call, getattr(servant, name)))
+
+
+class _Calls:
+    """Makes operations calls into a peer, in its thread."""
+
+    def __init__(
+        self,
+        reference: Reference,
+        operations: tuple[str, ...],
+        thread: PeerThread,
+        watch: PeerWatch,
+    ) -> None:
+        for name in operations:
+            call = partial(_call, getattr(reference, name), watch)
+            setattr(self, name, partial(thread.submit, call))
+
+
+def _call(operation: Callable[[], None], watch: PeerWatch) -> None:
+    """Call a peer, in its thread."""
+    try:
+        operation()
+    except CORBA.SystemException as error:
+        watch.unanswered(NoAnswerError(explain(error)))
+    else:
+        watch.answered(PortStatus.PORT_OK)
+
+
+def _old_name(interface: InterfaceProfile) -> str:
+    return f"port.{interface.type_name}.{interface.instance_name}"
+
+
+def _interface(type_name: str) -> Any:
+    return getattr(stubs().services, type_name)

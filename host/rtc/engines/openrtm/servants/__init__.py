@@ -1,1 +1,0 @@
-"""What peers can ask of components, their execution contexts and their manager."""

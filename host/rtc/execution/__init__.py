@@ -1,1 +1,0 @@
-"""Execution contexts: when components run, and in which order (OMG RTC 1.0)."""

@@ -1,0 +1,173 @@
+"""What peers brought, let in at each tick: nobody wakes the manager's thread for it."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, Final, TypeVar
+
+from tickrig.host.links.ready import ready
+from tickrig.host.rtc.states import ReturnCode, RtcRefused
+from tickrig.host.text.log import log_of
+from tickrig.wire.instant import NEVER
+
+# Calls of other threads, made in the thread that runs a manager: nobody else touches it.
+
+R = TypeVar("R")
+
+CALL_TIMEOUT_US: Final = 1_000_000
+_LOG: Final = log_of(__name__)
+
+_Entry = tuple[Future[Any] | None, Callable[[], Any]]
+
+
+class CallQueue:
+    """Takes calls from any thread; the one that runs the manager makes them between its ticks.
+
+    `serve` is what a `ServingClock` calls while it waits. Where a control socket is served
+    there, `LineServer.attach(queue, queue.make)` serves both.
+
+    Args:
+        timeout_us: how long a call waits for that thread, if its caller does not say.
+    """
+
+    def __init__(self, timeout_us: int = CALL_TIMEOUT_US) -> None:
+        self._timeout_us = timeout_us
+        self._lock, self._entries, self._closed = threading.Lock(), list[_Entry](), False
+        self._owner = threading.get_ident()
+        self._reader, self._writer = socket.socketpair()
+        self._reader.setblocking(False)
+
+    def fileno(self) -> int:
+        """Return what can be read while there is something to `make`; -1 at the end."""
+        return self._reader.fileno()
+
+    def call(self, function: Callable[[], R], timeout_us: int | None = None) -> R:
+        """Have a function called in the manager's thread, and wait for what it returns.
+
+        In that thread itself it is called at once.
+
+        Args:
+            function: what is called; it does not wait.
+            timeout_us: how long to wait until it begins; that of the queue if left out.
+
+        Returns:
+            What the function returned.
+
+        Raises:
+            TimeoutError: it did not begin in time, and will not.
+            RtcRefused: the system has ended.
+            Exception: what the function raised.
+        """
+        if threading.get_ident() == self._owner:
+            return function()
+        future: Future[R] = Future()
+        wait_s = (self._timeout_us if timeout_us is None else timeout_us) / 1e6
+        self._enter((future, function))
+        try:
+            return future.result(wait_s)
+        except TimeoutError:
+            if not future.cancel():  # it is being made, or has raised this itself
+                return future.result()
+        raise TimeoutError(f"the system did not begin the call within {wait_s:g} s")
+
+    def post(self, function: Callable[[], object]) -> None:
+        """Have a function called in the manager's thread; what it raises is logged.
+
+        Raises:
+            RtcRefused: the system has ended.
+        """
+        self._enter((None, function))
+
+    def make(self) -> None:
+        """Make the calls that wait now; those that come meanwhile wait for the next time."""
+        self._owner = threading.get_ident()
+        for future, function in self._taken():
+            if future is None:
+                _logged(function)
+            elif future.set_running_or_notify_cancel():
+                _fulfil(future, function)
+
+    def serve(self, wait_us: int) -> None:
+        """Make the calls that wait; if there are none, wait for the first, up to `wait_us`."""
+        wait_s = max(0, wait_us) / 1e6
+        if self._closed:
+            time.sleep(wait_s)
+        elif ready([self], wait_s=wait_s)[0]:
+            self.make()
+
+    def close(self) -> None:
+        """Refuse the calls that wait, and all that come."""
+        with self._lock:
+            was_closed, self._closed = self._closed, True
+        if was_closed:
+            return
+        for future, _ in self._taken():
+            if future is not None and future.set_running_or_notify_cancel():
+                future.set_exception(_ended())
+        self._reader.close()
+        self._writer.close()
+
+    def _enter(self, entry: _Entry) -> None:
+        with self._lock:
+            if self._closed:
+                raise _ended()
+            self._entries.append(entry)
+            if len(self._entries) == 1:
+                self._writer.send(b"\0")
+
+    def _taken(self) -> list[_Entry]:
+        with self._lock:
+            entries, self._entries = self._entries, []
+            if entries:
+                self._reader.recv(1)
+        return entries
+
+
+def _ended() -> RtcRefused:
+    return RtcRefused("the system has ended", ReturnCode.PRECONDITION_NOT_MET)
+
+
+def _logged(function: Callable[[], object]) -> None:
+    try:
+        function()
+    except Exception:  # whoever posted it is gone; the others go on
+        _LOG.exception("a call from another thread raised")
+
+
+def _fulfil(future: Future[R], function: Callable[[], R]) -> None:
+    try:
+        future.set_result(function())
+    except BaseException as error:
+        future.set_exception(error)
+        if not isinstance(error, Exception):
+            raise
+
+
+class Arrivals:
+    """Calls that are made at the begin of the next tick; an item of a schedule.
+
+    Nobody looks at a value before the next tick; to wake the thread of the manager for each would
+    take three times the processor time.
+
+    Attributes:
+        due_us: it makes no tick come earlier.
+    """
+
+    due_us: Final = NEVER
+
+    def __init__(self) -> None:
+        self._calls: deque[Callable[[], object]] = deque()
+
+    def post(self, call: Callable[[], object]) -> None:
+        """Have a call made, in any thread."""
+        self._calls.append(call)
+
+    def tick(self, now_us: int, /) -> None:
+        """Make the calls that wait; those that come meanwhile, too."""
+        while self._calls:
+            self._calls.popleft()()

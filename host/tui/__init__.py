@@ -1,1 +1,0 @@
-"""Widgets that the screens of host tools share (extra `tui`)."""

@@ -1,0 +1,142 @@
+"""A SCIP host that waits for nothing: ask, look for scans later."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import tau
+from typing import Final
+
+from tickrig.host.links.link import DeviceRefused, Link
+from tickrig.wire import scip as status
+from tickrig.wire.errors import WireError
+from tickrig.wire.scip import (
+    SWITCH,
+    WIDTHS,
+    Command,
+    Reply,
+    ReplySplitter,
+    Specification,
+    parse_scan,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class UrgScan:
+    """What a sensor measured in one turn.
+
+    Attributes:
+        time_ms: its timer when the turn began, 24 bits.
+        first: step of the first number.
+        cluster: steps for each number.
+        distances_mm: as they came; what is below DMIN is a code, no distance.
+        specification: limits and steps of the sensor.
+    """
+
+    time_ms: int
+    first: int
+    cluster: int
+    distances_mm: tuple[int, ...]
+    specification: Specification
+
+    def angle_rad(self, place: int) -> float:
+        """Return the direction of a number, from straight ahead to the left."""
+        step = self.first + place * self.cluster + (self.cluster - 1) / 2
+        return (step - self.specification.front) * tau / self.specification.resolution
+
+    def points(self) -> Iterator[tuple[float, float]]:
+        """Yield direction in rad and distance in m, where there is one."""
+        low, high = self.specification.nearest_mm, self.specification.farthest_mm
+        for place, distance_mm in enumerate(self.distances_mm):
+            if low <= distance_mm <= high:
+                yield self.angle_rad(place), distance_mm / 1_000
+
+
+_SILENCE_US: Final = 500_000
+"""How long there may be no good scan: five turns; more where scans are left out."""
+
+_ENDLESS: Final = 0
+_LEAVE_ADJUST: Final = "2"
+
+
+class UrgClient:
+    """Reads what kind of sensor it is, lets it measure without end, and takes its scans.
+
+    It begins with SCIP2.0 for a sensor that speaks SCIP 1.1, and with TM2 and QT, so that one
+    which still does something for somebody before is quiet. After the time of five scans
+    without a good one it begins again. A scan that came garbled is left out.
+
+    Args:
+        link: the line.
+        cluster: steps for each number, 1..99.
+        interval: scans that are left out after each, 0..9.
+
+    Attributes:
+        specification: what the sensor told of itself, None before.
+        garbled: replies and scans that were none.
+        restarts: how often it began again.
+    """
+
+    def __init__(self, link: Link[bytes], cluster: int = 1, interval: int = 0) -> None:
+        self._link, self._cluster, self._interval = link, cluster, interval
+        self.specification: Specification | None = None
+        self.restarts = self._spoilt = 0
+        self._begin()
+
+    @property
+    def garbled(self) -> int:
+        """Replies and scans that were none."""
+        return self._spoilt + self._splitter.garbled
+
+    def poll(self) -> list[UrgScan]:
+        """Return the scans that have come.
+
+        Raises:
+            LinkClosed: the line is gone.
+            DeviceRefused: the sensor has a trouble, or cannot do what was asked.
+        """
+        scans, data = [], self._link.receive(0)
+        for reply in self._splitter.push(data):
+            try:
+                scans += self._take(reply)
+            except WireError:
+                self._spoilt += 1
+        if self._link.now_us - self._received_us > _SILENCE_US * (1 + self._interval):
+            self.restarts += 1
+            self._spoilt = self.garbled
+            self._begin()
+        return scans
+
+    def close(self) -> None:
+        """Switch the laser off, and give the line back."""
+        self._link.send(Command("QT").encode())
+        self._link.close()
+
+    def _begin(self) -> None:
+        self._splitter, self._received_us = ReplySplitter(), self._link.now_us
+        commands = (Command("TM", _LEAVE_ADJUST), Command("QT"), Command("PP"))
+        switch = SWITCH + b"\n"
+        self._link.send(switch + b"".join(command.encode() for command in commands))
+
+    def _take(self, reply: Reply) -> list[UrgScan]:
+        command = Command.parse(reply.echo)
+        if command.symbol == "PP" and reply.status == status.OK:
+            self.specification = Specification.parse(reply.lines)
+            self._received_us = self._link.now_us
+            self._measure(self.specification)
+        if command.symbol != "MD" or reply.status in (status.OK, status.REPEATED):
+            return []
+        if reply.status != status.DATA:
+            raise DeviceRefused(f"{reply.echo!r}: status {reply.status}", reply.status)
+        if self.specification is None:
+            return []
+        time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
+        self._received_us = self._link.now_us
+        return [
+            UrgScan(time_ms, self.specification.first, self._cluster, distances, self.specification)
+        ]
+
+    def _measure(self, specification: Specification) -> None:
+        steps = f"{specification.first:04}{specification.last:04}"
+        rest = f"{self._cluster:02}{self._interval}{_ENDLESS:02}"
+        self._link.send(Command("MD", steps + rest).encode())

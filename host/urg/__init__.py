@@ -1,1 +1,0 @@
-"""A host's side of scanning range finders that speak SCIP 2.0."""

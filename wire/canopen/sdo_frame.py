@@ -1,0 +1,385 @@
+r"""SDO command bytes, abort codes and the frames of block transfer (CiA 301, 7.2.4).
+
+SDO abort codes (CiA 301, table of SDO abort codes).
+
+>>> describe_abort(0x0602_0000), describe_abort(0x0601_0003)
+('object does not exist (06020000h)', 'unknown (06010003h)')
+
+SDO block transfer: its frames as values (CiA 301, SDO block protocols).
+
+>>> BlockDownloadInitiateRequest(0x2007, 0, crc=True, size=30).encode().hex()
+'c60720001e000000'
+>>> BlockSegment.parse(bytes.fromhex("852E2E0000000000"))
+BlockSegment(seqno=5, data=b'..\x00\x00\x00\x00\x00', last=True)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final, Self
+
+import crcmod
+
+from tickrig.wire.errors import FieldError, FramingError
+
+
+class AbortCode(IntEnum):
+    """Why an SDO transfer was aborted."""
+
+    TOGGLE_BIT = 0x0503_0000
+    TIMEOUT = 0x0504_0000
+    COMMAND_SPECIFIER = 0x0504_0001
+    BLOCK_SIZE = 0x0504_0002
+    SEQUENCE_NUMBER = 0x0504_0003
+    CRC = 0x0504_0004
+    OUT_OF_MEMORY = 0x0504_0005
+    UNSUPPORTED_ACCESS = 0x0601_0000
+    WRITE_ONLY = 0x0601_0001
+    READ_ONLY = 0x0601_0002
+    NO_OBJECT = 0x0602_0000
+    NOT_MAPPABLE = 0x0604_0041
+    PDO_LENGTH = 0x0604_0042
+    PARAMETER_INCOMPATIBLE = 0x0604_0043
+    INTERNAL_INCOMPATIBLE = 0x0604_0047
+    HARDWARE = 0x0606_0000
+    LENGTH = 0x0607_0010
+    TOO_LONG = 0x0607_0012
+    TOO_SHORT = 0x0607_0013
+    NO_SUBINDEX = 0x0609_0011
+    VALUE_RANGE = 0x0609_0030
+    VALUE_TOO_HIGH = 0x0609_0031
+    VALUE_TOO_LOW = 0x0609_0032
+    MAXIMUM_BELOW_MINIMUM = 0x0609_0036
+    NO_RESOURCE = 0x060A_0023
+    GENERAL = 0x0800_0000
+    NOT_STORED = 0x0800_0020
+    LOCAL_CONTROL = 0x0800_0021
+    DEVICE_STATE = 0x0800_0022
+    NO_DICTIONARY = 0x0800_0023
+    NO_DATA = 0x0800_0024
+
+
+_TEXTS: Final[dict[int, str]] = {
+    AbortCode.TOGGLE_BIT: "toggle bit not alternated",
+    AbortCode.TIMEOUT: "SDO protocol timed out",
+    AbortCode.COMMAND_SPECIFIER: "command specifier not valid",
+    AbortCode.BLOCK_SIZE: "invalid block size",
+    AbortCode.SEQUENCE_NUMBER: "invalid sequence number",
+    AbortCode.CRC: "CRC error",
+    AbortCode.OUT_OF_MEMORY: "out of memory",
+    AbortCode.UNSUPPORTED_ACCESS: "unsupported access",
+    AbortCode.WRITE_ONLY: "object is write only",
+    AbortCode.READ_ONLY: "object is read only",
+    AbortCode.NO_OBJECT: "object does not exist",
+    AbortCode.NOT_MAPPABLE: "object cannot be mapped",
+    AbortCode.PDO_LENGTH: "mapped objects exceed the PDO length",
+    AbortCode.PARAMETER_INCOMPATIBLE: "parameters are incompatible",
+    AbortCode.INTERNAL_INCOMPATIBLE: "internal incompatibility",
+    AbortCode.HARDWARE: "hardware error",
+    AbortCode.LENGTH: "length does not match",
+    AbortCode.TOO_LONG: "too long",
+    AbortCode.TOO_SHORT: "too short",
+    AbortCode.NO_SUBINDEX: "sub-index does not exist",
+    AbortCode.VALUE_RANGE: "invalid value",
+    AbortCode.VALUE_TOO_HIGH: "value too high",
+    AbortCode.VALUE_TOO_LOW: "value too low",
+    AbortCode.MAXIMUM_BELOW_MINIMUM: "maximum below minimum",
+    AbortCode.NO_RESOURCE: "resource not available",
+    AbortCode.GENERAL: "general error",
+    AbortCode.NOT_STORED: "cannot be transferred or stored",
+    AbortCode.LOCAL_CONTROL: "not possible under local control",
+    AbortCode.DEVICE_STATE: "not possible in this device state",
+    AbortCode.NO_DICTIONARY: "no object dictionary",
+    AbortCode.NO_DATA: "no data available",
+}
+
+
+def describe_abort(code: int) -> str:
+    """Return the text of an abort code with its number."""
+    return f"{_TEXTS.get(code, 'unknown')} ({code:08X}h)"
+
+
+# Command bytes of SDO frames, and where things are in their 8 bytes (CiA 301, SDO protocols).
+
+REQUEST_COB_ID: Final = 0x600
+RESPONSE_COB_ID: Final = 0x580
+"""The default SDO server of node n listens and answers on these plus n."""
+
+FRAME_BYTES: Final = 8
+EXPEDITED_BYTES: Final = 4
+SEGMENT_BYTES: Final = 7
+MAX_BLOCK_SIZE: Final = 127
+
+TOGGLE: Final = 0x10
+LAST: Final = 0x01
+"""Bit c of a segment: no more segments."""
+SIZE_INDICATED: Final = 0x01
+EXPEDITED: Final = 0x02
+
+BLOCK_LAST: Final = 0x80
+BLOCK_SEQNO: Final = 0x7F
+BLOCK_CRC: Final = 0x04
+BLOCK_SIZE_INDICATED: Final = 0x02
+
+
+class ClientCommand(IntEnum):
+    """Client command specifier: bits 7 to 5 of a request."""
+
+    DOWNLOAD_SEGMENT = 0x00
+    DOWNLOAD = 0x20
+    UPLOAD = 0x40
+    UPLOAD_SEGMENT = 0x60
+    ABORT = 0x80
+    BLOCK_UPLOAD = 0xA0
+    BLOCK_DOWNLOAD = 0xC0
+
+
+class ServerCommand(IntEnum):
+    """Server command specifier: bits 7 to 5 of a response."""
+
+    UPLOAD_SEGMENT = 0x00
+    DOWNLOAD_SEGMENT = 0x20
+    UPLOAD = 0x40
+    DOWNLOAD = 0x60
+    ABORT = 0x80
+    BLOCK_DOWNLOAD = 0xA0
+    BLOCK_UPLOAD = 0xC0
+
+
+SPECIFIER: Final = 0xE0
+
+BLOCK_ENDED: Final = 0xA1
+BLOCK_ACKNOWLEDGE: Final = 0xA2
+BLOCK_START: Final = 0xA3
+BLOCK_END: Final = 0xC1
+"""Block transfer: these four are the same whoever sends them; an end has n in bits 4 to 2."""
+BLOCK_SUBCOMMAND: Final = 0x03
+"""Bits of the subcommand where block upload is meant, and of an acknowledgement."""
+
+
+def frame_at(command: int, index: int, sub: int, rest: bytes = b"") -> bytes:
+    """Return a frame of command byte, multiplexer and up to 4 bytes."""
+    if not 0 <= index <= 0xFFFF or not 0 <= sub <= 0xFF:
+        raise FieldError(f"{index:X}h:{sub:X} is not in 0000h:00 to FFFFh:FF")
+    return bytes([command, index & 0xFF, index >> 8, sub]) + rest.ljust(4, b"\0")
+
+
+def index_sub(frame: bytes) -> tuple[int, int]:
+    """Return index and sub-index of a frame that has a multiplexer."""
+    return int.from_bytes(frame[1:3], "little"), frame[3]
+
+
+def number_field(number: int) -> bytes:
+    """Return the 4 bytes of a size or an abort code."""
+    if not 0 <= number < 1 << 32:
+        raise FieldError(f"{number} does not fit into 32 bits")
+    return number.to_bytes(4, "little")
+
+
+def check_frame(frame: bytes) -> None:
+    """Raise FramingError unless a frame has the length of all SDO frames."""
+    if len(frame) != FRAME_BYTES:
+        raise FramingError(f"an SDO frame of {len(frame)} bytes, it has {FRAME_BYTES}")
+
+
+@dataclass(frozen=True, slots=True)
+class BlockSegment:
+    """7 bytes of a block, either way; the fill of the last one is said at the end.
+
+    Attributes:
+        seqno: 1..127, its place in the block.
+        last: no more segments follow.
+    """
+
+    seqno: int
+    data: bytes
+    last: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.seqno <= BLOCK_SEQNO or len(self.data) > SEGMENT_BYTES:
+            raise FieldError(f"block segment {self.seqno} of {len(self.data)} bytes")
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        head = self.seqno | (BLOCK_LAST if self.last else 0)
+        return bytes([head]) + self.data.ljust(SEGMENT_BYTES, b"\0")
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls(frame[0] & BLOCK_SEQNO, frame[1:], bool(frame[0] & BLOCK_LAST))
+
+
+@dataclass(frozen=True, slots=True)
+class _BlockInitiate:
+    """Begin of a transfer whose sender says the size.
+
+    Attributes:
+        crc: the sender can do the CRC.
+        size: number of bytes, None if it is not indicated.
+    """
+
+    index: int
+    sub: int
+    crc: bool
+    size: int | None
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        command = 0xC0 | self.crc * BLOCK_CRC
+        if self.size is not None:
+            command |= BLOCK_SIZE_INDICATED
+        return frame_at(command, self.index, self.sub, number_field(self.size or 0))
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        indicated = bool(frame[0] & BLOCK_SIZE_INDICATED)
+        size = int.from_bytes(frame[4:], "little") if indicated else None
+        return cls(*index_sub(frame), bool(frame[0] & BLOCK_CRC), size)
+
+
+class BlockDownloadInitiateRequest(_BlockInitiate):
+    """Initiate SDO block download."""
+
+    __slots__ = ()
+
+
+class BlockUploadInitiateResponse(_BlockInitiate):
+    """Answer to `BlockUploadInitiateRequest`."""
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BlockDownloadInitiateResponse:
+    """Answer to `BlockDownloadInitiateRequest`.
+
+    Attributes:
+        crc: the server can do the CRC.
+        block_size: segments in the first block, 1..127.
+    """
+
+    index: int
+    sub: int
+    crc: bool
+    block_size: int
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        command = ServerCommand.BLOCK_DOWNLOAD | self.crc * BLOCK_CRC
+        return frame_at(command, self.index, self.sub, bytes([self.block_size]))
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls(*index_sub(frame), bool(frame[0] & BLOCK_CRC), frame[4])
+
+
+@dataclass(frozen=True, slots=True)
+class BlockUploadInitiateRequest:
+    """Initiate SDO block upload.
+
+    Attributes:
+        crc: the client can do the CRC.
+        block_size: segments in the first block, 1..127.
+        threshold: protocol switch threshold, 0 to forbid the switch to another upload.
+    """
+
+    index: int
+    sub: int
+    crc: bool
+    block_size: int
+    threshold: int = 0
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        command = ClientCommand.BLOCK_UPLOAD | self.crc * BLOCK_CRC
+        return frame_at(command, self.index, self.sub, bytes([self.block_size, self.threshold]))
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls(*index_sub(frame), bool(frame[0] & BLOCK_CRC), frame[4], frame[5])
+
+
+@dataclass(frozen=True, slots=True)
+class BlockStart:
+    """The client of a block upload is ready for segments."""
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        return bytes([BLOCK_START, *bytes(SEGMENT_BYTES)])
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls()
+
+
+@dataclass(frozen=True, slots=True)
+class BlockAcknowledge:
+    """Receipt of a block, either way.
+
+    Attributes:
+        ackseq: the last segment that came in sequence, 0 for none.
+        block_size: segments in the next block, 1..127.
+    """
+
+    ackseq: int
+    block_size: int
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        return bytes([BLOCK_ACKNOWLEDGE, self.ackseq, self.block_size, *bytes(5)])
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls(frame[1], frame[2])
+
+
+@dataclass(frozen=True, slots=True)
+class BlockEnd:
+    """All segments are received: what the sender says of them, either way.
+
+    Attributes:
+        fill: bytes of the last segment that are no data, 0..7.
+        crc: 0 if one side cannot do it.
+    """
+
+    fill: int
+    crc: int
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        head = bytes([BLOCK_END | self.fill << 2])
+        return (head + self.crc.to_bytes(2, "little")).ljust(FRAME_BYTES, b"\0")
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls(frame[0] >> 2 & 7, int.from_bytes(frame[1:3], "little"))
+
+
+@dataclass(frozen=True, slots=True)
+class BlockEnded:
+    """Answer to `BlockEnd`, either way."""
+
+    def encode(self) -> bytes:
+        """Return the 8 bytes."""
+        return bytes([BLOCK_ENDED, *bytes(SEGMENT_BYTES)])
+
+    @classmethod
+    def parse(cls, frame: bytes) -> Self:
+        """Read the 8 bytes."""
+        return cls()
+
+
+_crc: Final = crcmod.mkCrcFun(0x1_1021, initCrc=0, rev=False, xorOut=0)
+
+
+def crc16(data: bytes) -> int:
+    """Return the CRC over the data of a block transfer, without the fill of the last segment."""
+    return _crc(data)

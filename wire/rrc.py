@@ -1,0 +1,612 @@
+r"""RRC messages: checksums, commands, replies, events and loads.
+
+Commands from the host to the RRC (RRC manual, list of commands host to RRC).
+
+>>> Output(v_pct=30, w_pct=-1).encode()
+b'output1eff\n'
+>>> Output(v_pct=30, w_pct=0).encode(check=True)
+b'output1e007\n'
+>>> parse_command(b"statusA1")
+Status(on=1)
+
+Lines from the RRC to the host (RRC manual, list of commands RRC to host).
+
+>>> status = parse_reply(b"SA:64003200A1000F")
+>>> status.in_v_pct, status.out_v_pct, status.gauge
+(100, 50, 10)
+>>> parse_reply(b"EV:PowerOnTrigger").kind
+<RrcEvent.POWER_ON: 'PowerOn'>
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import product
+from typing import ClassVar, Final
+
+from tickrig.wire.errors import ChecksumError, FieldError, FramingError
+
+# Numbers as the RRC writes them: `2hex` and `1hex`, negative ones in two's complement.
+
+_UPPER_DIGITS: Final = tuple(b"%X" % n for n in range(16))
+_HEX_DIGITS: Final = frozenset(bytes([code]) for code in b"0123456789ABCDEFabcdef")
+
+
+def all_digits(width: int) -> list[bytes]:
+    """Return all numbers of so many hex digits, in every mixture of cases."""
+    return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
+
+
+def read_hex(digits: bytes) -> int:
+    """Read one or two hex digits of either case.
+
+    Raises:
+        FieldError: a character that is not a hex digit.
+    """
+    if not all(digits[n : n + 1] in _HEX_DIGITS for n in range(len(digits))):
+        raise FieldError(f"{digits!r} is not hexadecimal")
+    return int(digits, 16)
+
+
+def read_signed(digits: bytes) -> int:
+    """Read two hex digits as an 8-bit two's complement number.
+
+    >>> read_signed(b"9c"), read_signed(b"64")
+    (-100, 100)
+    """
+    value = read_hex(digits)
+    return value - 0x100 if value >= 0x80 else value
+
+
+# The CHECK digit of a line.
+#
+# The manual says "the sum from the head of the command to just before CHECK";
+# its nine samples show that the low nibble of the sum of the character codes is
+# meant. Letter case and exchanged characters are not seen by it.
+
+
+def check_digit(message: bytes) -> bytes:
+    """Return CHECK for a message without LF, as an upper-case digit.
+
+    >>> check_digit(b"beep646464640a0a0a0a0a0a")
+    b'A'
+    """
+    return _UPPER_DIGITS[sum(message) & 0xF]
+
+
+def strip_check(line: bytes) -> bytes:
+    """Return a line without the CHECK digit at its end.
+
+    Raises:
+        ChecksumError: CHECK is missing, wrong or not a hex digit.
+    """
+    message, digit = line[:-1], line[-1:]
+    if digit not in _HEX_DIGITS or int(digit, 16) != sum(message) & 0xF:
+        raise ChecksumError(f"CHECK {digit!r} of {line!r}, expected {check_digit(message)!r}")
+    return message
+
+
+# What traffic costs the RRC, and how much of it a host may send (DECISION R27).
+#
+# Costs are in per cent of the RRC's period of 10 ms. Above 100 % it falls behind, and 300 % behind
+# stops VR2. At exactly 100 % nothing drains: a host whose clock is 0.1 % fast stops VR2 after 60 s,
+# so a host takes at most `SAFE_PCT`.
+
+BASE_PCT: Final = 30
+STATUS_PCT: Final = 20
+LINE_FEED_PCT: Final = 25
+REPLY_PCT: Final = 15
+OVERFLOW_PCT: Final = 150
+PERIOD_PCT: Final = 100
+TOO_FAR_BEHIND_PCT: Final = 300
+SAFE_PCT: Final = 90
+
+PERIOD_US: Final = 10_000
+PERIODS_A_SECOND: Final = 100
+
+LINES_A_PERIOD: Final = 2
+"""Lines worked on in a period while VR2 runs; elsewhere one in two periods."""
+
+PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
+"""Lines a second that a host may send while VR2 does not run."""
+
+
+def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
+    """Return how many lines a second a host may send while VR2 runs.
+
+    Args:
+        stable: whether OK lines are left out (stablemode).
+        status: whether a status line is sent in each period.
+        extra_pct: other work of the RRC, in per cent of a period.
+
+    >>> pace_lines_s(stable=True, status=True), pace_lines_s(stable=False, status=True)
+    (160, 100)
+    """
+    left_pct = SAFE_PCT - BASE_PCT - extra_pct - (STATUS_PCT if status else 0)
+    line_pct = LINE_FEED_PCT + (0 if stable else REPLY_PCT)
+    most = LINES_A_PERIOD * PERIODS_A_SECOND * SAFE_PCT // PERIOD_PCT
+    return max(0, min(most, left_pct * PERIODS_A_SECOND // line_pct))
+
+
+class Parameter:
+    """One parameter of a command: how many digits, and which values are allowed.
+
+    Attributes:
+        width: number of hex digits, 1 or 2.
+        low: smallest value; below 0 for two's complement.
+        high: largest value.
+        values: value by digits, in either case, for all that is allowed.
+    """
+
+    __slots__ = ("high", "low", "values", "width")
+
+    def __init__(self, width: int, low: int, high: int) -> None:
+        self.width, self.low, self.high = width, low, high
+        read = read_signed if low < 0 else read_hex
+        numbers = {digits: read(digits) for digits in all_digits(width)}
+        self.values = {d: value for d, value in numbers.items() if low <= value <= high}
+
+    def read(self, digits: bytes) -> int:
+        """Read the parameter from its digits; FieldError for a bad digit or value."""
+        value = self.values.get(digits)
+        if value is None:
+            return self.checked(read_signed(digits) if self.low < 0 else read_hex(digits))
+        return value
+
+    def write(self, value: int) -> bytes:
+        """Write the parameter in lower case, as the manual's samples do."""
+        return b"%0*x" % (self.width, value & 0xFF)
+
+    def checked(self, value: int) -> int:
+        """Return the value; FieldError if it is out of range."""
+        if not self.low <= value <= self.high:
+            raise FieldError(f"{value} is not in {self.low}..{self.high}")
+        return value
+
+
+_PERCENT: Final = Parameter(2, 0, 100)
+_SIGNED_PERCENT: Final = Parameter(2, -100, 100)
+_BYTE: Final = Parameter(2, 0, 255)
+_ANGLE: Final = Parameter(2, 0, 90)
+_NIBBLE: Final = Parameter(1, 0, 15)
+_FLAG: Final = Parameter(1, 0, 1)
+_SPEED_MODE: Final = Parameter(1, 1, 5)
+_REVERSE_MODE: Final = Parameter(1, 0, 3)
+
+
+class UnknownCommand(FramingError):  # noqa: N818 - the manual's word: CommandUnknown
+    """No command begins like this."""
+
+
+class BadParameters(FieldError):  # noqa: N818 - what came
+    """A known command with a wrong number of digits, a bad digit or a bad value.
+
+    Attributes:
+        name: the command's name.
+    """
+
+    def __init__(self, name: bytes, reason: str) -> None:
+        super().__init__(f"{name.decode()}: {reason}")
+        self.name = name
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """Base of all commands: a name, and parameters of fixed width."""
+
+    name: ClassVar[bytes]
+    literal: ClassVar[bytes] = b""  # what stands between the name and the parameters
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    size: ClassVar[int] = 0  # characters behind the name
+
+    def __init_subclass__(cls) -> None:
+        """Count what stands behind the name."""
+        widths: int = sum(p.width for p in cls.parameters)
+        cls.size = len(cls.literal) + widths
+
+    def __post_init__(self) -> None:
+        """Refuse values that do not fit; BadParameters says which."""
+        values = self.values()
+        if len(values) != len(self.parameters):
+            raise BadParameters(self.name, f"{len(values)} values, not {len(self.parameters)}")
+        try:
+            for number, value in enumerate(values):
+                self.parameters[number].checked(value)
+        except FieldError as error:
+            raise BadParameters(self.name, f"#{number + 1} {error}") from error
+
+    def values(self) -> tuple[int, ...]:
+        """Return the parameters #1, #2, ... in order."""
+        names: tuple[str, ...] = self.__match_args__
+        return tuple([getattr(self, name) for name in names])
+
+    def encode(self, *, check: bool = False) -> bytes:
+        """Write the line with its LF, and with CHECK where stablemode wants it."""
+        digits = [p.write(v) for p, v in zip(self.parameters, self.values(), strict=True)]
+        message = self.name + self.literal + b"".join(digits)
+        return message + (check_digit(message) if check else b"") + b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Limit(Command):
+    """Let the stick drive, within limits.
+
+    Attributes:
+        v_pct: #1, translation input limit, 0..100 %.
+        w_pct: #2, rotation input limit, 0..100 %.
+        sum_pct: #3, limit of |v| + |w|, 0..255 %.
+        product_pct: #4, limit of |v| * |w| / 100, 0..255 %.
+        radius_pct: #5, limit of the root of v² + w², 0..255 %.
+    """
+
+    name = b"limit"
+    parameters = (_PERCENT, _PERCENT, _BYTE, _BYTE, _BYTE)
+
+    v_pct: int
+    w_pct: int
+    sum_pct: int = 255
+    product_pct: int = 255
+    radius_pct: int = 255
+
+
+@dataclass(frozen=True, slots=True)
+class Output(Command):
+    """Let the host drive: translation (forward) and rotation (right), -100..100 %."""
+
+    name = b"output"
+    parameters = (_SIGNED_PERCENT, _SIGNED_PERCENT)
+
+    v_pct: int
+    w_pct: int
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceName(Command):
+    """Ask for the device name."""
+
+    name = b"device"
+
+
+@dataclass(frozen=True, slots=True)
+class Version(Command):
+    """Ask for the version."""
+
+    name = b"version"
+
+
+@dataclass(frozen=True, slots=True)
+class Date(Command):
+    """Ask for the date and time of compilation."""
+
+    name = b"date"
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedMode(Command):
+    """Choose the speed mode, 1 (slowest) to 5; `locked` = 1 locks the speed buttons."""
+
+    name = b"speedmode"
+    parameters = (_SPEED_MODE, _FLAG)
+
+    mode: int
+    locked: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Joystick(Command):
+    """Shape the stick. The defaults are those of the emulator (DECISION R15).
+
+    Attributes:
+        v_low_pct: #1, translation that counts as 0; below `v_high_pct`.
+        w_low_pct: #2, rotation that counts as 0; below `w_high_pct`.
+        v_high_pct: #3, translation that counts as 100.
+        w_high_pct: #4, rotation that counts as 100.
+        v_exponent: #5, 0..15: output = input ^ (1 + 0.1 * #5).
+        w_exponent: #6, 0..15.
+        reverse_mode: #7, 0 plain, 1 no backing, 2 gear change, 3 gear change turned round.
+        neutral_pct: #8, neutral radius, 0..100 %; with #7 at 0 or 1 any byte (DECISION R14).
+        switch_deg: #9, threshold between backward and forward gear, 0..90 from straight back;
+            likewise.
+        fade_deg: #10, where the backward gear begins to fade, 0..90 from straight back; likewise.
+    """
+
+    name = b"joystick"
+    parameters = (*[_PERCENT] * 4, _NIBBLE, _NIBBLE, _REVERSE_MODE, _BYTE, _BYTE, _BYTE)
+    gear_parameters: ClassVar[tuple[Parameter, ...]] = (
+        _PERCENT,
+        _ANGLE,
+        _ANGLE,
+    )  # of a gear change
+
+    v_low_pct: int = 0
+    w_low_pct: int = 0
+    v_high_pct: int = 100
+    w_high_pct: int = 100
+    v_exponent: int = 0
+    w_exponent: int = 0
+    reverse_mode: int = 0
+    neutral_pct: int = 5
+    switch_deg: int = 30
+    fade_deg: int = 45
+
+    def __post_init__(self) -> None:
+        """Refuse a dead zone that is upside down, and #8 to #10 that no gear change could use."""
+        Command.__post_init__(self)
+        try:
+            for number, parameter in enumerate(self.gear_parameters, 8):
+                if self.reverse_mode > 1:
+                    parameter.checked(self.values()[number - 1])
+        except FieldError as error:
+            raise BadParameters(self.name, f"#{number} {error}") from error
+        if self.v_low_pct >= self.v_high_pct or self.w_low_pct >= self.w_high_pct:
+            raise BadParameters(self.name, "lower dead zone is not below the upper one")
+
+    def after(self, former: Joystick) -> Joystick:
+        """Return what holds after this command: #8 to #10 out of range leave the former ones.
+
+        Args:
+            former: what held before (DECISION R14).
+
+        >>> Joystick(neutral_pct=255, switch_deg=20).after(Joystick(neutral_pct=7)).values()[7:]
+        (7, 20, 45)
+        """
+        taken = [
+            new if new <= parameter.high else old
+            for parameter, new, old in zip(
+                self.gear_parameters, self.values()[7:], former.values()[7:], strict=True
+            )
+        ]
+        return Joystick(*self.values()[:7], *taken)
+
+
+@dataclass(frozen=True, slots=True)
+class Watchdog(Command):
+    """Stop VR2 after this time without a correct command: 0..255 x 10 ms, 0 is off."""
+
+    name = b"watchdog"
+    parameters = (_BYTE,)
+
+    time_10ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class StableMode(Command):
+    """Switch stablemode: CHECK wanted on each line, and no OK lines."""
+
+    name = b"stablemode"
+    parameters = (_FLAG,)
+
+    on: int
+
+
+@dataclass(frozen=True, slots=True)
+class Status(Command):
+    """Switch the stream of SA lines (type A is the only one of version 1.0)."""
+
+    name = b"status"
+    literal = b"A"
+    parameters = (_FLAG,)
+
+    on: int
+
+
+@dataclass(frozen=True, slots=True)
+class PowerOff(Command):
+    """Stop VR2 by force."""
+
+    name = b"poweroff"
+
+
+@dataclass(frozen=True, slots=True)
+class Beep(Command):
+    """Sound the buzzer: five pairs of on and off times, 0..255 x 10 ms each."""
+
+    name = b"beep"
+    parameters = (_BYTE,) * 10
+
+    times_10ms: tuple[int, ...]
+
+    def values(self) -> tuple[int, ...]:
+        """Return the ten times."""
+        return self.times_10ms
+
+
+COMMANDS: Final[dict[bytes, type[Command]]] = {
+    kind.name: kind
+    for kind in (
+        *(Limit, Output, DeviceName, Version, Date, SpeedMode),
+        *(Joystick, Watchdog, StableMode, Status, PowerOff, Beep),
+    )
+}
+
+_NAME: Final = re.compile(b"|".join(COMMANDS))  # no name is a prefix of another
+
+
+def parse_command(message: bytes) -> Command:
+    """Read a command without line end and CHECK.
+
+    Raises:
+        UnknownCommand: no command has this name; names are lower case.
+        BadParameters: wrong number of digits, a bad digit, a value out of range.
+    """
+    match = _NAME.match(message)
+    if match is None:
+        raise UnknownCommand(f"{message!r} is none of {', '.join(n.decode() for n in COMMANDS)}")
+    kind = COMMANDS[match[0]]
+    values = _read_parameters(kind, message[match.end() :])
+    return Beep(values) if kind is Beep else kind(*values)
+
+
+def _read_parameters(kind: type[Command], text: bytes) -> tuple[int, ...]:
+    """Cut the text behind the name into parameters; BadParameters if it does not fit."""
+    at = len(kind.literal)
+    size = kind.size
+    if len(text) != size or not text.startswith(kind.literal):
+        raise BadParameters(kind.name, f"{text!r} is not {size} characters of its grammar")
+    values: list[int] = []
+    try:
+        for parameter in kind.parameters:
+            values.append(parameter.read(text[at : at + parameter.width]))
+            at += parameter.width
+    except FieldError as error:
+        raise BadParameters(kind.name, f"#{len(values) + 1} {error}") from error
+    return tuple(values)
+
+
+COMMAND_CHECKSUM: Final = "CommandChecksum"
+COMMAND_UNKNOWN: Final = "CommandUnknown"
+RECEIVE_BUFFER_OVERFLOW: Final = "ReceiveBufferOverflow"
+
+
+class RrcEvent(StrEnum):
+    """The 16 events of the manual."""
+
+    INITIALIZED = "Initialized"
+    POWER_ON = "PowerOn"
+    POWER_ON_SUCCESS = "PowerOnSuccess"
+    POWER_ON_ERROR1 = "PowerOnError1"
+    POWER_ON_ERROR2 = "PowerOnError2"
+    POWER_ON_TIMEOUT = "PowerOnTimeout"
+    BY_BUTTON = "PowerOffWaitByButton"
+    BY_COMMUNICATION_ERROR = "PowerOffWaitByCommunicationError"
+    BY_JOYSTICK_MODULE_ERROR = "PowerOffWaitByJoystickModuleError"
+    BY_POWER_MODULE_ERROR = "PowerOffWaitByPowerModuleError"
+    BY_SYSTEM_ERROR = "PowerOffWaitBySystemError"
+    BY_HOST = "PowerOffWaitByHost"
+    BY_WATCHDOG = "PowerOffWaitByWatchdog"
+    BY_OVER_TIME = "PowerOffWaitByOverTime"
+    BY_NO_COMMUNICATION = "PowerOffWaitByNoCommunication"
+    POWER_OFF_FINISHED = "PowerOffFinished"
+
+
+POWER_ON_TRIGGER: Final = "PowerOnTrigger"
+"""What devices in the field send for `PowerOn` (DECISION R7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ok:
+    """`OK:name`: the command was carried out."""
+
+    name: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"OK:%b\n" % self.name.encode("latin-1")
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """`ER:reason`: a command's name, or what was wrong with the line."""
+
+    reason: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"ER:%b\n" % self.reason.encode("latin-1")
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """`EV:name`: the state of RRC or VR2 changed. The name may be a newer firmware's."""
+
+    name: str
+
+    @property
+    def kind(self) -> RrcEvent | None:
+        """Which of the manual's events this is; None for one it does not list."""
+        if self.name == POWER_ON_TRIGGER:
+            return RrcEvent.POWER_ON
+        try:
+            return RrcEvent(self.name)
+        except ValueError:
+            return None
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"EV:%b\n" % self.name.encode("latin-1")
+
+
+@dataclass(frozen=True, slots=True)
+class StatusA:
+    """`SA:`: the state of RRC and VR2, once a period of 10 ms.
+
+    Attributes:
+        in_v_pct: #1, translation of the stick, -100..100 %.
+        in_w_pct: #2, rotation of the stick.
+        out_v_pct: #3, translation that goes to the power module.
+        out_w_pct: #4, rotation that goes to the power module.
+        gauge: #5, voltage gauge, 1..10.
+        speed_mode: #6, 1..5.
+        speed_up_count: #7, 0..15; odd while the button is pressed.
+        speed_down_count: #8.
+        alarm_count: #9.
+    """
+
+    in_v_pct: int
+    in_w_pct: int
+    out_v_pct: int
+    out_w_pct: int
+    gauge: int
+    speed_mode: int
+    speed_up_count: int
+    speed_down_count: int
+    alarm_count: int
+
+    def encode(self) -> bytes:
+        """Write the line with CHECK and LF."""
+        message = b"SA:%02X%02X%02X%02X%X%X%X%X%X" % (
+            *(self.in_v_pct & 0xFF, self.in_w_pct & 0xFF),
+            *(self.out_v_pct & 0xFF, self.out_w_pct & 0xFF),
+            *(self.gauge, self.speed_mode),
+            *(self.speed_up_count, self.speed_down_count, self.alarm_count),
+        )
+        return message + check_digit(message) + b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Any other line: the answer of `device`, `version`, `date`, or a newer firmware's."""
+
+    text: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return self.text.encode("latin-1") + b"\n"
+
+
+Reply = Ok | Refusal | Event | StatusA | Text
+
+_BY_PREFIX: Final[dict[bytes, type[Ok] | type[Refusal] | type[Event]]] = {
+    b"OK:": Ok,
+    b"ER:": Refusal,
+    b"EV:": Event,
+}
+
+
+def parse_reply(line: bytes) -> Reply:
+    """Read a line without its LF.
+
+    Raises:
+        FramingError: an SA line of a wrong length.
+        ChecksumError: an SA line whose CHECK does not match.
+        FieldError: an SA line with a bad digit or a value out of range.
+    """
+    prefix = line[:3]
+    if prefix == b"SA:":
+        return _parse_status(line)
+    kind = _BY_PREFIX.get(prefix)
+    return Text(line.decode("latin-1")) if kind is None else kind(line[3:].decode("latin-1"))
+
+
+def _parse_status(line: bytes) -> StatusA:
+    if len(line) != 17:
+        raise FramingError(f"{line!r} has {len(line)} characters, an SA line has 17")
+    message = strip_check(line)
+    v_in, w_in, v_out, w_out = (read_signed(message[at : at + 2]) for at in (3, 5, 7, 9))
+    gauge, mode, up, down, alarm = (read_hex(message[at : at + 1]) for at in range(11, 16))
+    sound = max(map(abs, (v_in, w_in, v_out, w_out))) <= 100 and 1 <= gauge <= 10 and 1 <= mode <= 5
+    if not sound:
+        raise FieldError(f"{line!r}: a percentage, the gauge or the speed mode is out of range")
+    return StatusA(v_in, w_in, v_out, w_out, gauge, mode, up, down, alarm)

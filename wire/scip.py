@@ -1,0 +1,422 @@
+r"""SCIP of scanning range finders: commands, replies, scans, descriptions; 2.0 and 1.1.
+
+Numbers as characters of 6 bits, and the sum behind each line (SCIP 2.0, data encoding).
+
+>>> encode_number(1_234, 2), encode_number(5_432, 3), encode_number(16_000_000, 4)
+(b'CB', b'1Dh', b'm2@0')
+>>> with_sum(b"DMIN:20;", b"DMIN:20")
+b'DMIN:20;4'
+
+What a host asks of a sensor: symbol, parameters, and a string that comes back with the reply.
+
+>>> Command.parse(b"GD0044072501;left")
+Command(symbol='GD', parameters='0044072501', string=';left')
+>>> Command("TM", "0").encode()
+b'TM0\n'
+
+The data of a scan: time stamp, and distances in blocks of 64 characters, each with its sum.
+
+>>> encode_scan(16_000_000, [5_432], 3)
+(b'm2@0?', b'1DhM')
+>>> parse_scan((b'm2@0?', b'1DhM'), 3)
+(16000000, (5432,))
+
+SCIP 1.1, in which a URG-04LX starts: no sums, statuses of one character, distances of two.
+
+Sources: HokuyoAIST, urg_nz (gearbox) and urg_library as hosts; two recordings of real sensors
+(`tests/golden/scip_urg_04lx.json`). The document itself is not public any more.
+
+>>> encode_reply(b"L1", OK)
+b'L1\n0\n\n'
+>>> encode_reply(b"G38438401", OK, encode_distances([1_234]))
+b'G38438401\n0\nCB\n\n'
+
+What a sensor answers: echo, status, lines of data, an empty line.
+
+>>> Reply(b"BM", "00").encode()
+b'BM\n00P\n\n'
+>>> ReplySplitter().push(b"BM\n00P\n\n")
+[Reply(echo=b'BM', status='00', lines=())]
+
+Lines such as `DMIN:20;4`: what VV, PP and II tell of a sensor.
+
+>>> encode_lines({"DMIN": "20"})
+(b'DMIN:20;4',)
+>>> parse_lines((b'DMIN:20;4',))
+{'DMIN': '20'}
+"""
+
+from __future__ import annotations
+
+import struct
+from binascii import a2b_base64, b2a_base64
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from string import ascii_letters, digits
+from typing import Final
+
+from tickrig._compiled import mypyc_attr
+from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireError
+
+# Status codes of replies (SCIP 2.0, sensor commands and response to invalid commands).
+
+OK: Final = "00"
+DATA: Final = "99"
+"""Behind the echo of a scan that was asked for with MD or MS."""
+
+REPEATED: Final = "0B"
+TOO_SHORT: Final = "0C"
+TOO_LONG: Final = "0D"
+UNKNOWN: Final = "0E"
+STRING_TOO_LONG: Final = "0G"
+STRING_LETTERS: Final = "0H"
+
+LASER_OFF: Final = "10"
+LASER_TROUBLE: Final = "50"
+MOTOR_TROUBLE: Final = "51"
+"""50..97 are hardware trouble; which is which is ours."""
+
+
+_BITS: Final = 6
+_MASK: Final = 0x3F
+_ZERO: Final = 0x30
+_CHARACTERS: Final = bytes(range(_ZERO, _ZERO + _MASK + 1))
+
+_BASE64: Final = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
+"""Other characters of 6 bits, four for three bytes: a fifth of the time of shifts and masks."""
+
+_FROM_BASE64: Final = bytes.maketrans(_BASE64, _CHARACTERS)
+_TO_BASE64: Final = bytes.maketrans(_CHARACTERS, _BASE64)
+_MOST: Final = 4
+"""Characters of a number."""
+
+
+def encode_numbers(values: Sequence[int], width: int) -> bytes:
+    """Return numbers in `width` characters each, 1 to 4, one behind the other.
+
+    Raises:
+        FieldError: one needs more.
+    """
+    for value in (min(values, default=0), max(values, default=0)):
+        if not 0 <= value < 1 << _BITS * width:
+            raise FieldError(f"{value} does not fit into {width} characters of 6 bits")
+    words = bytearray(struct.pack(f">{len(values)}I", *values))
+    del words[::_MOST]
+    characters = b2a_base64(words, newline=False).translate(_FROM_BASE64)
+    out = bytearray(len(values) * width)
+    for place in range(width):
+        out[place::width] = characters[_MOST - width + place :: _MOST]
+    return bytes(out)
+
+
+def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
+    """Return the numbers that characters make, `width` each, 1 to 4.
+
+    Raises:
+        FieldError: a character that carries none.
+        FramingError: half a number at the end.
+    """
+    if strange := data.translate(None, _CHARACTERS):
+        raise FieldError(f"character {strange[0]:#04x} is not in 0x30..0x6f")
+    if len(data) % width:
+        raise FramingError(f"{len(data)} characters are no numbers of {width}")
+    count = len(data) // width
+    characters = bytearray(_BASE64[:1] * (_MOST * count))
+    for place in range(width):
+        characters[_MOST - width + place :: _MOST] = data[place::width].translate(_TO_BASE64)
+    words, bytes_of_three = bytearray(_MOST * count), a2b_base64(characters)
+    for place in range(3):
+        words[place + 1 :: _MOST] = bytes_of_three[place::3]
+    return struct.unpack(f">{count}I", words)
+
+
+def encode_number(value: int, width: int) -> bytes:
+    """Return a number in `width` characters; FieldError if it needs more."""
+    return encode_numbers((value,), width)
+
+
+def parse_number(data: bytes) -> int:
+    """Return the number that all characters make; FieldError if one carries none."""
+    return parse_numbers(data, len(data))[0]
+
+
+def _line_sum(data: bytes) -> bytes:
+    """Return the character that sums a line up."""
+    return bytes((_ZERO + (sum(data) & _MASK),))
+
+
+def with_sum(line: bytes, summed: bytes | None = None) -> bytes:
+    """Return a line with its sum behind it, the sum of `summed` if that is given."""
+    return line + _line_sum(line if summed is None else summed)
+
+
+def without_sum(line: bytes) -> bytes:
+    """Return a line without its sum.
+
+    Raises:
+        ChecksumError: the sum does not match.
+    """
+    data, came = line[:-1], line[-1:]
+    if not came or came != _line_sum(data):
+        raise ChecksumError(f"line {line!r}: its sum is {_line_sum(data)!r}")
+    return data
+
+
+_SYMBOL_BYTES: Final = 2
+MOST_STRING: Final = 16
+"""Letters that a string may have (SCIP 2.0, communication format)."""
+
+LETTERS: Final = frozenset(ascii_letters + digits + " ._+@")
+
+SIZES: Final[Mapping[str, tuple[int, ...]]] = {
+    "MD": (4, 4, 2, 1, 2),
+    "MS": (4, 4, 2, 1, 2),
+    "GD": (4, 4, 2),
+    "GS": (4, 4, 2),
+    "BM": (),
+    "QT": (),
+    "RS": (),
+    "TM": (1,),
+    "SS": (6,),
+    "CR": (2,),
+    "HS": (1,),
+    "VV": (),
+    "PP": (),
+    "II": (),
+}
+"""Characters of each parameter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command, as it came or goes; nothing of it is checked.
+
+    Attributes:
+        symbol: two letters.
+        parameters: all, one behind the other.
+        string: with its semicolon, empty if there is none.
+    """
+
+    symbol: str
+    parameters: str = ""
+    string: str = ""
+
+    @classmethod
+    def parse(cls, line: bytes) -> Command:
+        """Read a line without its end."""
+        text = line.decode("latin-1")
+        head, semicolon, rest = text.partition(";")
+        return cls(head[:_SYMBOL_BYTES], head[_SYMBOL_BYTES:], semicolon + rest)
+
+    @property
+    def echo(self) -> bytes:
+        """The line with which a reply begins."""
+        return f"{self.symbol}{self.parameters}{self.string}".encode("latin-1")
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The parameters, each for itself, cut as `SIZES` says."""
+        out, at = [], 0
+        for size in SIZES[self.symbol]:
+            out.append(self.parameters[at : at + size])
+            at += size
+        return tuple(out)
+
+    def encode(self) -> bytes:
+        """Return the bytes on the line."""
+        return self.echo + b"\n"
+
+
+_TIME_WIDTH: Final = 4
+_BLOCK_BYTES: Final = 64
+WIDTHS: Final = {"D": 3, "S": 2}
+"""Characters of a distance, by the second letter of the command."""
+
+
+def encode_scan(time_ms: int, distances: Sequence[int], width: int) -> tuple[bytes, ...]:
+    """Return the lines behind the status; FieldError for a number that does not fit."""
+    data = encode_numbers(distances, width)
+    blocks = [data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES)]
+    return tuple(with_sum(line) for line in (encode_number(time_ms, _TIME_WIDTH), *blocks))
+
+
+def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]]:
+    """Return time stamp in ms and distances in mm.
+
+    Raises:
+        ChecksumError: of a line.
+        FramingError: no time stamp, or half a distance.
+        FieldError: a character that carries no number.
+    """
+    stamp, *blocks = [without_sum(line) for line in lines] or [b""]
+    data = b"".join(blocks)
+    if len(stamp) != _TIME_WIDTH:
+        raise FramingError(f"{len(stamp)} characters of time, not {_TIME_WIDTH}")
+    return parse_number(stamp), parse_numbers(data, width)
+
+
+SWITCH: Final = b"SCIP2.0"
+"""The command after which a sensor speaks SCIP 2.0, until it is without power."""
+
+SCIP1_OK: Final = b"0"
+ERROR: Final = b"E"
+"""What QT is answered with, by which hosts know SCIP 1.1; anything but 0 is an error."""
+
+_WIDTH: Final = 2
+FARTHEST_MM: Final = 4_095
+"""What two characters carry."""
+
+
+def encode_reply(echo: bytes, status: bytes, lines: Iterable[bytes] = ()) -> bytes:
+    """Return the bytes on the line."""
+    return b"\n".join((echo, status, *lines)) + b"\n\n"
+
+
+def encode_distances(distances: Sequence[int]) -> tuple[bytes, ...]:
+    """Return the lines of G; FieldError for a number that does not fit."""
+    data = encode_numbers(distances, _WIDTH)
+    return tuple(data[at : at + _BLOCK_BYTES] for at in range(0, len(data), _BLOCK_BYTES))
+
+
+_END: Final = b"\n\n"
+_STATUS_BYTES: Final = 2
+MOST_BYTES: Final = 16_384
+"""No reply is longer: a whole scan has less than 3000 bytes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """One reply.
+
+    Attributes:
+        echo: the command, with the scans that remain in the place of their number.
+        status: two characters.
+        lines: behind the status, as they came, each with its sum.
+    """
+
+    echo: bytes
+    status: str
+    lines: tuple[bytes, ...] = ()
+
+    def encode(self) -> bytes:
+        """Return the bytes on the line."""
+        return b"\n".join((self.echo, with_sum(self.status.encode()), *self.lines)) + _END
+
+    @classmethod
+    def parse(cls, data: bytes) -> Reply:
+        """Read a reply without its last two line ends.
+
+        Raises:
+            FramingError: no echo or status.
+            ChecksumError: the sum of the status does not match.
+        """
+        echo, *rest = data.split(b"\n")
+        if not rest:
+            raise FramingError(f"{data!r} has no status")
+        if (echo, rest) == (SWITCH, [SCIP1_OK]):
+            return cls(echo, SCIP1_OK.decode())  # the last answer in SCIP 1.1
+        status = without_sum(rest[0])
+        if len(status) != _STATUS_BYTES or not status.isascii():
+            raise FramingError(f"status {status!r} has not 2 characters")
+        return cls(echo, status.decode(), tuple(rest[1:]))
+
+
+@mypyc_attr(serializable=True)
+class ReplySplitter:
+    """Collects bytes and gives whole replies; chunking makes no difference.
+
+    Attributes:
+        garbled: how many replies were none.
+    """
+
+    def __init__(self) -> None:
+        self._tail = b""
+        self.garbled = 0
+
+    def push(self, data: bytes) -> list[Reply]:
+        """Take bytes in; give whole replies out."""
+        *whole, self._tail = (self._tail + data).split(_END)
+        if len(self._tail) > MOST_BYTES:
+            self._tail, self.garbled = b"", self.garbled + 1
+        out = []
+        for part in whole:
+            try:
+                out.append(Reply.parse(part))
+            except WireError:
+                self.garbled += 1
+        return out
+
+
+def encode_lines(values: Mapping[str, str]) -> tuple[bytes, ...]:
+    """Return the lines; the semicolon is no part of the sum."""
+    texts = [f"{key}:{value}".encode("latin-1") for key, value in values.items()]
+    return tuple(with_sum(text + b";", text) for text in texts)
+
+
+def parse_lines(lines: Iterable[bytes]) -> dict[str, str]:
+    """Return the values by their keys.
+
+    Raises:
+        FramingError: a line that is none.
+        ChecksumError: of a line.
+    """
+    values = {}
+    for line in lines:
+        text, semicolon, came = line.rpartition(b";")
+        key, colon, value = text.decode("latin-1").partition(":")
+        if not (semicolon and colon):
+            raise FramingError(f"line {line!r} is not KEY:VALUE;SUM")
+        if came != _line_sum(text):
+            raise ChecksumError(f"line {line!r}: its sum is {_line_sum(text)!r}")
+        values[key] = value.strip()
+    return values
+
+
+@dataclass(frozen=True, slots=True)
+class Specification:
+    """What PP tells: limits in mm, steps, turns per minute.
+
+    Attributes:
+        model: its name.
+        nearest_mm: DMIN.
+        farthest_mm: DMAX.
+        resolution: ARES, steps of a whole turn.
+        first: AMIN, the first step that measures.
+        last: AMAX, the last one.
+        front: AFRT, the step straight ahead.
+        speed_rpm: SCAN.
+    """
+
+    model: str
+    nearest_mm: int
+    farthest_mm: int
+    resolution: int
+    first: int
+    last: int
+    front: int
+    speed_rpm: int
+
+    @property
+    def lines(self) -> tuple[bytes, ...]:
+        """The lines of a reply to PP."""
+        numbers = (self.nearest_mm, self.farthest_mm, self.resolution)
+        steps = (self.first, self.last, self.front, self.speed_rpm)
+        keys = ("DMIN", "DMAX", "ARES", "AMIN", "AMAX", "AFRT", "SCAN")
+        values = dict(zip(keys, map(str, (*numbers, *steps)), strict=True))
+        return encode_lines({"MODL": self.model, **values})
+
+    @classmethod
+    def parse(cls, lines: Iterable[bytes]) -> Specification:
+        """Read a reply to PP.
+
+        Raises:
+            WireError: a line that is none, or a number that is missing, none or below 0.
+        """
+        values = parse_lines(lines)
+        numbers = []
+        for key in ("DMIN", "DMAX", "ARES", "AMIN", "AMAX", "AFRT", "SCAN"):
+            text = values.get(key, "")
+            if not (text.isascii() and text.isdecimal()):
+                raise FieldError(f"{key} {text!r} is not a whole number")
+            numbers.append(int(text))
+        return cls(values.get("MODL", ""), *numbers)

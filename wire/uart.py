@@ -1,0 +1,247 @@
+"""Characters of a UART on a serial line, and how one of another setting samples them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from tickrig.wire.errors import FieldError
+from tickrig.wire.instant import NEVER
+
+Parity = Literal["N", "E", "O", "M", "S"]
+"""None, even, odd, mark (always 1), space (always 0)."""
+
+PS_PER_US: Final = 1_000_000
+PS_PER_S: Final = 1_000_000 * PS_PER_US
+"""Bits of a fast line are shorter than a microsecond: here, times are in picoseconds."""
+
+_OVERSAMPLING: Final = 16
+"""Samples of a receiver for each of its bits."""
+
+_MID_BIT: Final = _OVERSAMPLING // 2
+
+
+@dataclass(frozen=True, slots=True)
+class UartSetting:
+    """How a UART sends and receives characters.
+
+    Attributes:
+        baud: bit rate in bit/s, at least 1.
+        data_bits: of a character, 5 to 8, the lowest first.
+        parity: of the bit behind them.
+        stop_bits: 1, 1.5 or 2; a receiver looks at the first alone.
+
+    Raises:
+        FieldError: a value that no UART has.
+
+    >>> str(UartSetting(9_600, 7, "E", 2)), UartSetting(9_600, 7, "E", 2).frame_bits
+    ('9600 7E2', 11)
+    """
+
+    baud: int = 115_200
+    data_bits: int = 8
+    parity: Parity = "N"
+    stop_bits: int | float = 1
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.baud < 1:
+            raise FieldError(f"{self.baud} bit/s: a UART has at least 1")
+        if self.data_bits not in (5, 6, 7, 8):
+            raise FieldError(f"{self.data_bits} data bits: a UART has 5, 6, 7 or 8")
+        if self.parity not in ("N", "E", "O", "M", "S"):
+            raise FieldError(f"parity {self.parity!r}: a UART has N, E, O, M or S")
+        if self.stop_bits not in (1, 1.5, 2):
+            raise FieldError(f"{self.stop_bits} stop bits: a UART has 1, 1.5 or 2")
+
+    def __str__(self) -> str:
+        """Write it as people do: `115200 8N1`."""
+        return f"{self.baud} {self.data_bits}{self.parity}{self.stop_bits:g}"
+
+    @property
+    def frame_bits(self) -> float:
+        """Bits of a character on the line, from the start bit to the last stop bit."""
+        return 1 + self.data_bits + (self.parity != "N") + self.stop_bits
+
+    def duration_ps(self, characters: int = 1) -> int:
+        """Compute how long characters take that are sent back to back.
+
+        Args:
+            characters: how many.
+        """
+        return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
+
+    def parity_bit(self, value: int) -> int:
+        """Compute the bit behind the data bits of a character; the stop bit if there is none.
+
+        Args:
+            value: the character.
+        """
+        odd = value.bit_count() % 2
+        return {"E": odd, "O": 1 - odd, "S": 0}.get(self.parity, 1)
+
+    def bits(self, value: int) -> tuple[int, ...]:
+        """Return start bit, data bits and parity bit of a character.
+
+        Args:
+            value: the character; bits above its data bits are not sent.
+        """
+        value &= (1 << self.data_bits) - 1
+        data = tuple(value >> bit & 1 for bit in range(self.data_bits))
+        parity = () if self.parity == "N" else (self.parity_bit(value),)
+        return (0, *data, *parity)
+
+    def levels(self, value: int, start_ps: int) -> Iterator[tuple[int, int]]:
+        """Yield the levels of the line while a character is sent.
+
+        Args:
+            value: the character.
+            start_ps: when its start bit begins.
+
+        Yields:
+            1 or 0, and until when in ps; the stop bits as one.
+        """
+        for number, bit in enumerate(self.bits(value), start=1):
+            yield bit, start_ps + number * PS_PER_S // self.baud
+        yield 1, start_ps + self.duration_ps()
+
+
+@dataclass(frozen=True, slots=True)
+class Character:
+    """What a UART has received.
+
+    Attributes:
+        value: the data bits as they were sampled.
+        end_ps: when its first stop bit ends.
+        framing_error: the line was 0 where a stop bit should have been.
+        parity_error: the parity bit is not that of the value.
+        line_break: the line was 0 from the start bit to the stop bit; a framing error too.
+    """
+
+    value: int
+    end_ps: int
+    framing_error: bool = False
+    parity_error: bool = False
+    line_break: bool = False
+
+
+@dataclass(slots=True)
+class UartReceiver:
+    """Samples a line 16 times a bit, and makes characters of it.
+
+    A sample of 0 after one of 1 is the edge of a start bit. Half a bit later it has to be 0
+    still; then each bit is sampled once, in its middle (National Semiconductor PC16550D has this
+    clock of 16 times the baud rate). After a framing error or a break the line has to be 1 again
+    before there can be a start bit; the PC16550D takes the missing stop bit for a start bit.
+
+    Not emulated: majority votes of several samples, FIFOs and their overrun.
+
+    Args:
+        setting: its setting.
+        now_ps: from when on it looks at the line, which is idle.
+    """
+
+    setting: UartSetting
+    now_ps: int = 0
+    _next: int = field(init=False)  # number of the next sample to be taken
+    _sampled: list[int] | None = field(init=False, default=None)  # of a character, from its edge
+    _idle: bool = field(init=False, default=True)  # the line was 1, a 0 is a start bit
+
+    def __post_init__(self) -> None:
+        """Begin with the first sample from `now_ps` on."""
+        self._next = self._sample_from(self.now_ps)
+
+    @property
+    def due_ps(self) -> int:
+        """When the stop bit of the character that is being received is sampled, else `NEVER`."""
+        if self._sampled is None:
+            return NEVER
+        left = self._frame_samples - len(self._sampled) - 1
+        return self._time_of(self._next + left * _OVERSAMPLING)
+
+    def push(self, level: int, until_ps: int) -> Iterator[Character]:
+        """Let the line have a level from where the last push ended.
+
+        Args:
+            level: 1 or 0.
+            until_ps: until when; a time that has passed is no error.
+
+        Yields:
+            The characters that are complete.
+        """
+        end = self._sample_from(until_ps)
+        while self._next < end:
+            if self._sampled is not None:
+                yield from self._sample(self._sampled, level)
+            elif level or not self._idle:
+                self._idle, self._next = bool(level), end
+            else:
+                self._sampled = []
+                self._next += _MID_BIT
+
+    def _sample(self, frame: list[int], level: int) -> Iterator[Character]:
+        """Take the middle of a bit."""
+        taken = self._next
+        frame.append(level)
+        self._next += _OVERSAMPLING
+        false_start = len(frame) == 1 and level
+        if false_start or len(frame) == self._frame_samples:
+            self._next = taken + 1
+            self._sampled, self._idle = None, bool(level)
+            if not false_start:
+                yield self._character(frame[1:], self._time_of(taken + _MID_BIT))
+
+    @property
+    def _frame_samples(self) -> int:
+        """Start bit, data bits, parity bit, stop bit."""
+        return 2 + self.setting.data_bits + (self.setting.parity != "N")
+
+    def _character(self, sampled: list[int], end_ps: int) -> Character:
+        count = self.setting.data_bits
+        value = sum(bit << place for place, bit in enumerate(sampled[:count]))
+        parity = sampled[count:-1]
+        return Character(
+            value,
+            end_ps,
+            framing_error=not sampled[-1],
+            parity_error=parity not in ([], [self.setting.parity_bit(value)]),
+            line_break=not any(sampled),
+        )
+
+    def _sample_from(self, t_ps: int) -> int:
+        """Return the number of the first sample at or after a time."""
+        return -(-t_ps * _OVERSAMPLING * self.setting.baud // PS_PER_S)
+
+    def _time_of(self, sample: int) -> int:
+        """Return when a sample is taken, in ps, rounded up."""
+        return -(-sample * PS_PER_S // (_OVERSAMPLING * self.setting.baud))
+
+
+def sample(
+    data: bytes, sender: UartSetting, receiver: UartSetting, start_ps: int = 0
+) -> tuple[Character, ...]:
+    """Let a UART receive what one of another setting sends back to back.
+
+    Args:
+        data: what is sent.
+        sender: the setting at which it is sent.
+        receiver: the setting of the UART that receives it.
+        start_ps: when the first start bit begins.
+
+    Returns:
+        What is received of it, until the line has been idle for a character.
+
+    >>> [hex(got.value) for got in sample(b"OK", UartSetting(115_200), UartSetting(115_200))]
+    ['0x4f', '0x4b']
+    >>> [hex(got.value) for got in sample(b"OK", UartSetting(115_200), UartSetting(57_600))]
+    ['0xcc']
+    """
+    uart = UartReceiver(receiver, start_ps)
+    received: list[Character] = []
+    for value in data:
+        for level, until_ps in sender.levels(value, start_ps):
+            received += uart.push(level, until_ps)
+        start_ps += sender.duration_ps()
+    received += uart.push(1, start_ps + receiver.duration_ps(2))
+    return tuple(received)

@@ -1,0 +1,139 @@
+r"""Lines of an infra-red ucode reader: `$TYPE,FIELD,...*HHHH`. The protocol is ours.
+
+The source (NEDO report 3.4.43.3 (4), Fig. 123) names the reader and not its lines. HHHH is
+the CRC-16 (XMODEM: 1021h, from 0) of all octets between `$` and `*`.
+
+>>> UcodeLine(LineType.ROUND, (7, 2)).encode()
+b'$UR,7,2*0FF7\n'
+>>> parse_line(b"$UR,7,2*0FF7")
+UcodeLine(type=<LineType.ROUND: 'UR'>, fields=(7, 2))
+"""
+
+from __future__ import annotations
+
+import re
+from binascii import crc_hqx
+from dataclasses import dataclass
+from enum import Enum
+from typing import Final
+
+from tickrig.wire.errors import ChecksumError, FieldError, FramingError
+
+BAUD: Final = 38_400
+ROUNDS: Final = 1 << 16
+"""Rounds are counted up to here, and from 0 again."""
+
+MAX_LEVEL: Final = 100
+_UCODE: Final = re.compile(r"[0-9A-Fa-f]{32}", re.ASCII)
+_LINE: Final = re.compile(rb"\$([A-Z]{2}(?:,[0-9A-Za-z]*)*)\*([0-9A-F]{4})")
+
+
+class LineType(Enum):
+    """What a line is.
+
+    Attributes:
+        READER: after power-up, and the answer to ID: version of the protocol, range in mm, cone
+            in degrees, 1 while it listens.
+        UCODE: a marker that was heard: round, ucode, level of the signal in per cent.
+        ROUND: the end of a round: its number, and how many markers were heard in it.
+        LIGHT: the end of a round in which too much light left nothing to be heard: its number.
+        REFUSED: the answer to what is no command.
+    """
+
+    READER = "UI"
+    UCODE = "UC"
+    ROUND = "UR"
+    LIGHT = "UL"
+    REFUSED = "UE"
+
+
+HIGHEST: Final = {
+    LineType.READER: (9, 99_999, 360, 1),
+    LineType.UCODE: (ROUNDS - 1, None, MAX_LEVEL),
+    LineType.ROUND: (ROUNDS - 1, 99),
+    LineType.LIGHT: (ROUNDS - 1,),
+    LineType.REFUSED: (),
+}
+"""The fields of each kind: numbers from 0 to this, None for a ucode."""
+
+_COMMANDS: Final = (b"ID", b"ON", b"OFF")
+"""What a host may send, each with LF: tell who it is, listen, listen no more."""
+
+
+def parse_ucode(text: str) -> str:
+    """Return a ucode as it is written: 128 bits, 32 hex digits in capitals.
+
+    Raises:
+        FieldError: it is none.
+
+    >>> parse_ucode("00001c00000000000001000000000abc")
+    '00001C00000000000001000000000ABC'
+    """
+    if not _UCODE.fullmatch(text):
+        shown = text if len(text) <= 40 else f"{text[:40]}..."
+        raise FieldError(f"ucode {shown!r} is not 32 hex digits")
+    return text.upper()
+
+
+@dataclass(frozen=True, slots=True)
+class UcodeLine:
+    """A line of a reader.
+
+    Attributes:
+        type: what it is.
+        fields: as `HIGHEST` has them; ucodes as 32 hex digits in capitals.
+
+    Raises:
+        FieldError: fields that this kind does not have.
+    """
+
+    type: LineType
+    fields: tuple[int | str, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse fields of other kinds."""
+        highest = HIGHEST[self.type]
+        if len(self.fields) != len(highest):
+            raise FieldError(f"{self.type.value} has {len(highest)} fields, not {len(self.fields)}")
+        for field, limit in zip(self.fields, highest, strict=True):
+            if isinstance(field, str) != (limit is None):
+                raise FieldError(f"{self.type.value}: {field!r} is out of its place")
+            if isinstance(field, int) and limit is not None and not 0 <= field <= limit:
+                raise FieldError(f"{self.type.value}: {field} is not in 0..{limit}")
+
+    def encode(self) -> bytes:
+        """Return the line with its sum and LF."""
+        body = ",".join((self.type.value, *map(str, self.fields))).encode()
+        return b"$%s*%04X\n" % (body, crc_hqx(body, 0))
+
+
+def parse_line(line: bytes) -> UcodeLine:
+    """Read a line without its end.
+
+    Raises:
+        FramingError: no line of a reader.
+        ChecksumError: its sum is another.
+        FieldError: fields that its kind does not have.
+    """
+    if (match := _LINE.fullmatch(line)) is None:
+        raise FramingError(f"no line of a ucode reader: {line[:60]!r}")
+    body, told = match[1], int(match[2], 16)
+    if (crc := crc_hqx(body, 0)) != told:
+        raise ChecksumError(f"CRC {told:04X} of {body[:60]!r} is {crc:04X}")
+    name, *words = body.decode().split(",")
+    try:
+        kind = LineType(name)
+    except ValueError:
+        raise FieldError(f"no kind of line: {name!r}") from None
+    limits = HIGHEST[kind]
+    if len(words) != len(limits):
+        raise FieldError(f"{name} has {len(limits)} fields, not {len(words)}")
+    return UcodeLine(kind, tuple(map(_field, words, limits)))
+
+
+def _field(word: str, limit: int | None) -> int | str:
+    if limit is None:
+        return parse_ucode(word)
+    if not word.isdigit() or len(word) > len(str(limit)):
+        raise FieldError(f"{word[:40]!r} is no number of 0..{limit}")
+    return int(word)
