@@ -30,7 +30,7 @@ from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, EXTENDED
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _BIT_7: Final = 0x80
-"""No node-ID has it: what is behind 127 is none."""
+"""Set in no node-ID: they end at 127."""
 
 # Whether an EDS is of the device that answers, or of another one.
 
