@@ -18,13 +18,13 @@ from serial.rfc2217 import COM_PORT_OPTION, IAC, IAC_DOUBLED, PortManager
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.serial.bridge import HostSetting
 from tickrig.host.links.serial_link import tune
+from tickrig.host.text.values import MOST_PORT, parse_port
 from tickrig.wire.instant import NEVER
 
 # Where a serial line is served: `rfc2217://[HOST:]PORT` or `socket://[HOST:]PORT`.
 
 _SCHEMES: Final = ("rfc2217", "socket")
 _LOOPBACK: Final = "127.0.0.1"
-_MAX_PORT: Final = 65_535
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +67,12 @@ def parse_serve_url(text: str) -> ServeUrl:
     bare = host[1:-1] if host[:1] + host[-1:] == "[]" else host
     if colon and not bare:
         raise ValueError(f"{text!r}: no host before the colon; 0.0.0.0 is every address")
-    if not (port.isascii() and port.isdecimal()) or int(port[:6]) > _MAX_PORT:
-        raise ValueError(f"{text!r}: port {port!r} is not in 0..{_MAX_PORT}")
+    number = parse_port(port)
+    if number is None:
+        raise ValueError(f"{text!r}: port {port!r} is not in 0..{MOST_PORT}")
     if ":" in bare and bare == host:
         raise ValueError(f"{text!r}: an IPv6 address stands in brackets, as [::1]")
-    return ServeUrl(scheme, bare or _LOOPBACK, int(port))
+    return ServeUrl(scheme, bare or _LOOPBACK, number)
 
 
 # A host that was told to leave.
