@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 from math import cos, pi
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import canopen
-import click
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.bench.child import running
@@ -20,14 +19,12 @@ from tickrig.emulators.can.outside.sim_network import SimNetwork
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.models import MODELS, EmulatedModel
 from tickrig.emulators.canopen.node import Node, Nodes
-from tickrig.emulators.commands.picture import check_plot, new_figure, write_figure
+from tickrig.emulators.commands.picture import new_figure, write_figure
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
-from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options, open_raw
-from tickrig.host.cli.messages import Refused, refuse_path, warnings_shown
-from tickrig.host.cli.options import PATH
-from tickrig.host.cli.start import loading, raise_of_output
+from tickrig.host.cli.can_options import BusOptions, open_raw
+from tickrig.host.cli.messages import Refused
 from tickrig.host.control.client import ControlClient
 from tickrig.host.text.values import Setting
 
@@ -81,7 +78,7 @@ def row(sample: CurveSample) -> str:
 _TITLE: Final = "Fig. 120: a potentiometer on node 16 turns the motor of node 32"
 
 
-def _write_plot(samples: Sequence[CurveSample], path: Path) -> None:
+def write_plot(samples: Sequence[CurveSample], path: Path) -> None:
     """Draw voltage, reference and angle over time into a file, PNG, SVG or HTML.
 
     Raises:
@@ -293,7 +290,7 @@ class BusStage:
 
 
 @contextmanager
-def _bus_stage(options: BusOptions) -> Iterator[Fig120Stage]:
+def bus_stage(options: BusOptions) -> Iterator[Fig120Stage]:
     """Start the emulator on a bus, and a master beside it.
 
     Raises:
@@ -432,51 +429,3 @@ def _arrival(samples: list[CurveSample]) -> str:
 def _number(value: Setting) -> float:
     assert not isinstance(value, str)
     return value
-
-
-# The command `tickrig demo fig120`.
-
-
-@click.command(cls=BusCommand)
-@click.option("--plot", type=PATH, help="Draw the curves into FILE.png, .svg or .html.")
-@bus_options
-def fig120(plot: Path | None, **options: Any) -> None:
-    """Let a potentiometer at one CANopen node turn the motor of another, without a PC in between.
-
-    A master links the analogue input of an f-palette with the reference of a
-    motor core unit (PDO linking), starts both and leaves the bus. It runs in
-    virtual time; with -i and -c in real time on a bus of python-can.
-
-    \b
-    tickrig demo fig120
-    tickrig demo fig120 --plot curves.png
-    tickrig demo fig120 -i socketcan -c vcan0
-    """  # noqa: D301 - click wants the backspace
-    if plot is not None:
-        check_plot(plot)
-    samples = _play_fig120(BusOptions(**options))
-    if plot is not None:
-        _draw_fig120(samples, plot)
-        click.echo(f"\nThe curves are in {plot}.")
-
-
-def _play_fig120(bus: BusOptions) -> list[CurveSample]:
-    with loading():
-        from canopen import SdoCommunicationError  # noqa: PLC0415
-
-    try:
-        if not bus:
-            return run_demo(VirtualStage(), click.echo)
-        with warnings_shown(), _bus_stage(bus) as stage:
-            return run_demo(stage, click.echo)
-    except (RuntimeError, OSError, SdoCommunicationError) as error:
-        raise_of_output(error)
-        raise click.ClickException(str(error)) from error
-
-
-def _draw_fig120(samples: list[CurveSample], plot: Path) -> None:
-
-    try:
-        _write_plot(samples, plot)
-    except OSError as error:
-        refuse_path("plot", error)

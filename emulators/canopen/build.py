@@ -16,10 +16,11 @@ from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body import BodySpec
-from tickrig.emulators.canopen.choices import AUTO, LSS, NodeSpec, is_bus_node
+from tickrig.emulators.canopen.choices import AUTO, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm
+from tickrig.emulators.canopen.node_spec import LSS, NodeSpec
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.clock import Clock

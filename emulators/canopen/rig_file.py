@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from tickrig.emulators.canopen.body import BodySpec, read_body
-from tickrig.emulators.canopen.choices import MODELS, PROFILES, NodeSpec, parse_ids
+from tickrig.emulators.canopen.choices import MODELS, PROFILES
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.text.toml_reader import load_toml

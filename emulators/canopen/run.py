@@ -25,8 +25,9 @@ from tickrig.emulators.canopen.build import (
     make_nodes,
     store_keeper,
 )
-from tickrig.emulators.canopen.choices import AUTO, NodeSpec, parse_ids, parse_node
+from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import profile_name
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.rig_file import RigFile, read_rig
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in

@@ -24,7 +24,7 @@ DEMOS: Final = {
         "Let a robot keep its position by ucodes while the service that resolves them is gone.",
     ),
     "fig120": (
-        "tickrig.emulators.fig120:fig120",
+        "tickrig.emulators.fig120_cli:fig120",
         "Let a potentiometer at one CANopen node turn the motor of another, without a PC in"
         " between.",
     ),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from tickrig.host.cli.messages import Refused, refuse_path
@@ -13,6 +11,9 @@ from tickrig.host.cli.start import give_up_terminals, taking_signals
 from tickrig.host.control.client import ControlClient
 
 if TYPE_CHECKING:
+    from pathlib import Path
+    from types import FrameType
+
     from tickrig.host.control.requests import RequestDispatcher
     from tickrig.host.control.server import ControlServer
 

@@ -172,7 +172,7 @@ def _on_bus(
 ) -> ComparedRun:
     """Compare what passed a bus."""
     from tickrig.emulators.canopen.build import describe_nodes, make_nodes  # noqa: PLC0415 - slow
-    from tickrig.emulators.canopen.choices import parse_node  # noqa: PLC0415
+    from tickrig.emulators.canopen.node_spec import parse_node  # noqa: PLC0415
     from tickrig.emulators.testing.commands.compare import compare_bus  # noqa: PLC0415
 
     specs = [spec for text in options["nodes"] for spec in parse_node(text)]

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from tickrig.emulators.canopen.choices import LSS, parse_ids
 from tickrig.emulators.canopen.models import MODELS
+from tickrig.emulators.canopen.node_spec import LSS, parse_ids
 from tickrig.emulators.canopen.rig_file import DEVICE_KEYS, NODE_KEYS
 from tickrig.emulators.testing.rig_file.section import (
     RigFileNotes,

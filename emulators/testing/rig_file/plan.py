@@ -15,7 +15,7 @@ from typing import Final
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.canopen.choices import LSS
+from tickrig.emulators.canopen.node_spec import LSS
 from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text.values import Setting
 

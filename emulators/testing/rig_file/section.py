@@ -17,7 +17,7 @@ from math import isfinite
 from typing import Any, Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.canopen.choices import LSS
+from tickrig.emulators.canopen.node_spec import LSS
 from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath
 from tickrig.host.text.values import parse_size, us_of

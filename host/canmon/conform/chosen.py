@@ -1,13 +1,16 @@
-"""Which checks `--only` names."""
+"""Which checks `--only` names, and the list of `--list`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
 
 from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.suite import OBJECTS, group_titles, suite_checks
 from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import closest
+from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
 
 def patterns(only: str | Iterable[str]) -> tuple[str, ...]:
@@ -66,3 +69,39 @@ def check_chosen(only: Sequence[str], level: Level) -> None:
         least = min((check.level for check in named), default=level)
         if least > level:
             raise Refused(f"--only {word} needs --{least.word}")
+
+
+# The list of checks: names, levels, titles, and what their groups are about.
+
+_ANY_NODE_ID: Final = 1
+_NAMED: Final = ", which --eds FILE names"
+
+
+def listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str]:
+    """Yield a line a check, whatever its level, and then a line a group.
+
+    Args:
+        only: groups or ids, with * and ?, in any case; all if empty.
+        device: what an EDS says, for the checks of its objects.
+
+    Raises:
+        Refused: a word that names none.
+    """
+    checks = [*chosen(only), *_of_objects(only, device)]
+    wide = max((len(check.id) for check in checks), default=0) + 2
+    yield from (f"{check.id:<{wide}}{check.level.word:<15}{check.title}" for check in checks)
+    yield ""
+    groups = {check.group for check in checks}
+    unnamed = device is None and (not only or any(map(_is_of_objects, only)))
+    for name, title in group_titles().items():
+        if name in groups or (name == OBJECTS and unnamed):
+            yield f"{name:<5}{title}{_NAMED if name == OBJECTS and unnamed else ''}"
+
+
+def _of_objects(only: Sequence[str], device: EdsDevice | None) -> list[Check]:
+    made = object_checks(device, _ANY_NODE_ID) if device else ()
+    return list(filter(ConformancePlan(Level.INTRUSIVE, tuple(only)).chooses, made))
+
+
+def _is_of_objects(word: str) -> bool:
+    return word.upper().startswith(OBJECTS)

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.conform.chosen import chosen
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
-from tickrig.host.canopen.conform.object_checks import object_checks
-from tickrig.host.canopen.conform.suite import OBJECTS, group_titles
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.start import loading
-from tickrig.wire.canopen.eds.eds_device import EdsDevice
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -164,47 +159,11 @@ def _level(options: dict[str, Any]) -> str:
 
 
 def _list(only: Sequence[str], eds: Path | None) -> None:
-    from tickrig.host.canmon.conform.chosen import patterns  # noqa: PLC0415 - slow
+    from tickrig.host.canmon.conform.chosen import listed_checks, patterns  # noqa: PLC0415 - slow
     from tickrig.host.canmon.eds_document import read_device_document  # noqa: PLC0415 - slow
 
     device = None if eds is None else read_device_document(eds, "--eds").device
-    lines = list(_listed_checks(patterns(only), device))
+    lines = list(listed_checks(patterns(only), device))
     with until_unread():
         for line in lines:
             click.echo(line)
-
-
-# The list of checks: names, levels, titles, and what their groups are about.
-
-_ANY_NODE_ID: Final = 1
-_NAMED: Final = ", which --eds FILE names"
-
-
-def _listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str]:
-    """Yield a line a check, whatever its level, and then a line a group.
-
-    Args:
-        only: groups or ids, with * and ?, in any case; all if empty.
-        device: what an EDS says, for the checks of its objects.
-
-    Raises:
-        Refused: a word that names none.
-    """
-    checks = [*chosen(only), *_of_objects(only, device)]
-    wide = max((len(check.id) for check in checks), default=0) + 2
-    yield from (f"{check.id:<{wide}}{check.level.word:<15}{check.title}" for check in checks)
-    yield ""
-    groups = {check.group for check in checks}
-    unnamed = device is None and (not only or any(map(_is_of_objects, only)))
-    for name, title in group_titles().items():
-        if name in groups or (name == OBJECTS and unnamed):
-            yield f"{name:<5}{title}{_NAMED if name == OBJECTS and unnamed else ''}"
-
-
-def _of_objects(only: Sequence[str], device: EdsDevice | None) -> list[Check]:
-    made = object_checks(device, _ANY_NODE_ID) if device else ()
-    return list(filter(ConformancePlan(Level.INTRUSIVE, tuple(only)).chooses, made))
-
-
-def _is_of_objects(word: str) -> bool:
-    return word.upper().startswith(OBJECTS)

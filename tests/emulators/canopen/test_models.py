@@ -11,10 +11,10 @@ from canopen.objectdictionary import ODVariable, import_od
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
-from tickrig.emulators.canopen.choices import NodeSpec
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.emulators.canopen.models import MODELS, EmulatedModel
 from tickrig.emulators.canopen.node import NODE_OUTPUTS
+from tickrig.emulators.canopen.node_spec import NodeSpec
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription, ObjectCode
 

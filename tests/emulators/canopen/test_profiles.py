@@ -12,9 +12,9 @@ from tickrig.device.canopen.ds402 import Ds402
 from tickrig.device.canopen.slave import Application, ServiceMaker
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.choices import NodeSpec, parse_node
 from tickrig.emulators.canopen.eds import application_of
 from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_node
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.choices import parse_node
+from tickrig.emulators.canopen.node_spec import parse_node
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.host.rtc.canopen.builder.build import build
