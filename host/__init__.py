@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tickrig.host.rtc.lite.proxy import RtcLiteProxy as RtcLiteProxy
     from tickrig.host.rtc.motion.modbus_master import ModbusMaster as ModbusMaster
     from tickrig.host.urg import UrgClient as UrgClient
-    from tickrig.wire.rrc import RrcEvent as RrcEvent
+    from tickrig.wire.rrc.replies import RrcEvent as RrcEvent
 else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
@@ -33,6 +33,6 @@ else:
             "tickrig.host.rrc.client": ("RrcClient",),
             "tickrig.host.rtc.lite.proxy": ("RtcLiteProxy",),
             "tickrig.host.urg": ("UrgClient",),
-            "tickrig.wire.rrc": ("RrcEvent",),
+            "tickrig.wire.rrc.replies": ("RrcEvent",),
         },
     )

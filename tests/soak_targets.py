@@ -45,11 +45,11 @@ from tickrig.host.rtc.commands.system_control import SystemControl
 from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.schedule import RealTime
-from tickrig.wire import rrc as cmd
 from tickrig.wire.can import CanFrame, Frames, data_frame
 from tickrig.wire.canopen.lss import LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID, LssAddress, LssCommand
 from tickrig.wire.instant import NEVER
 from tickrig.wire.modbus import Request, encode_frame, encode_request
+from tickrig.wire.rrc import commands as cmd
 
 Throw = Callable[[Random], str]
 """Makes an input with chance and throws it; says in a word what came of it."""

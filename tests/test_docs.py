@@ -11,7 +11,7 @@ import pytest
 
 from tests.host.live import live_rrc, pty
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "tests/hil/README.md"])

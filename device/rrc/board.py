@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
 from tickrig.device.rrc.settings import POWERED_ON, FailTarget, Move, RrcConfig, RrcState
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import (
+from tickrig.wire.rrc.message import (
     BASE_PCT,
     LINE_FEED_PCT,
     OVERFLOW_PCT,
@@ -17,8 +17,8 @@ from tickrig.wire.rrc import (
     REPLY_PCT,
     STATUS_PCT,
     TOO_FAR_BEHIND_PCT,
-    RrcEvent,
 )
+from tickrig.wire.rrc.replies import RrcEvent
 
 # The physical side of the RRC and of the VR2 around it.
 

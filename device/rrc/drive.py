@@ -10,7 +10,7 @@ from typing import Final
 
 from tickrig.device.physical import InputBank
 from tickrig.device.rrc.settings import RrcState, Settings
-from tickrig.wire.rrc import Joystick, Limit
+from tickrig.wire.rrc.commands import Joystick, Limit
 
 # The buttons of the VR2 controller as the RRC sees them while VR2 runs.
 

@@ -12,29 +12,28 @@ from tickrig.device.rrc.board import OUTPUTS, Buzzer, LoadAccount, PowerSequence
 from tickrig.device.rrc.drive import Drive, chosen_mode, count_button_edges
 from tickrig.device.rrc.settings import NEXT_STATE, POWERED_ON, Move, RrcConfig, RrcState, Settings
 from tickrig.device.twin import Copyable
-from tickrig.wire import rrc as cmd
 from tickrig.wire.errors import ChecksumError
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import (
-    COMMAND_CHECKSUM,
-    COMMAND_UNKNOWN,
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.commands import BadParameters, Command, UnknownCommand, parse_command
+from tickrig.wire.rrc.message import (
     LINES_A_PERIOD,
     PACE_WITHOUT_VR2,
     PERIOD_PCT,
+    pace_lines_s,
+    strip_check,
+)
+from tickrig.wire.rrc.replies import (
+    COMMAND_CHECKSUM,
+    COMMAND_UNKNOWN,
     RECEIVE_BUFFER_OVERFLOW,
-    BadParameters,
-    Command,
     Event,
     Ok,
     Refusal,
     RrcEvent,
     Text,
-    UnknownCommand,
-    pace_lines_s,
-    parse_command,
-    strip_check,
 )
-from tickrig.wire.rrc import StatusA as Status
+from tickrig.wire.rrc.replies import StatusA as Status
 
 # What comes over the line: bytes that wait, lines, commands and refusals.
 

@@ -7,18 +7,17 @@ from enum import Enum, auto
 from typing import Final
 
 from tickrig.device.twin import Immutable
-from tickrig.wire.rrc import (
-    POWER_ON_TRIGGER,
+from tickrig.wire.rrc.commands import (
     Command,
     Joystick,
     Limit,
     Output,
-    RrcEvent,
     SpeedMode,
     StableMode,
     Status,
     Watchdog,
 )
+from tickrig.wire.rrc.replies import POWER_ON_TRIGGER, RrcEvent
 
 # States and transitions of the RRC (RRC manual, state diagram and its conditions 1 to 9).
 

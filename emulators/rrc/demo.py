@@ -11,9 +11,9 @@ from tickrig.host.control.requests import Object
 from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient, RrcRefused
-from tickrig.wire import rrc as cmd
 from tickrig.wire.lines import LineSplitter
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.replies import RrcEvent
 
 _Echo = Callable[[str], None]
 _Request = Callable[..., Object]

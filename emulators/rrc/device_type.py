@@ -12,7 +12,7 @@ from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType,
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.text.trace import Config, Mark
-from tickrig.wire.rrc import check_digit
+from tickrig.wire.rrc.message import check_digit
 
 _EVENTS: Final = (b"EV:", b"ER:")
 

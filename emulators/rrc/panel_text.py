@@ -12,7 +12,8 @@ from tickrig.host.control.requests import Object
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.wire.errors import WireError
-from tickrig.wire.rrc import SAFE_PCT, StatusA, parse_reply
+from tickrig.wire.rrc.message import SAFE_PCT
+from tickrig.wire.rrc.replies import StatusA, parse_reply
 
 _Value = int | str
 _Values = dict[str, _Value]

@@ -18,27 +18,27 @@ from tickrig.host.rrc.inbox import Answer, Exchange, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals, ReplyMatcher
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import (
+from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
+from tickrig.wire.rrc.message import (
     BASE_PCT,
-    COMMAND_CHECKSUM,
-    COMMAND_UNKNOWN,
     LINE_FEED_PCT,
     OVERFLOW_PCT,
     PERIOD_PCT,
     PERIOD_US,
     PERIODS_A_SECOND,
-    RECEIVE_BUFFER_OVERFLOW,
     REPLY_PCT,
     SAFE_PCT,
     STATUS_PCT,
-    Command,
+)
+from tickrig.wire.rrc.replies import (
+    COMMAND_CHECKSUM,
+    COMMAND_UNKNOWN,
+    RECEIVE_BUFFER_OVERFLOW,
     Event,
     Ok,
-    PowerOff,
     Refusal,
     RrcEvent,
     StatusA,
-    Watchdog,
 )
 
 _ONLY_WHILE_ON: Final = (

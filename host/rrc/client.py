@@ -11,8 +11,9 @@ from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc.channel import Channel, RrcLoad, RrcRefused
 from tickrig.host.rrc.inbox import Arrival, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals
-from tickrig.wire import rrc as cmd
-from tickrig.wire.rrc import COMMAND_CHECKSUM, Command, Event, RrcEvent, StatusA
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.commands import Command
+from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, RrcEvent, StatusA
 
 TIMEOUT_US: Final = 200_000
 _SETTLE_US: Final = 100_000

@@ -24,22 +24,17 @@ from typing import Final, Generic, TypeVar
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
-from tickrig.wire.rrc import (
+from tickrig.wire.rrc.commands import Command, Date, DeviceName, StableMode, Version, Watchdog
+from tickrig.wire.rrc.replies import (
     COMMAND_CHECKSUM,
     COMMAND_UNKNOWN,
     RECEIVE_BUFFER_OVERFLOW,
-    Command,
-    Date,
-    DeviceName,
     Event,
     Ok,
     Refusal,
     Reply,
-    StableMode,
     StatusA,
     Text,
-    Version,
-    Watchdog,
     parse_reply,
 )
 

@@ -8,17 +8,8 @@ from enum import Enum
 from typing import Final, NamedTuple
 
 from tickrig.host.rrc.inbox import NAMELESS, Answer, Exchange
-from tickrig.wire.rrc import (
-    Command,
-    Limit,
-    Ok,
-    Output,
-    Refusal,
-    SpeedMode,
-    StableMode,
-    Text,
-    Watchdog,
-)
+from tickrig.wire.rrc.commands import Command, Limit, Output, SpeedMode, StableMode, Watchdog
+from tickrig.wire.rrc.replies import Ok, Refusal, Text
 
 _SETTLED_US: Final = 100_000
 """An ER would have come by then: 10 periods of the RRC."""

@@ -43,9 +43,9 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.properties.device_bench import DeviceBench
 from tickrig.emulators.testing.properties.strategies import Session
 from tickrig.testing import check_device, strategies
-from tickrig.wire import rrc as cmd
 from tickrig.wire.can import CanFrame
 from tickrig.wire.modbus import Request, encode_frame, encode_request
+from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rtc_lite.codes import LiteContextType
 from tickrig.wire.rtc_lite.frame import Framing
 from tickrig.wire.rtc_lite.values import LONG

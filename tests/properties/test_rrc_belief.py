@@ -23,9 +23,9 @@ from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import VERSION, Object
 from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused, RrcStopped
-from tickrig.wire import rrc as cmd
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.replies import RrcEvent
 
 MS: Final = 1_000
 AROUND_MS: Final = 40

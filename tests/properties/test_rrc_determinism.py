@@ -16,7 +16,7 @@ from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.wire import rrc as cmd
+from tickrig.wire.rrc import commands as cmd
 
 ROOT = Path(__file__).parents[2]
 Act = tuple[int, bytes | tuple[str, int]]

@@ -13,7 +13,7 @@ from tickrig.emulators.serial.outside.serial_side import SerialSide
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc import Output, StableMode, Status
+from tickrig.wire.rrc.commands import Output, StableMode, Status
 
 SECONDS = 20
 

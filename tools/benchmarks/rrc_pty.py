@@ -18,7 +18,7 @@ from pathlib import Path
 
 from benchmarks.table import percentiles
 from tickrig.wire.lines import LineSplitter
-from tickrig.wire.rrc import Output, Status
+from tickrig.wire.rrc.commands import Output, Status
 
 EMULATOR = "from tickrig.emulators.rrc.cli import main; main()"
 PERIOD_S = 0.01

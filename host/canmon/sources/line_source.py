@@ -21,17 +21,9 @@ from tickrig.host.canmon.sources.source import LineSpec
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
-from tickrig.wire.rrc import (
-    Command,
-    Event,
-    Ok,
-    Refusal,
-    StatusA,
-    Text,
-    parse_command,
-    parse_reply,
-    strip_check,
-)
+from tickrig.wire.rrc.commands import Command, parse_command
+from tickrig.wire.rrc.message import strip_check
+from tickrig.wire.rrc.replies import Event, Ok, Refusal, StatusA, Text, parse_reply
 from tickrig.wire.rtc_lite.frame import Checksum
 
 # Lines of an RRC's serial port, decoded into the trace of the buses.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.device.rrc.bench import RrcBench
-from tickrig.wire.rrc import check_digit
+from tickrig.wire.rrc.message import check_digit
 
 
 def sounds(bench: RrcBench, ticks: int) -> str:

@@ -10,7 +10,7 @@ import pytest
 
 from tests.device.rrc.bench import RrcBench
 from tickrig.device.rrc.drive import Gearbox, apply_limits, shape
-from tickrig.wire.rrc import Joystick, Limit
+from tickrig.wire.rrc.commands import Joystick, Limit
 
 VECTORS: dict[str, list[dict[str, Any]]] = json.loads(
     (Path(__file__).parents[2] / "golden" / "rrc.json").read_text("utf-8")

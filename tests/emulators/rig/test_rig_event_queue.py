@@ -33,7 +33,7 @@ from tickrig.emulators.serial.emulator import Emulator
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.host.rrc import RrcClient
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 DESCRIPTION = read_eds(Path(__file__).parents[2] / "golden" / "canopen" / "r1.eds")
 TO_US = 4_000_000

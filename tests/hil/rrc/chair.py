@@ -9,7 +9,7 @@ from tests.host.spy_link import SpyLink
 from tickrig import Bench
 from tickrig.emulators.testing.bench.errors import OperatorRefused
 from tickrig.host import RrcClient, RrcEvent
-from tickrig.wire.rrc import StatusA
+from tickrig.wire.rrc.replies import StatusA
 
 PATIENCE_US: Final = 5_000_000
 """For what takes VR2 its time, 10 times what is expected."""

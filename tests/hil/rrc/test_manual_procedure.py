@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tests.hil.rrc.chair import PATIENCE_US, Chair
-from tickrig.wire.rrc import Joystick, RrcEvent
+from tickrig.wire.rrc.commands import Joystick
+from tickrig.wire.rrc.replies import RrcEvent
 
 pytestmark = pytest.mark.needs("device:rrc")
 

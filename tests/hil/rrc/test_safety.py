@@ -6,7 +6,7 @@ import pytest
 
 from tests.hil.rrc.chair import PATIENCE_US, Chair
 from tickrig.host.rrc import RrcRefused, RrcStopped
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 pytestmark = pytest.mark.needs("device:rrc")
 

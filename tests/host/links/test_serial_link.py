@@ -15,7 +15,7 @@ from tests.host.live import LiveRrc, live_rrc, pty, served
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_a_loop_gives_back_what_was_sent() -> None:

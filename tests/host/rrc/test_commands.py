@@ -7,8 +7,8 @@ import pytest
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
 from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
-from tickrig.wire import rrc as cmd
-from tickrig.wire.rrc import BadParameters
+from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc.commands import BadParameters
 
 SAMPLES: list[tuple[Callable[[RrcClient], object], bytes]] = [
     (lambda rrc: rrc.limit(50, 50), b"limit3232ffffff"),

@@ -4,7 +4,7 @@ import pytest
 
 from tests.host.rigs import powered_off_bench, standby_bench
 from tickrig.host.rrc import RrcRefused
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_the_slowest_speed_mode_comes_before_a_change_of_the_driver() -> None:

@@ -7,7 +7,7 @@ import pytest
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
 from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import Arrival, RrcClient
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def test_events_come_in_order_until_none_comes_in_time() -> None:

@@ -9,7 +9,7 @@ import pytest
 from tests.host.rigs import standby_bench
 from tests.host.spy_link import SpyLink
 from tickrig.host.rrc import RrcClient, RrcLoad, RrcRefused
-from tickrig.wire.rrc import PACE_WITHOUT_VR2, pace_lines_s
+from tickrig.wire.rrc.message import PACE_WITHOUT_VR2, pace_lines_s
 
 
 class FastClock(SpyLink):

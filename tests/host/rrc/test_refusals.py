@@ -4,7 +4,7 @@ import pytest
 
 from tests.host.rigs import Bench, powered_off_bench, standby_bench
 from tickrig.host.rrc import OnRefusals, RrcRefused, RrcStopped
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def spoil_output(line: bytes) -> bytes:

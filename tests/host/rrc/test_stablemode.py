@@ -5,7 +5,8 @@ import pytest
 from tests.host.rigs import ScriptedLink, powered_off_bench, standby_bench
 from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient, RrcRefused
-from tickrig.wire.rrc import RrcEvent, StableMode
+from tickrig.wire.rrc.commands import StableMode
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 def spoiled(line: bytes) -> bytes:

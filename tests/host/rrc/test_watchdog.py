@@ -5,7 +5,7 @@ import pytest
 from tests.host.rigs import ScriptedLink, standby_bench
 from tickrig.host.links.link import LinkTimeout
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 
 @pytest.mark.parametrize("stable", [False, True])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tickrig.wire import rrc as cmd
+from tickrig.wire.rrc import commands as cmd
 
 SAMPLES = {
     b"limit3232ffffffD": cmd.Limit(50, 50),

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tests.wire.rrc.samples import SAMPLES
 from tickrig.wire.errors import ChecksumError
-from tickrig.wire.rrc import check_digit, strip_check
+from tickrig.wire.rrc.message import check_digit, strip_check
 
 
 @pytest.mark.parametrize("line", SAMPLES)

@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.wire.rrc.samples import SAMPLES
-from tickrig.wire import rrc as cmd
 from tickrig.wire.errors import WireError
+from tickrig.wire.rrc import commands as cmd
 
 
 @st.composite

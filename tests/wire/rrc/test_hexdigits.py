@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rrc import all_digits, read_hex, read_signed
+from tickrig.wire.rrc.message import all_digits, read_hex, read_signed
 
 
 def test_either_case_is_read() -> None:

@@ -5,17 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.errors import ChecksumError, FieldError, FramingError, WireError
-from tickrig.wire.rrc import (
-    Event,
-    Ok,
-    Refusal,
-    Reply,
-    RrcEvent,
-    StatusA,
-    Text,
-    check_digit,
-    parse_reply,
-)
+from tickrig.wire.rrc.message import check_digit
+from tickrig.wire.rrc.replies import Event, Ok, Refusal, Reply, RrcEvent, StatusA, Text, parse_reply
 
 percents = st.integers(-100, 100)
 counts = st.integers(0, 15)

@@ -8,15 +8,8 @@ from pathlib import Path
 
 from tickrig import Bench
 from tickrig.host import RrcClient
-from tickrig.wire.rrc import (
-    COMMANDS,
-    PACE_WITHOUT_VR2,
-    Command,
-    Parameter,
-    check_digit,
-    pace_lines_s,
-    parse_command,
-)
+from tickrig.wire.rrc.commands import COMMANDS, Command, Parameter, parse_command
+from tickrig.wire.rrc.message import PACE_WITHOUT_VR2, check_digit, pace_lines_s
 
 PAGE = Path(__file__).parents[3] / "docs" / "reference" / "devices" / "rrc.md"
 

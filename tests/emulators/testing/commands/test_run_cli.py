@@ -15,7 +15,7 @@ from tickrig.emulators.testing.commands.run_cli import run
 from tickrig.host.control.client import ControlClient
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rrc import RrcClient
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 RIG = """\
 [device.vr2]

@@ -24,7 +24,7 @@ from tests.emulators.testing.bench.modes.hardware.plans import serial_plan
 from tickrig import Bench
 from tickrig.emulators.testing.rig_file.plan import HardwarePlan, PortPlan
 from tickrig.host import RrcClient
-from tickrig.wire.rrc import RrcEvent
+from tickrig.wire.rrc.replies import RrcEvent
 
 plan = serial_plan(HardwarePlan(ports={"rrc": PortPlan(port=sys.argv[1])}))
 with Bench.of_plan(plan, "hardware") as bench, RrcClient(bench.link) as client:

@@ -1,0 +1,1 @@
+"""RRC messages: commands to the wheelchair relay, its replies and events."""

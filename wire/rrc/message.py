@@ -1,0 +1,109 @@
+"""What commands and replies are made of: hex numbers, the CHECK digit, and what traffic costs."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Final
+
+from tickrig.wire.errors import ChecksumError, FieldError
+
+# Numbers as the RRC writes them: `2hex` and `1hex`, negative ones in two's complement.
+
+_UPPER_DIGITS: Final = tuple(b"%X" % n for n in range(16))
+_HEX_DIGITS: Final = frozenset(bytes([code]) for code in b"0123456789ABCDEFabcdef")
+
+
+def all_digits(width: int) -> list[bytes]:
+    """Return all numbers of so many hex digits, in every mixture of cases."""
+    return [b"".join(digits) for digits in product(sorted(_HEX_DIGITS), repeat=width)]
+
+
+def read_hex(digits: bytes) -> int:
+    """Read one or two hex digits of either case.
+
+    Raises:
+        FieldError: a character that is not a hex digit.
+    """
+    if not all(digits[n : n + 1] in _HEX_DIGITS for n in range(len(digits))):
+        raise FieldError(f"{digits!r} is not hexadecimal")
+    return int(digits, 16)
+
+
+def read_signed(digits: bytes) -> int:
+    """Read two hex digits as an 8-bit two's complement number.
+
+    >>> read_signed(b"9c"), read_signed(b"64")
+    (-100, 100)
+    """
+    value = read_hex(digits)
+    return value - 0x100 if value >= 0x80 else value
+
+
+# The CHECK digit of a line.
+#
+# The manual says "the sum from the head of the command to just before CHECK";
+# its nine samples show that the low nibble of the sum of the character codes is
+# meant. Letter case and exchanged characters are not seen by it.
+
+
+def check_digit(message: bytes) -> bytes:
+    """Return CHECK for a message without LF, as an upper-case digit.
+
+    >>> check_digit(b"beep646464640a0a0a0a0a0a")
+    b'A'
+    """
+    return _UPPER_DIGITS[sum(message) & 0xF]
+
+
+def strip_check(line: bytes) -> bytes:
+    """Return a line without the CHECK digit at its end.
+
+    Raises:
+        ChecksumError: CHECK is missing, wrong or not a hex digit.
+    """
+    message, digit = line[:-1], line[-1:]
+    if digit not in _HEX_DIGITS or int(digit, 16) != sum(message) & 0xF:
+        raise ChecksumError(f"CHECK {digit!r} of {line!r}, expected {check_digit(message)!r}")
+    return message
+
+
+# What traffic costs the RRC, and how much of it a host may send (DECISION R27).
+#
+# Costs are in per cent of the RRC's period of 10 ms. Above 100 % it falls behind, and 300 % behind
+# stops VR2. At exactly 100 % nothing drains: a host whose clock is 0.1 % fast stops VR2 after 60 s,
+# so a host takes at most `SAFE_PCT`.
+
+BASE_PCT: Final = 30
+STATUS_PCT: Final = 20
+LINE_FEED_PCT: Final = 25
+REPLY_PCT: Final = 15
+OVERFLOW_PCT: Final = 150
+PERIOD_PCT: Final = 100
+TOO_FAR_BEHIND_PCT: Final = 300
+SAFE_PCT: Final = 90
+
+PERIOD_US: Final = 10_000
+PERIODS_A_SECOND: Final = 100
+
+LINES_A_PERIOD: Final = 2
+"""Lines worked on in a period while VR2 runs; elsewhere one in two periods."""
+
+PACE_WITHOUT_VR2: Final = PERIODS_A_SECOND // 2 * SAFE_PCT // PERIOD_PCT
+"""Lines a second that a host may send while VR2 does not run."""
+
+
+def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
+    """Return how many lines a second a host may send while VR2 runs.
+
+    Args:
+        stable: whether OK lines are left out (stablemode).
+        status: whether a status line is sent in each period.
+        extra_pct: other work of the RRC, in per cent of a period.
+
+    >>> pace_lines_s(stable=True, status=True), pace_lines_s(stable=False, status=True)
+    (160, 100)
+    """
+    left_pct = SAFE_PCT - BASE_PCT - extra_pct - (STATUS_PCT if status else 0)
+    line_pct = LINE_FEED_PCT + (0 if stable else REPLY_PCT)
+    most = LINES_A_PERIOD * PERIODS_A_SECOND * SAFE_PCT // PERIOD_PCT
+    return max(0, min(most, left_pct * PERIODS_A_SECOND // line_pct))

@@ -1,0 +1,173 @@
+"""Lines from the RRC to the host (RRC manual, list of commands RRC to host).
+
+>>> status = parse_reply(b"SA:64003200A1000F")
+>>> status.in_v_pct, status.out_v_pct, status.gauge
+(100, 50, 10)
+>>> parse_reply(b"EV:PowerOnTrigger").kind
+<RrcEvent.POWER_ON: 'PowerOn'>
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from tickrig.wire.errors import FieldError, FramingError
+from tickrig.wire.rrc.message import check_digit, read_hex, read_signed, strip_check
+
+COMMAND_CHECKSUM: Final = "CommandChecksum"
+COMMAND_UNKNOWN: Final = "CommandUnknown"
+RECEIVE_BUFFER_OVERFLOW: Final = "ReceiveBufferOverflow"
+
+
+class RrcEvent(StrEnum):
+    """The 16 events of the manual."""
+
+    INITIALIZED = "Initialized"
+    POWER_ON = "PowerOn"
+    POWER_ON_SUCCESS = "PowerOnSuccess"
+    POWER_ON_ERROR1 = "PowerOnError1"
+    POWER_ON_ERROR2 = "PowerOnError2"
+    POWER_ON_TIMEOUT = "PowerOnTimeout"
+    BY_BUTTON = "PowerOffWaitByButton"
+    BY_COMMUNICATION_ERROR = "PowerOffWaitByCommunicationError"
+    BY_JOYSTICK_MODULE_ERROR = "PowerOffWaitByJoystickModuleError"
+    BY_POWER_MODULE_ERROR = "PowerOffWaitByPowerModuleError"
+    BY_SYSTEM_ERROR = "PowerOffWaitBySystemError"
+    BY_HOST = "PowerOffWaitByHost"
+    BY_WATCHDOG = "PowerOffWaitByWatchdog"
+    BY_OVER_TIME = "PowerOffWaitByOverTime"
+    BY_NO_COMMUNICATION = "PowerOffWaitByNoCommunication"
+    POWER_OFF_FINISHED = "PowerOffFinished"
+
+
+POWER_ON_TRIGGER: Final = "PowerOnTrigger"
+"""What devices in the field send for `PowerOn` (DECISION R7)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ok:
+    """`OK:name`: the command was carried out."""
+
+    name: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"OK:%b\n" % self.name.encode("latin-1")
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """`ER:reason`: a command's name, or what was wrong with the line."""
+
+    reason: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"ER:%b\n" % self.reason.encode("latin-1")
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """`EV:name`: the state of RRC or VR2 changed. The name may be a newer firmware's."""
+
+    name: str
+
+    @property
+    def kind(self) -> RrcEvent | None:
+        """Which of the manual's events this is; None for one it does not list."""
+        if self.name == POWER_ON_TRIGGER:
+            return RrcEvent.POWER_ON
+        try:
+            return RrcEvent(self.name)
+        except ValueError:
+            return None
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return b"EV:%b\n" % self.name.encode("latin-1")
+
+
+@dataclass(frozen=True, slots=True)
+class StatusA:
+    """`SA:`: the state of RRC and VR2, once a period of 10 ms.
+
+    Attributes:
+        in_v_pct: #1, translation of the stick, -100..100 %.
+        in_w_pct: #2, rotation of the stick.
+        out_v_pct: #3, translation that goes to the power module.
+        out_w_pct: #4, rotation that goes to the power module.
+        gauge: #5, voltage gauge, 1..10.
+        speed_mode: #6, 1..5.
+        speed_up_count: #7, 0..15; odd while the button is pressed.
+        speed_down_count: #8.
+        alarm_count: #9.
+    """
+
+    in_v_pct: int
+    in_w_pct: int
+    out_v_pct: int
+    out_w_pct: int
+    gauge: int
+    speed_mode: int
+    speed_up_count: int
+    speed_down_count: int
+    alarm_count: int
+
+    def encode(self) -> bytes:
+        """Write the line with CHECK and LF."""
+        message = b"SA:%02X%02X%02X%02X%X%X%X%X%X" % (
+            *(self.in_v_pct & 0xFF, self.in_w_pct & 0xFF),
+            *(self.out_v_pct & 0xFF, self.out_w_pct & 0xFF),
+            *(self.gauge, self.speed_mode),
+            *(self.speed_up_count, self.speed_down_count, self.alarm_count),
+        )
+        return message + check_digit(message) + b"\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Any other line: the answer of `device`, `version`, `date`, or a newer firmware's."""
+
+    text: str
+
+    def encode(self) -> bytes:
+        """Write the line with its LF."""
+        return self.text.encode("latin-1") + b"\n"
+
+
+Reply = Ok | Refusal | Event | StatusA | Text
+
+_BY_PREFIX: Final[dict[bytes, type[Ok] | type[Refusal] | type[Event]]] = {
+    b"OK:": Ok,
+    b"ER:": Refusal,
+    b"EV:": Event,
+}
+
+
+def parse_reply(line: bytes) -> Reply:
+    """Read a line without its LF.
+
+    Raises:
+        FramingError: an SA line of a wrong length.
+        ChecksumError: an SA line whose CHECK does not match.
+        FieldError: an SA line with a bad digit or a value out of range.
+    """
+    prefix = line[:3]
+    if prefix == b"SA:":
+        return _parse_status(line)
+    kind = _BY_PREFIX.get(prefix)
+    return Text(line.decode("latin-1")) if kind is None else kind(line[3:].decode("latin-1"))
+
+
+def _parse_status(line: bytes) -> StatusA:
+    if len(line) != 17:
+        raise FramingError(f"{line!r} has {len(line)} characters, an SA line has 17")
+    message = strip_check(line)
+    v_in, w_in, v_out, w_out = (read_signed(message[at : at + 2]) for at in (3, 5, 7, 9))
+    gauge, mode, up, down, alarm = (read_hex(message[at : at + 1]) for at in range(11, 16))
+    sound = max(map(abs, (v_in, w_in, v_out, w_out))) <= 100 and 1 <= gauge <= 10 and 1 <= mode <= 5
+    if not sound:
+        raise FieldError(f"{line!r}: a percentage, the gauge or the speed mode is out of range")
+    return StatusA(v_in, w_in, v_out, w_out, gauge, mode, up, down, alarm)
