@@ -1,12 +1,13 @@
-"""What `tools/fuzz-eds`, `-bus`, `-check` and `-rig-files` share: mutated files, judged.
+"""The work of `tools/fuzz`: make mutated files of a kind, and judge each of them.
 
-It says each minute how far it is; interrupted, how far it came. The files are those of the
-seed, however many processes share them.
+It prints its progress each minute, and the result when you interrupt it. A seed gives the same
+files, however many processes share them.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import signal
 import sys
 import time
@@ -22,6 +23,18 @@ Make = Callable[[Random], tuple[str, bytes]]
 """Returns the name and the bytes of a file with chance in it."""
 Judge = Callable[[str, bytes], str]
 """Says in a word what a file is; raises if it is not as it should be."""
+
+KINDS: Final = {
+    "bus": "tests.host.canopen.bus_file.mutations",
+    "check": "tests.host.canmon.model.check.mutations",
+    "conform": "tests.host.canopen.conform.fuzzing",
+    "eds": "tests.host.canopen.data_sheet.mutations",
+    "logs": "tests.host.canmon.model.logs.mutations",
+    "net": "tests.host.canmon.net.net_mutations",
+    "rig-files": "tests.emulators.testing.rig_file.mutations",
+    "rrc": "tests.emulators.rrc.fuzzing",
+}
+"""The module of each kind: its docstring, `mutated` and `judge`."""
 
 BATCH: Final = 100
 """Files that a process takes at a time."""
@@ -95,26 +108,40 @@ class Tally:
         )
 
 
-def main(doc: str | None, make: Make, judge: Judge) -> int:
-    """Judge files until there are enough, or one is not as it should be.
+def main(words: list[str] | None = None) -> int:
+    """Judge mutated files until there are enough or one has a fault, or judge the given files."""
+    options = _parser().parse_args(words)
+    module = importlib.import_module(KINDS[options.kind])
+    for path in options.paths:
+        print(f"{path}: {module.judge(path.name, path.read_bytes())}")
+    return 0 if options.paths else _search(module.mutated, module.judge, options)
 
-    Args:
-        doc: of the tool; its first line is the description.
-        make: of a module that other processes can import.
-        judge: likewise.
-    """
-    parser = argparse.ArgumentParser(description=(doc or "").partition("\n")[0])
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("kind", choices=KINDS)
+    parser.add_argument("paths", metavar="FILE", nargs="*", type=Path, help="judge only these")
     parser.add_argument("--files", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("-j", "--jobs", type=int, default=1, help="processes  [1]")
-    words = parser.parse_args()
-    tally = Tally(words.seed)
+    return parser
+
+
+def _search(make: Make, judge: Judge, options: argparse.Namespace) -> int:
+    """Judge files until there are enough, or one has a fault.
+
+    Args:
+        make: of a module that other processes can import.
+        judge: likewise.
+        options: of the command line.
+    """
+    tally = Tally(options.seed)
     batches = (
-        Work(make, judge, words.seed, first, min(first + BATCH, words.files))
-        for first in range(0, words.files, BATCH)
+        Work(make, judge, options.seed, first, min(first + BATCH, options.files))
+        for first in range(0, options.files, BATCH)
     )
     fault = ""
-    with Pool(max(words.jobs, 1), _ignore_interrupts) as pool:
+    with Pool(max(options.jobs, 1), _ignore_interrupts) as pool:
         try:
             for batch in pool.imap_unordered(judge_batch, batches):
                 tally.add(batch)

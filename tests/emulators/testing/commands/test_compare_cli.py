@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.emulators.record.test_bench_replay import Bench
-from tests.mutated import mutated
+from tests.mutators import spoilt
 from tickrig.device.canopen.models.epos import make_epos
 from tickrig.device.canopen.models.f_palette import make_f_palette
 from tickrig.device.rrc.machine import Rrc
@@ -330,10 +330,10 @@ def test_no_damage_of_a_trace_ends_in_a_traceback(tmp_path: Path) -> None:
     for name in ("rrc", "bus"):
         data = (tmp_path / name).read_bytes()
         for _ in range(60):
-            spoilt = mutated(data, chance)
-            if re.search(rb"^\d{3,}\.", spoilt, re.MULTILINE):
+            damaged = spoilt(data, chance)
+            if re.search(rb"^\d{3,}\.", damaged, re.MULTILINE):
                 continue  # a run of many minutes
-            (tmp_path / "spoilt").write_bytes(spoilt)
+            (tmp_path / "spoilt").write_bytes(damaged)
             result = compared(tmp_path / "spoilt", "--node", "5=epos", "--node", "3=f-palette")
             assert result.exit_code in (0, 1, 2)
             assert len(result.stderr.splitlines()) <= 1

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.emulators.record.test_bench_replay import EDS, Bench
-from tests.mutated import mutated
+from tests.mutators import spoilt
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.record.recorder import TracedDevice, TraceFile
 from tickrig.emulators.rig.rig import Rig
@@ -140,10 +140,10 @@ def test_no_damage_of_a_trace_ends_in_a_traceback(
     data = bench_trace if version == 2 else rrc_trace(tmp_path / "v1")
     chance = Random(version)
     for _ in range(150):
-        spoilt = mutated(data, chance)
-        if re.search(rb"^\d{3,}\.", spoilt, re.MULTILINE):
+        damaged = spoilt(data, chance)
+        if re.search(rb"^\d{3,}\.", damaged, re.MULTILINE):
             continue  # a run of many minutes
-        result = replayed(tmp_path / "run.trace", spoilt)
+        result = replayed(tmp_path / "run.trace", damaged)
         assert result.exit_code in (0, 1, 2)
         assert len(result.stderr.splitlines()) <= 2
 

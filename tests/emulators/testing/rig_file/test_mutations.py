@@ -1,4 +1,4 @@
-"""Whatever a rig file is: a bench, or lines with the mistakes; tools/fuzz-rig-files does more."""
+"""Whatever a rig file is: a bench, or lines with the mistakes; tools/fuzz rig-files does more."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from typing import Final
 import pytest
 from click.testing import CliRunner
 
-from tests.mutated import mutated as spoilt
+from tests.mutators import spoilt
 from tickrig.device import make_epos
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
 from tickrig.emulators.testing.conformance.conformance import SlaveBench

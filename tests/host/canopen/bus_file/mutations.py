@@ -191,7 +191,7 @@ def judge(name: str, data: bytes) -> str:
     Returns:
         `good`, `warned` or `wrong`.
     """
-    path = Path(name)
+    path = Path(NAME).parent / name  # a relative name is that of a kept file
     is_bus_file(data)
     bus = decode_bus_file(data, path)
     lines = data.count(b"\n") + data.count(b"\r") + data.count("\u2028".encode()) + 1

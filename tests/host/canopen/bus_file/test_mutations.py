@@ -1,4 +1,4 @@
-"""Whatever a bus.yml is: findings in lines, never a traceback; tools/fuzz-bus does more."""
+"""Whatever a bus.yml is: findings in lines, never a traceback; tools/fuzz bus does more."""
 
 from __future__ import annotations
 
@@ -33,9 +33,17 @@ def test_a_mutated_eds_beside_a_bus_file_is_told_well(seed: int, tmp_path: Path)
 
 
 def test_the_tool_judges_files_by_several_processes() -> None:
-    words = [sys.executable, str(ROOT / "tools" / "fuzz-bus"), "--files", "10", "-j", "2"]
+    words = [sys.executable, str(ROOT / "tools" / "fuzz"), "bus", "--files", "10", "-j", "2"]
     said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert said.startswith("seed 1: 10 files, {")
+
+
+def test_the_tool_judges_a_kept_file_again(tmp_path: Path) -> None:
+    kept = tmp_path / "kept.yml"
+    kept.write_bytes(NODE.encode())
+    words = [sys.executable, str(ROOT / "tools" / "fuzz"), "bus", str(kept)]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert said == f"{kept}: good\n"
 
 
 def test_noise_is_no_bus() -> None:

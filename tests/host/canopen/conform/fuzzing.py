@@ -1,4 +1,4 @@
-"""A node that answers by chance, and a run of the tester against it: `tools/fuzz-conform`.
+"""A node that answers by chance, and a run of the tester against it: `tools/fuzz conform`.
 
 The node has few objects. What an object holds has any length; what it answers comes late, twice,
 with the wrong toggle, cut, refused or never, at any step. It never tells a value that it does not
@@ -252,3 +252,13 @@ def judge_conversation(chance: Random) -> str:
     assert not left, left
     assert report.duration_us < LONGEST_US, report.duration_us
     return "unrestored" if report.unrestored else "restored"
+
+
+def mutated(chance: Random) -> tuple[str, bytes]:
+    """Choose the seed of a conversation."""
+    return "conversation", chance.randbytes(8)
+
+
+def judge(_name: str, data: bytes) -> str:
+    """Hold a conversation."""
+    return judge_conversation(Random(data))

@@ -1,4 +1,4 @@
-"""Whatever a file is: findings in lines, never a traceback; tools/fuzz-eds does more."""
+"""Whatever a file is: findings in lines, never a traceback; tools/fuzz eds does more."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_a_mutated_eds_is_judged_read_and_mended(seed: int) -> None:
 def test_the_files_of_a_seed_are_judged_alike_by_several_processes() -> None:
     told = []
     for jobs in ("1", "2"):
-        words = [sys.executable, str(ROOT / "tools" / "fuzz-eds"), "--files", "120", "-j", jobs]
+        words = [sys.executable, str(ROOT / "tools" / "fuzz"), "eds", "--files", "120", "-j", jobs]
         said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
         told.append(said.partition(";")[0])
     assert told[0] == told[1]

@@ -8,7 +8,7 @@ from typing import Final
 
 from tests.host.canmon.model.check.expression.held import MAPPED
 from tests.host.canmon.model.record_log import hear
-from tests.mutated import mutated as spoilt
+from tests.mutators import spoilt
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.decoded_check import Surroundings
 from tickrig.host.canmon.model.check.rule_parser import DEMANDS

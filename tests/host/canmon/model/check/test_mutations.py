@@ -1,4 +1,4 @@
-"""Whatever a rule or a file of rules is: held, or refused in a line; tools/fuzz-check does more."""
+"""Whatever a rule or a file of rules is: held, or refused in a line; tools/fuzz check does more."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from tests.host.canmon.model.check.mutations import RULES, judge, mutated
 
-TOOL = Path(__file__).parents[5] / "tools" / "fuzz-check"
+TOOL = Path(__file__).parents[5] / "tools" / "fuzz"
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -27,6 +27,6 @@ def test_a_rule_of_each_kind_is_held(rule: str) -> None:
 
 
 def test_the_tool_judges_rules_by_several_processes() -> None:
-    words = [sys.executable, str(TOOL), "--files", "10", "-j", "2"]
+    words = [sys.executable, str(TOOL), "check", "--files", "10", "-j", "2"]
     said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert said.startswith("seed 1: 10 files, {")

@@ -12,7 +12,7 @@ from zlib import crc32
 
 from tests.host.canmon.model.columns.test_column_reader import rows_of, rows_of_records
 from tests.host.canmon.model.logs.test_reports import REPORTS
-from tests.mutated import mutated as spoilt
+from tests.mutators import spoilt
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.rules import Rules
 from tickrig.host.canmon.model.columns.column_reader import read_columns

@@ -1,4 +1,4 @@
-"""Whatever a log is, it is read as far as it goes; tools/fuzz-logs tries more of them."""
+"""Whatever a log is, it is read as far as it goes; tools/fuzz logs tries more of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from tests.host.canmon.model.logs.mutations import NAMES, heard, judge, log, mutated
 
-TOOL = Path(__file__).parents[5] / "tools" / "fuzz-logs"
+TOOL = Path(__file__).parents[5] / "tools" / "fuzz"
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -28,6 +28,6 @@ def test_a_whole_log_of_each_kind_is_read_to_its_end(name: str) -> None:
 
 
 def test_the_tool_judges_logs_by_several_processes() -> None:
-    words = [sys.executable, str(TOOL), "--files", "10", "-j", "2"]
+    words = [sys.executable, str(TOOL), "logs", "--files", "10", "-j", "2"]
     said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     assert said.startswith("seed 1: 10 files, {")

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from tests.emulators.record.test_bench_replay import Bench
-from tests.mutated import mutated
+from tests.mutators import spoilt
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
@@ -95,6 +95,6 @@ def test_what_is_no_trace_is_said(tmp_path: Path, data: bytes, message: str) -> 
 def test_any_damage_is_a_log_error(tmp_path: Path, bench: bytes) -> None:
     chance = Random(1)
     for _ in range(300):
-        (tmp_path / "run.trace").write_bytes(mutated(bench, chance))
+        (tmp_path / "run.trace").write_bytes(spoilt(bench, chance))
         with suppress(LogError):
             list(read_log(tmp_path / "run.trace"))
