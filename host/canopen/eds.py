@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +27,24 @@ def open_eds(path: Path) -> EdsFile:
     return EdsFile(str(path), decode_text(read_eds_bytes(path)))
 
 
+def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
+    """Return the sections of a file and the device that they describe, of unchanged bytes once.
+
+    Both are shared: read them, but do not add findings to the file.
+
+    Raises:
+        OSError: the file cannot be read.
+        EdsError: it is too large for an EDS.
+    """
+    return _sheet_of(str(path), read_eds_bytes(path))
+
+
+@lru_cache(maxsize=16)  # all nodes of a bus, and each test of a bench, have the same few files
+def _sheet_of(name: str, data: bytes) -> tuple[EdsFile, EdsDevice]:
+    file = EdsFile(name, decode_text(data))
+    return file, read_device(file)
+
+
 def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
     """Read what is sound in such a file, for a host that looks at a device or manages it.
 
@@ -36,8 +55,7 @@ def read_sound(path: Path) -> tuple[EdsDevice, tuple[Finding, ...]]:
         OSError: the file cannot be read.
         EdsError: it has no object that can be used, or is too large.
     """
-    file = open_eds(path)
-    device = read_device(file)
+    file, device = read_sheet(path)
     if not device.entries:
         raise EdsError(file.errors)
     return device, (*file.errors, *file.warnings)

@@ -39,7 +39,7 @@ class Item:
         keys: where the keys of a mapping stand.
     """
 
-    value: Scalar | tuple[Item, ...] | Mapping[Key, Item]
+    value: Scalar | tuple[Item, ...] | dict[Key, Item]
     place: FilePlace
     text: str = ""
     keys: Mapping[Key, FilePlace] = field(default_factory=dict)
@@ -47,7 +47,7 @@ class Item:
     @property
     def fields(self) -> Mapping[Key, Item]:
         """What a mapping holds; nothing if it is none."""
-        return self.value if isinstance(self.value, Mapping) else {}
+        return self.value if isinstance(self.value, dict) else {}
 
     @property
     def items(self) -> tuple[Item, ...]:
@@ -62,7 +62,7 @@ class Item:
     @property
     def is_mapping(self) -> bool:
         """Whether it is a mapping."""
-        return isinstance(self.value, Mapping)
+        return isinstance(self.value, dict)
 
     def __str__(self) -> str:
         """Say it in a message."""

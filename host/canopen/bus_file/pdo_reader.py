@@ -18,7 +18,6 @@ from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 RPDO: Final = 0x1400
 TPDO: Final = 0x1800
 _MAPPING: Final = 0x200
-_MOST_PDOS: Final = 0x200
 _PREDEFINED: Final = 4
 _AUTO: Final = "auto"
 _OTHER_WAY: Final = {
@@ -68,9 +67,7 @@ class PdoReader:
             The PDOs that the master's dictionary is given.
         """
         pdos = {
-            index - first + 1: _of_sheet(self._sheet, index)
-            for index in range(first, first + _MOST_PDOS)
-            if index in self._sheet
+            index - first + 1: _of_sheet(self._sheet, index) for index in self._sheet.pdos(first)
         }
         if key in self._node:
             section = self._node.section(key)
@@ -263,8 +260,7 @@ def pdos_after(sheet: Sheet, writes: Writes) -> tuple[BusPdo, ...]:
         )
 
     return tuple(
-        pdo(first + at, at + 1, first == TPDO)
+        pdo(index, index - first + 1, first == TPDO)
         for first in (RPDO, TPDO)
-        for at in range(_MOST_PDOS)
-        if first + at in sheet
+        for index in sheet.pdos(first)
     )

@@ -9,14 +9,13 @@ from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusWrite
 from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace
-from tickrig.host.canopen.eds import open_eds
+from tickrig.host.canopen.eds import read_sheet
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import (
     COMMISSIONING,
     HIGHEST_NODE_ID,
     EdsDevice,
-    read_device,
 )
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
@@ -29,6 +28,7 @@ UNSET: Final = 255
 """The node-ID of who has none."""
 _WRONG: Final = -(1 << 31) - 1
 """Stands for a node-ID that is no number; what is wrong with it is noted."""
+_MOST_PDOS: Final = 0x200
 _SUFFIXES: Final = (".eds", ".dcf", ".xdd", ".xdc")
 
 
@@ -52,6 +52,10 @@ class Sheet:
     def __contains__(self, index: int) -> bool:
         """Return whether there is an object."""
         return index in self._rows
+
+    def pdos(self, first: int) -> list[int]:
+        """Return the communication parameters that there are, `first` being that of PDO 1."""
+        return sorted([index for index in self._rows if first <= index < first + _MOST_PDOS])
 
     def subs(self, index: int) -> dict[int, EntryDescription]:
         """Return the entries of an object by sub-index; none if it is not there."""
@@ -97,7 +101,7 @@ class Sheet:
 
 
 class Sheets:
-    """Finds and reads the EDS and DCF files of a bus, each of them once.
+    """Finds and reads the EDS and DCF files of a bus.
 
     Args:
         folder: of the bus.yml.
@@ -106,7 +110,6 @@ class Sheets:
 
     def __init__(self, folder: Path, dcf_path: str) -> None:
         self._folder, self._dcf_path = folder, dcf_path
-        self._read: dict[Path, tuple[EdsFile, EdsDevice]] = {}
 
     def find(self, node: BusFileSection) -> Sheet | None:
         """Return the sheet of a node; None, and a finding, without one.
@@ -152,10 +155,7 @@ class Sheets:
         return f"no file {shorten(name)!r}; looked in {_printable(where)}{hint}"
 
     def _sheet(self, node: BusFileSection, path: Path, *, is_first: bool) -> Sheet | None:
-        if path not in self._read:
-            file = open_eds(path)
-            self._read[path] = file, read_device(file)
-        file, device = self._read[path]
+        file, device = read_sheet(path)
         if not is_first:
             text = f"dcf: it is taken from {_printable(str(path.parent))}"
             node.note("file-elsewhere", "dcf", text)
