@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -87,6 +89,23 @@ def test_a_list_of_commands_says_what_their_help_says(group: click.Group) -> Non
         assert awaited.short_help is not None
         told = " ".join(load(awaited.path).help.split())
         assert told.startswith(awaited.short_help.removesuffix("."))
+
+
+def commands_of(group: click.Group) -> Iterator[click.Command]:
+    for command in group.commands.values():
+        loaded = load(command.path) if isinstance(command, LazyCommand) else command
+        yield from commands_of(loaded) if isinstance(loaded, click.Group) else (loaded,)
+
+
+WORKED = [
+    c for group in (tickrig, canmon) for c in commands_of(group) if hasattr(c.callback, "work")
+]
+
+
+@pytest.mark.parametrize("command", WORKED, ids=lambda command: str(command.name))
+def test_the_work_of_a_command_takes_its_options(command: click.Command) -> None:
+    work = load(vars(command.callback)["work"])
+    inspect.signature(work).bind(**{str(parameter.name): None for parameter in command.params})
 
 
 def test_what_can_be_named_is_what_there_is() -> None:

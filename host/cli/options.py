@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from functools import wraps
 from math import isnan
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from tickrig._version import __version__
-from tickrig.host.cli.start import load, standard_streams
+from tickrig.host.cli.start import load, loading, standard_streams
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -112,7 +113,33 @@ run_code_option: Final[Decorator] = click.option(
 """Of commands that make devices again of a trace."""
 
 
-# Groups of commands that are imported when they are asked for, so that each starts fast.
+# Commands that are imported when they are asked for, so that each starts fast: a group finds its
+# commands by their paths, and a command with heavy imports finds its work by its path.
+
+
+def works_in(path: str) -> Decorator:
+    """Return a decorator: the function says what a command takes, and `path` does its work.
+
+    Help and completion need the options alone, so the module of the work is imported when the
+    command runs. The decorated function has the signature of the work and an empty body.
+
+    Args:
+        path: of the function that does the work, as `MODULE:NAME`. What it returns is the exit
+            status; None is 0.
+    """
+
+    def decorate(described: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(described)
+        def command(**options: Any) -> None:
+            with loading():
+                work = load(path)
+            if status := work(**options):
+                click.get_current_context().exit(status)
+
+        vars(command)["work"] = path  # for those who look whether options and work agree
+        return command
+
+    return decorate
 
 
 class LazyCommand(click.Command):

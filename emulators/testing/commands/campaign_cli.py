@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
-from tickrig.host.cli.messages import Refused, say
-from tickrig.host.cli.options import PATH, VERSION, time_option
-from tickrig.host.cli.start import loading
-
-if TYPE_CHECKING:
-    from tickrig.emulators.testing.campaign.table import CampaignTable
+from tickrig.host.cli.options import PATH, time_option, works_in
 
 _RUN: Final = "run"
 _OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
-_NOT_PASSED: Final = 1
 
 
 class CampaignGroup(click.Group):
@@ -77,8 +71,8 @@ def campaign() -> None:
 )
 @click.option("--scheduler", default="", metavar="URL", help="Run on this Dask cluster.")
 @click.option("--fresh", is_flag=True, help="Begin anew, whatever is there.")
-@click.pass_context
-def run(context: click.Context, /, **options: Any) -> None:
+@works_in("tickrig.emulators.testing.commands.campaign:run")
+def run(**options: Any) -> None:
     """Run TESTS (files, folders or node IDs) with each seed and each value, in virtual time.
 
     Exit status 1 if a run did not pass, 3 if the disk is full.
@@ -87,66 +81,16 @@ def run(context: click.Context, /, **options: Any) -> None:
     tickrig campaign tests/test_stop.py --seeds 0-9999 --param flip=0.0001,0.001
     tickrig campaign tests/test_stop.py --seeds 0-99 -o runs.csv -o runs.parquet
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.testing.campaign.campaign_run import (  # noqa: PLC0415
-            CampaignOptions,
-            CampaignRun,
-        )
-        from tickrig.emulators.testing.campaign.order import CampaignRefusal  # noqa: PLC0415 - slow
-
-    try:
-        wanted = CampaignOptions(version=VERSION, **options)
-        table = CampaignRun(wanted).run()
-    except CampaignRefusal as refusal:
-        raise Refused(str(refusal)) from None
-    context.exit(_shown(table, wanted.output_paths[0]))
 
 
 @campaign.command()
 @click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", "outputs", multiple=True, required=True, type=PATH, help=_OUTPUT)
-@click.pass_context
-def merge(context: click.Context, tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
+@works_in("tickrig.emulators.testing.commands.campaign:merge")
+def merge(tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
     """Join the tables of shards, and say what they found.
 
     \b
     tickrig campaign merge part1.csv part2.csv -o all.csv
     tickrig campaign merge part*.parquet -o all.csv -o all.parquet
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.testing.campaign.campaign_run import (  # noqa: PLC0415
-            check_arrow,
-            check_outputs,
-            write_outputs,
-        )
-        from tickrig.emulators.testing.campaign.order import CampaignRefusal  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
-            merge_tables,
-            missing_seeds,
-            read_table,
-        )
-
-    try:
-        check_outputs(outputs)
-        check_arrow(tables)
-        table = merge_tables([(path, read_table(path)) for path in tables])
-        write_outputs(table, outputs)
-    except CampaignRefusal as refusal:
-        raise Refused(str(refusal)) from None
-    except OSError as error:
-        raise Refused(f"{error.filename}: {error.strerror}") from None
-    for line in missing_seeds(table):
-        say(f"warning: {line}")
-    context.exit(_shown(table, outputs[0]))
-
-
-def _shown(table: CampaignTable, path: Path) -> int:
-    """Show what was found; return the exit status."""
-    from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
-        WELL,
-        summary,
-    )
-
-    for line in summary(table, str(path)):
-        click.echo(line)
-    return 0 if all(row.outcome in WELL for row in table.rows) else _NOT_PASSED

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
+
+import click
 
 from tickrig.device.physical import InputSignal, SignalType
 from tickrig.emulators.commands.device_config import option_names
 from tickrig.emulators.testing.rig_file.devices import RESERVED, kind_of
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.emulators.testing.rig_file.probe import Probe, probe
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.text.names import SHOWN
+from tickrig.host.text.whole_file import write_whole
 
 _HEAD: Final = """\
 # A rig file: what is on the bench. Lines behind a # are proposals.
@@ -167,3 +172,35 @@ def _door_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
     if any(found.baud is None for _, found in made):
         yield '# can0 = { interface = "socketcan", channel = "can0" }'
     yield ""
+
+
+# The command `tickrig init`.
+
+RIG: Final = "rig.toml"
+_STANDARD_OUTPUT: Final = "-"
+
+
+def init(types: tuple[str, ...], file: Path) -> None:
+    """Write the template into a file, or to standard output where that is `-`."""
+    on_output = str(file) == _STANDARD_OUTPUT
+    folder = Path() if on_output else file.parent
+    try:
+        text = rig_template(types or ("rrc",), RIG if on_output else file.name, folder)
+    except TypeRefusedError as error:
+        raise Refused(f"--device {error}") from None
+    if on_output:
+        click.echo(text, nl=False)
+        return
+    if file.exists():
+        why = "is there already, and is left alone: -o FILE writes another one"
+        raise Refused(f"file {file} {why}")
+    try:
+        write_whole(file, text)
+    except FileNotFoundError:
+        why = "cannot be made there" if file.parent.is_dir() else f"no directory {file.parent}"
+        raise Refused(f"file {file}: {why}") from None
+    except OSError as error:
+        refuse_path("file", error)
+    click.echo(file)
+    words = shlex.quote(str(file))
+    click.echo(f"next: edit it; tickrig check {words}; tickrig run {words}", err=True)

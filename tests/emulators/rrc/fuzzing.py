@@ -11,7 +11,7 @@ from tickrig.device.rrc.machine import TICK_US, Rrc
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.wire import rrc as cmd
+from tickrig.wire.rrc import commands as cmd
 
 ASK: Final = b"\n" + cmd.DeviceName().encode() + cmd.DeviceName().encode(check=True)
 """One of the two is right, with stablemode or without; the LF ends what noise began."""
