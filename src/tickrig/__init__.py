@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.errors import NotOnThisBench as NotOnThisBench
     from tickrig.emulators.testing.bench.errors import OperatorRefused as OperatorRefused
     from tickrig.emulators.testing.bench.errors import PortGone as PortGone
-    from tickrig.emulators.testing.rig_file.section import RigFileError as RigFileError
+    from tickrig.emulators.testing.rig_file.schema import RigFileError as RigFileError
     from tickrig.host.control.clock import RealClock as RealClock
     from tickrig.wire.can import CanFrame as CanFrame
     from tickrig.wire.instant import NEVER as NEVER
@@ -79,7 +79,7 @@ else:
                 "OperatorRefused",
                 "PortGone",
             ),
-            "tickrig.emulators.testing.rig_file.section": ("RigFileError",),
+            "tickrig.emulators.testing.rig_file.schema": ("RigFileError",),
             "tickrig.host.control.clock": ("RealClock",),
             "tickrig.wire.can": ("CanFrame",),
             "tickrig.wire.instant": ("NEVER",),

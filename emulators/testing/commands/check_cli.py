@@ -83,7 +83,7 @@ def _check_rig(file: Path) -> int:
     with loading():
         from tickrig.emulators.testing.rig_file.plan import summary  # noqa: PLC0415
         from tickrig.emulators.testing.rig_file.reader import read_rig_file  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.rig_file.section import RigFileError  # noqa: PLC0415
+        from tickrig.emulators.testing.rig_file.schema import RigFileError  # noqa: PLC0415
 
     try:
         first, *wires = summary(read_rig_file(file))

@@ -68,7 +68,7 @@ def run(  # noqa: PLR0913 - options
             BenchRun,
         )
         from tickrig.emulators.testing.rig_file.reader import read_rig_file  # noqa: PLC0415
-        from tickrig.emulators.testing.rig_file.section import RigFileError  # noqa: PLC0415
+        from tickrig.emulators.testing.rig_file.schema import RigFileError  # noqa: PLC0415
 
     try:
         plan = read_rig_file(file)

@@ -9,8 +9,8 @@ from typing import Any, Final
 from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus
 from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
 from tickrig.emulators.testing.rig_file.probe import eds_cache
-from tickrig.emulators.testing.rig_file.section import RigFileNotes, RigFileTable, shown
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
+from tickrig.host.text.section import Notes, Section, shown
 from tickrig.host.text.toml_reader import Mistake, TomlDocument, TomlPath
 
 _BUS: Final = "bus"
@@ -29,7 +29,7 @@ def _is_named(path: Path) -> bool:
     return path.suffix.lower() in (".yml", ".yaml")
 
 
-def bus_as_rig(path: Path) -> RigFileTable:
+def bus_as_rig(path: Path) -> Section:
     """Return a bus.yml as if it were a rig file with its nodes alone.
 
     Raises:
@@ -37,13 +37,11 @@ def bus_as_rig(path: Path) -> RigFileTable:
     """
     document = TomlDocument({_BUS: path.name}, {(_BUS,): 1})
     if not _is_named(path):
-        return RigFileTable(RigFileNotes(document, [Mistake(1, _MISNAMED)]), (), {"device": {}})
-    return with_nodes(
-        RigFileTable(RigFileNotes(document), (), document.values), path.parent, alone=True
-    )
+        return Section(Notes(document, [Mistake(1, _MISNAMED)]), (), {"device": {}})
+    return with_nodes(Section(Notes(document), (), document.values), path.parent, alone=True)
 
 
-def with_nodes(top: RigFileTable, folder: Path, *, alone: bool = False) -> RigFileTable:
+def with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
     """Return a rig file in which each node of the bus.yml that it names is a device.
 
     What the file says of a device of the same name is kept.
@@ -69,7 +67,7 @@ def with_nodes(top: RigFileTable, folder: Path, *, alone: bool = False) -> RigFi
     return _merged(top, given, places)
 
 
-def _places(top: RigFileTable, path: Path, *, alone: bool) -> dict[str, int]:
+def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
     """Return the lines of the nodes by their names; what is wrong is noted."""
     try:
         bus = read_bus(path, cache=eds_cache())
@@ -85,7 +83,7 @@ def _places(top: RigFileTable, path: Path, *, alone: bool) -> dict[str, int]:
     return {node.name: node.line for node in bus.nodes}
 
 
-def _merged(top: RigFileTable, bus: str, nodes: dict[str, int]) -> RigFileTable:
+def _merged(top: Section, bus: str, nodes: dict[str, int]) -> Section:
     """Return the document with a device for each node."""
     old = top.notes.document
     devices: Any = top.values.get("device", {})
@@ -104,4 +102,4 @@ def _merged(top: RigFileTable, bus: str, nodes: dict[str, int]) -> RigFileTable:
     values = {key: each for key, each in top.values.items() if key != _BUS}
     values["device"] = {**found, **{k: v for k, v in devices.items() if k not in found}}
     document = TomlDocument(values, lines, old.mistakes, old.whole)
-    return RigFileTable(RigFileNotes(document, top.notes.mistakes, names), (), values)
+    return Section(Notes(document, top.notes.mistakes, names), (), values)

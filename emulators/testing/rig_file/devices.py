@@ -13,9 +13,14 @@ from tickrig.emulators.canopen.choices import MODELS, is_bus_node
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.device_type import DEVICES
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, WirePlan, WireType
-from tickrig.emulators.testing.rig_file.schema import CANOPEN_DEVICE, SERIAL_DEVICE, WIRES
-from tickrig.emulators.testing.rig_file.section import RigFileTable, Schema, check_name, shown
+from tickrig.emulators.testing.rig_file.schema import (
+    CANOPEN_DEVICE,
+    SERIAL_DEVICE,
+    WIRES,
+    check_name,
+)
 from tickrig.host.text.names import near
+from tickrig.host.text.section import Schema, Section, shown
 from tickrig.host.text.user_file import SUFFIX
 
 _BUS: Final = "can"
@@ -47,11 +52,11 @@ class DeviceReader:
         sections: the table of each.
     """
 
-    def __init__(self, section: RigFileTable | None, wires: _Wires, folder: Path) -> None:
+    def __init__(self, section: Section | None, wires: _Wires, folder: Path) -> None:
         self._wires, self._folder = wires, folder
         self._given, self._types = dict(wires), cache(DEVICES.names)
         self.plans: dict[str, DevicePlan | None] = {}
-        self.sections: dict[str, RigFileTable] = {}
+        self.sections: dict[str, Section] = {}
         for name, table in section.subs() if section else ():
             self.plans[name] = None
             if table is not None:
@@ -80,7 +85,7 @@ class DeviceReader:
                 wire = self._wire_of(self.sections[name], plan)
                 self.plans[name] = replace(plan, wire=wire) if wire else None
 
-    def _check_name(self, name: str, section: RigFileTable) -> None:
+    def _check_name(self, name: str, section: Section) -> None:
         try:
             check_name(name)
             if name in self._given:
@@ -90,7 +95,7 @@ class DeviceReader:
         except ValueError as error:
             section.wrong(str(error))
 
-    def _read(self, name: str, section: RigFileTable) -> DevicePlan | None:
+    def _read(self, name: str, section: Section) -> DevicePlan | None:
         given = section.values.get("type")
         kind, place = None, ""
         if isinstance(given, str) and given:
@@ -121,7 +126,7 @@ class DeviceReader:
             ),
         )
 
-    def _wire_of(self, section: RigFileTable, plan: DevicePlan) -> str | None:
+    def _wire_of(self, section: Section, plan: DevicePlan) -> str | None:
         """Return the wire of a device; None if it cannot be said."""
         is_node = plan.kind is not DeviceKind.SERIAL
         if not plan.wire:
@@ -135,7 +140,7 @@ class DeviceReader:
             return None
         return plan.wire
 
-    def _bus_of(self, section: RigFileTable) -> str | None:
+    def _bus_of(self, section: Section) -> str | None:
         """Return the only bus, made if the file has none."""
         if None in self._given.values():
             return None
@@ -196,7 +201,7 @@ _WIRE_KEYS: Final[Schema] = {key: each for schema in WIRES.values() for key, eac
 _OPTIONAL: Final = {"framing", "buffer_bytes", "echo", "bursts"}
 
 
-def read_wires(section: RigFileTable | None) -> dict[str, WirePlan | None]:
+def read_wires(section: Section | None) -> dict[str, WirePlan | None]:
     """Read all wires; None for one of which it is not known what it is."""
     wires: dict[str, WirePlan | None] = {}
     for name, table in section.subs() if section else ():
@@ -208,7 +213,7 @@ def read_wires(section: RigFileTable | None) -> dict[str, WirePlan | None]:
     return wires
 
 
-def _read(name: str, section: RigFileTable) -> WirePlan | None:
+def _read(name: str, section: Section) -> WirePlan | None:
     types = {each.value: each for each in WireType}
     given = section.values.get("type")
     wire_type = types.get(given) if isinstance(given, str) else None
@@ -225,7 +230,7 @@ def _read(name: str, section: RigFileTable) -> WirePlan | None:
 
 
 def check_wires(
-    top: RigFileTable,
+    top: Section,
     wires: Mapping[str, WirePlan | None],
     devices: Mapping[str, DevicePlan | None],
 ) -> None:

@@ -29,8 +29,8 @@ from tickrig.emulators.testing.rig_file.schema import (
     REAL_LINE,
     TOLERANCE,
 )
-from tickrig.emulators.testing.rig_file.section import RigFileTable, Schema
 from tickrig.host.text.names import closest, near
+from tickrig.host.text.section import Schema, Section
 
 _CONTROL = "control"
 _TOLERANCE_TABLE = "tolerance"
@@ -53,7 +53,7 @@ class DoorReader:
     ) -> None:
         self._wires, self._devices, self._folder = wires, devices, folder
 
-    def read_real(self, section: RigFileTable) -> RealPlan:
+    def read_real(self, section: Section) -> RealPlan:
         """Read `[real]`."""
         values = section.read(REAL, *(key for key in section.values if key not in REAL))
         doors: dict[str, DoorPlan] = {}
@@ -69,7 +69,7 @@ class DoorReader:
         self._check_twice(section, doors)
         return RealPlan(control=self._file(values.get(_CONTROL)), doors=doors)
 
-    def read_hardware(self, section: RigFileTable) -> HardwarePlan:
+    def read_hardware(self, section: Section) -> HardwarePlan:
         """Read `[hardware]`."""
         values = section.read(HARDWARE, *(key for key in section.values if key not in HARDWARE))
         control = {
@@ -100,8 +100,8 @@ class DoorReader:
         )
 
     def _tables(
-        self, section: RigFileTable, *but: str
-    ) -> Iterator[tuple[str, WirePlan | None, RigFileTable]]:
+        self, section: Section, *but: str
+    ) -> Iterator[tuple[str, WirePlan | None, Section]]:
         """Yield each table with the wire of its name, or that of a device alone on its line."""
         names = [*self._devices, *(name for name in self._wires if name not in self._devices)]
         for name in section.values:
@@ -124,7 +124,7 @@ class DoorReader:
         sharing = [each for each in self._devices.values() if each and each.wire == wire.name]
         return wire.type is not WireType.CAN and len(sharing) == 1
 
-    def _door(self, wire: WirePlan, section: RigFileTable) -> DoorPlan:
+    def _door(self, wire: WirePlan, section: Section) -> DoorPlan:
         if wire.type is WireType.CAN:
             found = section.read(REAL_BUS)
             return DoorPlan(bus=_bus(section, found) if "interface" in found else None)
@@ -132,7 +132,7 @@ class DoorReader:
         serve = [url for url in found.get("serve", ()) if _is_url(section, url)]
         return DoorPlan(link=self._file(found.get("link")), serve=tuple(serve))
 
-    def _check_twice(self, section: RigFileTable, doors: Mapping[str, DoorPlan]) -> None:
+    def _check_twice(self, section: Section, doors: Mapping[str, DoorPlan]) -> None:
         """Note links and addresses that two wires would have."""
         seen: dict[object, str] = {}
         for wire, door in doors.items():
@@ -148,7 +148,7 @@ class DoorReader:
         return None if name is None else self._folder / name
 
 
-def _is_url(section: RigFileTable, url: str) -> bool:
+def _is_url(section: Section, url: str) -> bool:
     """Return whether a line can be served there; else it is noted."""
     try:
         parse_serve_url(url)
@@ -168,7 +168,7 @@ def _hardware_schema(wire: WirePlan | None, *, is_device: bool) -> Schema:
     return {**HARDWARE_LINE, **of_device}
 
 
-def _bus(section: RigFileTable, found: Mapping[str, Any]) -> BusPlan:
+def _bus(section: Section, found: Mapping[str, Any]) -> BusPlan:
     """Return a bus; a driver that is not here may be there on another machine."""
     from can import VALID_INTERFACES  # noqa: PLC0415 - slow
 
@@ -183,7 +183,7 @@ def _bus(section: RigFileTable, found: Mapping[str, Any]) -> BusPlan:
     )
 
 
-def _power(section: RigFileTable, found: Mapping[str, Any]) -> PowerPlan | None:
+def _power(section: Section, found: Mapping[str, Any]) -> PowerPlan | None:
     missing = [key for key in ("power_on", "power_off") if key not in section.values]
     if len(missing) == 1:
         section.wrong(f"no key {missing[0]!r}: power_on and power_off come together")
@@ -192,7 +192,7 @@ def _power(section: RigFileTable, found: Mapping[str, Any]) -> PowerPlan | None:
     return None
 
 
-def _tolerance(section: RigFileTable | None) -> Tolerances:
+def _tolerance(section: Section | None) -> Tolerances:
     found = section.read(TOLERANCE) if section else {}
     given: dict[str, Any] = {}
     if "stick_pct" in found:

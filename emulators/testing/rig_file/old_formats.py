@@ -13,15 +13,9 @@ from typing import Any, Final
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node_spec import LSS, parse_ids
 from tickrig.emulators.canopen.rig_file import DEVICE_KEYS, NODE_KEYS
-from tickrig.emulators.testing.rig_file.section import (
-    RigFileNotes,
-    RigFileTable,
-    dotted,
-    is_broken,
-    shown,
-)
 from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import closest
+from tickrig.host.text.section import Notes, Section, dotted, is_broken, shown
 from tickrig.host.text.toml_reader import BROKEN, TomlDocument, TomlPath
 from tickrig.host.text.trace import BEGIN
 
@@ -70,7 +64,7 @@ def no_rig_file(text: str) -> str:
 class _Translation:
     """A document in the words of rig files, and what is wrong with the old one."""
 
-    old: RigFileTable
+    old: Section
     values: dict[str, Any] = field(default_factory=dict)
     lines: dict[TomlPath, int] = field(default_factory=dict)
     names: dict[TomlPath, str] = field(default_factory=dict)
@@ -89,14 +83,14 @@ class _Translation:
         self.names.setdefault(keys, dotted(old))
 
     @property
-    def section(self) -> RigFileTable:
+    def section(self) -> Section:
         """The document as a section, with the mistakes of the old one."""
         old = self.old.notes
         document = TomlDocument(self.values, self.lines, old.document.mistakes, old.document.whole)
-        return RigFileTable(RigFileNotes(document, old.mistakes, self.names), (), self.values)
+        return Section(Notes(document, old.mistakes, self.names), (), self.values)
 
 
-def in_new_words(top: RigFileTable) -> RigFileTable:
+def in_new_words(top: Section) -> Section:
     """Return an old file as if it were a rig file, a rig file as it is.
 
     Args:
@@ -111,11 +105,11 @@ def in_new_words(top: RigFileTable) -> RigFileTable:
         return _hil(top)
     if isinstance(given.get("component"), list):
         top.wrong(_SYSTEM, "component")
-        return RigFileTable(top.notes, (), {"device": {}})
+        return Section(top.notes, (), {"device": {}})
     return top
 
 
-def _hil(top: RigFileTable) -> RigFileTable:
+def _hil(top: Section) -> Section:
     """Read the file that tells where a real RRC is."""
     new = _Translation(top)
     new.put(("device", "rrc", "type"), "rrc", ("dut", "rrc"))
@@ -134,7 +128,7 @@ def _hil(top: RigFileTable) -> RigFileTable:
     return new.section
 
 
-def _check_keys(section: RigFileTable, known: Iterable[str]) -> set[str]:
+def _check_keys(section: Section, known: Iterable[str]) -> set[str]:
     """Note the keys that are not known, and return those that may be meant."""
     known = list(dict.fromkeys(known))
     unknown = [key for key in section.values if key not in known]
@@ -150,12 +144,12 @@ def _value(values: Mapping[str, Any], keys: TomlPath) -> Any:
     return value
 
 
-def _canopen_rig(top: RigFileTable) -> RigFileTable:
+def _canopen_rig(top: Section) -> Section:
     """Read tables [[node]] and [body]."""
     new = _Translation(top)
     for at, table in enumerate(top.values["node"]):
         if isinstance(table, dict):
-            section = RigFileTable(top.notes, ("node", at), table)
+            section = Section(top.notes, ("node", at), table)
             for name, values in _nodes(section, list(new.values.get("device", {}))):
                 for key, (value, old) in values.items():
                     new.put(("device", name, key), value, ("node", at, *old))
@@ -175,7 +169,7 @@ _Keys = dict[str, tuple[Any, TomlPath]]
 """Values by their keys, with the keys that they had."""
 
 
-def _nodes(section: RigFileTable, taken: list[str]) -> Iterator[tuple[str, _Keys]]:
+def _nodes(section: Section, taken: list[str]) -> Iterator[tuple[str, _Keys]]:
     """Yield the nodes of a table: each name, and its keys with what they were."""
     given = section.values
     misspelt = _check_keys(section, NODE_KEYS)

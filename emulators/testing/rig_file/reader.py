@@ -36,17 +36,10 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
 )
 from tickrig.emulators.testing.rig_file.probe import UNKNOWN, Probe, WrongDevice, probe
-from tickrig.emulators.testing.rig_file.schema import BODY, TOP
-from tickrig.emulators.testing.rig_file.section import (
-    RigFileError,
-    RigFileNotes,
-    RigFileTable,
-    is_broken,
-    shown,
-    texts,
-)
+from tickrig.emulators.testing.rig_file.schema import BODY, TOP, RigFileError
 from tickrig.emulators.testing.rig_file.starts import Start, StartReader, read_safe
 from tickrig.host.text.names import near
+from tickrig.host.text.section import Notes, Section, is_broken, shown, texts
 from tickrig.host.text.toml_reader import Mistake, read_toml
 
 # `[fault]`: faults of devices and wires, each in a word as on command lines.
@@ -55,9 +48,7 @@ _FaultRates = Mapping[str, bool]
 """Whether each fault of a device or wire wants a rate."""
 
 
-def _read_faults(
-    section: RigFileTable, owners: Mapping[str, _FaultRates | None]
-) -> Iterator[FaultPlan]:
+def _read_faults(section: Section, owners: Mapping[str, _FaultRates | None]) -> Iterator[FaultPlan]:
     """Yield the faults that can be.
 
     Args:
@@ -72,7 +63,7 @@ def _read_faults(
 
 
 def _read(
-    section: RigFileTable, owner: str, value: object, faults: _FaultRates | None
+    section: Section, owner: str, value: object, faults: _FaultRates | None
 ) -> Iterator[FaultPlan]:
     try:
         specs = texts(value)
@@ -103,7 +94,7 @@ _PARAMETERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
 
 
 def _read_body(
-    section: RigFileTable, devices: Mapping[str, HasSignals], node_ids: Mapping[int, str]
+    section: Section, devices: Mapping[str, HasSignals], node_ids: Mapping[int, str]
 ) -> BodyPlan | None:
     """Read the table.
 
@@ -138,7 +129,7 @@ def _read_body(
 
 
 def _drive(
-    section: RigFileTable,
+    section: Section,
     wheel: str,
     devices: Mapping[str, HasSignals],
     node_ids: Mapping[int, str],
@@ -164,7 +155,7 @@ def _drive(
     return None
 
 
-def _mirrored(section: RigFileTable, names: tuple[str, ...], wheels: list[str]) -> tuple[str, ...]:
+def _mirrored(section: Section, names: tuple[str, ...], wheels: list[str]) -> tuple[str, ...]:
     if wheels:
         for name in names:
             if name not in wheels:
@@ -239,11 +230,11 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
     if reason := no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
-    top = in_new_words(RigFileTable(RigFileNotes(document), (), document.values))
+    top = in_new_words(Section(Notes(document), (), document.values))
     return _plan(with_nodes(top, path.parent), path)
 
 
-def _plan(top: RigFileTable, path: Path) -> RigPlan:
+def _plan(top: Section, path: Path) -> RigPlan:
     plan = _Reader(top, path).read()
     if top.notes.all:
         raise RigFileError(str(path), top.notes.all)
@@ -253,7 +244,7 @@ def _plan(top: RigFileTable, path: Path) -> RigPlan:
 class _Reader:
     """Reads one file."""
 
-    def __init__(self, top: RigFileTable, path: Path) -> None:
+    def __init__(self, top: Section, path: Path) -> None:
         self._top, self._path, self._folder = top, path, path.parent
         self._wires = read_wires(top.sub("wire"))
         self._devices = DeviceReader(top.sub("device"), self._wires, self._folder)

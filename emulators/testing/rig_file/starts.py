@@ -12,11 +12,12 @@ from typing import Any, Final
 
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.testing.rig_file.probe import UNKNOWN
-from tickrig.emulators.testing.rig_file.section import RigFileTable, check_name, is_broken, shown
+from tickrig.emulators.testing.rig_file.schema import check_name
 from tickrig.emulators.testing.signals.scope import SLASH, check_signals
 from tickrig.emulators.testing.signals.sources import Constant, SignalSpec
 from tickrig.emulators.testing.signals.spec_reader import FORMS, read_signal_spec
 from tickrig.host.text.names import closest, near
+from tickrig.host.text.section import Section, is_broken, shown
 from tickrig.host.text.toml_reader import TomlPath
 from tickrig.host.text.values import Setting
 
@@ -39,9 +40,9 @@ class StartReader:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._signals: dict[str, SignalSpec] = {}
-        self._places: dict[str, tuple[RigFileTable, TomlPath]] = {}
+        self._places: dict[str, tuple[Section, TomlPath]] = {}
 
-    def read_signals(self, section: RigFileTable) -> dict[str, SignalSpec]:
+    def read_signals(self, section: Section) -> dict[str, SignalSpec]:
         """Read `[signal]`."""
         for name, value in section.values.items():
             try:
@@ -53,7 +54,7 @@ class StartReader:
             )
         return dict(self._signals)
 
-    def read_start(self, device: str, section: RigFileTable, physical: HasSignals) -> Start:
+    def read_start(self, device: str, section: Section, physical: HasSignals) -> Start:
         """Read the start of a device.
 
         Args:
@@ -87,7 +88,7 @@ class StartReader:
             section.wrong(mistake.reason, *keys)
 
     def _inputs(
-        self, section: RigFileTable, groups: Mapping[str, tuple[str, ...]]
+        self, section: Section, groups: Mapping[str, tuple[str, ...]]
     ) -> Iterator[tuple[TomlPath, str, Any]]:
         """Yield each input with the keys of its value; a group gives several."""
         for name, value in section.values.items():
@@ -103,7 +104,7 @@ class StartReader:
                 section.wrong(f"it takes {wanted}, not {came}", name)
 
     def _value(
-        self, section: RigFileTable, keys: TomlPath, value: Any, full: str
+        self, section: Section, keys: TomlPath, value: Any, full: str
     ) -> Setting | SignalSpec | None:
         """Return a value, or a signal, which is kept to be checked; None if it is noted."""
         if isinstance(value, bool | int | float | str):
@@ -114,13 +115,13 @@ class StartReader:
         return spec
 
     def _keep(
-        self, name: str, spec: SignalSpec, section: RigFileTable, keys: TomlPath, value: Any
+        self, name: str, spec: SignalSpec, section: Section, keys: TomlPath, value: Any
     ) -> None:
         """Keep a signal with the key that says what it is."""
         form = [key for key in FORMS if isinstance(value, dict) and key in value]
         self._signals[name], self._places[name] = spec, (section, (*keys, *form[:1]))
 
-    def _spec(self, section: RigFileTable, keys: TomlPath, value: Any) -> SignalSpec | None:
+    def _spec(self, section: Section, keys: TomlPath, value: Any) -> SignalSpec | None:
         if is_broken(value):
             return None
         spec = read_signal_spec(value, keys, self._folder)
@@ -135,9 +136,7 @@ class StartReader:
         return None
 
 
-def read_safe(
-    section: RigFileTable, devices: Mapping[str, HasSignals]
-) -> dict[str, dict[str, Setting]]:
+def read_safe(section: Section, devices: Mapping[str, HasSignals]) -> dict[str, dict[str, Setting]]:
     """Read `[safe]`: for each device outputs, and what they are when a test is over.
 
     Args:
@@ -158,7 +157,7 @@ def read_safe(
     return safe
 
 
-def _can_be_safe(section: RigFileTable, physical: HasSignals, name: str) -> bool:
+def _can_be_safe(section: Section, physical: HasSignals, name: str) -> bool:
     """Return whether an output or input can be this; else it is noted."""
     value = section.values[name]
     if is_broken(value):
@@ -190,7 +189,7 @@ def _without_lists(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check(
-    section: RigFileTable, keys: TomlPath, physical: HasSignals, name: str, value: Setting
+    section: Section, keys: TomlPath, physical: HasSignals, name: str, value: Setting
 ) -> None:
     try:
         physical.inputs.check(name, value)

@@ -8,7 +8,7 @@ from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, RigPlan
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file, read_rig_file
-from tickrig.emulators.testing.rig_file.section import RigFileError
+from tickrig.emulators.testing.rig_file.schema import RigFileError
 
 RIGS = Path(__file__).parents[4] / "examples" / "rigs"
 

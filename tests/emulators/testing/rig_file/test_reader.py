@@ -21,7 +21,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
 )
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file, read_rig_file
-from tickrig.emulators.testing.rig_file.section import RigFileError
+from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.emulators.testing.signals.sources import SignalSpec
 
 ROOT = Path(__file__).parents[4]

@@ -1,14 +1,13 @@
-"""A table of a rig file while it is read: its keys by a schema, and what is wrong with them.
+"""A table of a user's file while it is read: its fields, and what is wrong with them.
 
-Values of a rig file: each takes what TOML gives, or says what it takes instead.
+A taker takes a value as the file gives it, or raises ValueError that says what it takes instead.
 
->>> whole(1, 127)(5), framing("8N1")
-(5, '8N1')
+>>> whole(1, 127)(5), duration("500ms")
+(5, 500000)
 """
 
 from __future__ import annotations
 
-import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -16,19 +15,14 @@ from datetime import date, time
 from math import isfinite
 from typing import Any, Final
 
-from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.canopen.node_spec import LSS
 from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath
 from tickrig.host.text.values import parse_size, us_of
 
-_Field = Callable[[Any], Any]
+Taker = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
 
 _LONGEST: Final = 60
-_LONGEST_NAME: Final = 40
-_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_FRAMING: Final = re.compile(r"[5-8][NEOMS](1|1\.5|2)")
 
 
 def shown(value: object) -> str:
@@ -99,7 +93,7 @@ def table(value: object) -> dict[str, Any]:
     raise ValueError(f"it takes a table, not {shown(value)}")
 
 
-def whole(low: int, high: int) -> _Field:
+def whole(low: int, high: int) -> Taker:
     """Return what takes a whole number of a range."""
 
     def take(value: object) -> int:
@@ -110,7 +104,7 @@ def whole(low: int, high: int) -> _Field:
     return take
 
 
-def number(low: float, high: float) -> _Field:
+def number(low: float, high: float) -> Taker:
     """Return what takes a number of a range."""
 
     def take(value: object) -> float:
@@ -122,7 +116,7 @@ def number(low: float, high: float) -> _Field:
     return take
 
 
-def one_of(*names: str) -> _Field:
+def one_of(*names: str) -> Taker:
     """Return what takes one of some words."""
 
     def take(value: object) -> str:
@@ -133,22 +127,6 @@ def one_of(*names: str) -> _Field:
         raise ValueError(f"it takes {', '.join(names)}, not {shown(value)}{hint}")
 
     return take
-
-
-def framing(value: object) -> str:
-    """Take data bits, parity and stop bits."""
-    if isinstance(value, str) and _FRAMING.fullmatch(value):
-        return value
-    raise ValueError(f"it takes data bits, parity and stop bits as 8N1, not {shown(value)}")
-
-
-def node_id(value: object) -> int:
-    """Take a node-ID, or the word of a node that waits for one."""
-    if value == LSS:
-        return UNCONFIGURED
-    if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= 127:
-        return value
-    raise ValueError(f"it takes 1..127, or {LSS} for a node that waits for LSS, not {shown(value)}")
 
 
 def duration(value: object) -> int:
@@ -167,35 +145,12 @@ def size(value: object) -> int:
     raise ValueError(f'it takes bytes as 4096 or "64k", not {shown(value)}')
 
 
-def check_name(name: str) -> None:
-    """Raise ValueError unless a device, wire or signal can be called so."""
-    if len(name) > _LONGEST_NAME:
-        raise ValueError(f"a name of {len(name)} letters; {_LONGEST_NAME} are enough")
-    if not _NAME.fullmatch(name):
-        fitting = re.sub(r"\W", "_", name, flags=re.ASCII)
-        hint = f", as {fitting}" if _NAME.fullmatch(fitting) else ""
-        raise ValueError(f"a name is letters, digits and _, a letter first{hint}")
-
-
 _MOST: Final = 500
 """Characters of a mistake."""
 
 
-class RigFileError(ValueError):
-    """A rig file that cannot be used: all that is wrong with it, a line each.
-
-    Attributes:
-        file: what the file is called.
-        mistakes: in the order of their lines.
-    """
-
-    def __init__(self, file: str, mistakes: tuple[Mistake, ...]) -> None:
-        self.file, self.mistakes = file, mistakes
-        super().__init__("\n".join(f"{file}:{line}: {reason}" for line, reason in mistakes))
-
-
 @dataclass(frozen=True, slots=True)
-class FileKey:
+class Field:
     """A key that a table can have.
 
     Attributes:
@@ -205,18 +160,18 @@ class FileKey:
         default: what holds without it, for people; empty where it has to be there.
     """
 
-    field: _Field
+    field: Taker
     values: str
     text: str
     default: str = ""
 
 
-Schema = Mapping[str, FileKey]
+Schema = Mapping[str, Field]
 """The keys that a table can have."""
 
 
 @dataclass(slots=True)
-class RigFileNotes:
+class Notes:
     """What is wrong with a document.
 
     Attributes:
@@ -246,7 +201,7 @@ class RigFileNotes:
 
 
 @dataclass(frozen=True, slots=True)
-class RigFileTable:
+class Section:
     """A table.
 
     Attributes:
@@ -255,7 +210,7 @@ class RigFileTable:
         values: what it holds.
     """
 
-    notes: RigFileNotes
+    notes: Notes
     keys: TomlPath
     values: dict[str, Any]
 
@@ -298,17 +253,17 @@ class RigFileTable:
         reason = f"no key {key!r}; {near(key, list(dict.fromkeys(known)))}"
         self.notes.mistakes.append(Mistake(line, f"{self.notes.place(self.keys)}{reason}"))
 
-    def sub(self, key: str) -> RigFileTable | None:
+    def sub(self, key: str) -> Section | None:
         """Return the table of a key; None if there is none, or something else, which is noted."""
         value = self.values.get(key)
         if value is None or value is BROKEN:
             return None
         if isinstance(value, dict):
-            return RigFileTable(self.notes, (*self.keys, key), value)
+            return Section(self.notes, (*self.keys, key), value)
         self.wrong(f"it is a table [{dotted((*self.keys, key))}], not {shown(value)}", key)
         return None
 
-    def subs(self, *but: str) -> Iterator[tuple[str, RigFileTable | None]]:
+    def subs(self, *but: str) -> Iterator[tuple[str, Section | None]]:
         """Yield all keys but some, each with its table."""
         for key in self.values:
             if key not in but:
