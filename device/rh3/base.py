@@ -13,6 +13,47 @@ from tickrig.device.rh3.driver import INPUTS, OUTPUTS, Driver
 from tickrig.device.rh3.parameters import COUNTS_PER_RAD, BaseParameters
 from tickrig.device.twin import Copyable, Part
 
+# Theory of operation
+# ===================
+#
+# The base works in milliseconds: waiting orders, watchdog, stall, servo, ground, in this
+# order, in `_pass_to`. It is not ticked in each of them: one cycle of a master takes 8.3 ms
+# at 115 200 bit/s, and between two frames nothing is seen of the base but what `read`
+# shows, every `LOOK_US`. So
+#
+# - `due_us` is the end of the frame on the line, or the next look; in between the base
+#   sleeps;
+# - a tick first makes the milliseconds that have passed (`_catch_up`), up to the one before
+#   now if something happens in this tick (a frame ends, an input was set, a reset), else
+#   with now;
+# - then a reset, inputs, bytes, and last the millisecond of now.
+#
+# So a request is served from the state at the beginning of its millisecond, and an order
+# that is written in it takes effect in it. The order must not change: `tests/device/rh3/
+# test_milliseconds.py` compares a base that is left alone with one that is ticked each
+# millisecond, to the bit.
+#
+# Milliseconds that are alike are made in one call (`Driver.step`, `Side.drive` with
+# `steps`). They are alike while the targets are constant speeds, no order waits, the
+# watchdog does not expire and no wheel stalls; `Driver._alike` counts them. What is added
+# to the step of a millisecond must end the run there, or the two kinds of ticking differ.
+#
+# Side by side, with the same numbers in each: `SpeedLoop.drive` repeats `Wheel.step` over
+# locals, because the loop is the hot one; `Wheel.step` itself serves coasting and braking.
+# `Wheel.held` and `Side.resting` say when a step would change nothing: they are the same
+# condition as the one that holds the wheel in both, turned round.
+#
+# Units: counts and milliseconds inside, because the loop of the driver counts so (23 844.6
+# counts are a radian of the wheel); metres and radians begin at `Ground.roll`. Torque is in
+# per mille of the rated one. Gains have the units of the text of the register table in
+# driver.py.
+#
+# Numbers: geometry and gains from the functional specification of RH3, laws from
+# rh3-control, section 1.7 and 2.3; mass, friction, torque and current are choices and say
+# so in parameters.py. The wheels' true radii and tread are the calibrated ones (0.0995 and
+# 0.464 m), and commands are computed from 0.1 and 0.441 m by the host: that difference is
+# wanted.
+
 # The ground under a base: where its wheels have taken it.
 
 _STEP_S: Final = 1e-3
@@ -66,6 +107,8 @@ class Ground(Part):
         """
         left, right, tread_m, place = self.left, self.right, self._tread_m, self._place
         grips, noise, left_m, right_m = self._grips, self._noise, 0.0, 0.0
+        # `grips` skips the slip model: without a coefficient of friction the rim goes where
+        # the wheel goes, in the same arithmetic.
         for each, other in zip(lefts, rights):  # noqa: B905 - strict takes as long as a step
             left_rad, right_rad = each / COUNTS_PER_RAD, other / COUNTS_PER_RAD
             if grips:
@@ -226,6 +269,8 @@ class Rh3Base(Copyable):
             The bytes that it sends in this tick.
         """
         heard, before_us = self.slave.due_us <= now_us, now_us - _TICK_US
+        # What happens in this tick must find the base as the millisecond before now has
+        # left it.
         happens = heard or self.inputs.changed or self._restarted
         made = self._catch_up(before_us if happens else now_us) and not happens
         if self._restarted:
@@ -235,6 +280,7 @@ class Rh3Base(Copyable):
             self._inputs_changed()
         sent = b""
         if self._on:
+            # Served and garbled frames are outputs too: the next look has to be taken.
             self._unseen |= heard or bool(rx)
             sent = self.slave.tick(now_us, rx)
         if not made:
@@ -280,6 +326,7 @@ class Rh3Base(Copyable):
         else:
             lefts, rights = driver.coast()
         ground.roll(lefts, rights)
+        # Speed first: it is the cheap test, and true in most milliseconds of a drive.
         if ground.speed_m_s or not (ground.resting and driver.resting):
             self._moving = self._unseen = True
         else:

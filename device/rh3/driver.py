@@ -229,11 +229,14 @@ class Driver(Part):
         """
         if self._waiting:
             self._take_waiting()
+        # After the orders: a target that takes effect clears a trip, but not the silence that
+        # led to it. Without another request the base stops again.
         if self.now_us - last_request_us >= self._watch_us:
             self._watch()
         left, right = self.sides
         if left.stalled or right.stalled:
             self.find_faults()
+        # Mode 0 leaves the motors open; a fault shorts both, whichever wheel has it.
         powered = self._enabled and self._mode is not Mode.FREE
         if powered != self._powered:
             powered = self._switch(powered=powered)
@@ -259,6 +262,9 @@ class Driver(Part):
         left, right = self.sides
         if left.stalling or right.stalling:
             return 1
+        # The millisecond in which silence is long enough is not like the present one, nor
+        # that of the next waiting order; STALL_MS bounds the run, so that a stall is found
+        # in its millisecond.
         until_us = min(until_us, last_request_us + self._watch_us - 1)
         if self._waiting:
             until_us = min(until_us, self._waiting[0][0] - 1)
@@ -283,6 +289,8 @@ class Driver(Part):
             self._obey(self._waiting.popleft()[1])
 
     def _obey(self, values: Mapping[str, int]) -> None:
+        # Any new target ends a stop, of the watchdog too: a master that speaks again need
+        # not clear it.
         if values.keys() & _TARGETS:
             self._tripped = self._stopped = False
         for side in self.sides:
@@ -290,6 +298,8 @@ class Driver(Part):
         self._mode = Mode(values.get("mode", self._mode))
         match values.get("command"):
             case Command.ENABLE:
+                # Enabling while a fault is there is passed over; bit 0 of the status shows
+                # that (map A has no answer for it).
                 self._enabled = not self._faulty
             case Command.DISABLE:
                 self._enabled = False
@@ -320,6 +330,7 @@ class Driver(Part):
             self._tripped = True
 
     def _configure(self) -> None:
+        # 0 switches the watchdog off (0012h).
         self._watch_us = self.registers["watchdog_ms"] * 1_000 or NEVER
         for side in self.sides:
             side.configure()

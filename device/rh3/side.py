@@ -66,6 +66,8 @@ class Wheel(Part):
 
     def brake(self) -> None:
         """Turn for a millisecond with the motor shorted."""
+        # Never more than stops the wheel in this millisecond: a brake does not drive
+        # backward.
         most = min(_BRAKE, abs(self.speed) / self.agility)
         self.step(-copysign(most, self.speed) if self.speed else 0.0)
 
@@ -108,6 +110,8 @@ class PositionLoop(Part):
             + registers["gain_i"] * self._sum / 1e6
             + registers["gain_d"] * change
         )
+        # v = sqrt(2 a s), in counts and milliseconds: from this speed the ramp still stops
+        # at the goal.
         braking = sqrt(2 * registers["acceleration_limit"] / 1e6 * abs(error))
         return copysign(min(abs(wanted), braking), wanted)
 
@@ -193,6 +197,8 @@ class SpeedLoop(Part):
                 speed += (net - (friction if (speed or net) > 0 else -friction)) * agility
                 travel += speed
                 counted, counts = floor(travel) - counts, floor(travel)
+            # Encoder counts decide: a wheel that creeps below one count in a millisecond
+            # stands.
             stalled_ms = 0 if counted or abs(torque) < PER_MILLE else stalled_ms + 1
             speeds.append(speed)
         self.reference, self._error, self._change, self.torque = reference, before, change, torque
@@ -266,6 +272,7 @@ class Side(Part):
 
     def stop(self, *, quick: bool) -> None:
         """Want standstill, with or without a ramp."""
+        # The register follows, so that a master reads the target that is in force.
         self._speed, self._registers[f"target_speed_{self.name}"] = 0.0, 0
         if quick:
             self._speed_loop.reference = 0.0
@@ -350,6 +357,8 @@ class Side(Part):
     def coast(self, *, shorted: bool) -> list[float]:
         """Turn for a millisecond without power, or with the motor shorted; return the speed."""
         loop, wheel = self._speed_loop, self.wheel
+        # Without power the loop holds nothing; `take_over` gives it the speed of the wheel
+        # when power comes back, so that nothing jerks.
         loop.take_over(0.0)
         loop.counted = loop.stalled_ms = 0
         self.clipped = False
@@ -361,5 +370,8 @@ class Side(Part):
 
     def _signed(self, value: int) -> int:
         """Turn a number round where the wheel is said to run backward; cut it to 32 bits."""
+        # The one place for direction bits (002Bh), for targets on their way in and measured
+        # values on their way out. Cut to 32 bits: the position register wraps, as the
+        # counter of a driver does.
         value = -value if self._backward else value
         return (value + _INT32 // 2) % _INT32 - _INT32 // 2

@@ -141,6 +141,8 @@ class LoadAccount:
         cost_pct = idle_pct + LINE_FEED_PCT * line_feeds + OVERFLOW_PCT * overflows
         cost_pct += REPLY_PCT * replies
         self.backlog_pct = max(0, self.backlog_pct + cost_pct - PERIOD_PCT)
+        # Only the idle cost of ten periods in a row is settled: until then `load_pct`, a
+        # mean of the last ten, still changes without traffic, and each tick has to be run.
         self._costs_pct = (*self._costs_pct[1:], cost_pct)
         self.settled = not self.backlog_pct and self._costs_pct == (idle_pct,) * _SHOWN_PERIODS
 
@@ -170,6 +172,8 @@ class Buzzer:
         A zero time skips its phase; all zero is silence (DECISION R24).
         """
         self._phases.clear()
+        # A pattern begins in the tick after its command (R24): the first, silent, phase
+        # ends there.
         end = tick + 1
         self._phases.append((end, False))
         for number, ticks in enumerate(times):
@@ -190,6 +194,8 @@ class Buzzer:
         """
         while self._phases and tick >= self._phases[0][0]:
             self._phases.popleft()
+        # A pattern of the host has priority over the automatic alarm, also while it is
+        # silent (R18).
         if self._phases:
             self.changes_at, self.sounding = self._phases[0]
         elif alarm_since is not None:
@@ -235,6 +241,9 @@ class PowerSequence:
         """Look at the physical side, once a tick; Initialize does not see the button yet."""
         if state is RrcState.INITIALIZE and self._since is not None:
             return self._waiting(state, tick - self._since, inputs)
+        # An edge, not a level: a button that is held from one state into the next acts
+        # once. It is not followed in Initialize, so a press there counts in the first tick
+        # of the state after it.
         pressed = inputs["power_button"] > self._button
         self._button = inputs["power_button"]
         if state in POWERED_ON:
@@ -249,12 +258,17 @@ class PowerSequence:
         """Return the next tick at which something happens without input."""
         holds = (since + self.config.fault_hold_ticks for since in self._faults.values())
         if self._since is None:
+            # No wait runs: the RRC waits for the button, or VR2 runs and a fault may be on
+            # its way.
             return min(holds, default=NEVER)
         return self._since + self._wait_ticks(state)
 
     def _running(self, tick: int, inputs: InputBank, *, pressed: bool) -> Step:
         if pressed:
             return Step(RrcEvent.BY_BUTTON, Move.POWER_BUTTON)
+        # In the order of the table: of two faults that are detected in one tick the first
+        # one is the cause. `>=` with the tick of the first sight: 10 ticks are 100 ms (R25,
+        # corrected).
         for name, event in _RUNNING_FAULTS.items():
             if not inputs[name]:
                 self._faults.pop(name, None)
@@ -290,6 +304,8 @@ class PowerSequence:
                 return Step(RrcEvent.POWER_OFF_FINISHED, Move.TRAFFIC_ENDED)
 
     def _power_on_result(self, waited: int, inputs: InputBank) -> Step:
+        # Without an answer of VR2 the test cannot end; it goes on until the time-out, or
+        # until the connector is put in again.
         if inputs["bus_unplugged"]:
             if waited < self.config.power_on_timeout_ticks:
                 return _NOTHING
@@ -302,5 +318,7 @@ class PowerSequence:
 
     def _power_on_failed(self, event: RrcEvent) -> Step:
         self._since = None
+        # No move keeps state and settings (R3); with one, `_move` goes through Initialize
+        # and wipes.
         again = self.config.power_on_fail_target is FailTarget.INITIALIZE
         return Step(event, Move.POWER_ON_FAILED if again else None)

@@ -105,9 +105,13 @@ class Gearbox:
             return max(v_pct, 0), w_pct
         if self._rests(tick, stick, knobs.neutral_pct):
             return 0, 0
+        # The gear follows the raw stick and only the values are shaped (R18): a dead zone
+        # or exponent must not move the angle at which a person reaches the backward gear.
         angle = _angle_deg(stick)
         if self.gear is Gear.NEUTRAL:
             self._engage(tick, Gear.REVERSE if angle <= knobs.switch_deg else Gear.FORWARD)
+        # Backward in gear F stands and turns: the stick left neutral more than `switch_deg`
+        # from straight back, and only neutral takes the gear out (R17).
         if self.gear is Gear.FORWARD:
             return max(v_pct, 0), w_pct
         if stick[0] > 0:
@@ -123,6 +127,9 @@ class Gearbox:
         if self.resets_at is None:
             self.resets_at = tick + _RESET_TICKS
         if tick >= self.resets_at:
+            # Twenty ticks after the first one inside the radius, not the twentieth of them:
+            # a duration is the difference of two tick times, as for the watchdog (spec,
+            # section 5, corrected).
             self.gear = Gear.NEUTRAL
         return True
 
@@ -146,6 +153,8 @@ def _fade(value_pct: int, angle: float, start_deg: int) -> int:
     """
     if angle <= start_deg:
         return value_pct
+    # `int` truncates toward zero, as R18 asks; `start_deg` = 90 never comes here, because
+    # no angle of gear R that drives is above 90.
     return int(value_pct * (90 - angle) / (90 - start_deg))
 
 
@@ -163,6 +172,8 @@ def shape_table(low_pct: int, high_pct: int, exponent: int) -> tuple[int, ...]:
     """
     span, power = high_pct - low_pct, 1 + 0.1 * exponent
     positions = [min(max(a - low_pct, 0), span) / span for a in range(101)]
+    # Half up, as R16 asks; 1e-9 keeps a product such as 0.5 * 100, which floating point may
+    # put a hair below the half, on its side.
     return tuple(int(100 * s**power + 0.5 + 1e-9) for s in positions)
 
 
@@ -190,6 +201,8 @@ def apply_limits(v_pct: int, w_pct: int, limit: Limit) -> tuple[int, int]:
     candidates = [(a, b)]
     if a + b > limit.sum_pct:
         candidates.append((a * limit.sum_pct // (a + b), b * limit.sum_pct // (a + b)))
+    # Percent of a percent: 255 is then beyond the largest product, 100 * 100 / 100, and
+    # means "no limit" for #4 as it does for #3 and #5 (R19).
     if a * b > (product := 100 * limit.product_pct):
         candidates.append((isqrt(product * a // b), isqrt(product * b // a)))
     if (square := a * a + b * b) > (most := limit.radius_pct * limit.radius_pct):
@@ -253,5 +266,7 @@ class Drive:
 def _driving_mode(state: RrcState, settings: Settings) -> int | None:
     """Return the reverse mode in which the stick drives, None if it does not."""
     if state is RrcState.LIMIT:
+        # The `joystick` command's #7, never what the buttons chose: that counts in Standby
+        # only (R8).
         return settings.joystick.reverse_mode
     return settings.button_mode if state is RrcState.STANDBY else None

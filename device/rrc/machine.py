@@ -35,6 +35,54 @@ from tickrig.wire.rrc.replies import (
 )
 from tickrig.wire.rrc.replies import StatusA as Status
 
+# Theory of operation
+# ===================
+#
+# One tick is one internal command period of the RRC, 10 ms. Everything that happens in it
+# happens in `Rrc.tick`, in the order of DECISION R28, and the lines of a tick leave in that
+# order:
+#
+# 1. bytes of the line        ER:ReceiveBufferOverflow for each overflow
+# 2. buttons, faults, time    EV lines of power-on, power-off and faults
+# 3. lines, up to the quota   OK, ER, and the answers of device, version and date
+# 4. watchdog                 EV:PowerOffWaitByWatchdog
+# 5. motors                   nothing is sent; the SA line of step 6 shows what they get
+# 6. SA line, load account    SA, then EV:PowerOffWaitByOverTime
+# 7. buzzer                   nothing is sent
+#
+# The order is part of the behaviour. Power events come before lines, so a command that
+# arrives in the tick of the power button meets the new state. The watchdog comes after the
+# lines, so a command in the tick of its expiry still renews it (R20). The motors come
+# before SA, so #3 and #4 show the values of this tick. The golden vectors
+# (`tests/device/rrc/test_vectors.py`) and a second, independent model (`reference_model.py`
+# there) both hold the order.
+#
+# What couples to what:
+#
+# - `_move` is the only place that changes the state, and `NEXT_STATE` the only table. It
+#   also does what the change implies: a pass through Initialize wipes what commands have
+#   set (R5), crossing the border of `POWERED_ON` starts the power sequence and the load
+#   account afresh, entering Standby renews the watchdog (R20), and entering Limit takes the
+#   gear out (R18).
+# - `POWERED_ON` is the manual's "PowerOnSuccess period". Quota, watchdog, SA lines, load
+#   account, button counters and alarm all run in these three states only. A state that is
+#   added must be put into or left out of that tuple on purpose.
+# - `_wipe` resets exactly what Initialize resets. `config` and `inputs` survive a power
+#   cut, the receive buffer survives Initialize but not a power cut. State that is added
+#   elsewhere must be wiped in `_wipe` or in `reset`, or a second power-on differs from the
+#   first.
+# - Costs are charged where the bytes come in, not where lines are obeyed (R27): `rx.count`
+#   counts each LF that arrives, even one that an overflow throws away. `_replies` counts
+#   lines that answer a line, so EV, SA and overflow lines must not go through `_reply`.
+# - `_next_due` must name every tick in which anything changes without traffic. A rig in
+#   virtual time skips all others: a timer that is missing there works in real time and
+#   fails in virtual time. While SA lines run or the load account drains, each tick is due.
+#
+# Numbers: the manual gives the period, the ranges and "about 2 commands per 10 ms".
+# Durations (R6), the load model (R27), buffer size and alarm pattern are decisions, listed
+# in the reference page of the device; hosts pace themselves by the same constants in
+# `tickrig.wire.rrc.message`.
+
 # What comes over the line: bytes that wait, lines, commands and refusals.
 
 
@@ -99,6 +147,8 @@ class ReceiveBuffer:
 
 def _read_line(line: bytes, *, check_wanted: bool) -> Command | Refusal | None:
     """Return what a line without LF asks for, its refusal (DECISION R11), or None if empty."""
+    # One CR before the LF is taken off: terminals send CR LF (R11). An empty line is what a
+    # person who presses Enter sends; it has no reply.
     message = line.removesuffix(b"\r")
     if not message:
         return None
@@ -221,6 +271,7 @@ class Rrc(Copyable):
         if self.state is RrcState.OFF:
             self._boot(tick)
         self._sent, self._commands, self._replies = [], 0, 0
+        # The order from here on is R28; see the top of this file.
         overflows = self._receive(rx) if rx else 0
         self._read_inputs(tick)
         self._work(tick)
@@ -265,6 +316,9 @@ class Rrc(Copyable):
 
     def _work(self, tick: int) -> None:
         """Work on as many lines as the period allows."""
+        # "About 1 command per 20 ms" without VR2: one in each even tick (R27). The quota is
+        # fixed before the first line, so `poweroff` as the first line still lets a second
+        # one through.
         quota = LINES_A_PERIOD if self.state in POWERED_ON else 1 - tick % 2
         while self._commands < quota and self._buffer:
             self._commands += 1
@@ -272,6 +326,8 @@ class Rrc(Copyable):
 
     def _answer(self, line: bytes, tick: int) -> None:
         """Do what a line asks for; the reply keeps to the mode it came in (DECISION R21)."""
+        # Read before the command acts: `stablemode1` gets its OK, `stablemode0` with CHECK
+        # none (R21).
         stable = self._settings.stable
         request = _read_line(line, check_wanted=stable)
         if request is None:
@@ -281,6 +337,8 @@ class Rrc(Copyable):
                 self._buzzer.silence()
             self._reply(request)
         elif self._obey(request, tick):
+            # Only an obeyed command renews the watchdog; ER renews nothing (RRC manual,
+            # `watchdog`).
             self._renewed = tick
             if not stable:
                 self._reply(Ok(request.name.decode()))
@@ -338,6 +396,8 @@ class Rrc(Copyable):
             load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
             if self.config.overtime and load.too_far_behind:
                 self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
+                # The motors had their values for this tick already, in the state before;
+                # stop them now, not one tick later.
                 self._drive.step(tick, self.state, self._settings, self.inputs)  # motors stop
 
     def _status(self) -> Status:
@@ -369,6 +429,8 @@ class Rrc(Copyable):
             self._load = LoadAccount()
         if state is RrcState.STANDBY:
             self._renewed = tick
+        # Leaving counts as well as entering: Initialize may last several ticks, and the
+        # commands that come meanwhile are obeyed (R10) but do not outlive it.
         if RrcState.INITIALIZE in (self.state, state):  # what commands set in there goes, too
             self._wipe()
         self.state, self._moved = state, tick

@@ -229,6 +229,8 @@ class Plant(Part):
         A torque against the motion costs the motor 1 / efficiency of it, one with
         the motion brings it only the part that gets through.
         """
+        # A gear that loses a part of the power acts like friction that depends on the load:
+        # the motor pays 1/efficiency against it and gets efficiency of it back.
         against, along = abs(load_nm) * (1 / efficiency - 1), abs(load_nm) * (1 - efficiency)
         forward, backward = (along, against) if load_nm > 0 else (against, along)
         self.load_nm = load_nm
@@ -237,12 +239,16 @@ class Plant(Part):
     def hold(self, blocked: bool) -> None:
         """Hold the shaft, or let it go."""
         if blocked:
+            # The energy of the turning shaft goes into what holds it, so that the sum of
+            # the losses stays the work that was put in.
             self.losses.friction_j += self.inertia_kg_m2 * self.speed_rad_s**2 / 2
             self.speed_rad_s = 0.0
         self.blocked = blocked
 
     def open(self) -> None:
         """Let one step pass with the winding open; what current there was dies in the diodes."""
+        # The energy of the inductance, L i^2 / 2, ends as heat: there is no step in which
+        # it decays.
         self.losses.copper_j += self._motor.inductance_h * self.current_a**2 / 2
         self.current_a = 0.0
         if self.speed_rad_s == 0.0 and self._sticks(0.0):
@@ -254,6 +260,9 @@ class Plant(Part):
 
     def drive(self, current_a: float, limit_v: float) -> int:
         """Let one step pass toward a current; return how the voltage cut it: -1, 0, 1."""
+        # Standstill is a case of its own: winding alone, without back-EMF. The general step
+        # has one friction for the whole step, which ends at speed 0 but lets the angle
+        # creep on the way.
         if self.speed_rad_s == 0.0 and (cut := self._stay(current_a, limit_v)) is not None:
             return cut
         step, motor, i, w = self._step, self._motor, self.current_a, self.speed_rad_s
@@ -264,6 +273,8 @@ class Plant(Part):
         slope_v = motor.inductance_h * rise / STEP_S
         if (
             not -limit_v <= r * i + k * w + slope_v <= limit_v
+            # The voltage that leads the current there is looked at at both ends of the
+            # step; between them the current goes straight.
             or not -limit_v <= r * current_a + k * speed + slope_v <= limit_v
         ):
             return self._drive_constant(current_a, limit_v, friction)
@@ -279,6 +290,8 @@ class Plant(Part):
         v0, v1, v2, v3 = step.voltage
         u, cut = _within(v0 * i + v1 * w + v2 * current_a + v3 * (m + friction), limit_v)
         s0, s1, s2, s3 = step.speed_u
+        # The friction was worked out for a led current; the voltage is not enough for that
+        # one, and the shaft ends at another speed.
         friction, speed = self._rub(s0 * i + s1 * w + s2 * u + s3 * m, s3)
         m += friction
         a0, a1, a2, a3 = step.angle_u
@@ -336,6 +349,8 @@ class Plant(Part):
     def _mean(self, current_a: float, speed: float, way: float) -> float:
         """Return the integral of current times speed, by Simpson's rule."""
         i, w = self.current_a, self.speed_rad_s
+        # Simpson backwards: the way of the shaft is known exactly, so it gives the speed in
+        # the middle of the step, and that the integral of i * w.
         middle = (6 * way / STEP_S - w - speed) / 4
         return (i * w + 2 * (i + current_a) * middle + current_a * speed) * STEP_S / 6
 

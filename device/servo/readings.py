@@ -62,6 +62,9 @@ class ThermalModel(Part):
         heat = square_a2 * self.resistance_ohm(winding_c)
         dw = (heat - flow) / winding
         dh = (flow - out * (housing_c - ambient_c)) / housing
+        # The eigenvalues of the two nodes are real, because b * c > 0: heat flows both ways
+        # through the same resistance. So the exponentials are plain ones, for any length of
+        # time.
         middle, spread = (a + d) / 2, sqrt(((a - d) / 2) ** 2 + b * c)
         slow, fast = _span(middle + spread, seconds), _span(middle - spread, seconds)
         mean, half = (slow + fast) / 2, (slow - fast) / (2 * spread)
@@ -74,6 +77,8 @@ class ThermalModel(Part):
 
 def _span(rate: float, seconds: float) -> float:
     """Return the integral of e^(rate t) over a time."""
+    # A slope of R above what the housing carries off makes a rate positive: the temperature
+    # runs away, and 50 keeps exp from overflowing long after `HOTTEST_C` has cut it.
     return expm1(min(rate * seconds, 50.0)) / rate if rate else seconds
 
 
@@ -109,6 +114,7 @@ class I2t(Part):
         """Let time pass with an integral of the squared current."""
         filled = self.filled_a2s + square_a2s - self._continuous_a2 * seconds
         self.filled_a2s = min(max(filled, 0.0), self._budget_a2s)
+        # Both ends are met exactly, because `min` and `max` put the value there.
         if self.filled_a2s == 0.0:
             self.reduced = False
         elif self.filled_a2s == self._budget_a2s:
@@ -119,6 +125,8 @@ class I2t(Part):
         rate = current_a**2 - self._continuous_a2
         if rate < 0.0:
             return self.filled_a2s == 0.0 and not self.reduced
+        # Reduced and above the continuous current: the budget stands, and `bears` refuses
+        # the current.
         return rate == 0.0 or self.reduced
 
 
@@ -187,6 +195,8 @@ class Heat(Part):
     def bears(self, current_a: float) -> bool:
         """Return whether a current may flow for ever and changes no limit."""
         last, _ = self._after(_AGES_S, current_a**2)
+        # The limit falls with the temperature, so the hottest of now and of the far future
+        # counts.
         hottest = max(last, self.temperatures[0])
         return self.i2t.settled(current_a) and abs(current_a) <= self._limit_at(hottest)
 

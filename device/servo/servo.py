@@ -11,6 +11,49 @@ from tickrig.device.servo.plant import BREAKAWAY, STEP_S, Plant
 from tickrig.device.servo.readings import Readings
 from tickrig.device.twin import Part
 
+# Theory of operation
+# ===================
+#
+# A servo is four parts in three files: `Loops` (what current is wanted), `Plant` in
+# plant.py (what winding, shaft and friction do with it), `Heat` in readings.py
+# (temperatures and I2t, from the squared current), and `Servo`, which lets them act. One
+# control step is 1 ms, whatever the tick of the drive: `step_to(now_us)` makes as many as
+# have passed. In each step
+#
+# 1. the loops turn position and velocity demand into a current (`_push`),
+# 2. the plant leads the current there if limit and voltage allow, and moves (`Plant.drive`),
+# 3. the encoder counts whole counts, unless it is unplugged,
+# 4. each 20 ms heat and I2t are worked out from the current since then (`_update_limit`),
+# 5. the servo begins to rest if the step has changed nothing (`_rest`).
+#
+# Rules that hold this together:
+#
+# - Set after stepping. What the world does and what the drive wants holds from the instant
+#   up to which `step_to` has gone. A setter that is called first changes the past.
+# - Derived numbers have one writer. `changed` computes plant load, friction bounds, inertia
+#   and limits from the settings; heat changes the resistance and `_limit_a` in
+#   `_update_limit`. A new setting needs its property in `ServoSettings` and its line in
+#   `changed`.
+# - Resting is exact. A servo rests only when a step leaves position, current, integral and
+#   cut as they were to the bit; floating point makes that possible because dry friction
+#   stops the shaft at exactly 0.0 (plant.py) and a demand within one count counts as
+#   reached (`Loops`). While it rests no steps are made, and the temperatures come in closed
+#   form, from one place (`Heat.at`), whoever asks. `_wake` pays for the time of rest before
+#   anything else changes.
+# - Several steps in one go are the same steps. `_work_out` repeats `Loops.follow` and
+#   `turn`, `Plant.drive`, `_rub`, `_lead`, `_mean` and `_turn` and the counting of `_step`,
+#   over locals and in the same order of operations. `tests/device/servo/test_run_ahead.py`
+#   compares them to the bit: a change of one formula, or of the order of two additions,
+#   must be made in both. Where anything special begins (friction holds, the demand is cut,
+#   heat is due, a bound is left) the run ends before that step, and single steps go on.
+#   `device/canopen/ds402/stretch.py` is its user.
+# - No step depends on what was tried. `run_ahead` changes nothing; `follow` takes it over.
+#
+# Numbers: motors, stages and gears stand in parameters.py with their sources; gains are
+# natural frequencies, so they keep their meaning with another motor. 1 ms is the tick of
+# the drives on CAN; 20 ms between two looks at heat is small against the second for which a
+# stage bears its peak current and the 16 s of a winding, and `plain_steps` counts from it.
+
 # The velocity and position loops of a drive.
 
 
@@ -60,6 +103,8 @@ class Loops(Part):
         self, position: float, counts: int, velocity: float, acceleration: float, speed: float
     ) -> float:
         """Return the current that a demanded position asks for, A."""
+        # Below one count the encoder cannot tell: without this the integral would push
+        # against friction for ever, and the servo would never rest.
         error = position - counts
         if velocity == 0.0 and -1.0 < error < 1.0:
             error = 0.0
@@ -75,6 +120,8 @@ class Loops(Part):
         """
         wanted = velocity * self._rad
         error = wanted - speed
+        # Anti-windup: while the demand is cut, the integral may only come back from that
+        # side.
         if error * self.cut <= 0.0:
             self.integral_a += self._integral * error
         current = self.integral_a + self._proportional * error + self._viscous * wanted
@@ -290,6 +337,8 @@ class Servo(Readings):
         special = self.resting or self._off or self.encoder_unplugged or self._loops.cut
         if special or feed != 0.0 or self._demand is not Demand.POSITION:
             return 0
+        # The step at whose end heat is looked at is made singly: it may change resistance
+        # and limit.
         return (_SLOW_US - STEP_US - self.now_us + self._heat.since_us) // STEP_US
 
     def run_ahead(
@@ -354,6 +403,7 @@ class Servo(Readings):
         else:
             self.counts = floor(plant.position - self._lost_counts + 0.5)
         self.now_us += STEP_US
+        # After `now_us` has moved on: the look belongs to the end of this step.
         if self.now_us - self._heat.since_us >= _SLOW_US:
             self._update_limit()
         if (
@@ -381,6 +431,8 @@ class Servo(Readings):
             current, loops.integral_a = value, 0.0
         limit = self._limit_a
         if current > limit:
+            # Cut by the current limit counts as cut in this direction, unless the voltage
+            # cut it too and says otherwise.
             return plant.drive(limit, self._limit_v) or 1
         if current < -limit:
             return plant.drive(-limit, self._limit_v) or -1
@@ -400,11 +452,15 @@ class Servo(Readings):
         """Rest, unless the current will not stay as it is."""
         self._update_limit()
         current, limit = self._plant.current_a, self._limit_a
+        # A current that the voltage limits is U/R, and R follows the temperature: it will
+        # change.
         by_voltage = self.current_limited and abs(current) != limit  # follows the resistance
         self.resting = not by_voltage and self._heat.bears(current)
 
     def _wake(self) -> None:
         """Take the time of rest into account."""
+        # With the current, air and limits of the time of rest: so before the caller changes
+        # them.
         self._heat.rest(self.now_us, self._plant.current_a)
         self.resting = False
         self._update_limit()

@@ -319,6 +319,8 @@ def parse_command(message: bytes) -> Command:
         UnknownCommand: no command has this name; names are lower case.
         BadParameters: wrong number of digits, a bad digit, a value out of range.
     """
+    # The name decides first, then the count of characters, then digits, then ranges (R11):
+    # so `limit 6464ffffff` is ER:limit and `Limit6464ffffff` is ER:CommandUnknown.
     match = _NAME.match(message)
     if match is None:
         raise UnknownCommand(f"{message!r} is none of {', '.join(n.decode() for n in COMMANDS)}")

@@ -61,6 +61,8 @@ def strip_check(line: bytes) -> bytes:
     Raises:
         ChecksumError: CHECK is missing, wrong or not a hex digit.
     """
+    # The last character is CHECK whatever it is: a line whose CHECK was left out loses its
+    # last digit here, and is refused as a wrong CHECK (vector C02).
     message, digit = line[:-1], line[-1:]
     if digit not in _HEX_DIGITS or int(digit, 16) != sum(message) & 0xF:
         raise ChecksumError(f"CHECK {digit!r} of {line!r}, expected {check_digit(message)!r}")
@@ -105,5 +107,7 @@ def pace_lines_s(*, stable: bool, status: bool, extra_pct: int = 0) -> int:
     """
     left_pct = SAFE_PCT - BASE_PCT - extra_pct - (STATUS_PCT if status else 0)
     line_pct = LINE_FEED_PCT + (0 if stable else REPLY_PCT)
+    # Two bounds: what the work of a period leaves, and the two lines that it takes at most.
+    # With stablemode and without SA the second one is the smaller: 180 lines a second.
     most = LINES_A_PERIOD * PERIODS_A_SECOND * SAFE_PCT // PERIOD_PCT
     return max(0, min(most, left_pct * PERIODS_A_SECOND // line_pct))

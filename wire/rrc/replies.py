@@ -117,6 +117,8 @@ class StatusA:
 
     def encode(self) -> bytes:
         """Write the line with CHECK and LF."""
+        # SA:64003200A1000F: two's complement in two digits (FF = -1, 9C = -100), then five
+        # nibbles and CHECK. SA has its CHECK in every mode; EV, OK and ER have none.
         message = b"SA:%02X%02X%02X%02X%X%X%X%X%X" % (
             *(self.in_v_pct & 0xFF, self.in_w_pct & 0xFF),
             *(self.out_v_pct & 0xFF, self.out_w_pct & 0xFF),
@@ -162,6 +164,7 @@ def parse_reply(line: bytes) -> Reply:
 
 
 def _parse_status(line: bytes) -> StatusA:
+    # "SA:", 8 digits of percentages, 5 nibbles, CHECK.
     if len(line) != 17:
         raise FramingError(f"{line!r} has {len(line)} characters, an SA line has 17")
     message = strip_check(line)
