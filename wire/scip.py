@@ -100,6 +100,8 @@ def encode_numbers(values: Sequence[int], width: int) -> bytes:
     for value in (min(values, default=0), max(values, default=0)):
         if not 0 <= value < 1 << _BITS * width:
             raise FieldError(f"{value} does not fit into {width} characters of 6 bits")
+    # Four bytes a number; without the top one they are 24 bits, that is four characters of
+    # 6 bits, as base64 has them: `b2a_base64` does in C what shifts would do here.
     words = bytearray(struct.pack(f">{len(values)}I", *values))
     del words[::_MOST]
     characters = b2a_base64(words, newline=False).translate(_FROM_BASE64)
@@ -116,6 +118,7 @@ def parse_numbers(data: bytes, width: int) -> tuple[int, ...]:
         FieldError: a character that carries none.
         FramingError: half a number at the end.
     """
+    # Before base64 sees them: `a2b_base64` skips what it does not know.
     if strange := data.translate(None, _CHARACTERS):
         raise FieldError(f"character {strange[0]:#04x} is not in 0x30..0x6f")
     if len(data) % width:
@@ -248,6 +251,8 @@ def parse_scan(lines: Sequence[bytes], width: int) -> tuple[int, tuple[int, ...]
         FramingError: no time stamp, or half a distance.
         FieldError: a character that carries no number.
     """
+    # Each line has a sum of its own, and a distance may lie across two blocks of 64
+    # characters: take the sums off first, join, then cut.
     stamp, *blocks = [without_sum(line) for line in lines] or [b""]
     data = b"".join(blocks)
     if len(stamp) != _TIME_WIDTH:
@@ -300,6 +305,8 @@ class Reply:
 
     def encode(self) -> bytes:
         """Return the bytes on the line."""
+        # MD0044072501001 LF 99b LF time stamp, sum LF block, sum LF ... LF LF. The echo has
+        # no sum.
         return b"\n".join((self.echo, with_sum(self.status.encode()), *self.lines)) + _END
 
     @classmethod
@@ -313,6 +320,7 @@ class Reply:
         echo, *rest = data.split(b"\n")
         if not rest:
             raise FramingError(f"{data!r} has no status")
+        # SCIP2.0 LF 0 LF LF: still in SCIP 1.1, so its status has one character and no sum.
         if (echo, rest) == (SWITCH, [SCIP1_OK]):
             return cls(echo, SCIP1_OK.decode())  # the last answer in SCIP 1.1
         status = without_sum(rest[0])
@@ -335,6 +343,7 @@ class ReplySplitter:
 
     def push(self, data: bytes) -> list[Reply]:
         """Take bytes in; give whole replies out."""
+        # LF LF ends a reply and cannot occur inside: no line of a reply is empty.
         *whole, self._tail = (self._tail + data).split(_END)
         if len(self._tail) > MOST_BYTES:
             self._tail, self.garbled = b"", self.garbled + 1

@@ -142,6 +142,7 @@ class Capture(Immutable):
 
     def answer(self, view: View) -> bytes:
         """Return a scan as it was asked for."""
+        # Two characters carry 4095 at most (SCIP 1.1), and what is farther reads so.
         numbers = view.distances(self.first, self.last, self.cluster)
         lines = encode_distances([min(number, FARTHEST_MM) for number in numbers])
         return encode_reply(self.line, SCIP1_OK, lines)
@@ -173,6 +174,8 @@ def _laser(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
 
 def _rate(sensor: Sensor, now_us: int, match: re.Match[bytes]) -> bytes:
     code = sensor.settings.set_rate(match[1].decode())
+    # Setting the rate that is set already is no error in SCIP 1.1, where status 0 and E are
+    # all.
     return encode_reply(match[0], SCIP1_OK if code in (status.OK, _RATE_KEPT) else ERROR)
 
 

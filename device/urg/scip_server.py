@@ -26,6 +26,49 @@ from tickrig.wire.scip import (
     with_sum,
 )
 
+# Theory of operation
+# ===================
+#
+# Two clocks and three memories make the behaviour; the rest is texts.
+#
+# The clocks. `Rotation` counts whole turns of the mirror from `began_us`, without drift:
+# scans end at multiples of its period from there, whoever asks for them. `_timer` counts
+# milliseconds from `_zero_us`, modulo 2^24, and stamps each scan with the time of its
+# beginning (decision U2 in the reference page). CR starts the turn anew, TM and the laser
+# do not; RS and power-up start both clocks anew. `due_us` is the end of the scan that is
+# being measured, `NEVER` while the laser is off: nothing else here happens by itself.
+#
+# The memories. `_waiting` is one GD, GS or G that came before the first scan was ready;
+# `_running` is the one MD or MS; `_latest` is the latest scan. Rules:
+#
+# - GD and GS need the laser (status 10 without) and answer at once with `_latest`; only
+#   before the first scan they wait. A second one that would wait has status 0B (U5).
+# - MD and MS switch the laser on themselves. Their first scan is the first that begins
+#   after the command (`begins_us`), not the one that the mirror is in the middle of; scan
+#   interval and count work from there. After the last one the laser goes off.
+# - `stop` forgets all three and switches the laser off. QT, TM0, TM2, RS, trouble and the
+#   end of MD end here, so no reply can come from a measurement that was stopped.
+# - Trouble (`fail`) answers whoever waits with its status before it forgets him.
+#
+# The order in a tick is that of `Urg.tick`: power and inputs, the end of a scan, then
+# commands. So a GD that arrives in the tick in which a scan ends gets that scan.
+#
+# A reply to MD is two: `00P` at once, then for each scan the same echo with the scans that
+# remain in the place of their number, and status `99b`:
+#
+# MD0044072501000 -> MD0044072501000 00P
+#                ... MD0044072501000 99b, time stamp, blocks     (00 has no end)
+#
+# SCIP 1.1 (first_protocol.py) acts on the same state through the `Sensor` protocol: V, L,
+# G, S and SCIP2.0. In it the laser is on after power-up, and II calls that mode CLASSIC
+# until MD, MS or the laser's end (U12): `_classic`. After `SCIP2.0` everything else stays
+# as it is, so a switch in the middle of a measurement loses nothing; only a power cut leads
+# back.
+#
+# Numbers: `SIZES`, characters of parameters, and status codes come from SCIP 2.0; hosts
+# (HokuyoAIST, urg_library, hokuyolx) decide where it is silent, each case with its U
+# number.
+
 # Why a command is refused (SCIP 2.0, sensor commands and response to invalid commands).
 
 _NOT_A_NUMBER = ("01", "02", "03", "06", "07")
@@ -36,6 +79,7 @@ def _refusal(command: Command, *, adjusting: bool) -> str:
     """Return the status for what is no command, or not now; empty if nothing is wrong."""
     if command.symbol not in SIZES:
         return status.UNKNOWN
+    # The semicolon is part of `string`, the 16 letters of SCIP 2.0 come behind it.
     if len(command.string) > MOST_STRING + 1:
         return status.STRING_TOO_LONG
     if not LETTERS.issuperset(command.string[1:]):
@@ -50,6 +94,7 @@ def _refusal(command: Command, *, adjusting: bool) -> str:
 
 def _flaw(command: Command) -> str:
     """Return the status that refuses MD, MS, GD or GS for its parameters, empty if none does."""
+    # GD and GS have three fields, MD and MS five; the codes follow the order of the fields.
     for text, code in zip(command.fields, _NOT_A_NUMBER, strict=False):
         if not text.isdecimal():
             return code
@@ -97,6 +142,8 @@ class Rotation:
     def whole_end_us(self, now_us: int) -> int:
         """Return when the first scan ends that begins now or later."""
         period_us = self.period_us
+        # Rounded up: the scan that is running at `now_us` has begun before it, and is not
+        # whole.
         return self.began_us + (-(-(now_us - self.began_us) // period_us) + 1) * period_us
 
     def change(self, now_us: int, level: int) -> None:
@@ -150,11 +197,15 @@ class Stream:
 
     def take(self, ended_us: int, view: View) -> bytes:
         """Return what is sent of a scan of MD or MS."""
+        # `begins_us` holds the end of the first whole scan, and scans are known by their
+        # end.
         if ended_us < self.begins_us:
             return b""
         if self.skipped:
             self.skipped -= 1
             return b""
+        # Interval n: one scan is given, then n are left out; the first one is given at
+        # once.
         self.skipped = int(self.command.fields[3])
         self.left -= not self.endless
         return self.reply(view, status.DATA, self.echo)
@@ -220,6 +271,7 @@ class ScipServer(Part):
         self._switched = self.parameters.scip == "2.0"
         self._begin(now_us)
         if not self._switched:
+            # After `_begin`, whose `stop` has switched the laser off.
             self._classic = self.light(now_us)
 
     def _begin(self, now_us: int) -> None:

@@ -150,8 +150,11 @@ class Urg(Copyable):
         if not self._on:
             return b""
         server = self._server
+        # The scan first: a command of the same tick finds it as the latest one.
         if server.due_us <= now_us:
             sent += server.end_scan(self.pose, self.surroundings)
+        # SCIP lets a host end a line by LF, CR or both; the empty line between CR and LF is
+        # none.
         for line in self._lines.push(rx.replace(b"\r", b"\n")):
             if line:
                 sent += server.obey(now_us, line)
@@ -163,6 +166,8 @@ class Urg(Copyable):
         self._server.power_up(now_us)
 
     def _input_set(self) -> None:
+        # Only power and faults act at once. A pose that a rig sets each millisecond must
+        # not make each tick due: it counts when a scan ends.
         self._switched = self._switches != self._obeyed
 
     def _inputs_changed(self, now_us: int) -> bytes:

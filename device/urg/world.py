@@ -119,6 +119,8 @@ class Post(Immutable):
 
     def distances_m(self, x_m: float, y_m: float, rays: _Rays) -> list[float]:
         """Return how far each ray goes until it meets the post, infinity if it does not."""
+        # d = (off . ray) is the way to the nearest point of the axis, (off x ray) the
+        # distance there.
         off_x, off_y, most = self.x_m - x_m, self.y_m - y_m, self.radius_m**2
         return [
             _first_m(off_x * dx + off_y * dy, sqrt(inside))
@@ -227,6 +229,9 @@ class Beams(Part):
         off_x, off_y = wall.x1_m - self._x_m, wall.y1_m - self._y_m
         end_x, end_y = off_x + wall_x, off_y + wall_y
         area = off_x * wall_y - off_y * wall_x
+        # Area of the triangle against its sides: near 0 the sensor stands on the line of
+        # the wall, where the angle of the wall's ends says nothing about which beams meet
+        # it.
         size = hypot(wall_x, wall_y) * (hypot(off_x, off_y) + hypot(end_x, end_y))
         if not abs(area) > _BLUR * size:
             self._measure(wall, (0, len(self._rays)))
@@ -235,6 +240,9 @@ class Beams(Part):
         if area < 0:
             right, left = left, right
         first, last = self._places(right, (left - right) % tau)
+        # One beam of margin at each end: those between are sure to meet the wall, those in
+        # the margin are asked in full. So the numbers are those of `World.distances_m` to
+        # the bit.
         sure = ceil(first + 1), floor(last - 1) + 1
         if sure[0] >= sure[1]:
             self._measure_some(wall, (ceil(first - 1), floor(last + 1) + 1))
@@ -262,6 +270,8 @@ class Beams(Part):
 
     def _here(self, span: _Span) -> Iterator[_Span]:
         """Yield which of ours a span is, wherever in which turn it was counted."""
+        # A span is counted from the first beam, modulo a turn, and may begin before or end
+        # behind ours.
         for turns in (-self._turn, 0, self._turn):
             begin, end = max(span[0] + turns, 0), min(span[1] + turns, len(self._rays))
             if begin < end:
@@ -327,6 +337,9 @@ class View(Immutable):
         """
         kind, ways_m = self.kind, self._ways_m(range(first, last + 1))
         measurable = kind.first <= first and last <= kind.last
+        # The least of a cluster is the same before and after rounding, as long as no
+        # distance in it is below DMIN: that one would be a code, and codes are no
+        # distances.
         if measurable and cluster > 1:  # round once a cluster: a third of the time of a scan
             least_m = _least_of_each(ways_m, cluster)
             if kind.nearest_mm / 1_000 <= min(least_m, default=inf):
