@@ -13,10 +13,14 @@ from pathlib import Path
 import click
 import pytest
 
+from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.emulators.canopen import choices
 from tickrig.emulators.canopen.choices import AUTO, MODELS, PROFILES
 from tickrig.emulators.canopen.eds import PROFILES as CANOPEN_PROFILES
 from tickrig.emulators.canopen.models import MODELS as CANOPEN_MODELS
 from tickrig.emulators.commands.cli import main as tickrig
+from tickrig.emulators.rtc_lite.device_type import COMPONENTS
+from tickrig.emulators.rtc_lite.fields import FIELDS as LITE_FIELDS
 from tickrig.host.canmon.cli import main as canmon
 from tickrig.host.cli.options import LazyCommand
 from tickrig.host.cli.start import load
@@ -43,7 +47,7 @@ MOST = {
     "tickrig rtc con TAB": 29,
     "rrc-emu TAB": 15,
     "rtc-lite-emu --framing TAB": 21,
-    "rh3 goto TAB": 15,
+    "rh3 goto TAB": 16,
     "rh3-emu TAB": 17,
     "urg-emu TAB": 15,
     "ucode-reader-emu TAB": 17,
@@ -111,3 +115,5 @@ def test_the_work_of_a_command_takes_its_options(command: click.Command) -> None
 def test_what_can_be_named_is_what_there_is() -> None:
     assert tuple(CANOPEN_MODELS) == MODELS
     assert (AUTO, *CANOPEN_PROFILES) == PROFILES
+    assert choices.UNCONFIGURED == UNCONFIGURED
+    assert next(each.proposals for each in LITE_FIELDS if each.name == "node") == tuple(COMPONENTS)

@@ -6,6 +6,9 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
+from tickrig.host.cli.messages import Refused
+from tickrig.host.text.user_file import SUFFIX
+
 MODELS: Final = ("f-palette", "f-palette-boot", "motor-core-unit", "epos", "rtc-echo")
 """Names of `models.MODELS`."""
 
@@ -22,6 +25,9 @@ MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
     "epos": _DRIVE,
 }
 """Physical faults by the name of the model, beside those of every node."""
+
+UNCONFIGURED: Final = 0xFF
+"""That of `device/canopen/slave.py`."""
 
 _BUS_NODE: Final = re.compile(r".+\.ya?ml:.+", re.IGNORECASE)
 

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
+from tickrig.emulators.fields import DeviceField, field_of_option, read_config
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.scenario import Encoder, Sender
 from tickrig.emulators.serial.emulator import Emulator, LineSettings
 from tickrig.host.cli.extensions import ExtensionGroup
-from tickrig.host.cli.messages import Refused
 from tickrig.host.text.trace import Config, Header
 from tickrig.host.text.user_file import SUFFIX, explain_error
 
@@ -39,7 +39,9 @@ class DeviceType:
         title: for people.
         build: makes a device of the configuration that a trace carries; ValueError if it cannot be.
         text: one sentence for `tickrig emu --help`.
-        options: of its command line; their values are the configuration.
+        fields: what can be set of it, on its command line and in rig files; their values are the
+            configuration.
+        options: the same as options of click, as before `fields`; they become fields.
         configure: what else a command line makes of them; see `Configure`.
         line: baud rate, wire faults, and how the log cuts what passes.
         encoders: further verbs of its scenarios that send a line.
@@ -56,6 +58,7 @@ class DeviceType:
     title: str
     build: Callable[[Config], Emulated[bytes]]
     text: str = ""
+    fields: tuple[DeviceField, ...] = ()
     options: tuple[click.Option, ...] = ()
     configure: Configure | None = None
     line: LineSettings = field(default_factory=LineSettings)
@@ -67,27 +70,31 @@ class DeviceType:
     config_of: Callable[[Any], Config | None] = lambda device: None
     user_code: str = ""
 
+    def __post_init__(self) -> None:
+        """Make fields of what is declared as options of click."""
+        object.__setattr__(self, "fields", (*self.fields, *map(field_of_option, self.options)))
+
     def of_options(self, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
-        """Make the device that a command line asks for.
+        """Make the device that a command line or a rig file asks for.
 
         Args:
-            options: its own, without those that all emulators share.
+            options: the values of its fields.
             seed: of all chance.
 
         Raises:
-            Refused: it cannot be made.
+            ValueError: it cannot be made.
         """
         if self.configure is not None:
             return self.configure(self, options, seed)
         try:
             device = self.build(options)
         except ValueError as error:
-            raise Refused(str(error)) from None
+            raise ValueError(str(error)) from None
         except Exception as error:  # of another package, it may raise anything
-            raise Refused(f"{self.name} cannot be built: {explain_error(error)}") from error
+            raise ValueError(f"{self.name} cannot be built: {explain_error(error)}") from error
         if missing := [name for name in _MEMBERS if not hasattr(device, name)]:
             kind = type(device).__name__
-            raise Refused(f"{self.name}: {kind} has no {', '.join(missing)}")
+            raise ValueError(f"{self.name}: {kind} has no {', '.join(missing)}")
         return ConfiguredDevice(self, device, options)
 
     def of_trace(self, config: Config) -> Emulated[bytes]:
@@ -104,7 +111,7 @@ class DeviceType:
         """
         settings = {name: value for name, value in config.items() if name != _SEED}
         if self.configure is None:
-            known: dict[str, Any] = {str(option.name): option.default for option in self.options}
+            known = {each.name: each.default for each in self.fields}
             check_config(settings, known, f"{self.title} has no setting", typed=False)
         return self.build(settings)
 
@@ -141,6 +148,30 @@ DEVICES: Final = ExtensionGroup[DeviceType](
     wanted="a DeviceType",
 )
 """The device types that there are."""
+
+
+def configure(name: str, config: Mapping[str, object], seed: int = 0) -> ConfiguredDevice:
+    """Make a device of its type and of values for its fields, as a rig file gives them.
+
+    Args:
+        name: of the device type.
+        config: values by the names of command lines, without their dashes; see `read_config`.
+        seed: of all chance in it.
+
+    Raises:
+        ExtensionError: there is no such type, or it cannot be loaded.
+        ValueError: no such field, or not with this value; the text begins with the field.
+
+    >>> configure("rtc-lite", {"node": "lite-a"}).config["node"]
+    'lite-a'
+    """
+    device_type = DEVICES.load(name)
+    return device_type.of_options(read_config(name, device_type.fields, config), seed)
+
+
+def option_names(name: str) -> tuple[str, ...]:
+    """Return the options of a device type without their dashes; ExtensionError if there is none."""
+    return tuple(field.word for field in DEVICES.load(name).fields)
 
 
 def build_recorded(header: Header, *, run_code: bool = False) -> Emulated[bytes]:

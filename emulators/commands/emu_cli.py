@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.emulators.commands.run_options import line_options, run_named
+from tickrig.emulators.commands.run_options import device_options, line_options, run_named
 from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import LazyGroup
@@ -73,7 +73,9 @@ class DeviceGroup(LazyGroup):
 
 def device_command(device_type: DeviceType) -> click.Command:
     """Make the command line of a device type: its own options and those of all devices."""
+    declared = {option.name: option for option in device_type.options}
 
+    @device_options(field for field in device_type.fields if field.name not in declared)
     @line_options(", ".join(device_type.line.faults), lambda: _inputs(device_type))
     @click.pass_context
     def run(context: click.Context, /, **options: Any) -> None:
@@ -81,7 +83,7 @@ def device_command(device_type: DeviceType) -> click.Command:
 
     first = device_type.text or f"Emulate {device_type.title}."
     command = click.command(device_type.name, help=f"{first}\n\n{_HELP}")(run)
-    command.params[:0] = device_type.options
+    command.params[:0] = declared.values()
     if device_type.panel:
         command.params.append(click.Option(["--panel"], is_flag=True, help=_PANEL))
     return command

@@ -188,14 +188,13 @@ _DEVICE_TYPE: Final = '''\
 from collections.abc import Mapping
 from typing import Any
 
-import click
-from tickrig import DeviceType, LineSettings
+from tickrig import DeviceField, DeviceType, LineSettings
 
 from $module.device import $cls
 
 
 def build(config: Mapping[str, Any]) -> $cls:
-    """Make a device of the options below, from a command line or a trace."""
+    """Make a device of the fields below, from a command line or a trace."""
     return $cls(**config)
 
 
@@ -204,7 +203,7 @@ DEVICE = DeviceType(
     title="$cls",
     text="Emulate a $name on a pseudo-terminal.",
     build=build,
-    options=(click.Option(["--greeting"], default="ready", help="What it says first."),),
+    fields=(DeviceField(name="greeting", default="ready", help="What it says first."),),
     line=LineSettings(baud=115_200),
 )
 '''

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.cli.options import PATH, Decorator, add_options, version_option
+from tickrig.emulators.fields import DeviceField
+from tickrig.host.cli.options import (
+    PATH,
+    Decorator,
+    NumberRange,
+    add_options,
+    version_option,
+)
 from tickrig.host.cli.start import load, loading
 
 if TYPE_CHECKING:
@@ -16,6 +23,34 @@ if TYPE_CHECKING:
 
 _Faults = Callable[[click.Context], Iterable[str]]
 """Gives the faults of a device as the command line has it so far."""
+
+
+def device_options(fields: Iterable[DeviceField]) -> Decorator:
+    """Return a decorator that adds an option for each field of a device."""
+    return add_options(*map(_field_option, fields))
+
+
+def _field_option(field: DeviceField) -> Decorator:
+    given: dict[str, Any] = {"help": field.help}
+    ranged = field.low is not None or field.high is not None
+    if field.kind is bool:
+        return click.option(f"--{field.word}", field.name, is_flag=True, **given)
+    if field.choices:
+        given["type"] = click.Choice(field.choices)
+    elif ranged:
+        range_type: Any = click.IntRange if field.kind is int else NumberRange
+        given["type"] = range_type(field.low, field.high)
+    else:
+        given["type"] = field.kind
+    if field.unit:
+        given["metavar"] = field.unit
+    if field.default is not None:
+        given["default"] = field.default
+    if field.proposals:
+        given["shell_complete"] = lambda context, option, begun: [
+            each for each in field.proposals if each.startswith(begun)
+        ]
+    return click.option(f"--{field.word}", field.name, multiple=field.many, **given)
 
 
 def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:

@@ -52,7 +52,10 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
     names = {item.name for item in fields(Options)}
     own = {name: value for name, value in options.items() if name not in names}
     shared = Options(**{name: value for name, value in options.items() if name in names})
-    configured = device_type.of_options(own, shared.seed)
+    try:
+        configured = device_type.of_options(own, shared.seed)
+    except ValueError as error:
+        raise Refused(str(error)) from None
     with mistakes_in([configured.type.user_code]):
         return SerialRun(configured, shared).run()
 

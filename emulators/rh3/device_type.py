@@ -12,7 +12,7 @@ from tickrig.device.rh3.driver import TABLE
 from tickrig.device.rh3.parameters import BaseParameters
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.wire_log import Splitter, WireLine
-from tickrig.emulators.rh3.cli import parameters_of, read_parameters
+from tickrig.emulators.rh3.fields import FIELDS
 from tickrig.emulators.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
@@ -135,6 +135,31 @@ def _config_to_trace(parameters: BaseParameters) -> Config:
     return {"ground_seed" if name == "seed" else name: v for name, v in settings.items()}
 
 
+def _parameters_of(settings: Mapping[str, Any]) -> BaseParameters:
+    """Return parameters; ValueError for a value of another type or out of range."""
+    defaults = asdict(BaseParameters())
+    for name, value in settings.items():
+        wanted = (int,) if type(defaults[name]) is int else (int, float)
+        if not (type(value) in wanted or (name == "friction" and value is None)):
+            kind = "a whole number" if wanted == (int,) else "a number"
+            raise ValueError(f"{name} is {value!r}, expected is {kind}")
+    return BaseParameters(**settings)
+
+
+def read_parameters(options: Mapping[str, Any]) -> BaseParameters:
+    """Return a base of options, those left out as they are.
+
+    Raises:
+        ValueError: there is no such base; a message that begins with a parameter names its option.
+    """
+    try:
+        return _parameters_of({name: v for name, v in options.items() if v is not None})
+    except ValueError as error:
+        name, blank, rest = str(error).partition(" ")
+        word = next((f"--{each.word}" for each in FIELDS if each.name == name), name)
+        raise ValueError(f"{word}{blank}{rest}") from None
+
+
 def _build_rh3(config: Config) -> Rh3Base:
     """Build a base.
 
@@ -145,7 +170,7 @@ def _build_rh3(config: Config) -> Rh3Base:
     if "ground_seed" in settings:
         settings["seed"] = settings.pop("ground_seed")
     check_config(settings, asdict(BaseParameters()), "a base has no parameter", typed=False)
-    return Rh3Base(parameters_of(settings))
+    return Rh3Base(_parameters_of(settings))
 
 
 def _configure(base: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
@@ -172,6 +197,7 @@ RH3_BASE: Final = DeviceType(
     name="rh3-base",
     title="RH3 base",
     build=_build_rh3,
+    fields=FIELDS,
     configure=_configure,
     config_of=lambda base: _config_to_trace(base.parameters),
     line=LineSettings(splitter=_frame_splitter, wire=Rs485Line),

@@ -7,7 +7,8 @@ from typing import Any, Final
 
 import click
 
-from tickrig.emulators.rh3.cli import base_options
+from tickrig.emulators.commands.run_options import device_options
+from tickrig.emulators.rh3.fields import PARAMETERS
 from tickrig.host.cli.engine_options import openrtm_options, ros2_options
 from tickrig.host.cli.options import (
     PATH,
@@ -52,7 +53,7 @@ _SHARED: Final[Decorator] = add_options(
     ),
     click.option("--odometry-conf", "conf", type=PATH, help="File with conf.default.NAME: VALUE."),
     click.option("--map/--no-map", "show_map", default=None, help="Draw the track as it grows."),
-    base_options,
+    device_options(PARAMETERS),
     click.option("--seed", type=int, default=0, help="Of the noise.  [0]"),
 )
 

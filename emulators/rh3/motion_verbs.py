@@ -12,7 +12,8 @@ import click
 
 from tickrig.emulators.commands.picture import check_plot, new_figure, write_figure
 from tickrig.emulators.rh3.cart_options import MotionOptions, RunWatcher, require_arrival, watched
-from tickrig.emulators.rh3.cli import NAMES, read_parameters
+from tickrig.emulators.rh3.device_type import read_parameters
+from tickrig.emulators.rh3.fields import PARAMETERS
 from tickrig.emulators.rh3.served_cart import serve_cart
 from tickrig.host.cli.engine_options import take_engines
 from tickrig.host.cli.messages import Refused, refuse_path
@@ -257,14 +258,17 @@ def serve(options: dict[str, Any]) -> None:
 
 
 def _checked(options: dict[str, Any]) -> MotionOptions:
-    given = {name: options.pop(name) for name in (*NAMES, "seed")}
+    given = {name: options.pop(name) for name in (*(field.name for field in PARAMETERS), "seed")}
     if options["device"] is not None and options["pace"] is not None:
         raise Refused("--pace is for the emulated base; a --device has real time")
     if options["any_device"] and options["device"] is None:
         raise Refused("--any-device is for a --device; the emulated base is known")
     if options["show_map"] is None:
         options["show_map"] = sys.stdout.isatty()
-    checked = MotionOptions(**options, base=read_parameters(given))
+    try:
+        checked = MotionOptions(**options, base=read_parameters(given))
+    except ValueError as error:
+        raise Refused(str(error)) from None
     if checked.plot is not None:
         check_plot(checked.plot)  # before the run, not after it
     return checked

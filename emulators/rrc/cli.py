@@ -6,17 +6,13 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import line_options, run_named
+from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.rrc.fields import FIELDS
 from tickrig.host.cli.options import HarmlessCommand
 
 
 @click.command(cls=HarmlessCommand)
-@click.option(
-    "--power-on-event",
-    type=click.Choice(["PowerOnTrigger", "PowerOn"]),
-    default="PowerOnTrigger",
-    help="Name of the power-on event, as in the field or as in the manual.",
-)
+@device_options(FIELDS)
 @click.option("--panel", is_flag=True, help="Show an operator panel in this terminal.")
 @line_options("flip, drop, dup, cut", "tickrig.device.rrc.board:INPUTS")
 @click.pass_context

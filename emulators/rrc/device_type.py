@@ -10,6 +10,7 @@ from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rrc.settings import FailTarget, RrcConfig
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
 from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rrc.fields import FIELDS
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.text.trace import Config, Mark
 from tickrig.wire.rrc.message import check_digit
@@ -58,6 +59,7 @@ RRC: Final = DeviceType(
     name="rrc",
     title="RRC",
     build=_build_rrc,
+    fields=FIELDS,
     configure=_configure,
     config_of=lambda rrc: _config_to_trace(rrc.config),
     encoders={"check": _with_check},

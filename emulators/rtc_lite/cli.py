@@ -6,50 +6,13 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import line_options, run_named
+from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.rtc_lite.fields import FIELDS
 from tickrig.host.cli.options import HarmlessCommand
-from tickrig.wire.rtc_lite.frame import Checksum, Framing
-
-
-def _complete_node(context: click.Context, option: click.Parameter, word: str) -> list[str]:
-    from tickrig.emulators.rtc_lite.device_type import COMPONENTS  # noqa: PLC0415 - slow
-
-    return [name for name in COMPONENTS if name.startswith(word)]
 
 
 @click.command(cls=HarmlessCommand)
-@click.option(
-    "--node",
-    default="echo",
-    metavar="NAME",
-    help="Component: echo, lite-a, lite-b, or FILE.py:Class.  [echo]",
-    shell_complete=_complete_node,
-)
-@click.option(
-    "--baud",
-    type=click.IntRange(300, 4_000_000),
-    default=57_600,
-    help="Bit rate of the line, 8N1.  [57600]",
-)
-@click.option(
-    "--timer",
-    "timer_hz",
-    type=click.IntRange(1, 1_000),
-    metavar="HZ",
-    help="Execute by a timer of the device (type 22h) instead of by the proxy (21h).",
-)
-@click.option(
-    "--framing",
-    type=click.Choice([framing.value for framing in Framing]),
-    default=Framing.LITE.value,
-    help="Frames of RTC-Lite, or packets of RTno.  [lite]",
-)
-@click.option(
-    "--checksum",
-    type=click.Choice([checksum.value for checksum in Checksum]),
-    default=Checksum.SUM8.value,
-    help="How frames are summed up.  [sum8]",
-)
+@device_options(FIELDS)
 @line_options("flip, drop, dup, cut, noise, ping, radio", "tickrig.device.rtc_lite.node:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:

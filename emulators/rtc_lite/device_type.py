@@ -11,10 +11,11 @@ from tickrig.device.rtc_lite.component import LiteA, LiteB, LiteComponent, LiteE
 from tickrig.device.rtc_lite.node import RtcLiteNode
 from tickrig.device.rtc_lite.server import DEFAULT_RATE_HZ, LiteConfig
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
+from tickrig.emulators.fields import named
 from tickrig.emulators.record.wire_log import WireLine
+from tickrig.emulators.rtc_lite.fields import FIELDS
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS, frame_splitter, verbs
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.host.cli.messages import refused_at
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Config
 from tickrig.host.text.user_file import SUFFIX, explain_error, find_class
@@ -99,14 +100,14 @@ def _find_component(spec: str) -> type[LiteComponent]:
 
 def _configure(lite: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
     node, timer_hz = options["node"], options["timer_hz"]
-    with refused_at("--checksum"):
+    with named("--checksum"):
         config = LiteConfig(
             Framing(options["framing"]),
             Checksum(options["checksum"]),
             LiteContextType.TIMER if timer_hz else LiteContextType.PROXY,
             timer_hz or DEFAULT_RATE_HZ,
         )
-    with refused_at("--node"):
+    with named("--node"):
         device = RtcLiteNode(_find_component(node), config)
     lite = replace(
         lite,
@@ -135,6 +136,7 @@ RTC_LITE: Final = DeviceType(
     name="rtc-lite",
     title="RTC-Lite node",
     build=_build_rtc_lite,
+    fields=FIELDS,
     configure=_configure,
     config_of=_config_of,
     is_event=_is_event,

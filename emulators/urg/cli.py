@@ -2,44 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.host.cli.options import HarmlessCommand, NumberRange, add_options
-
-USB_BAUD: Final = 12_000_000
-"""As fast as USB at full speed."""
-
-_WORLD: Final = add_options(
-    click.option("--room", "size", metavar="WIDTH,DEPTH", help="Four walls around the origin, m."),
-    click.option("--wall", "walls", multiple=True, metavar="X1,Y1,X2,Y2", help="A wall, m."),
-    click.option("--post", "posts", multiple=True, metavar="X,Y,RADIUS", help="A round post, m."),
-)
+from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.urg.fields import FIELDS
+from tickrig.host.cli.options import HarmlessCommand
 
 
 @click.command(cls=HarmlessCommand)
-@click.option("--serial", default="H0614967", metavar="TEXT", help="Serial number.  [H0614967]")
-@click.option(
-    "--noise",
-    type=NumberRange(0, 1),
-    default=0.0,
-    help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
-)
-@click.option(
-    "--scip",
-    type=click.Choice(["1.1", "2.0"]),
-    default="1.1",
-    help="Protocol after power-up: 1.1 as the URG-04LX, 2.0 as the URG-04LX-UG01.  [1.1]",
-)
-@click.option(
-    "--baud",
-    type=click.IntRange(1_200, USB_BAUD),
-    default=USB_BAUD,
-    help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
-)
-@_WORLD
+@device_options(FIELDS)
 @line_options("flip, drop, dup, cut", "tickrig.device.urg.sensor:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:

@@ -15,11 +15,11 @@ from tickrig.emulators.commands.device_type import (
     by_miniterm,
     check_config,
 )
+from tickrig.emulators.fields import named
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.serial_line import SerialLine
-from tickrig.emulators.urg.cli import USB_BAUD
-from tickrig.host.cli.messages import refused_at
+from tickrig.emulators.urg.fields import FIELDS, USB_BAUD
 from tickrig.host.text.trace import Config, Mark
 
 _USUAL_BAUD: Final = 115_200
@@ -95,7 +95,7 @@ def _text(things: Iterable[Wall | Post]) -> str:
 
 def _configure(urg: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
     scip = options["scip"]
-    with refused_at("--serial"):
+    with named("--serial"):
         parameters = UrgParameters(
             serial=options["serial"], noise=options["noise"], seed=seed, scip=scip
         )
@@ -108,12 +108,12 @@ def _configure(urg: DeviceType, options: Mapping[str, Any], seed: int) -> Config
 def _world(size: str | None, walls: Sequence[str], posts: Sequence[str]) -> World:
     around = World()
     if size is not None:
-        with refused_at("--room"):
+        with named("--room"):
             width_m, depth_m = _parse_numbers(size, 2, "a room is WIDTH,DEPTH in m")
             around = room(width_m, depth_m)
-    with refused_at("--wall"):
+    with named("--wall"):
         more = tuple(_parse_wall(text) for text in walls)
-    with refused_at("--post"):
+    with named("--post"):
         return World(around.walls + more, tuple(_parse_post(text) for text in posts))
 
 
@@ -130,6 +130,7 @@ URG: Final = DeviceType(
     name="urg",
     title="URG-04LX",
     build=build_urg,
+    fields=FIELDS,
     configure=_configure,
     config_of=lambda urg: _config_to_trace(urg.parameters, urg.world),
     line=LineSettings(wire=partial(SerialLine, buffer_bytes=_BUFFER_BYTES)),

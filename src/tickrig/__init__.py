@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.can.wire import CanWire as CanWire
     from tickrig.emulators.canopen.eds import read_eds as read_eds
     from tickrig.emulators.commands.device_type import DeviceType as DeviceType
+    from tickrig.emulators.fields import DeviceField as DeviceField
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
     from tickrig.emulators.rig.rig import Rig as Rig
     from tickrig.emulators.rig.sim_link import SimLink as SimLink
@@ -60,6 +61,7 @@ else:
             "tickrig.emulators.can.wire": ("CanWire",),
             "tickrig.emulators.canopen.eds": ("read_eds",),
             "tickrig.emulators.commands.device_type": ("DeviceType",),
+            "tickrig.emulators.fields": ("DeviceField",),
             "tickrig.emulators.rig.clock": ("VirtualClock",),
             "tickrig.emulators.rig.rig": ("Rig",),
             "tickrig.emulators.rig.station": ("Station",),

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
-import click
-
 from tickrig import (
     NEVER,
     Copyable,
+    DeviceField,
     DeviceType,
     InputBank,
     InputSignal,
@@ -116,7 +115,7 @@ DEVICE: Final = DeviceType(
     title="Kettle",
     text="Emulate a kettle on a pseudo-terminal.",
     build=_build,
-    options=(click.Option(["--power-w"], type=int, default=2_000, help="Of its heater.  [2000]"),),
+    fields=(DeviceField(name="power_w", kind=int, default=2_000, help="Of its heater.  [2000]"),),
     line=LineSettings(baud=9_600),
     encoders={"ask": _ask},
     is_event=lambda line: line.data == b"boils",

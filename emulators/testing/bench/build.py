@@ -11,8 +11,7 @@ from typing import Final, NamedTuple
 
 from tickrig.device.canopen.sdo import SdoServers
 from tickrig.device.canopen.slave import CanopenSlave
-from tickrig.emulators.commands.device_config import configure
-from tickrig.emulators.commands.device_type import DEVICES, DeviceType
+from tickrig.emulators.commands.device_type import DEVICES, DeviceType, configure
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount, seed_of

@@ -17,8 +17,7 @@ from tickrig.emulators.canopen.build import describe, store_keeper
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.store_file import StoreFile
-from tickrig.emulators.commands.device_config import configure
-from tickrig.emulators.commands.device_type import ConfiguredDevice
+from tickrig.emulators.commands.device_type import ConfiguredDevice, configure
 from tickrig.emulators.rig.port import ByteLine
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line

@@ -194,8 +194,7 @@ def _on_bus(
 
 def _configured(options: Mapping[str, Any], recorded: str) -> ConfiguredDevice:
     """Make the device of --type and --config, or of the trace."""
-    from tickrig.emulators.commands.device_config import configure  # noqa: PLC0415 - slow
-    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415
+    from tickrig.emulators.commands.device_type import DEVICES, configure  # noqa: PLC0415
     from tickrig.host.text.names import near  # noqa: PLC0415
     from tickrig.host.text.values import parse_setting  # noqa: PLC0415
 

@@ -87,8 +87,7 @@ def _known(type_name: str) -> tuple[int, Inputs | None]:
     """Return the baud rate and the inputs of a device type."""
     if not type_name:
         return _BAUD, None
-    from tickrig.emulators.commands.device_config import configure  # noqa: PLC0415 - slow
-    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
+    from tickrig.emulators.commands.device_type import DEVICES, configure  # noqa: PLC0415
     from tickrig.host.text.names import near  # noqa: PLC0415
 
     if type_name not in DEVICES.names():

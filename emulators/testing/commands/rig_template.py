@@ -13,7 +13,7 @@ from typing import Final
 import click
 
 from tickrig.device.physical import InputSignal, SignalType
-from tickrig.emulators.commands.device_config import option_names
+from tickrig.emulators.commands.device_type import option_names
 from tickrig.emulators.testing.rig_file.devices import RESERVED, kind_of
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.emulators.testing.rig_file.probe import Probe, probe

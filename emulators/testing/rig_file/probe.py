@@ -18,8 +18,7 @@ from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node, Nodes
-from tickrig.emulators.commands.device_config import configure, option_names
-from tickrig.emulators.commands.device_type import ConfiguredDevice
+from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.host.cli.extensions import ExtensionError
@@ -129,10 +128,7 @@ def _reason(name: str, key: str, value: object) -> str:
     if key.replace("_", "-") not in names:
         return f"no option {key!r}; {near(key, list(names))}"
     made = _configured(name, {key: value})
-    if isinstance(made, ConfiguredDevice):
-        return ""
-    reason = made.removeprefix("Invalid value for ")
-    return reason.replace("'", "", 2) if reason.startswith("'--") else reason
+    return "" if isinstance(made, ConfiguredDevice) else made
 
 
 def _configured(name: str, config: Mapping[str, object]) -> ConfiguredDevice | str:

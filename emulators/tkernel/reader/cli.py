@@ -6,30 +6,13 @@ from typing import Any
 
 import click
 
-from tickrig.emulators.commands.run_options import line_options, run_named
-from tickrig.host.cli.options import HarmlessCommand, NumberRange
+from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.tkernel.reader.fields import FIELDS
+from tickrig.host.cli.options import HarmlessCommand
 
 
 @click.command(cls=HarmlessCommand)
-@click.option(
-    "--marker", "markers", multiple=True, metavar="UCODE,X,Y", help="A marker, place in m."
-)
-@click.option(
-    "--range",
-    "range_m",
-    type=NumberRange(0.1, 99),
-    default=3.0,
-    metavar="M",
-    help="How far it hears a marker.  [3]",
-)
-@click.option(
-    "--cone",
-    "cone_deg",
-    type=click.IntRange(1, 360),
-    default=90,
-    metavar="DEG",
-    help="Whole angle in which it hears, around where it looks.  [90]",
-)
+@device_options(FIELDS)
 @line_options("flip, drop, dup, cut", "tickrig.device.ucode_reader:INPUTS")
 @click.pass_context
 def main(context: click.Context, /, **options: Any) -> None:

@@ -7,9 +7,10 @@ from typing import Any, Final
 
 from tickrig.device.ucode_reader import Marker, ReaderParameters, UcodeReader
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
+from tickrig.emulators.fields import named
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.serial.emulator import LineSettings
-from tickrig.host.cli.messages import refused_at
+from tickrig.emulators.tkernel.reader.fields import FIELDS
 from tickrig.host.text.trace import Config, Mark
 from tickrig.wire.ucode import BAUD, parse_ucode
 
@@ -55,7 +56,7 @@ def _parse_marker(text: str) -> Marker:
 
 def _configure(reader: DeviceType, options: Mapping[str, Any], seed: int) -> ConfiguredDevice:
     parameters = ReaderParameters(range_m=options["range_m"], cone_deg=options["cone_deg"])
-    with refused_at("--marker"):
+    with named("--marker"):
         markers = tuple(map(_parse_marker, options["markers"]))
     config = _config_to_trace(parameters, markers)
     return ConfiguredDevice(reader, UcodeReader(parameters, markers), config)
@@ -69,6 +70,7 @@ UCODE_READER: Final = DeviceType(
     name="ucode-reader",
     title="ucode reader",
     build=build_reader,
+    fields=FIELDS,
     configure=_configure,
     config_of=lambda reader: _config_to_trace(reader.parameters, reader.markers),
     line=LineSettings(baud=BAUD),

@@ -17,7 +17,7 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.commands.cli import main
-from tickrig.emulators.commands.device_config import configure
+from tickrig.emulators.commands.device_type import configure
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station

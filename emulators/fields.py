@@ -1,0 +1,178 @@
+"""What can be set of a device: declared once, for command lines, rig files and traces.
+
+A `DeviceType` has a `DeviceField` for each of its options. The command line is made of them
+(`commands/run_options.py`), a rig file is read by them, and a trace of a device type that has no
+`configure` may have no other keys. Command lines and rig files refuse a value with the same words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import click
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DeviceField:
+    """One option of a device.
+
+    Attributes:
+        name: its key in the configuration that `DeviceType.build` is given.
+        kind: `str`, `int`, `float`, or `bool` for a flag.
+        option: its name on command lines (without the dashes) and in rig files; `name` with
+            dashes unless given.
+        low: the least value of a number, None for any.
+        high: the greatest value of a number, None for any.
+        choices: the texts that it can be, empty for any.
+        proposals: texts that the shell completes; others are allowed.
+        unit: unit of a number, or form of a text, as help shows it: `M`, `X,Y,RADIUS`.
+        default: its value where nobody sets it.
+        many: it can be given several times; its value is a tuple then.
+        help: one sentence.
+    """
+
+    name: str
+    kind: type[str | int | float] = str
+    option: str = ""
+    low: float | None = None
+    high: float | None = None
+    choices: tuple[str, ...] = ()
+    proposals: tuple[str, ...] = ()
+    unit: str = ""
+    default: Any = None
+    many: bool = False
+    help: str = ""
+
+    @property
+    def word(self) -> str:
+        """Its name on command lines, without the dashes."""
+        return self.option or self.name.replace("_", "-")
+
+    @property
+    def unset(self) -> Any:
+        """Its value where nobody sets it."""
+        if self.many:
+            return tuple(self.default or ())
+        return self.default if self.kind is not bool else bool(self.default)
+
+    def read(self, value: str | float) -> Any:
+        """Return a value of a rig file as the command line would.
+
+        Raises:
+            ValueError: it is out of range, or not of this kind.
+
+        >>> DeviceField(name="baud", kind=int, low=300).read("9600")
+        9600
+        """
+        text, number = str(value), 0.0
+        if self.kind is str:
+            if self.choices and text not in self.choices:
+                several = "one of " if len(self.choices) > 1 else ""
+                raise ValueError(f"{text!r} is not {several}{', '.join(map(repr, self.choices))}.")
+            return text
+        ranged = self.low is not None or self.high is not None
+        try:
+            number = int(text) if self.kind is int else float(text)
+        except ValueError:
+            named = {int: "integer", float: "float"}[self.kind] + " range" * ranged
+            raise ValueError(f"{text!r} is not a valid {named}.") from None
+        if ranged and isnan(number):
+            raise ValueError(f"{number} is no number.")
+        if not (self.low is None or self.low <= number) or not (
+            self.high is None or number <= self.high
+        ):
+            raise ValueError(f"{number} is not in the range {self._range}.")
+        return number
+
+    @property
+    def _range(self) -> str:
+        if self.low is None:
+            return f"x<={self.high}"
+        return f"x>={self.low}" if self.high is None else f"{self.low}<=x<={self.high}"
+
+
+def read_config(
+    owner: str, fields: Iterable[DeviceField], config: Mapping[str, object]
+) -> dict[str, Any]:
+    """Return the values of all fields.
+
+    Args:
+        owner: the device type, for messages.
+        fields: its fields.
+        config: values by the names of command lines, without their dashes: `run-s` or `run_s`; a
+            list for a field of several values. What is left out has its default.
+
+    Raises:
+        ValueError: no such field, or not with this value; the text begins with the field.
+    """
+    known = {field.word: field for field in fields}
+    given: dict[str, Any] = {}
+    for key, value in config.items():
+        field = known.get(key.replace("_", "-"))
+        if field is None:
+            from tickrig.host.text.names import near  # noqa: PLC0415 - a TAB needs none
+
+            raise ValueError(f"{key}: {owner} has no such option; {near(key, known)}")
+        given[key] = _plain(key, field, value)
+    values = {field.name: field.unset for field in known.values()}
+    for key, plain in given.items():
+        field = known[key.replace("_", "-")]
+        if field.kind is bool:
+            values[field.name] = plain[0]
+            continue
+        with named(f"--{field.word}"):
+            read = tuple(map(field.read, plain))
+        if read or field.many:
+            values[field.name] = read if field.many else read[-1]
+    return values
+
+
+def _plain(key: str, field: DeviceField, value: object) -> list[Any]:
+    """Return what a file gives for a field as a list; ValueError if it is of another kind."""
+    if field.kind is bool:
+        if not isinstance(value, bool):
+            raise ValueError(f"{key}: {value!r} is not true or false")
+        return [value]
+    if isinstance(value, list) and not field.many:
+        raise ValueError(f"{key}: it is given once, not as a list")
+    values = value if isinstance(value, list) else [value]
+    for each in values:
+        if not isinstance(each, int | float | str) or isinstance(each, bool):
+            raise ValueError(f"{key}: {each!r} is not a number or a text")
+    return values
+
+
+@contextmanager
+def named(option: str) -> Iterator[None]:
+    """Put the name of an option before the text of a ValueError."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{option}: {error}") from None
+
+
+def field_of_option(option: click.Option) -> DeviceField:
+    """Return the field of a `click.Option`, as device types of tickrig 0.1 declare theirs.
+
+    A type of values that is none of click's numbers and choices becomes a text here.
+    """
+    kinds: dict[str, type[str | int | float]] = {"integer": int, "float": float}
+    kind = bool if option.is_flag else kinds.get(option.type.name.partition(" ")[0], str)
+    default = option.default
+    return DeviceField(
+        name=str(option.name),
+        kind=kind,
+        option=option.opts[0].removeprefix("--"),
+        low=getattr(option.type, "min", None),
+        high=getattr(option.type, "max", None),
+        choices=tuple(getattr(option.type, "choices", ())),
+        unit=option.metavar or "",
+        default=default if isinstance(default, str | int | float | tuple | list) else None,
+        many=option.multiple,
+        help=option.help or "",
+    )

@@ -1,0 +1,37 @@
+"""What can be set of a reader of ucodes."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.emulators.fields import DeviceField
+
+FIELDS: Final = (
+    DeviceField(
+        name="markers",
+        option="marker",
+        many=True,
+        unit="UCODE,X,Y",
+        help="A marker, place in m.",
+    ),
+    DeviceField(
+        name="range_m",
+        option="range",
+        kind=float,
+        low=0.1,
+        high=99,
+        default=3.0,
+        unit="M",
+        help="How far it hears a marker.  [3]",
+    ),
+    DeviceField(
+        name="cone_deg",
+        option="cone",
+        kind=int,
+        low=1,
+        high=360,
+        default=90,
+        unit="DEG",
+        help="Whole angle in which it hears, around where it looks.  [90]",
+    ),
+)

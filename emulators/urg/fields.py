@@ -1,0 +1,44 @@
+"""What can be set of a range finder."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tickrig.emulators.fields import DeviceField
+
+USB_BAUD: Final = 12_000_000
+"""As fast as USB at full speed."""
+
+FIELDS: Final = (
+    DeviceField(name="serial", unit="TEXT", default="H0614967", help="Serial number.  [H0614967]"),
+    DeviceField(
+        name="noise",
+        kind=float,
+        low=0,
+        high=1,
+        default=0.0,
+        help="Share of the sensor's accuracy of 10 mm and 1 %.  [0]",
+    ),
+    DeviceField(
+        name="scip",
+        choices=("1.1", "2.0"),
+        default="1.1",
+        help="Protocol after power-up: 1.1 as the URG-04LX, 2.0 as the URG-04LX-UG01.  [1.1]",
+    ),
+    DeviceField(
+        name="baud",
+        kind=int,
+        low=1_200,
+        high=USB_BAUD,
+        default=USB_BAUD,
+        help="Bit rate of the line; a whole scan at 10 Hz needs 230400.  [12000000, as USB]",
+    ),
+    DeviceField(
+        name="size",
+        option="room",
+        unit="WIDTH,DEPTH",
+        help="Four walls around the origin, m.",
+    ),
+    DeviceField(name="walls", option="wall", many=True, unit="X1,Y1,X2,Y2", help="A wall, m."),
+    DeviceField(name="posts", option="post", many=True, unit="X,Y,RADIUS", help="A round post, m."),
+)
