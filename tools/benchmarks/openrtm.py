@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
 from typing import Any
+
+import omniORB
 
 from benchmarks.table import RUNS, row
 from tickrig.host.cli.engine_options import Endpoint
@@ -17,14 +22,17 @@ from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.engines.openrtm.connector_ends import INPORT_IOR, InPortClient, texts
 from tickrig.host.rtc.engines.openrtm.orb import Orb
 from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
-from tickrig.host.rtc.engines.openrtm.stubs import stubs
+from tickrig.host.rtc.engines.openrtm.stubs import DATA_TYPES, IDL, compile_idl, stubs
 from tickrig.host.rtc.engines.out_port import OutPortPushConnector
 from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.rtc.system.schedule import RealTime
-from tickrig.wire.rtc_types.basic import Time, TimedOctetSeq
-from tickrig.wire.rtc_types.cdr import encode
+from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedOctetSeq
+from tickrig.wire.rtc_types.cdr import decode, encode
+from tickrig.wire.rtc_types.extended_2d import Pose2D, Velocity2D
+from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.iis import TimedPath2DSeq
 
 VALUE = TimedOctetSeq(Time(1, 2), bytes(52))
 PAYLOAD = encode(VALUE)
@@ -67,6 +75,7 @@ def run(seconds: float) -> None:
     try:
         with Server(orb) as server:
             puts(server)
+        codecs()
     finally:
         orb.close()
 
@@ -149,6 +158,39 @@ def puts(server: Server) -> None:
             ratio = [value / base for value, base in zip(values, plain, strict=True)]
             row(f"{name}, as a multiple of that", ratio, "x")
     thread.close()
+
+
+def codecs() -> None:
+    """Encode and decode in turn: with omniORB from Python, and without."""
+    path = TimedPath2DSeq(Time(), (), (Pose2D(),) * 20, (Velocity2D(),) * 20)
+    with tempfile.TemporaryDirectory() as folder:
+        compile_idl([IDL / DATA_TYPES], Path(folder), "benchmark_types")
+        sys.path.insert(0, folder)
+        for value in (TimedLong(Time(1, 2), 3), path):
+            module, _, name = type(value).idl_id()[4:-4].partition("/")
+            codec(value, getattr(import_module(f"benchmark_types.{module}"), f"_tc_{name}"))
+        sys.path.remove(folder)
+
+
+def codec(value: Struct, code: Any) -> None:
+    """Encode and decode one value, whose type code omniORB has."""
+    kind, data = type(value), encode(value)
+    theirs = omniORB.cdrUnmarshal(code, data, True)
+    works: dict[str, Callable[[], object]] = {
+        "omniORB": lambda: omniORB.cdrUnmarshal(code, omniORB.cdrMarshal(code, theirs, True), True),
+        "ours": lambda: decode(kind, encode(value)),
+    }
+    rates: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(RUNS):
+        for name, work in works.items():
+            start_s = time.process_time()
+            for _ in range(PUTS):
+                work()
+            rates[name].append(PUTS / (time.process_time() - start_s))
+    what = f"encode and decode {kind.__name__}, {len(data)} bytes"
+    row(f"{what}, omniORB from Python", rates["omniORB"], "/s")
+    ratio = [ours / base for ours, base in zip(rates["ours"], rates["omniORB"], strict=True)]
+    row(f"{what}, as a multiple of that", ratio, "x")
 
 
 def call(put: Callable[[bytes], Any]) -> None:

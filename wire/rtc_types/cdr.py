@@ -7,20 +7,40 @@
 -3
 """
 
+# Theory of operation
+#
+# CDR (CORBA 3.0, chapter 15) writes the fields of a struct one after the other. A number stands at
+# a multiple of its size, counted from the first byte. The bytes before it are padding: written as
+# 0 and ignored when read. A sequence is an unsigned long with the number of its elements, then the
+# elements. A string is such a count, the bytes in UTF-8, and a NUL that counts.
+#
+# For each struct and byte order, `_Codec` writes the Python source of an encoder and a decoder at
+# the first use. Both come from one walk through the fields, so that they cannot disagree:
+#
+# - Numbers that follow each other are a *run*: one `struct.Struct`, with its padding as `x`. The
+#   fields of a struct within the struct belong to the run of their neighbours.
+# - A run ends where the position is no longer known: at a string or a sequence, and where a number
+#   needs more alignment than what the length of the last string or sequence left. `_aligned` and
+#   `_phase` hold what is known: the next byte is at `_phase` modulo `_aligned`. At the first byte
+#   that is 0 modulo 8; after a string it is 0 modulo 1: nothing. The code then pads at run time.
+# - Elements that are numbers or structs of numbers, and need no padding among them (`Pose2D`),
+#   are read and written by one call for the sequence or one for each element. Others are a loop.
+# - An enumerator ends its run, because it is checked: of two faults in a message the first one is
+#   reported, and a run that is too short must not hide it.
+#
+# The source names fields of classes, constants (`c0`) and variables (`v1`); nothing in it comes
+# from a message.
+
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from enum import IntEnum, StrEnum
-from typing import Annotated, Any, Final, TypeVar, get_args, get_origin, get_type_hints
+from functools import cache
+from typing import Annotated, Any, Final, TypeVar, cast, get_args, get_origin, get_type_hints
 
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_types.idl import Primitive, Struct
-
-# Bytes of CDR with their alignment (CORBA 3.0, General Inter-ORB Protocol, CDR Transfer Syntax).
-#
-# A number stands at a multiple of its size, counted from the first byte. The
-# bytes before it are padding: written as 0, not looked at.
+from tickrig.wire.rtc_types.idl import Primitive, Struct, define
 
 
 class Endian(StrEnum):
@@ -30,273 +50,371 @@ class Endian(StrEnum):
     BIG = "big"
 
 
-_MARKS: Final = {Endian.LITTLE: "<", Endian.BIG: ">"}
-_ZEROS: Final = tuple(bytes(count) for count in range(8))
-
-
-class Number:
-    """A kind of number: its letter in the struct module, its size, its layout by byte order."""
-
-    __slots__ = ("layouts", "letter", "size")
-
-    def __init__(self, letter: str) -> None:
-        self.letter, self.size = letter, struct.calcsize(f"<{letter}")
-        self.layouts = {endian: struct.Struct(mark + letter) for endian, mark in _MARKS.items()}
-
-
-_ULONG: Final = Number("I")
-"""What counts are written as."""
-
-
-class CdrWriter:
-    """Appends values to a stream; struct.error where one does not fit.
-
-    Attributes:
-        data: what was written.
-    """
-
-    __slots__ = ("_endian", "data")
-
-    def __init__(self, endian: Endian) -> None:
-        self._endian, self.data = endian, bytearray()
-
-    def write(self, number: Number, value: object) -> None:
-        """Write one number."""
-        data = self.data
-        data += _ZEROS[-len(data) % number.size]
-        data += number.layouts[self._endian].pack(value)
-
-    def write_all(self, number: Number, values: Sequence[object]) -> None:
-        """Write a sequence of numbers, behind their count."""
-        self.write(_ULONG, len(values))
-        if values:
-            self.data += _ZEROS[-len(self.data) % number.size]
-            layout = f"{_MARKS[self._endian]}{len(values)}{number.letter}"
-            self.data += struct.pack(layout, *values)
-
-    def write_bytes(self, data: bytes) -> None:
-        """Write bytes behind their count."""
-        self.write(_ULONG, len(data))
-        self.data += data
-
-
-class CdrReader:
-    """Takes values from a stream; FieldError where it ends too early."""
-
-    __slots__ = ("_at", "_data", "_endian")
-
-    def __init__(self, data: bytes, endian: Endian) -> None:
-        self._data, self._at, self._endian = data, 0, endian
-
-    @property
-    def left(self) -> int:
-        """Number of bytes that were not read."""
-        return len(self._data) - self._at
-
-    def read(self, number: Number) -> Any:
-        """Read one number."""
-        self._at += -self._at % number.size
-        return number.layouts[self._endian].unpack(self.take(number.size))[0]
-
-    def read_all(self, number: Number) -> tuple[Any, ...]:
-        """Read a sequence of numbers."""
-        if not (count := self.read_count()):
-            return ()
-        self._at += -self._at % number.size
-        data = self.take(count * number.size)
-        return struct.unpack(f"{_MARKS[self._endian]}{count}{number.letter}", data)
-
-    def read_count(self) -> int:
-        """Read the number of elements of a sequence, none of which is empty."""
-        count: int = self.read(_ULONG)
-        if count > self.left:
-            raise FieldError(f"{count} elements announced, {self.left} bytes left")
-        return count
-
-    def take(self, count: int) -> bytes:
-        """Read bytes as they are."""
-        first, self._at = self._at, self._at + count
-        if self._at > len(self._data):
-            raise FieldError(f"{len(self._data)} bytes, at least {self._at} are needed")
-        return self._data[first : self._at]
-
-
 __all__ = ["Endian", "decode", "encode"]
 
 S = TypeVar("S", bound=Struct)
 
-_Write = Callable[[CdrWriter, Any], None]
-_Read = Callable[[CdrReader], Any]
-_Codec = tuple[_Write, _Read]
+_Encode = Callable[[Struct], bytes]
+_Decode = Callable[[bytes], tuple[Any, int]]
 
 
 def encode(value: Struct, endian: Endian = Endian.LITTLE) -> bytes:
     """Return the bytes of a struct; FieldError if a field does not fit its IDL type."""
-    writer = CdrWriter(endian)
+    coder = _codec(type(value), endian)[0]
     try:
-        _struct(type(value))[0](writer, value)
+        return coder(value)
     except (struct.error, OverflowError, TypeError, ValueError, AttributeError) as error:
         raise FieldError(f"{value!r} is no {type(value).idl_id()}: {error}") from error
-    return bytes(writer.data)
 
 
 def decode(kind: type[S], data: bytes, endian: Endian = Endian.LITTLE) -> S:
     """Return the struct that the bytes hold; FieldError if they hold none, or more."""
-    reader = CdrReader(data, endian)
     try:
-        value: S = _struct(kind)[1](reader)
+        value, end = _codec(kind, endian)[1](data)
     except UnicodeError as error:
         raise FieldError(f"text of {kind.idl_id()}: {error}") from error
-    if reader.left:
-        raise FieldError(f"{len(data)} bytes for {kind.idl_id()}, {reader.left} too many")
-    return value
+    if left := len(data) - end:
+        raise FieldError(f"{len(data)} bytes for {kind.idl_id()}, {left} too many")
+    return cast(S, value)
 
 
-_CHAR: Final = Number("c")
-_OCTET: Final = Number("B")
-_NUMBERS: Final[Mapping[Primitive | None, Number]] = {
-    Primitive.BOOLEAN: Number("?"),
-    Primitive.OCTET: _OCTET,
-    Primitive.SHORT: Number("h"),
-    Primitive.USHORT: Number("H"),
-    Primitive.LONG: Number("i"),
-    Primitive.ULONG: _ULONG,
-    Primitive.LONGLONG: Number("q"),
-    Primitive.ULONGLONG: Number("Q"),
-    Primitive.FLOAT: Number("f"),
-    Primitive.DOUBLE: Number("d"),
+@cache
+def _codec(kind: type[Struct], endian: Endian) -> tuple[_Encode, _Decode]:
+    """Compile the encoder and the decoder of a struct."""
+    return _Codec(kind, _MARKS[endian]).compiled()
+
+
+_MARKS: Final = {Endian.LITTLE: "<", Endian.BIG: ">"}
+_NUMBERS: Final[Mapping[Primitive, str]] = {
+    Primitive.BOOLEAN: "?",
+    Primitive.OCTET: "B",
+    Primitive.SHORT: "h",
+    Primitive.USHORT: "H",
+    Primitive.LONG: "i",
+    Primitive.ULONG: "I",
+    Primitive.LONGLONG: "q",
+    Primitive.ULONGLONG: "Q",
+    Primitive.FLOAT: "f",
+    Primitive.DOUBLE: "d",
 }
-_CODECS: Final[dict[type[Struct], _Codec]] = {}
-"""Made when a type is first met."""
+"""Letters of the struct module."""
+
+_COUNT: Final = "I"
+"""What counts and enumerators are written as."""
 
 
-def _struct(kind: type[Struct]) -> _Codec:
-    if kind not in _CODECS:
-        _CODECS[kind] = _fields(kind)
-    return _CODECS[kind]
+class _Codec:
+    """Writes the source of an encoder and of a decoder in one walk through a struct."""
+
+    def __init__(self, kind: type[Struct], mark: str) -> None:
+        self._kind, self._mark = kind, mark
+        self._scope: dict[str, Any] = dict(_HELPERS)
+        self._encoder, self._decoder = list[str](), list[str]()
+        self._indent, self._names = " ", 0
+        self._aligned, self._phase = 8, 0
+        self._format, self._values, self._targets = "", list[str](), list[str]()
+        self._making = list[str]()
+
+    def compiled(self) -> tuple[_Encode, _Decode]:
+        """Return the functions."""
+        value = self._field(self._kind, "value")
+        if self._encoder or not self._targets:
+            self._flush()
+            encoder = [" out = bytearray()", *self._encoder, " return bytes(out)"]
+        else:  # a single run
+            self._flush()
+            encoder = [self._encoder[0].replace("out +=", "return")]
+        making = [f" {line}" for line in self._making]
+        decoder = [" at, size = 0, len(data)", *self._decoder, *making, f" return {value}, at"]
+        source = "\n".join(["def encode(value):", *encoder, "def decode(data):", *decoder])
+        define(source, self._scope)
+        return self._scope["encode"], self._scope["decode"]
+
+    def _field(self, hint: Any, path: str) -> str:
+        """Write what one field needs.
+
+        Args:
+            hint: its annotation.
+            path: the encoder's expression for its value.
+
+        Returns:
+            The decoder's expression for its value, of names that are set by then.
+        """
+        if get_origin(hint) is Annotated:
+            return self._primitive(get_args(hint)[1], path)
+        if get_origin(hint) is tuple:
+            return self._sequence(get_args(hint)[0], path)
+        if isinstance(hint, type) and issubclass(hint, IntEnum):
+            kind = self._constant(hint)
+            number = self._number(_COUNT, f"{kind}({path})")
+            self._flush()
+            return self._read(f"enumerator({kind}, {number})")
+        if isinstance(hint, type) and issubclass(hint, Struct):
+            hints = get_type_hints(hint, include_extras=True)
+            fields = hint.__match_args__
+            return self._made(hint, [self._field(hints[name], f"{path}.{name}") for name in fields])
+        raise TypeError(f"{hint} is no IDL type")
+
+    def _made(self, kind: type[Struct], parts: list[str]) -> str:
+        """Have a struct made of its parts: a third faster than by a call of its class."""
+        made = self._name()
+        self._making.append(f"{made} = new({self._constant(kind)})")
+        for name, part in zip(kind.__match_args__, parts, strict=True):
+            put = self._constant(getattr(kind, name).__set__)
+            self._making.append(f"{put}({made}, {part})")
+        return made
+
+    def _primitive(self, kind: Primitive, path: str) -> str:
+        match kind:
+            case Primitive.CHAR:
+                return self._number("c", f"{path}.encode('latin-1')") + ".decode('latin-1')"
+            case Primitive.WCHAR:
+                return self._read(f"wchar({self._bytes(f'wchar_bytes({path})', 'B')})")
+            case Primitive.STRING:
+                return self._read(f"string({self._bytes(f'string_bytes({path})')})")
+            case Primitive.WSTRING:
+                return self._read(f"utf16({self._bytes(f'{path}.encode({_UTF16!r})')})")
+            case Primitive.OCTET_SEQ:
+                return self._bytes(path)
+            case _:
+                return self._number(_NUMBERS[kind], path)
+
+    def _number(self, letter: str, value: str, name: str = "") -> str:
+        """Add a number to the run; begin a new run where its alignment is not known."""
+        name = name or self._name()
+        size = struct.calcsize(f"={letter}")
+        if self._aligned < size:
+            self._flush()
+            self._pad(size)
+        padding = -self._phase % size
+        self._format += "x" * padding + letter
+        self._phase = (self._phase + padding + size) % self._aligned
+        self._values.append(value)
+        self._targets.append(name)
+        return name
+
+    def _pad(self, size: int) -> None:
+        self._write(f"out += zeros[-len(out) % {size}]")
+        self._take(f"at += -at % {size}")
+        self._aligned, self._phase = size, 0
+
+    def _flush(self) -> None:
+        """Write the run."""
+        if self._targets:
+            run = self._constant(layout := struct.Struct(self._mark + self._format))
+            ends, size = self._constant(_ends(self._format)), layout.size
+            self._write(f"out += {run}.pack({', '.join(self._values)})")
+            self._take(f"if at + {size} > size: too_short(at, size, {ends})")
+            self._take(f"{', '.join(self._targets)}, = {run}.unpack_from(data, at)")
+            self._take(f"at += {size}")
+        self._format, self._values, self._targets = "", [], []
+
+    def _count(self, value: str, letter: str = _COUNT) -> str:
+        """Write how many elements a sequence has, and read it; as a name of both."""
+        name = self._name()
+        self._write(f"{name} = len({value})")
+        self._number(letter, name, name)
+        self._flush()
+        return name
+
+    def _bytes(self, value: str, letter: str = _COUNT) -> str:
+        """Write bytes behind their count."""
+        data = self._name()
+        self._write(f"{data} = {value}")
+        count = self._count(data, letter)
+        self._write(f"out += {data}")
+        refusal = f"too_many(at, size, {count})"
+        if letter != _COUNT:
+            refusal = f"too_short(at, size, ({count},))"
+        self._take(f"if at + {count} > size: {refusal}")
+        self._take(f"{data} = data[at : at + {count}]; at += {count}")
+        self._aligned, self._phase = 1, 0
+        return data
+
+    def _sequence(self, hint: Any, path: str) -> str:
+        count = self._count(path)
+        self._take(f"if at + {count} > size: too_many(at, size, {count})")
+        if not _is_tight(letters := _letters(hint)):
+            return self._loop(hint, path, count)
+        made, size = self._name(), struct.calcsize(f"={letters[0]}")
+        self._write(f"if {count}:")
+        self._take(f"{made} = ()")
+        self._take(f"if {count}:")
+        self._indent += " "
+        self._pad(size)
+        if get_origin(hint) is Annotated:
+            self._numbers(letters, path, count, made)
+        else:
+            self._structs(hint, path, count, made)
+        self._indent = self._indent[:-1]
+        self._aligned, self._phase = min(size, 4), 0
+        return made
+
+    def _numbers(self, letter: str, path: str, count: str, made: str) -> None:
+        """Write all numbers of a sequence at once."""
+        layout, length = f"f'{self._mark}{{{count}}}{letter}'", self._name()
+        self._write(f"out += pack({layout}, *{path})")
+        self._take(f"{length} = {count} * {struct.calcsize(f'={letter}')}")
+        self._take(f"if at + {length} > size: too_short(at, size, ({length},))")
+        self._take(f"{made} = unpack_from({layout}, data, at)")
+        self._take(f"at += {length}")
+
+    def _structs(self, hint: Any, path: str, count: str, made: str) -> None:
+        """Write structs of numbers: one run for each, which is 2 to 4 times as fast as a loop."""
+        element, end = self._name(), self._name()
+        outer, self._making = self._making, []
+        value = self._field(hint, element)  # only adds to the run, for its size is fixed
+        run = self._constant(layout := struct.Struct(self._mark + self._format))
+        ends = self._constant(_ends(self._format))
+        values, targets = ", ".join(self._values), ", ".join(self._targets)
+        self._write(f"out += b''.join([{run}.pack({values}) for {element} in {path}])")
+        self._take(f"{end} = at + {count} * {layout.size}")
+        self._take(f"if {end} > size: too_short(at, size, {ends})")
+        self._take(f"{made} = []")
+        self._take(f"for {targets}, in {run}.iter_unpack(data[at:{end}]):")
+        self._append(made, value)
+        self._take(f"at = {end}")
+        self._format, self._values, self._targets, self._making = "", [], [], outer
+
+    def _loop(self, hint: Any, path: str, count: str) -> str:
+        """Write elements one by one."""
+        made, element = self._name(), self._name()
+        self._write(f"for {element} in {path}:")
+        self._take(f"{made} = []")
+        self._take(f"for {element} in range({count}):")
+        self._indent += " "
+        self._aligned, self._phase = 1, 0
+        outer, self._making = self._making, []
+        value = self._field(hint, element)
+        self._flush()
+        self._write("pass")  # an element may be empty
+        self._indent = self._indent[:-1]
+        self._append(made, value)
+        self._making = outer
+        self._aligned, self._phase = 1, 0
+        return made
+
+    def _append(self, made: str, value: str) -> None:
+        """End the decoder's loop over the elements of a sequence."""
+        for line in (*self._making, f"{made}.append({value})"):
+            self._take(f" {line}")
+        self._take(f"{made} = tuple({made})")
+
+    def _write(self, line: str) -> None:
+        self._encoder.append(self._indent + line)
+
+    def _take(self, line: str) -> None:
+        self._decoder.append(self._indent + line)
+
+    def _read(self, expression: str) -> str:
+        """Have the decoder look at a value at once, so that it reports the first fault."""
+        name = self._name()
+        self._take(f"{name} = {expression}")
+        return name
+
+    def _name(self) -> str:
+        self._names += 1
+        return f"v{self._names}"
+
+    def _constant(self, value: object) -> str:
+        name = f"c{len(self._scope)}"
+        self._scope[name] = value
+        return name
 
 
-def _fields(kind: type[Struct]) -> _Codec:
-    hints = get_type_hints(kind, include_extras=True)
-    codecs = [(name, *_codec(hints[name])) for name in kind.__match_args__]
-
-    def write(writer: CdrWriter, value: object) -> None:
-        for name, write_field, _ in codecs:
-            write_field(writer, getattr(value, name))
-
-    def read(reader: CdrReader) -> Struct:
-        return kind(*[read_field(reader) for _, _, read_field in codecs])
-
-    return write, read
-
-
-def _codec(hint: object) -> _Codec:
-    """Return how a field with this annotation is written and read."""
+def _letters(hint: Any) -> str:
+    """Return the letters of all numbers in an element, nothing if there is something else."""
     if get_origin(hint) is Annotated:
-        return _PRIMITIVES[get_args(hint)[1]]
-    if get_origin(hint) is tuple:
-        return _sequence(get_args(hint)[0])
-    if isinstance(hint, type) and issubclass(hint, IntEnum):
-        return _enum(hint)
-    if isinstance(hint, type) and issubclass(hint, Struct):
-        return _struct(hint)
-    raise TypeError(f"{hint} is no IDL type")
+        return _NUMBERS.get(get_args(hint)[1], "")
+    if not (isinstance(hint, type) and issubclass(hint, Struct)):
+        return ""
+    hints = get_type_hints(hint, include_extras=True)
+    parts = [_letters(hints[name]) for name in hint.__match_args__]
+    return "".join(parts) if all(parts) else ""
 
 
-def _sequence(hint: object) -> _Codec:
-    primitive = get_args(hint)[1] if get_origin(hint) is Annotated else None
-    if (number := _NUMBERS.get(primitive)) is not None:
-        return (
-            lambda writer, values: writer.write_all(number, values),
-            lambda reader: reader.read_all(number),
-        )
-    write_one, read_one = _codec(hint)
-
-    def write(writer: CdrWriter, values: tuple[object, ...]) -> None:
-        writer.write(_ULONG, len(values))
-        for value in values:
-            write_one(writer, value)
-
-    def read(reader: CdrReader) -> tuple[object, ...]:
-        return tuple(read_one(reader) for _ in range(reader.read_count()))
-
-    return write, read
+def _is_tight(letters: str) -> bool:
+    """Tell whether elements follow each other without padding, wherever the first one begins."""
+    sizes = [struct.calcsize(f"={letter}") for letter in letters]
+    end = 0
+    for size in sizes:
+        end += -end % size + size
+    return bool(sizes) and sizes[0] == max(sizes) and not end % sizes[0]
 
 
-def _number(number: Number) -> _Codec:
-    return (
-        lambda writer, value: writer.write(number, value),
-        lambda reader: reader.read(number),
+def _ends(layout: str) -> tuple[int, ...]:
+    """Return where each number of a run ends."""
+    return tuple(
+        struct.calcsize(f"={layout[: n + 1]}") for n, letter in enumerate(layout) if letter != "x"
     )
 
 
-def _enum(kind: type[IntEnum]) -> _Codec:
-    def read(reader: CdrReader) -> IntEnum:
-        number = reader.read(_ULONG)
-        try:
-            return kind(number)
-        except ValueError as error:
-            raise FieldError(str(error)) from error
+# What the functions call: refusals, and what is no number.
 
-    return lambda writer, value: writer.write(_ULONG, kind(value)), read
+_UTF16: Final = "utf-16-be"
 
 
-def _write_char(writer: CdrWriter, value: str) -> None:
-    writer.write(_CHAR, value.encode("latin-1"))
+def _too_short(at: int, size: int, ends: tuple[int, ...]) -> None:
+    """Refuse a run, or runs that follow each other, by the first number that is not there."""
+    at += max(size - at, 0) // ends[-1] * ends[-1]
+    needed = next(at + end for end in ends if at + end > size)
+    raise FieldError(f"{size} bytes, at least {needed} are needed")
 
 
-def _read_char(reader: CdrReader) -> str:
-    return reader.take(1).decode("latin-1")
+def _too_many(at: int, size: int, count: int) -> None:
+    raise FieldError(f"{count} elements announced, {size - at} bytes left")
 
 
-def _write_string(writer: CdrWriter, value: str) -> None:
+def _enumerator(kind: type[IntEnum], number: int) -> IntEnum:
+    try:
+        return kind(number)
+    except ValueError as error:
+        raise FieldError(str(error)) from error
+
+
+def _string_bytes(value: str) -> bytes:
     if "\0" in value:
         raise TypeError("a string with NUL")
-    writer.write_bytes(value.encode() + b"\0")
+    return value.encode() + b"\0"
 
 
-def _read_string(reader: CdrReader) -> str:
-    text, end = (data := reader.take(reader.read_count()))[:-1], data[-1:]
+def _string(data: bytes) -> str:
+    text, end = data[:-1], data[-1:]
     if end != b"\0" or b"\0" in text:
         raise FieldError(f"{data!r} is not a string that ends in NUL")
     return text.decode()
 
 
-def _write_wchar(writer: CdrWriter, value: str) -> None:
-    data = value.encode("utf-16-be")
+def _wchar_bytes(value: str) -> bytes:
+    data = value.encode(_UTF16)
     if len(data) != 2:
         raise TypeError(f"{value!r} is not one character of UTF-16")
-    writer.write(_OCTET, len(data))
-    writer.data += data
+    return data
 
 
-def _read_wchar(reader: CdrReader) -> str:
-    text = _utf16(reader.take(reader.read(_OCTET)))
+def _wchar(data: bytes) -> str:
+    text = _utf16(data)
     if len(text) != 1 or ord(text) > 0xFFFF:
         raise FieldError(f"{text!r} is not one character of UTF-16")
     return text
 
 
-def _write_wstring(writer: CdrWriter, value: str) -> None:
-    writer.write_bytes(value.encode("utf-16-be"))
-
-
 def _utf16(data: bytes) -> str:
     """Decode UTF-16; big-endian unless its byte order mark says otherwise (GIOP 1.2)."""
-    return data.decode("utf-16" if data[:2] in (b"\xfe\xff", b"\xff\xfe") else "utf-16-be")
+    return data.decode("utf-16" if data[:2] in (b"\xfe\xff", b"\xff\xfe") else _UTF16)
 
 
-_PRIMITIVES: Final[dict[Primitive, _Codec]] = {
-    **{primitive: _number(number) for primitive, number in _NUMBERS.items() if primitive},
-    Primitive.CHAR: (_write_char, _read_char),
-    Primitive.WCHAR: (_write_wchar, _read_wchar),
-    Primitive.STRING: (_write_string, _read_string),
-    Primitive.WSTRING: (
-        _write_wstring,
-        lambda reader: _utf16(reader.take(reader.read_count())),
-    ),
-    Primitive.OCTET_SEQ: (
-        lambda writer, value: writer.write_bytes(value),
-        lambda reader: reader.take(reader.read_count()),
-    ),
+_HELPERS: Final[Mapping[str, object]] = {
+    "new": object.__new__,
+    "pack": struct.pack,
+    "unpack_from": struct.unpack_from,
+    "zeros": tuple(bytes(count) for count in range(8)),
+    "too_short": _too_short,
+    "too_many": _too_many,
+    "enumerator": _enumerator,
+    "string_bytes": _string_bytes,
+    "string": _string,
+    "wchar_bytes": _wchar_bytes,
+    "wchar": _wchar,
+    "utf16": _utf16,
 }

@@ -90,8 +90,18 @@ def _initializer(kind: Any) -> Callable[..., None]:
     names = kind.__match_args__
     arguments = "".join(f", {name}=_{name}" for name in names)
     body = "".join(f"\n put_{name}(self, {name})" for name in names) or " pass"
-    exec(f"def __init__(self{arguments}):{body}", scope)
+    define(f"def __init__(self{arguments}):{body}", scope)
     return cast(Callable[..., None], scope["__init__"])
+
+
+def define(source: str, scope: dict[str, Any]) -> None:
+    """Define functions whose source was written for the fields of a struct.
+
+    Args:
+        source: of no other names than those of fields and of `scope`.
+        scope: what the functions know; takes them by their names.
+    """
+    exec(source, scope)
 
 
 def _zero(hint: Any) -> object:

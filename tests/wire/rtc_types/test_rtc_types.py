@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import struct
 from dataclasses import FrozenInstanceError, replace
 from enum import IntEnum
 from pathlib import Path
@@ -17,7 +18,19 @@ from tickrig.wire.errors import FieldError
 from tickrig.wire.rtc_types import actuators, basic, extended_2d, extended_3d, iis
 from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.cdr import Endian, decode, encode
-from tickrig.wire.rtc_types.idl import LongLong, Octet, Primitive, Struct, ULongLong
+from tickrig.wire.rtc_types.idl import (
+    Char,
+    Double,
+    Float,
+    LongLong,
+    Octet,
+    Primitive,
+    Short,
+    String,
+    Struct,
+    ULong,
+    ULongLong,
+)
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "cdr.txt"
 TM = Time(1, 2)
@@ -139,8 +152,120 @@ class Long64(Struct):
     unsigned: ULongLong = 0
 
 
+class Nothing(Struct):
+    """A struct without fields."""
+
+
+class Colour(IntEnum):
+    RED = 0
+    BLUE = 1
+
+
+class Pixel(Struct):
+    """Of a size that is no multiple of its alignment."""
+
+    x: Double = 0.0
+    colour: Colour = Colour.RED
+
+
+class Mixed(Struct):
+    """Fields of each kind where the position is known to 8, 4, 2 and 1 bytes."""
+
+    idl_module = "Test"
+    octet: Octet = 0
+    colour: Colour = Colour.RED
+    letters: tuple[Char, ...] = ()
+    wide: Double = 0.0
+    text: String = ""
+    signed: LongLong = 0
+    structs: tuple[Long64, ...] = ()
+    shorts: tuple[Short, ...] = ()
+    short: Short = 0
+    doubles: tuple[Double, ...] = ()
+    number: ULong = 0
+    points: tuple[extended_2d.Pose2D, ...] = ()
+    pixels: tuple[Pixel, ...] = ()
+    rows: tuple[tuple[Short, ...], ...] = ()
+    colours: tuple[Colour, ...] = ()
+    nothing: tuple[Nothing, ...] = ()
+    last: Float = 0.0
+
+
+REFERENCE = {
+    Primitive.OCTET: "B",
+    Primitive.CHAR: "c",
+    Primitive.SHORT: "h",
+    Primitive.ULONG: "I",
+    Primitive.LONGLONG: "q",
+    Primitive.ULONGLONG: "Q",
+    Primitive.FLOAT: "f",
+    Primitive.DOUBLE: "d",
+}
+
+
+def reference(hint: Any, value: Any, mark: str, out: bytes = b"") -> bytes:
+    """Append a value field by field, each one padded to its size."""
+    if get_origin(hint) is tuple:
+        out = number("I", len(value), mark, out)
+        for element in value:
+            out = reference(get_args(hint)[0], element, mark, out)
+        return out
+    if get_origin(hint) is Annotated:
+        kind = get_args(hint)[1]
+        if kind is Primitive.STRING:
+            text = str(value).encode() + b"\0"
+            return number("I", len(text), mark, out) + text
+        whole = value.encode("latin-1") if kind is Primitive.CHAR else value
+        return number(REFERENCE[kind], whole, mark, out)
+    if issubclass(hint, IntEnum):
+        return number("I", value, mark, out)
+    hints = get_type_hints(hint, include_extras=True)
+    for name in hint.__match_args__:
+        out = reference(hints[name], getattr(value, name), mark, out)
+    return out
+
+
+def number(letter: str, value: object, mark: str, out: bytes) -> bytes:
+    data = struct.pack(mark + letter, value)
+    return out + bytes(-len(out) % len(data)) + data
+
+
+@given(st.data(), st.sampled_from(Endian))
+def test_each_field_is_padded_to_its_size(data: st.DataObject, endian: Endian) -> None:
+    value = data.draw(values_of(Mixed))
+    expected = reference(Mixed, value, "<" if endian is Endian.LITTLE else ">")
+    assert encode(value, endian) == expected
+    assert decode(Mixed, expected, endian) == value
+
+
+TWO_POSES = encode(iis.TimedPath2DSeq(TM, (), (extended_2d.Pose2D(), extended_2d.Pose2D())))
+POSES_AT = 16
+"""Where their count ends, after the time and the count of `id`; they begin there, too."""
+
+
+@pytest.mark.parametrize("size", range(POSES_AT + 2, POSES_AT + 48))
+def test_a_truncated_sequence_names_the_number_that_is_not_whole(size: int) -> None:
+    needed = size // 8 * 8 + 8
+    with pytest.raises(FieldError, match=f"^{size} bytes, at least {needed} are needed$"):
+        decode(iis.TimedPath2DSeq, TWO_POSES[:size])
+
+
+@pytest.mark.parametrize(("size", "needed"), [(0, 4), (3, 4), (4, 8), (7, 8), (8, 12), (11, 12)])
+def test_a_truncated_run_names_its_first_number_that_is_not_whole(size: int, needed: int) -> None:
+    with pytest.raises(FieldError, match=f"^{size} bytes, at least {needed} are needed$"):
+        decode(basic.TimedLong, encode(basic.TimedLong())[:size])
+
+
+def test_of_two_faults_the_first_one_is_reported() -> None:
+    pixels = encode(Mixed(pixels=(Pixel(), Pixel())))
+    at = pixels.index(b"\2\0\0\0") + 8 + 8
+    wrong = pixels[:at] + b"\7\0\0\0" + pixels[at + 4 : at + 6]
+    with pytest.raises(FieldError, match="7 is not a valid Colour"):
+        decode(Mixed, wrong)
+
+
 @pytest.mark.unmeasured
-@given(st.data(), st.sampled_from([*TYPES, Long64]), st.sampled_from(Endian))
+@given(st.data(), st.sampled_from([*TYPES, Long64, Mixed]), st.sampled_from(Endian))
 def test_what_is_encoded_is_decoded_again(
     data: st.DataObject, kind: type[Struct], endian: Endian
 ) -> None:
@@ -275,10 +400,6 @@ def test_a_time_stamp_keeps_microseconds(now_us: int) -> None:
 
 def test_a_time_stamp_is_seconds_and_nanoseconds() -> None:
     assert Time.from_us(1_500_000) == Time(1, 500_000_000)
-
-
-class Nothing(Struct):
-    """A struct without fields."""
 
 
 def test_a_struct_is_made_by_place_by_name_or_of_zeros() -> None:
