@@ -6,9 +6,6 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.cli.messages import Refused
-from tickrig.host.text.user_file import SUFFIX
-
 MODELS: Final = ("f-palette", "f-palette-boot", "motor-core-unit", "epos", "rtc-echo")
 """Names of `models.MODELS`."""
 

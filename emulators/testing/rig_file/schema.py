@@ -8,7 +8,8 @@ from typing import Final
 
 from tickrig.device.body import SIDES
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.canopen.choices import AUTO, LSS, PROFILES
+from tickrig.emulators.canopen.choices import AUTO, PROFILES
+from tickrig.emulators.canopen.node_spec import LSS
 from tickrig.emulators.testing.rig_file.plan import WireType
 from tickrig.host.text.section import (
     Field,
