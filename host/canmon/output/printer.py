@@ -41,12 +41,12 @@ class FilteredDecoder:
     def __init__(self, decoder: Decoder | None, wanted: Filter | None) -> None:
         self._decoder, self._wanted = decoder, wanted
         self._missing: MissingSignals | None = None
-        if wanted is not None and wanted.signals:
+        if wanted is not None and (wanted.signals or wanted.words):
             from tickrig.host.canmon.model.decode.filter_terms import (  # noqa: PLC0415 - slow
                 MissingSignals,
             )
 
-            self._missing = MissingSignals(wanted.signals)
+            self._missing = MissingSignals(wanted.signals, wanted.words)
 
     def take(self, records: Sequence[AnyRecord]) -> Iterator[DecodedFrame]:
         """Pass on what is wanted; all frames are decoded, for the decoder learns from each."""
@@ -57,12 +57,12 @@ class FilteredDecoder:
             else:
                 decoded = decoder.take(record) if isinstance(record, Record) else record.decoded
             if missing and decoded is not None:
-                missing.take(decoded)
+                missing.take(record, decoded)
             if wanted is None or (decoded is not None and wanted.matches(record, decoded)):
                 yield record, decoded
 
     def messages(self) -> list[str]:
-        """Say which signals the filter asks for that never came, one line each."""
+        """Say which signals and kinds the filter asks for that never came, one line each."""
         return [] if self._missing is None else self._missing.messages()
 
 

@@ -177,7 +177,7 @@ class ExpressionRule:
         name: as findings and reports have it.
         demand: what must hold.
         scopes: when; always where there are none.
-        paths: the signals that it names.
+        missing: the signals and words that it names, of which none has come yet.
         slices: those of them that are bits of frames.
         mapped: it speaks of what PDOs carry, or of PDOs by their numbers.
     """
@@ -187,14 +187,14 @@ class ExpressionRule:
         name: str,
         demand: RuleDemand,
         scopes: Sequence[RuleScope],
-        paths: Iterable[str],
+        missing: MissingSignals,
         slices: Sequence[Slice],
         *,
         mapped: bool,
     ) -> None:
         self.name, self._demand, self._scopes = name, demand, tuple(scopes)
         self._slices = tuple(slices)
-        self._missing = MissingSignals(paths)
+        self._missing = missing
         self._mapped, self._unmapped = mapped, False
         self._looks, self._names = mapped or bool(self._missing), set[str]()
         self._running, self._began, self._found, self._forced = False, False, False, False
@@ -209,7 +209,7 @@ class ExpressionRule:
         if self._slices:
             decoded = _with_slices(record, decoded, self._slices)
         if self._looks:
-            self._look(decoded)
+            self._look(record, decoded)
         # without a scope nothing is asked once it runs: a third of the time of a rule
         if (self._scopes or not self._running) and not self._in_force(record, decoded):
             return None
@@ -234,6 +234,7 @@ class ExpressionRule:
         texts = list(self._demand.end(end_us, self._running or not self._began))
         if not (texts or self._found):
             texts = [f"no signal {path} came{self._near(path)}" for path in self._missing.paths]
+            texts += [f"no frame with {word} came" for word in self._missing.words]
         hint = "" if self._demand.came or not self._unmapped else _NO_MAPPING
         return [TrafficFinding(end_us, self.name, text + hint) for text in texts]
 
@@ -261,11 +262,11 @@ class ExpressionRule:
                 self._demand.pause()
         return running
 
-    def _look(self, decoded: Decoded) -> None:
+    def _look(self, record: Record, decoded: Decoded) -> None:
         """See which signals come, until all have, and whether PDOs come that nobody mapped."""
         if self._mapped and decoded.kind == _UNMAPPED:
             self._unmapped = True
-        self._missing.take(decoded)
+        self._missing.take(record, decoded)
         self._looks = bool(self._missing) or (self._mapped and not self._unmapped)
         if len(self._names) < _MOST_NAMES:
             self._names.update(signal.name for signal in decoded.signals)

@@ -58,6 +58,7 @@ from tickrig.host.canmon.model.decode.filter import FilterError, Token
 from tickrig.host.canmon.model.decode.filter_terms import (
     COMPARISONS,
     NMT_STATES,
+    MissingSignals,
     Test,
     comparison,
     number,
@@ -458,9 +459,11 @@ class Expression:
 
 
 def _made(name: str, text: str) -> ExpressionRule:
-    demand, scopes, paths, slices = RuleParser(text).rule()
+    parser = RuleParser(text)
+    demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
-    return ExpressionRule(name, demand, scopes, paths, slices, mapped=mapped)
+    missing = MissingSignals(paths, parser.words)
+    return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
 
 
 def parse_rule(text: str, name: str = "") -> Expression:

@@ -140,17 +140,23 @@ class FilterParser:
     def __init__(self, text: str) -> None:
         self._text = text
         self._signals: set[str] = set()
+        self._words: set[tuple[str, str]] = set()
         self._nodes: set[range] = set()
         if len(text) > _LONGEST:
             raise self.wrong(text, _LONGEST, f"it has {len(text)} characters, at most {_LONGEST}")
         self._tokens, self._depth = tokens_of(text), 0
 
-    def parse(self) -> tuple[Test, frozenset[str]]:
-        """Return the test and the signals it asks for; FilterError if it is no filter."""
+    def parse(self) -> Filter:
+        """Read the filter; FilterError if it is none."""
         test = self._or()
         if self._next.text:
             raise self._error(f"{self._next.text!r} after the end; join terms by 'and' or 'or'")
-        return test, frozenset(self._signals)
+        return Filter(self._text, test, frozenset(self._signals), self.words)
+
+    @property
+    def words(self) -> frozenset[tuple[str, str]]:
+        """Words that were read and that no decoder of ours says, as `Filter.words`."""
+        return frozenset(self._words)
 
     @property
     def _next(self) -> Token:
@@ -288,6 +294,7 @@ class FilterParser:
                 if meant or name not in FREE:
                     said = f"{name} is never {value!r}, but {', '.join(words)}"
                     raise self._error(said + "".join(meant))
+                self._words.add((name, value))
             del self._tokens[0]
             return word_test(name, sign, value)
         wanted = _hexadecimal(value) if name == "id" else number(value)
@@ -340,11 +347,13 @@ class Filter:
         text: as it was written.
         matches: says whether a frame is wanted.
         signals: names of the signals it asks for, to tell when none of them ever comes.
+        words: field and word for each word that only a decoder of an installed package can say.
     """
 
     text: str
     matches: Test
     signals: frozenset[str] = frozenset()
+    words: frozenset[tuple[str, str]] = frozenset()
 
 
 def parse_filter(text: str) -> Filter:
@@ -356,5 +365,5 @@ def parse_filter(text: str) -> Filter:
     try:
         chosen = CandumpFilter.parse(text)
     except ValueError:
-        return Filter(text, *FilterParser(text).parse())
+        return FilterParser(text).parse()
     return Filter(text, candump_test(chosen))

@@ -303,30 +303,46 @@ def _can_id(record: AnyRecord) -> int | None:
 
 
 class MissingSignals:
-    """Waits for signals by name.
+    """Waits for signals by name, and for words that no decoder of ours says.
 
     Args:
         paths: as filters write them: `position`, `3.position`, `statusword.fault`.
+        words: field and word, as `Filter.words` has them.
     """
 
-    def __init__(self, paths: Iterable[str]) -> None:
+    def __init__(self, paths: Iterable[str], words: Iterable[tuple[str, str]] = ()) -> None:
         self._left = {path: signal_reader(path) for path in sorted(paths)}
+        self._words = sorted(words)
 
     def __bool__(self) -> bool:
         """Say whether any is missing."""
-        return bool(self._left)
+        return bool(self._left or self._words)
 
-    def take(self, decoded: Decoded) -> None:
+    def take(self, record: AnyRecord, decoded: Decoded) -> None:
         """Take what a frame says."""
         if decoded.signals:
             left = self._left.items()
             self._left = {path: find for path, find in left if find(decoded) is None}
+        if self._words:
+            self._words = [
+                word for word in self._words if WORDS[word[0]](record, decoded) != word[1]
+            ]
 
     @property
     def paths(self) -> list[str]:
         """Those that have not come."""
         return list(self._left)
 
+    @property
+    def words(self) -> list[str]:
+        """Those that have not come, as `kind=word`."""
+        return [f"{name}={word}" for name, word in self._words]
+
     def messages(self) -> list[str]:
         """Say what never came, one line each."""
-        return [f"the filter asks for {path!r}: no such signal came" for path in self._left]
+        signals = [f"the filter asks for {path!r}: no such signal came" for path in self._left]
+        return signals + [
+            f"the filter asks for {name}={word}: no such frame came;"
+            f" there are {', '.join(KNOWN_WORDS[name])}"
+            for name, word in self._words
+        ]

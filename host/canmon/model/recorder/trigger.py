@@ -45,13 +45,13 @@ class FilterTrigger:
 
     def __init__(self, name: str, wanted: Filter) -> None:
         self.name, self.decodes, self._wanted = name, True, wanted
-        self._missing = MissingSignals(wanted.signals)
+        self._missing = MissingSignals(wanted.signals, wanted.words)
 
     def why(self, record: Record, decoded: Decoded | None, /) -> str:
         """Return the filter if the frame passes."""
         assert decoded is not None, "who filters has decoded"
         if self._missing:
-            self._missing.take(decoded)
+            self._missing.take(record, decoded)
         return self.name if self._wanted.matches(record, decoded) else ""
 
     def missing(self, now_us: int, lost: int, /) -> str:

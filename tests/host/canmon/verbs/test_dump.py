@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 
 from tests.host.canmon.model.decode.drive_trace import GOLDEN
 from tickrig.host.canmon.cli import main
+from tickrig.host.canmon.model.decode.filter_terms import KNOWN_WORDS
 from tickrig.host.canmon.model.logs.log_reader import read_log
 
 CANMON = (sys.executable, "-c", "from tickrig.host.canmon.cli import main; main()")
@@ -246,3 +247,14 @@ def test_a_filter_says_which_of_its_signals_never_came(tmp_path: Path, verb: lis
         "the filter asks for 'emyc': no such signal came",
     ]
     assert canmon(verb[0], DRIVE, *out, "-F", "node=5 and pdo").stderr == ""
+
+
+@pytest.mark.parametrize("verb", [["dump"], ["top"], ["conv", "out.log"]])
+def test_a_filter_says_which_of_its_kinds_never_came(tmp_path: Path, verb: list[str]) -> None:
+    out = [str(tmp_path / name) for name in verb[1:]]
+    wanted = "kind=qqq or src!=zzz or kind=nmt or (node=5 and kind=pdo1)"
+    assert canmon(verb[0], DRIVE, *out, "-F", wanted).stderr.splitlines() == [
+        "the filter asks for kind=qqq: no such frame came; there are "
+        + ", ".join(KNOWN_WORDS["kind"]),
+        "the filter asks for src=zzz: no such frame came; there are eds, seen, dbc",
+    ]

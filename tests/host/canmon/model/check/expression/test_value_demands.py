@@ -101,6 +101,7 @@ def test_a_value_that_does_not_change_is_found_once() -> None:
         ("emyc never", "no signal emyc came; did you mean emcy?"),
         ("4.statusword.fault never", "no signal 4.statusword.fault came"),
         ("3.speed in 0..5", "no signal 3.speed came"),
+        ("kind=qqq never", "no frame with kind=qqq came"),
         ("node 4 stopped never", "no signal state of node 4 came"),
     ],
 )
