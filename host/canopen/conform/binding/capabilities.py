@@ -56,7 +56,11 @@ _IDENTITY: Final = ((1, "VendorNumber"), (2, "ProductNumber"), (3, "RevisionNumb
 _DEVICE_TYPE: Final = 0x1000
 _ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
 """What a node need not do that has the object: bit 0 of its first sub-index tells."""
+_STORE: Final = 0x1010
+_AUTONOMOUSLY: Final = 2
 _LSS_ADDRESS: Final = 0x1018
+_DUMMIES: Final = {"dummy5": "Dummy0005", "dummy6": "Dummy0006"}
+"""Objects of the data types that checks map in place of an object, and what an EDS calls them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +92,11 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
     info = file.sections.get("DeviceInfo", {}) if file else {}
     dummies = file.sections.get("DummyUsage", {}) if file else {}
     reasons = dict(_missing(binding))
-    if not any(_number(text) for text in dummies.values()):
-        reasons["dummy"] = _unsaid(file, "DummyUsage", "dummy objects may be mapped")
+    for word, key in _DUMMIES.items():
+        if not _number(dummies.get(key.lower(), "")):
+            reasons[word] = _unsaid(file, key, "this dummy may be mapped")
+    if (client.number(_STORE, 1) or 0) & _AUTONOMOUSLY:
+        reasons["unsaved"] = f"{_STORE:04X}h:01 says that the node saves by itself (bit 1)"
     for word, index in _ON_COMMAND.items():
         said = client.number(index, 1)
         if said is not None and not said & 1:
@@ -106,7 +113,7 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
         reasons |= dict.fromkeys(_LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
     if not _has_block_upload(client):
         reasons["block"] = "it refuses a block upload of 1000h"
-    words = {*_OF_OBJECTS, *_PROFILES, *_LSS, "dummy", "block"} - reasons.keys()
+    words = {*_OF_OBJECTS, *_PROFILES, *_LSS, *_DUMMIES, "unsaved", "block"} - reasons.keys()
     return NodeFeatures(frozenset(words), reasons, tuple(findings))
 
 

@@ -224,7 +224,7 @@ def _upload_block(sdo: SdoFrames, at: Address, block: str, crc: str = "") -> byt
     """
     most, following = int(block.split(",", maxsplit=1)[0]), int(block.rsplit(",", maxsplit=1)[-1])
     sdo.say(bytes([0xA0 if crc else 0xA4, *_mux(at), most, 0, 0, 0]))
-    answer = sdo.answer(f"C[2367]{multiplexer(at)}........")
+    answer = sdo.answer(f"C[0-7]{multiplexer(at)}........")
     checked = bool(answer[0] & 4) and not crc
     size = int.from_bytes(answer[4:], "little")
     sdo.say(bytes([0xA3, *bytes(7)]))

@@ -22,9 +22,9 @@ EXAMPLES = sorted((ROOT / "examples").rglob("*.eds"))
 WITHOUT_EDS = {
     *("heartbeat", "hbcons", "guarding", "emcy", "history", "store", "restore", "sdo2", "sync"),
     *("syncprod", "synccounter", "syncstart", "eventtimer", "inhibit", "time", "tpdo", "rpdo"),
-    *("rtr", "block", "401"),
+    *("rtr", "block", "401", "unsaved"),
 }
-OF_R1 = {*WITHOUT_EDS, "dummy", "bits", "lss", "lssident", "unconfigured"}
+OF_R1 = {*WITHOUT_EDS, "dummy5", "dummy6", "bits", "lss", "lssident", "unconfigured"}
 
 
 def features(bench: Bench, file: EdsFile | None) -> NodeFeatures:
@@ -55,6 +55,21 @@ def test_the_examples_contradict_nothing(path: Path) -> None:
     found = features(make_bench(read_eds(path).make_dictionary()), open_eds(path))
     assert {"heartbeat", "block", "tpdo", "rpdo"} <= found.words
     assert found.findings == ()
+
+
+def test_a_dummy_is_one_that_the_eds_allows() -> None:
+    text = R1.read_text("ascii").replace("Dummy0005=1", "Dummy0005=0")
+    found = features(make_bench(make_dictionary()), EdsFile("a.eds", text))
+    assert found.words == OF_R1 - {"dummy5"}
+    assert found.reasons["dummy5"] == (
+        "Dummy0005 of the EDS does not say that this dummy may be mapped"
+    )
+
+
+def test_a_node_that_saves_by_itself_is_not_asked_to_forget() -> None:
+    bench = make_bench(make_dictionary())
+    bench.slave.dictionary[0x1010, 1].value = 3
+    assert "unsaved" not in features(bench, None).words
 
 
 def test_an_eds_that_does_not_tell_of_lss_denies_it() -> None:

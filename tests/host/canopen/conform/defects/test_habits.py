@@ -18,6 +18,7 @@ from tests.host.canopen.conform.defects.defect import (
     make_defective,
     refuses,
     says,
+    together,
     tolerant,
 )
 from tests.host.canopen.conform.defects.of_nmt import BusyAtStart
@@ -96,6 +97,12 @@ class OneAtATime(SpyLink):
 RESET: Final = 0x82
 """Reset communication; one is told to learn whether the error goes."""
 UNSAVED: Final = ("585#4310100101000000", "585#4310100100000000")
+SAVES: Final = ("585#4310100101000000", "585#4310100103000000")
+SIZE: Final = r"(585#)C[26](.{6}).*"
+CRC: Final = r"(585#[CD][159D])....(0{10})"
+UNSIZED: Final = says(SIZE, r"\1C0\g<2>00000000")
+UNCHECKED: Final = says(CRC, r"\g<1>0000\2")
+UPLOADS: Final = tuple(f"BU-{number:02}" for number in range(1, 11))
 UNLOADED: Final = ("585#4311100101000000", "585#4311100100000000")
 PROMPT: Final[dict[ServiceMaker, ServiceMaker]] = {HeartbeatProducer: Prompt}
 
@@ -114,6 +121,16 @@ PROMPT: Final[dict[ServiceMaker, ServiceMaker]] = {HeartbeatProducer: Prompt}
         (Defect("no LSS configuration is stored", (), says("7E4#1700", "7E4#1701")), ("LS-08",)),
         (Defect("stores nothing on command", (), says(*UNSAVED)), ("ST-01", "ST-02", "ST-03")),
         (Defect("restores nothing on command", (), says(*UNLOADED)), ("ST-05", "ST-08")),
+        (Defect("saves by itself", (), says(*SAVES)), ("ST-01", "ST-04")),
+        (Defect("blocks of no size, with a CRC", (), says(SIZE, r"\1C4\g<2>00000000")), UPLOADS),
+        (
+            Defect(
+                "blocks of no size or CRC",
+                (),
+                together(says(SIZE, r"\1C0\g<2>00000000"), says(CRC, r"\g<1>0000\2")),
+            ),
+            UPLOADS,
+        ),
     ],
     ids=lambda value: value.name if isinstance(value, Defect) else "",
 )
