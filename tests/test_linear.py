@@ -274,6 +274,7 @@ ELSEWHERE: Final = {
     "host.links.serial_link": "of the kernel",
     "host.canmon.model.check.report": "our own findings",
     "host.rtc.commands.verbs": "a word of the command line",
+    "host.text.section": "values of a TOML text, as of a rig file",
     "host.text.steps": "`parse_steps`, `parse_scenario`",
 }
 """Modules that parse what no stranger writes, or what a reader of the table is given."""

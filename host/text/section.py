@@ -9,15 +9,15 @@ A taker takes a value as the file gives it, or raises ValueError that says what 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date, time
 from math import isfinite
 from typing import Any, Final
 
 from tickrig.host.text.names import closest, near
-from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath
-from tickrig.host.text.values import parse_size, us_of
+from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath, read_toml
+from tickrig.host.text.values import counted, parse_size, us_of
 
 Taker = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
@@ -44,11 +44,34 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
+def anything(value: Any) -> Any:
+    """Take any value, because `Section.sub` or `Section.tables` reads it."""
+    return value
+
+
 def text(value: object) -> str:
     """Take a text that is not empty."""
     if isinstance(value, str) and value:
         return value
     raise ValueError(f"it takes a text, not {shown(value)}")
+
+
+def string(value: object) -> str:
+    """Take a text, which may be empty."""
+    if isinstance(value, str):
+        return value
+    raise ValueError(f"it takes a text, not {shown(value)}")
+
+
+def matching(accepts: Callable[[str], object], what: str) -> Taker:
+    """Return what takes a text that a function accepts; `what` names it for people."""
+
+    def take(value: object) -> str:
+        if isinstance(value, str) and accepts(value):
+            return value
+        raise ValueError(f"it takes {what}, not {shown(value)}")
+
+    return take
 
 
 def texts(value: object) -> tuple[str, ...]:
@@ -91,6 +114,13 @@ def table(value: object) -> dict[str, Any]:
     if isinstance(value, dict):
         return value
     raise ValueError(f"it takes a table, not {shown(value)}")
+
+
+def lines(value: object) -> dict[str, str]:
+    """Take a table of texts by name."""
+    if isinstance(value, dict) and all(isinstance(each, str) for each in value.values()):
+        return value
+    raise ValueError(f'it takes lines like name = "value", not {shown(value)}')
 
 
 def whole(low: int, high: int) -> Taker:
@@ -263,11 +293,47 @@ class Section:
         self.wrong(f"it is a table [{dotted((*self.keys, key))}], not {shown(value)}", key)
         return None
 
+    def tables(self, key: str) -> list[Section]:
+        """Return the tables `[[key]]`; what is none of them is noted."""
+        value = self.values.get(key, [])
+        if value is BROKEN:
+            return []
+        header = dotted((*self.keys, key))
+        if not isinstance(value, list):
+            given = f"[{header}]" if isinstance(value, dict) else shown(value)
+            self.wrong(f"it is a table [[{header}]], not {given}", key)
+            return []
+        for at, each in enumerate(value):
+            if not isinstance(each, dict) and each is not BROKEN:
+                self.wrong(f"it is a table [[{header}]], not {shown(each)}", key, at)
+        return [
+            Section(self.notes, (*self.keys, key, at), each)
+            for at, each in enumerate(value)
+            if isinstance(each, dict)
+        ]
+
     def subs(self, *but: str) -> Iterator[tuple[str, Section | None]]:
         """Yield all keys but some, each with its table."""
         for key in self.values:
             if key not in but:
                 yield key, self.sub(key)
+
+
+def read_section(text: str) -> Section:
+    """Read a TOML text; its mistakes are in `notes`."""
+    document = read_toml(text)
+    return Section(Notes(document), (), document.values)
+
+
+def in_a_line(mistakes: Sequence[Mistake]) -> str:
+    """Write the first mistake, and how many more there are.
+
+    >>> in_a_line([Mistake(3, "no key 'a'"), Mistake(4, "no key 'b'")])
+    "line 3: no key 'a' (and 1 mistake more)"
+    """
+    line, reason = mistakes[0]
+    more = f" (and {counted(len(mistakes) - 1, 'mistake')} more)" if len(mistakes) > 1 else ""
+    return f"line {line}: {reason}{more}"
 
 
 def is_broken(value: object) -> bool:

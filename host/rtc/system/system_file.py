@@ -28,7 +28,6 @@ path = "localhost:2809/robot.host_cxt/Joystick0.rtc"
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -38,48 +37,86 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import RemoteEntry
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
-from tickrig.host.text.toml_reader import load_toml
+from tickrig.host.text.section import (
+    Field,
+    Schema,
+    Section,
+    anything,
+    flag,
+    in_a_line,
+    lines,
+    number,
+    read_section,
+    shown,
+    string,
+    table,
+    text,
+)
 from tickrig.host.text.whole_file import check_file, write_whole
 
-_COMPONENT: Final[Mapping[str, type]] = {
-    "name": str,
-    "type": str,
-    "rate_hz": float,
-    "context": str,
-    "active": bool,
-    "configuration_set": str,
-    "configuration": dict,
-}
-_CONNECTION: Final[Mapping[str, type]] = {
-    "ports": list,
-    "name": str,
-    "connector_id": str,
-    "properties": dict,
-}
-_REMOTE: Final[Mapping[str, type]] = {"name": str, "path": str}
-_FIELDS: Final[Mapping[str, str]] = {"type": "type_name"}
+
+def _ports(value: object) -> tuple[str, str]:
+    if isinstance(value, list) and len(value) == 2 and all(isinstance(each, str) for each in value):
+        return value[0], value[1]
+    raise ValueError(f'it takes two ports, as ["A0.out", "B0.in"], not {shown(value)}')
 
 
-def parse_toml(text: str) -> System:
+_TEXT: Final = Field(text, "a text", "how it is called")
+_COMPONENT: Final[Schema] = {
+    "name": _TEXT,
+    "type": Field(text, "a text", "its type"),
+    "rate_hz": Field(number(0, 1e9), "a number", "how often it runs", "1000"),
+    "context": Field(string, "a text", "what shares its execution context", "its own"),
+    "active": Field(flag, "true, false", "whether it is activated", "false"),
+    "configuration_set": Field(string, "a text", "the active one", "default"),
+    "configuration": Field(table, "tables", "values of each set", "none"),
+}
+_CONNECTION: Final[Schema] = {
+    "ports": Field(_ports, '["A0.out", "B0.in"]', "what it connects"),
+    "name": Field(string, "a text", "how it is called", "none"),
+    "connector_id": Field(string, "a text", "its ID", "made of the ports"),
+    "properties": Field(lines, 'lines like name = "value"', "of the connector", "none"),
+}
+_REMOTE: Final[Schema] = {
+    "name": _TEXT,
+    "path": Field(text, "a text", "where its engine finds it"),
+}
+_TOP: Final[Schema] = {
+    name: Field(anything, f"tables [[{name}]]", "a part of the system", "none")
+    for name in ("component", "connection", "remote")
+}
+
+
+def parse_toml(content: str) -> System:
     """Read a system file.
 
     Raises:
         RtcRefused: no TOML, or a key or value that is not in the table above.
     """
-    try:
-        tables = load_toml(text)
-    except tomllib.TOMLDecodeError as error:
-        raise RtcRefused(f"not TOML: {error}") from error
-    if unknown := set(tables) - {"component", "connection", "remote"}:
-        raise RtcRefused(f"{min(unknown)!r} is none of: component, connection, remote")
-    components = _read(tables, "component", _COMPONENT, ("name", "type"))
-    connections = _read(tables, "connection", _CONNECTION, ("ports",))
-    remotes = _read(tables, "remote", _REMOTE, ("name", "path"))
+    top = read_section(content)
+    top.read(_TOP)
+    components = [_component(each) for each in top.tables("component")]
+    connections = [each.read(_CONNECTION) for each in top.tables("connection")]
+    remotes = [each.read(_REMOTE) for each in top.tables("remote")]
+    if mistakes := top.notes.all:
+        raise RtcRefused(in_a_line(mistakes))
     return System(
-        tuple(_component(entry) for entry in components),
-        tuple(_connection(entry) for entry in connections),
+        tuple(ComponentEntry(**entry) for entry in components),
+        tuple(ConnectionEntry(**entry) for entry in connections),
         tuple(RemoteEntry(**entry) for entry in remotes),
     )
+
+
+def _component(section: Section) -> dict[str, Any]:
+    entry = section.read(_COMPONENT)
+    for set_id, values in entry.get("configuration", {}).items():
+        try:
+            lines(values)
+        except ValueError as error:
+            section.wrong(str(error), "configuration", set_id)
+    if "rate_hz" in entry:
+        entry["rate_hz"] = float(entry["rate_hz"])
+    return {("type_name" if key == "type" else key): value for key, value in entry.items()}
 
 
 def write_toml(system: System) -> str:
@@ -87,51 +124,6 @@ def write_toml(system: System) -> str:
     return "\n".join(
         (*_component_lines(system), *_connection_lines(system), *_remote_lines(system))
     )
-
-
-def _read(
-    tables: Mapping[str, Any], name: str, kinds: Mapping[str, type], needed: tuple[str, ...]
-) -> Iterator[Mapping[str, Any]]:
-    """Yield the tables of a name, each checked."""
-    entries = tables.get(name, [])
-    if not isinstance(entries, list):
-        raise RtcRefused(f"{name} is written [[{name}]]")
-    for number, entry in enumerate(entries, 1):
-        place = f"[[{name}]] {number}"
-        for key in needed:
-            if key not in entry:
-                raise RtcRefused(f"{place} has no {key}")
-        yield {key: _value(f"{place}: {key}", kinds, key, value) for key, value in entry.items()}
-
-
-def _value(place: str, kinds: Mapping[str, type], key: str, value: object) -> object:
-    if key not in kinds:
-        raise RtcRefused(f"{place} is none of: {', '.join(kinds)}")
-    if kinds[key] is float and type(value) is int:
-        return float(value)
-    if type(value) is not kinds[key]:
-        raise RtcRefused(f"{place} takes {kinds[key].__name__}, not {value!r}")
-    return value
-
-
-def _component(entry: Mapping[str, Any]) -> ComponentEntry:
-    sets = entry.get("configuration", {})
-    for set_id, values in sets.items():
-        _check_texts(f"{entry['name']}: configuration.{set_id}", values)
-    return ComponentEntry(**{_FIELDS.get(key, key): value for key, value in entry.items()})
-
-
-def _connection(entry: Mapping[str, Any]) -> ConnectionEntry:
-    ports = entry["ports"]
-    if len(ports) != 2 or not all(isinstance(port, str) for port in ports):
-        raise RtcRefused(f'[[connection]]: ports {ports} is not like ["A0.out", "B0.in"]')
-    _check_texts("[[connection]]: properties", entry.get("properties", {}))
-    return ConnectionEntry((ports[0], ports[1]), **{k: v for k, v in entry.items() if k != "ports"})
-
-
-def _check_texts(place: str, values: object) -> None:
-    if not isinstance(values, dict) or not all(isinstance(text, str) for text in values.values()):
-        raise RtcRefused(f'{place} takes lines like name = "value", not {values!r}')
 
 
 def _component_lines(system: System) -> Iterator[str]:
@@ -169,8 +161,8 @@ def _remote_lines(system: System) -> Iterator[str]:
 
 
 def _texts(values: Mapping[str, str]) -> Iterator[str]:
-    for name, text in values.items():
-        yield f"{_quoted(name)} = {_quoted(text)}"
+    for name, value in values.items():
+        yield f"{_quoted(name)} = {_quoted(value)}"
     yield ""
 
 

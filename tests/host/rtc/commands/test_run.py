@@ -109,7 +109,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("--save /proc/a.toml", "system /proc/a.toml: No such file or directory"),
         ("none.toml", "system none.toml: No such file or directory"),
         ("twice.py", "system twice.py: the name ends in .toml or .xml"),
-        ("bad.toml", "system bad.toml: [[component]] 1 has no type"),
+        ("bad.toml", "system bad.toml: line 1: component[1]: no key 'type': its type, a text"),
         ("bad.xml", "system bad.xml: a is not an RTSProfile"),
         ("latin.toml", "system latin.toml: byte 2 is not UTF-8"),
         ("twice.toml", "system twice.toml: no component type 'Twice'; known: ConsoleIn, "),
