@@ -1,22 +1,14 @@
-"""A report as one HTML page that needs nothing else; Jinja2 (extra `report`) fills its templates.
-
-A template writes a value through `harmless` and escapes it; nothing is marked as safe but the
-style sheet and the script, which are ours, and whose hashes are all that the page lets run.
-"""
+"""The report of a test run as one HTML page that needs nothing else."""
 
 from __future__ import annotations
 
-from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from functools import cache
-from hashlib import sha256
-from importlib.resources import files
 from typing import Final
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup, escape
+from markupsafe import escape
 
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
@@ -35,7 +27,8 @@ from tickrig.emulators.testing.report.overview import (
 )
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 from tickrig.host.text import page_text
-from tickrig.host.text.values import counted, format_time
+from tickrig.host.text.html_page import PageTemplate
+from tickrig.host.text.values import counted
 
 # Which parts of which tests have room on a page: a browser has to open it in a few seconds.
 
@@ -121,8 +114,6 @@ def cut(text: str, most: int) -> tuple[str, int]:
     return text[:end], len(text) - end
 
 
-_PACKAGE: Final = __package__
-_FOLDER: Final = "template"
 _MOST_OPEN: Final = 12
 """Up to so many failed tests are unfolded at once."""
 
@@ -160,10 +151,8 @@ def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
         room_bytes: how much tests may bring to the page; what has no room is named on it.
     """
     places = reported(report.tests)
-    style, script = (_resource(name) for name in ("page.css", "page.js"))
     unwell = [place for place in places if place.record.outcome in UNWELL]
-    template = _environment().get_template("page.html")
-    return template.render(
+    return _template().render(
         report=report,
         tests=places,
         shown={test.place.anchor: test for test in _on_page(places, room_bytes)},
@@ -172,46 +161,13 @@ def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
         requirements=requirement_rows(report, places),
         slowest=slowest(places),
         files=by_file(places),
-        style=Markup(style),
-        script=Markup(script),
-        policy=_policy(style, script),
     )
 
 
 @cache
-def _environment() -> Environment:
-    """Return what has the templates; they are compiled once."""
-    environment = Environment(
-        loader=PackageLoader(_PACKAGE, _FOLDER),
-        autoescape=True,
-        finalize=page_text.harmless,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "duration": page_text.duration,
-        "size": page_text.size,
-        "counted": counted,
-        "time": format_time,
-        "seconds": page_text.seconds,
-    }
-    environment.globals["Outcome"] = Outcome
-    return environment
-
-
-def _resource(name: str) -> str:
-    return files(_PACKAGE).joinpath(_FOLDER, name).read_text("utf-8")
-
-
-def _policy(style: str, script: str) -> str:
-    """Return the content security policy: no network, and no style or script but ours."""
-    hashes = (b64encode(sha256(text.encode()).digest()).decode() for text in (style, script))
-    style_hash, script_hash = hashes
-    return (
-        f"default-src 'none'; style-src 'sha256-{style_hash}'; script-src 'sha256-{script_hash}';"
-        " base-uri 'none'; form-action 'none'"
-    )
+def _template() -> PageTemplate:
+    """Return the template; it is compiled once."""
+    return PageTemplate(__package__, {"Outcome": Outcome}, script="page.js")
 
 
 def _on_page(places: Sequence[ReportedTest], room_bytes: int) -> Iterator[TestOnPage]:

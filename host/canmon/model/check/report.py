@@ -7,22 +7,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Final, Protocol
 from urllib.parse import quote
-from xml.sax.saxutils import escape, quoteattr
 
 from tickrig.host.canmon.model.check.rule import TrafficFinding
+from tickrig.host.text.junit import ERROR, FAILURE, SKIPPED, JunitCase, JunitSuite, junit_text
 from tickrig.host.text.values import counted
 
 # Findings as a JUnit report, one test case for each rule.
-
-_CONTROLS: Final = {code: "�" for code in range(0x20) if chr(code) not in "\t\n\r"}
-"""Characters that XML does not have."""
-
 
 _NONE_SKIPPED: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 class Judged(Protocol):
-    """What a report needs of a finding, beside its text in one line."""
+    """What a report needs of a finding, beside its text."""
 
     @property
     def rule(self) -> str:
@@ -54,31 +50,16 @@ def junit(
     by_rule: dict[str, list[Judged]] = {name: [] for name in names}
     for finding in findings:
         by_rule[finding.rule].append(finding)
-    failures = sum(bool(found) for found in by_rule.values())
-    errors = len(by_rule) - failures if unjudged else 0
-    counts = f"tests='{len(names)}' failures='{failures}' errors='{errors}'"
-    skips = {} if unjudged else skipped
-    counts += f" skipped='{len(skips)}'" * bool(skips)
-    head = f"<testsuite name={_attribute(suite)} {counts}>"
-    cases = [
-        _case(suite, name, found, unjudged, skips.get(name, "")) for name, found in by_rule.items()
-    ]
-    lines = ["<?xml version='1.0' encoding='utf-8'?>", "<testsuites>", head, *cases]
-    return "\n".join([*lines, "</testsuite>", "</testsuites>", ""])
-
-
-def _case(suite: str, name: str, found: Sequence[Judged], unjudged: str, skipped: str) -> str:
-    head = f"<testcase classname={_attribute(suite)} name={_attribute(name)}"
-    if not found:
-        kind, why = ("error", unjudged) if unjudged else ("skipped", skipped)
-        return head + (f"><{kind} message={_attribute(why)}/></testcase>" if why else "/>")
-    message = f"{counted(len(found), 'finding')}, first: {found[0].text}"
-    text = escape("\n".join(map(str, found)).translate(_CONTROLS))
-    return f"{head}><failure message={_attribute(message)}>{text}</failure></testcase>"
-
-
-def _attribute(text: str) -> str:
-    return quoteattr(text.translate(_CONTROLS))
+    cases = []
+    for name, found in by_rule.items():
+        if found:
+            message = f"{counted(len(found), 'finding')}, first: {found[0].text}"
+            text = "\n".join(map(str, found))
+            cases.append(JunitCase(suite, name, FAILURE, message, text))
+        else:
+            tag, why = (ERROR, unjudged) if unjudged else (SKIPPED, skipped.get(name, ""))
+            cases.append(JunitCase(suite, name, tag if why else "", why))
+    return junit_text([JunitSuite(suite, cases)])
 
 
 # Findings as SARIF 2.1.0 (OASIS), which code hosts and editors show.

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import fsum
+from dataclasses import replace
 from typing import Final
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.overview import (
@@ -16,7 +15,15 @@ from tickrig.host.canopen.conform.report.overview import (
     plain_frames,
 )
 from tickrig.host.canopen.conform.verdict import FAILED, UNDECIDED, CheckVerdict, Report, Result
-from tickrig.host.text.page_text import harmless
+from tickrig.host.text.junit import (
+    ERROR,
+    FAILURE,
+    OUTPUT,
+    SKIPPED,
+    JunitCase,
+    JunitSuite,
+    junit_text,
+)
 
 # A badge for a README: how many checks passed, as SVG.
 
@@ -52,11 +59,11 @@ _MOST_LINES: Final = 200
 """Of a case."""
 
 _TAGS: Final[Mapping[CheckVerdict, str]] = {
-    CheckVerdict.FAIL: "failure",
-    CheckVerdict.INCONCLUSIVE: "error",
-    CheckVerdict.BLOCKED: "error",
-    CheckVerdict.NOT_APPLICABLE: "skipped",
-    CheckVerdict.IMPLEMENTATION_DEFINED: "system-out",
+    CheckVerdict.FAIL: FAILURE,
+    CheckVerdict.INCONCLUSIVE: ERROR,
+    CheckVerdict.BLOCKED: ERROR,
+    CheckVerdict.NOT_APPLICABLE: SKIPPED,
+    CheckVerdict.IMPLEMENTATION_DEFINED: OUTPUT,
 }
 
 
@@ -70,60 +77,39 @@ def report_junit(
         baseline: failures that are known.
         show: writes frames.
     """
-    root = Element("testsuites", name=harmless(f"node {report.node_id} on {report.source}"))
-    for row in by_group(report):
-        suite = SubElement(root, "testsuite", name=harmless(row.name))
-        for result in row.results:
-            _add_case(suite, result, baseline, show)
+    suites = [
+        JunitSuite(row.name, [_case(result, baseline, show) for result in row.results])
+        for row in by_group(report)
+    ]
     if report.aborted:
-        suite = SubElement(root, "testsuite", name="run")
-        case = SubElement(suite, "testcase", classname="run", name="comes to its end", time="0")
-        SubElement(case, "error", message=harmless(report.aborted))
-    for suite in root:
-        _count(suite)
-    _add_properties(root, report)
-    indent(root, " ")
-    return "<?xml version='1.0' encoding='utf-8'?>\n" + tostring(root, "unicode") + "\n"
+        ended = JunitCase("run", "comes to its end", ERROR, report.aborted, duration_us=0)
+        suites.append(JunitSuite("run", [ended]))
+    if suites:
+        suites[0] = replace(suites[0], properties=_properties(report))
+    return junit_text(suites, f"node {report.node_id} on {report.source}")
 
 
-def _add_case(suite: Element, result: Result, baseline: Baseline, show: ShowFrames) -> None:
+def _case(result: Result, baseline: Baseline, show: ShowFrames) -> JunitCase:
     check, outcome = result.check, result.outcome
-    seconds = f"{(outcome.end_us - outcome.start_us) / 1e6:.6f}"
-    name = harmless(f"{check.id} {check.title}")
-    case = SubElement(suite, "testcase", classname=harmless(check.group), name=name, time=seconds)
     known = baseline.knows(result)
-    tag = "skipped" if known else _TAGS.get(outcome.verdict)
-    if tag is None:
-        return
+    tag = SKIPPED if known else _TAGS.get(outcome.verdict, "")
     reason = f"{'known failure: ' if known else ''}{outcome.reason or outcome.verdict}"
-    told = SubElement(case, tag) if tag == "system-out" else None
-    lines = [reason] if tag in ("skipped", "system-out") else _lines(result, show)
-    if told is None:
-        told = SubElement(case, tag, message=harmless(f"{reason} ({check.source})"))
-    if tag != "skipped":
-        told.text = harmless("\n".join(lines))
+    text = {SKIPPED: "", OUTPUT: reason}.get(tag)
+    return JunitCase(
+        *(check.group, f"{check.id} {check.title}", tag, f"{reason} ({check.source})"),
+        "\n".join(_lines(result, show)) if text is None and tag else text or "",
+        outcome.end_us - outcome.start_us,
+    )
 
 
 def _lines(result: Result, show: ShowFrames) -> list[str]:
     return [result.check.source, *cut(all_goes(result.outcome, result.first, show), _MOST_LINES)]
 
 
-def _count(suite: Element) -> None:
-    suite.set("tests", str(len(suite)))
-    for name, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
-        suite.set(name, str(sum(case.find(tag) is not None for case in suite)))
-    suite.set("time", f"{fsum(float(case.get('time', '0')) for case in suite):.6f}")
-
-
-def _add_properties(root: Element, report: Report) -> None:
-    """Say in the first suite what was judged, and how."""
-    if not len(root):
-        return
+def _properties(report: Report) -> dict[str, str]:
+    """Return what was judged, and how."""
     told = {"level": report.level.word, **report.node, **report.settings}
     told |= {"doubt": report.doubt} if report.doubt else {}
     told |= {f"finding {number}": text for number, text in enumerate(report.findings, 1)}
     told |= {f"not restored {number}": text for number, text in enumerate(report.unrestored, 1)}
-    properties = Element("properties")
-    for name, value in told.items():
-        SubElement(properties, "property", name=harmless(name), value=harmless(value))
-    root[0].insert(0, properties)
+    return told

@@ -1,19 +1,9 @@
-"""A report as one HTML page that needs nothing else; Jinja2 (extra `report`) fills its template.
-
-A template writes a value through `harmless` and escapes it; nothing is marked as safe but the
-style sheet, which is ours, and whose hash is all that the page lets in. There is no script.
-"""
+"""A conformance run as one HTML page that needs nothing else."""
 
 from __future__ import annotations
 
-from base64 import b64encode
 from functools import cache
-from hashlib import sha256
-from importlib.resources import files
-from typing import Any, Final
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from typing import Final
 
 from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
@@ -34,11 +24,8 @@ from tickrig.host.canopen.conform.report.overview import (
 )
 from tickrig.host.canopen.conform.suite import group_titles
 from tickrig.host.canopen.conform.verdict import CheckOutcome, CheckVerdict, Report
-from tickrig.host.text import page_text
-from tickrig.host.text.values import counted
+from tickrig.host.text.html_page import PageTemplate
 
-_PACKAGE: Final = __package__
-_FOLDER: Final = "template"
 _MOST_LINES: Final = 200
 """Of frames of one go at a check."""
 _MOST_OPEN: Final = 12
@@ -55,14 +42,12 @@ def html_page(
         baseline: failures that are known.
         show: writes frames.
     """
-    style = files(_PACKAGE).joinpath(_FOLDER, "page.css").read_text("utf-8")
 
     def frames(outcome: CheckOutcome) -> str:
         return "\n".join(cut(show(outcome.evidence), _MOST_LINES))
 
     found = unwell(report)
-    template: Any = _environment().get_template("page.html")
-    page: str = template.render(
+    return _template().render(
         repairs=repair_commands(report),
         report=report,
         baseline=baseline,
@@ -74,47 +59,24 @@ def html_page(
         unwell=found,
         opened=len(found) <= _MOST_OPEN,
         frames=frames,
-        style=Markup(style),
-        policy=_policy(style),
     )
-    return page
 
 
 @cache
-def _environment() -> Environment:
-    """Return what has the template; it is compiled once."""
-    environment = Environment(
-        loader=PackageLoader(_PACKAGE, _FOLDER),
-        autoescape=True,
-        finalize=page_text.harmless,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
-        "duration": page_text.duration,
-        "counted": counted,
+def _template() -> PageTemplate:
+    """Return the template; it is compiled once."""
+    names = {
         "counts": counts_text,
         "slug": _slug,
         "hint": hint,
         "words": step_words,
-    }
-    environment.globals |= {
         "Verdict": CheckVerdict,
         "UNWELL": UNWELL,
         "same_go": same_go,
         "SAME": SAME,
     }
-    return environment
+    return PageTemplate(__package__, names)
 
 
 def _slug(verdict: CheckVerdict) -> str:
     return verdict.name.lower()
-
-
-def _policy(style: str) -> str:
-    """Return the content security policy: no network, no script, and no style but ours."""
-    style_hash = b64encode(sha256(style.encode()).digest()).decode()
-    return (
-        f"default-src 'none'; style-src 'sha256-{style_hash}'; base-uri 'none'; form-action 'none'"
-    )

@@ -1,0 +1,74 @@
+"""HTML pages that need nothing else; Jinja2 (extra `report`) fills their templates.
+
+A template writes a value through `harmless` and escapes it. Nothing is marked as safe but the
+style sheet and the script of the page, and their hashes are all that the page lets run.
+"""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from collections.abc import Mapping
+from hashlib import sha256
+from importlib.resources import files
+from typing import Any, Final
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from tickrig.host.text import page_text
+from tickrig.host.text.values import counted, format_time
+
+_FOLDER: Final = "template"
+_PAGE: Final = "page.html"
+_STYLE: Final = "page.css"
+
+
+class PageTemplate:
+    """The template of a page, in the folder `template` of a package.
+
+    Args:
+        package: the package.
+        names: filters and globals of the template beside those of all pages.
+        script: the file of its script, empty for none.
+    """
+
+    def __init__(self, package: str, names: Mapping[str, Any], script: str = "") -> None:
+        folder = files(package).joinpath(_FOLDER)
+        self._style = folder.joinpath(_STYLE).read_text("utf-8")
+        self._script = folder.joinpath(script).read_text("utf-8") if script else ""
+        environment = Environment(
+            loader=PackageLoader(package, _FOLDER),
+            autoescape=True,
+            finalize=page_text.harmless,
+            undefined=StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+        )
+        environment.filters |= {
+            "duration": page_text.duration,
+            "size": page_text.size,
+            "seconds": page_text.seconds,
+            "time": format_time,
+            "counted": counted,
+        }
+        environment.filters |= {name: each for name, each in names.items() if name.islower()}
+        environment.globals |= names
+        self._template = environment.get_template(_PAGE)
+
+    def render(self, **values: Any) -> str:
+        """Return the page of these values; the same values give the same bytes."""
+        return self._template.render(
+            style=Markup(self._style),
+            script=Markup(self._script),
+            policy=self._policy(),
+            **values,
+        )
+
+    def _policy(self) -> str:
+        """Return the content security policy: no network, and no style or script but ours."""
+        parts = [("style", self._style), *([("script", self._script)] if self._script else [])]
+        hashes = (
+            f"{kind}-src 'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
+            for kind, text in parts
+        )
+        return "; ".join(["default-src 'none'", *hashes, "base-uri 'none'", "form-action 'none'"])
