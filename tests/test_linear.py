@@ -166,7 +166,7 @@ READERS: Final = {
         ("<robot>", '<robot name="'),
         long=(("<robot>", "\n"),),
     ),
-    "host.canopen.bus_file.yaml_tree": Reader(
+    "host.text.yaml_reader": Reader(
         lambda text: decode_bus_file(text.encode(), Path("bus.yml")), ("nodes: ",), SLOW
     ),
     "host.rtc.canopen.definition_reader": Reader(parse_definition, ("nodes: ",), SLOW),

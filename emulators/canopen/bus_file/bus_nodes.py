@@ -25,7 +25,6 @@ from tickrig.emulators.canopen.bus_file.joint_drive import (
 from tickrig.emulators.canopen.bus_file.node_keys import (
     JOINT_KEYS,
     URDF,
-    BusFileMistake,
     BusMistakesError,
     NodeKeys,
     read_keys,
@@ -43,8 +42,9 @@ from tickrig.emulators.canopen.eds import (
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusSlave
-from tickrig.host.canopen.bus_file.notes import BusFileNotes, FilePlace
+from tickrig.host.canopen.bus_file.notes import BusFileNotes
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
+from tickrig.host.text.document import FileMistake, FilePlace
 from tickrig.wire.canopen.eds.eds_file import EdsError
 
 # What each node of a bus.yml is made of: its EDS, what its master expects, and a joint.
@@ -101,13 +101,13 @@ class NodeMaker:
         bus: BusFile,
         robot: Urdf | None,
         cache: EdsCache,
-        mistakes: list[BusFileMistake],
+        mistakes: list[FileMistake],
         profile: str,
     ) -> None:
         self._bus, self._cache, self._mistakes = bus, cache, mistakes
         self._profile = profile
-        self.remarks: list[BusFileMistake] = []
-        self.added: list[BusFileMistake] = []
+        self.remarks: list[FileMistake] = []
+        self.added: list[FileMistake] = []
         self._joints = dict(self._joints_of(robot)) if robot else {}
         self._robot = (Path(robot.name),) if robot else ()
 
@@ -135,7 +135,7 @@ class NodeMaker:
             else:
                 what = f"node {name!r}" if name else f"node-ID {joint.node_id}"
                 text = f"joint {joint.name!r}: no {what} in {self._bus.path.name}"
-                self.remarks.append(BusFileMistake(joint.place, text))
+                self.remarks.append(FileMistake(joint.place, text))
 
     def _node(self, slave: BusSlave, keys: NodeKeys, sheet: DeviceDescription) -> BusNode:
         sheet = replace(sheet, template=self._identified(slave, sheet.template))
@@ -178,10 +178,10 @@ class NodeMaker:
         if slave.num_channels > 1:
             text = "a drive of several axes (CiA 402-1) is not emulated"
             text = f"{slave.name}: {text}; profile: none for its objects"
-            self._mistakes.append(BusFileMistake(slave.place, text))
+            self._mistakes.append(FileMistake(slave.place, text))
         elif dictionary.find(second) is not None:
             text = f"{slave.name}: of its axes (CiA 402-1) the first one is emulated"
-            self.remarks.append(BusFileMistake(slave.place, text))
+            self.remarks.append(FileMistake(slave.place, text))
 
     def _check_units(self, slave: BusSlave, dictionary: Dictionary) -> None:
         """Tell of speeds that the driver believes in other units; an EDS may have its own."""
@@ -194,14 +194,14 @@ class NodeMaker:
                     f"{slave.name}: scale_vel_to_dev is {axis.scale_vel_to_dev:g}, but the drive"
                     f" counts speeds as positions: {axis.scale_pos_to_dev:g} a second"
                 )
-                self.remarks.append(BusFileMistake(slave.place, text))
+                self.remarks.append(FileMistake(slave.place, text))
 
     def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
         """Note keys of a motor in a node that has none."""
         for name in (*JOINT_KEYS, "modes"):
             if name in slave.extra:
                 text = f"{slave.name}.tickrig.{name}: it is no CiA 402 drive, and has no motor"
-                self._mistakes.append(BusFileMistake(keys.places[name], text))
+                self._mistakes.append(FileMistake(keys.places[name], text))
 
     def _joint(self, slave: BusSlave, keys: NodeKeys) -> JointDrive:
         """Return what moves a node: what its keys say, else the robot, else the driver's scale."""
@@ -223,7 +223,7 @@ class NodeMaker:
         if lower is not None and upper is not None and lower >= upper:
             place = keys.places.get("lower", keys.places.get("upper", slave.place))
             text = f"{slave.name}.tickrig.lower: {lower:g} is not below upper, which is {upper:g}"
-            self._mistakes.append(BusFileMistake(place, text))
+            self._mistakes.append(FileMistake(place, text))
         return JointDrive(**found)
 
     def _completed(
@@ -236,7 +236,7 @@ class NodeMaker:
         if added := missing(dictionary, wanted):
             names = ", ".join(f"{index:04X}h" for index in added)
             text = f"its EDS lacks {names}, which its modes need: they are added"
-            self.added.append(BusFileMistake(slave.place, f"{slave.name}: {text}"))
+            self.added.append(FileMistake(slave.place, f"{slave.name}: {text}"))
         template = complete(dictionary, modes, added, joint.defaults())
         return self._in_units(slave, keys, template, joint)
 
@@ -258,9 +258,9 @@ class NodeMaker:
         if not isclose(found, joint.units, rel_tol=_SAME_UNITS):
             after = f" ({found:g} after the boot-up)" if not isclose(found, given) else ""
             text = f"{differs}{after} by {fix}: its shaft turns by another angle than ROS believes"
-            self.remarks.append(BusFileMistake(place, text))
+            self.remarks.append(FileMistake(place, text))
         elif result is not dictionary and not isclose(given, joint.units, rel_tol=_SAME_UNITS):
-            self.remarks.append(BusFileMistake(place, f"{differs}: {fix} are changed"))
+            self.remarks.append(FileMistake(place, f"{differs}: {fix} are changed"))
         return result
 
     def _asked_for(self, slave: BusSlave, listed: frozenset[int]) -> frozenset[int]:
@@ -277,7 +277,7 @@ class NodeMaker:
                 text = f"mode {number} is not emulated: 6060h refuses it, and so fails the boot-up"
             else:
                 continue
-            self.remarks.append(BusFileMistake(write.place, f"{slave.name}: {text}"))
+            self.remarks.append(FileMistake(write.place, f"{slave.name}: {text}"))
         return frozenset(found)
 
     def _check_start(self, slave: BusSlave, keys: NodeKeys, description: DeviceDescription) -> None:
@@ -293,7 +293,7 @@ class NodeMaker:
                 inputs.check(name, value)
             except ValueError as error:
                 text = f"{slave.name}.tickrig.start.{name}: {error}"
-                self._mistakes.append(BusFileMistake(keys.places.get(name, slave.place), text))
+                self._mistakes.append(FileMistake(keys.places.get(name, slave.place), text))
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,7 +351,7 @@ def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
     made = _made(bus, None, EdsCache(), AUTO)
     notes = BusFileNotes()
     for rule, found in (("tickrig", made.mistakes), ("joint", made.remarks)):
-        for place, text in sorted(found):
+        for place, text, _ in sorted(found):
             if place not in told:
                 notes.note(rule, place, "", text)
     return notes.all
@@ -368,13 +368,13 @@ class _Made(NamedTuple):
     """What became of a file: its slaves, what is wrong, what is odd, what is added."""
 
     nodes: tuple[BusNode, ...]
-    mistakes: list[BusFileMistake]
-    remarks: list[BusFileMistake]
-    added: list[BusFileMistake]
+    mistakes: list[FileMistake]
+    remarks: list[FileMistake]
+    added: list[FileMistake]
 
 
 def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Made:
-    mistakes: list[BusFileMistake] = []
+    mistakes: list[FileMistake] = []
     robot = None
     try:
         robot = _robot(bus, urdf)
@@ -386,12 +386,12 @@ def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Ma
 
 def _nodes_of(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> BusNodes:
     made = _made(bus, urdf, cache, profile)
-    mistakes = [BusFileMistake(FilePlace(one.file, one.line), _said(one)) for one in bus.errors]
+    mistakes = [FileMistake(FilePlace(one.file, one.line), _said(one)) for one in bus.errors]
     mistakes += made.mistakes
     if mistakes:
         raise BusMistakesError(mistakes)
     if not bus.slaves:
-        raise BusMistakesError([BusFileMistake(FilePlace(str(bus.path), 1), "no node with a dcf")])
+        raise BusMistakesError([FileMistake(FilePlace(str(bus.path), 1), "no node with a dcf")])
     remarks = tuple(map(str, (*bus.warnings, *made.remarks, *made.added)))
     return BusNodes(made.nodes, remarks)
 
@@ -410,11 +410,11 @@ def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
         return None
     if not isinstance(item.value, str) or not item.value or "\0" in item.value:
         raise BusMistakesError(
-            [BusFileMistake(item.place, f"options.tickrig.urdf: {item} is no file")]
+            [FileMistake(item.place, f"options.tickrig.urdf: {item} is no file")]
         )
     file = bus.path.parent / item.value
     try:
         return read_urdf(file)
     except OSError as error:
         text = f"options.tickrig.urdf: {file}: {error.strerror}"
-        raise BusMistakesError([BusFileMistake(item.place, text)]) from None
+        raise BusMistakesError([FileMistake(item.place, text)]) from None

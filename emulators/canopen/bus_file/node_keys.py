@@ -1,7 +1,7 @@
 """`tickrig:` in a node of a bus.yml: its motor, gear and switches, its modes and inputs.
 
->>> from tickrig.host.canopen.bus_file.notes import Item, Place
->>> value = Item(100, Place("bus.yml", 7), "100")
+>>> from tickrig.host.text.document import FileMistake, FilePlace, Item
+>>> value = Item(100, FilePlace("bus.yml", 7), "100")
 >>> KEYS["gear_ratio"].take(value)
 100.0
 """
@@ -16,27 +16,11 @@ from typing import Any, Final, NamedTuple
 from tickrig.device.servo.parameters import PRESETS
 from tickrig.emulators.canopen.bus_file.joint_drive import NUMBERS
 from tickrig.emulators.canopen.choices import PROFILES
-from tickrig.host.canopen.bus_file.notes import FilePlace, Item
+from tickrig.host.text.document import FileMistake, FilePlace, Item
 from tickrig.host.text.names import closest, near
 from tickrig.host.text.values import Setting
 
 # What is wrong with a bus.yml and the files that it goes with, a line each.
-
-
-class BusFileMistake(NamedTuple):
-    """One thing that is wrong.
-
-    Attributes:
-        place: its file and line.
-        text: which key, what came, and what was allowed.
-    """
-
-    place: FilePlace
-    text: str
-
-    def __str__(self) -> str:
-        """Write it as compilers do."""
-        return f"{self.place}: {self.text}"
 
 
 class BusMistakesError(ValueError):
@@ -46,7 +30,7 @@ class BusMistakesError(ValueError):
         mistakes: all that is wrong, by file and line.
     """
 
-    def __init__(self, mistakes: Iterable[BusFileMistake]) -> None:
+    def __init__(self, mistakes: Iterable[FileMistake]) -> None:
         self.mistakes = tuple(dict.fromkeys(sorted(mistakes)))
         super().__init__("\n".join(map(str, self.mistakes)))
 
@@ -275,7 +259,7 @@ _ARGUMENTS: Final = {
 
 
 def read_keys(
-    layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[BusFileMistake]
+    layers: tuple[Mapping[str, Item], ...], where: str, mistakes: list[FileMistake]
 ) -> NodeKeys:
     """Read the mappings `tickrig:` that hold for a node; the first that has a key counts.
 
@@ -293,12 +277,12 @@ def read_keys(
             places[name] = item.place
             if name not in KEYS:
                 text = f"no key {str(name)!r}; {near(str(name), list(KEYS))}"
-                mistakes.append(BusFileMistake(item.place, f"{where}.tickrig: {text}"))
+                mistakes.append(FileMistake(item.place, f"{where}.tickrig: {text}"))
                 continue
             try:
                 found[name] = KEYS[name].take(item)
             except ValueError as error:
-                mistakes.append(BusFileMistake(item.place, f"{where}.tickrig.{name}: {error}"))
+                mistakes.append(FileMistake(item.place, f"{where}.tickrig.{name}: {error}"))
             if name == "start":
                 places.update({str(key): each.place for key, each in item.fields.items()})
     return NodeKeys(

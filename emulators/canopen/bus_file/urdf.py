@@ -21,8 +21,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Final
 
-from tickrig.emulators.canopen.bus_file.node_keys import BusFileMistake, BusMistakesError
-from tickrig.host.canopen.bus_file.notes import FilePlace
+from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
+from tickrig.host.text.document import FileMistake, FilePlace
 from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
 from tickrig.wire.canopen.eds.eds_file import decode_text
 from tickrig.wire.canopen.eds.xdd import Element, XddError, read_xml
@@ -97,12 +97,12 @@ def parse_urdf(data: bytes, name: str) -> Urdf:
     """Read the bytes of a file; see `read_urdf`."""
     if len(data) > _MOST_BYTES:
         raise BusMistakesError(
-            [BusFileMistake(FilePlace(name, 1), f"more than {_MOST_BYTES:,} bytes: no URDF")]
+            [FileMistake(FilePlace(name, 1), f"more than {_MOST_BYTES:,} bytes: no URDF")]
         )
     try:
         robot = read_xml(decode_text(data))[0]
     except XddError as error:
-        raise BusMistakesError([BusFileMistake(FilePlace(name, error.line), str(error))]) from None
+        raise BusMistakesError([FileMistake(FilePlace(name, error.line), str(error))]) from None
     return _Reader(name).read(robot)
 
 
@@ -121,7 +121,7 @@ class _Reader:
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._mistakes: list[BusFileMistake] = []
+        self._mistakes: list[FileMistake] = []
 
     def read(self, robot: Element) -> Urdf:
         """Read all joints; BusMistakesError with all that is wrong."""
@@ -226,7 +226,7 @@ class _Reader:
         return None
 
     def _wrong(self, element: Element, text: str) -> None:
-        self._mistakes.append(BusFileMistake(FilePlace(self._name, element.line), text))
+        self._mistakes.append(FileMistake(FilePlace(self._name, element.line), text))
 
 
 def _hint(text: str) -> str:

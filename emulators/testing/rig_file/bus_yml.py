@@ -75,7 +75,7 @@ def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
         top.wrong(str(error), _BUS)
         return {}
     except BusMistakesError as error:
-        for place, text in error.mistakes:
+        for place, text, _ in error.mistakes:
             own = alone and place.file == str(path)
             line = place.line if own else top.notes.document.line_of((_BUS,))
             top.notes.mistakes.append(Mistake(line, text if own else f"{place}: {text}"))

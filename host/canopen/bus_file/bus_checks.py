@@ -8,13 +8,14 @@ from typing import Final
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, DriveChannel
 from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.bus_file.layout import MASTER, OPTIONS, Layout
-from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO
 from tickrig.host.canopen.bus_file.sheet import final_places
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
 from tickrig.host.canopen.eds import read_eds_bytes
+from tickrig.host.text.document import FilePlace
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, INVALID, is_restricted

@@ -18,17 +18,12 @@ from tickrig.host.canopen.bus_file.bus_checks import (
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusMaster, BusSlave, Identity
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, check_keys
 from tickrig.host.canopen.bus_file.layout import Layout, read_layout
-from tickrig.host.canopen.bus_file.notes import (
-    UNSIGNED8,
-    UNSIGNED16,
-    BusFileNotes,
-    BusFileSection,
-    FilePlace,
-)
+from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileNotes, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import CobIds, pdos_after
 from tickrig.host.canopen.bus_file.sheet import UNSET, Sheet, Sheets, Writes
 from tickrig.host.canopen.bus_file.slave_reader import SlaveReader, read_extra
 from tickrig.host.canopen.data_sheet.rule import RuleFinding, Severity
+from tickrig.host.text.document import FilePlace
 from tickrig.wire.canopen.eds.eds_device import HIGHEST_NODE_ID
 from tickrig.wire.canopen.eds.object_table import BIT_RATES_KBIT
 
@@ -251,7 +246,7 @@ def read_bus_file(path: Path) -> BusFile:
 def decode_bus_file(data: bytes, path: Path) -> BusFile:
     """Read the bytes of a bus.yml; see `read_bus_file`."""
     try:
-        from tickrig.host.canopen.bus_file.yaml_tree import read_yaml  # noqa: PLC0415 - an extra
+        from tickrig.host.text.yaml_reader import read_yaml  # noqa: PLC0415 - an extra
     except ModuleNotFoundError as error:
         raise ImportError(_NEEDS_YAML) from error
     notes = BusFileNotes()
@@ -266,8 +261,8 @@ def decode_bus_file(data: bytes, path: Path) -> BusFile:
         notes.note("yaml", place, "", f"the byte 0x{data[error.start]:02x} is no UTF-8")
         return replace(empty, findings=notes.all)
     tree, wrong = read_yaml(text, str(path))
-    for rule, place, reason in wrong:
-        notes.note(rule, place, "", reason)
+    for one in wrong:
+        notes.note(one.rule, one.place, "", one.text)
     if tree is None:
         return replace(empty, findings=notes.all)
     return _Reader(path, read_layout(tree, notes), notes, FilePlace(str(path), 0)).read()

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tickrig.host.canopen.bus_file.notes import FilePlace, Item
+from tickrig.host.text.document import FilePlace, Item
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.nmt import INVALID
 from tickrig.wire.canopen.pdo import MappedObject

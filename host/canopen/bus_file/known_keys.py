@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
-from tickrig.host.canopen.bus_file.notes import BusFileSection, Item
+from tickrig.host.canopen.bus_file.notes import BusFileSection
+from tickrig.host.text.document import Item
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.eds.eds_file import shorten
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Final, NamedTuple, cast
 
-from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace, Item, Key
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
+from tickrig.host.text.document import FilePlace, Item, Key
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 OPTIONS: Final = "options"

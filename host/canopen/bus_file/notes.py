@@ -5,71 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final
 
 from tickrig.host.canopen.data_sheet.rule import RuleFinding, rules_of
+from tickrig.host.text.document import FilePlace, Item, Key
 from tickrig.wire.canopen.eds.eds_file import shorten
-
-# A value of a bus.yml, and the line where it stands.
-
-Key = str | int | float | bool | None
-Scalar = Key
-
-
-class FilePlace(NamedTuple):
-    """A line of a file; 0 is the file as a whole."""
-
-    file: str
-    line: int
-
-    def __str__(self) -> str:
-        """Write it as compilers do."""
-        return f"{self.file}:{max(self.line, 1)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Item:
-    """A value of the file.
-
-    Attributes:
-        value: of a scalar, or the items of a list, or those of a mapping by key.
-        place: where it stands.
-        text: a scalar as it is written, so short that it fits into a line.
-        keys: where the keys of a mapping stand.
-    """
-
-    value: Scalar | tuple[Item, ...] | dict[Key, Item]
-    place: FilePlace
-    text: str = ""
-    keys: Mapping[Key, FilePlace] = field(default_factory=dict)
-
-    @property
-    def fields(self) -> Mapping[Key, Item]:
-        """What a mapping holds; nothing if it is none."""
-        return self.value if isinstance(self.value, dict) else {}
-
-    @property
-    def items(self) -> tuple[Item, ...]:
-        """What a list holds; nothing if it is none."""
-        return self.value if isinstance(self.value, tuple) else ()
-
-    @property
-    def is_list(self) -> bool:
-        """Whether it is a list."""
-        return isinstance(self.value, tuple)
-
-    @property
-    def is_mapping(self) -> bool:
-        """Whether it is a mapping."""
-        return isinstance(self.value, dict)
-
-    def __str__(self) -> str:
-        """Say it in a message."""
-        if self.is_list:
-            return "a list"
-        return "a mapping" if self.is_mapping else repr(self.text) if self.text else "nothing"
-
 
 # All rules for a bus.yml: name, who says so, what breaks, what to do.
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusWrite
-from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection, FilePlace
+from tickrig.host.canopen.bus_file.notes import BusFileNotes, BusFileSection
 from tickrig.host.canopen.eds import read_sheet
+from tickrig.host.text.document import FilePlace
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import (

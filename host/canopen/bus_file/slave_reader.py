@@ -19,15 +19,10 @@ from tickrig.host.canopen.bus_file.known_keys import (
     WRITE,
     check_keys,
 )
-from tickrig.host.canopen.bus_file.notes import (
-    UNSIGNED8,
-    UNSIGNED16,
-    BusFileSection,
-    FilePlace,
-    Item,
-)
+from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet, Writes
+from tickrig.host.text.document import FilePlace, Item
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.nmt import INVALID
 

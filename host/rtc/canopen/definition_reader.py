@@ -1,9 +1,7 @@
 r"""Read a System Definition (ours: K16); YAML, so JSON is read as well.
 
-YAML that says in which line it is wrong.
-
->>> node = _compose("a: 0x10\nb: [1, x]")
->>> _read_table(node, "file", {"a": whole(0, 99), "b": many(whole(0, 9))})
+>>> item = _compose("a: 0x10\nb: [1, x]")
+>>> _read_table(item, "file", {"a": whole(0, 99), "b": many(whole(0, 9))})
 Traceback (most recent call last):
     ...
 tickrig.host.rtc.canopen.definition.DefinitionError: line 2: b: 'x' is not a whole number in 0..9
@@ -16,8 +14,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Final, NoReturn
-
-import yaml
 
 from tickrig.host.rtc.canopen.definition import (
     PDO_COUNT,
@@ -35,59 +31,54 @@ from tickrig.host.rtc.canopen.definition import (
     StartEntry,
     SystemDefinition,
 )
+from tickrig.host.text.document import FilePlace, Item
+from tickrig.host.text.yaml_reader import read_yaml
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
 from tickrig.wire.rtc_canopen import PORT_TYPES, PortDirection
 
-_Reader = Callable[[yaml.Node, str], Any]
-"""Reads a node of the tree; the text says what it is of, for people."""
+_Reader = Callable[[Item, str], Any]
+"""Reads a value of the tree; the text says what it is of, for people."""
 
 
-def _compose(text: str) -> yaml.Node:
+def _compose(text: str) -> Item:
     """Read a text into its tree; DefinitionError if it is no YAML, or empty."""
-    try:
-        root = yaml.compose(text, yaml.SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        raise DefinitionError(f"not YAML: {error.problem}", mark.line + 1 if mark else 0) from error
-    except yaml.YAMLError as error:
-        raise DefinitionError(f"not YAML: {' '.join(str(error).split())}") from error
-    except RecursionError:
-        raise DefinitionError("not YAML that can be read: lists or tables nest too deep") from None
-    if root is None:
+    tree, wrong = read_yaml(text, "")
+    for one in wrong:
+        if one.rule not in _OF_BUS_FILES:
+            raise DefinitionError(one.text, one.place.line)
+    if tree is None:
         raise DefinitionError("the file is empty", 1)
-    return root
+    return tree
 
 
-def _refuse(node: yaml.Node, message: str) -> NoReturn:
-    """Raise a DefinitionError with the line of a node."""
-    raise DefinitionError(message, node.start_mark.line + 1)
+def _refuse(where: Item | FilePlace, message: str) -> NoReturn:
+    """Raise a DefinitionError with the line of a value, or of a key."""
+    place = where.place if isinstance(where, Item) else where
+    raise DefinitionError(message, place.line)
 
 
 def _read_table(
-    node: yaml.Node, place: str, fields: Mapping[str, _Reader], needed: Collection[str] = ()
+    node: Item, place: str, fields: Mapping[str, _Reader], needed: Collection[str] = ()
 ) -> dict[str, Any]:
     """Read a mapping whose keys are known."""
-    nodes = _children(node, place)
-    for key, (key_node, _) in nodes.items():
+    items = _children(node, place)
+    for key, (key_place, _) in items.items():
         if key not in fields:
-            _refuse(key_node, f"{place}: {key!r} is none of: {', '.join(fields)}")
+            _refuse(key_place, f"{place}: {key!r} is none of: {', '.join(fields)}")
     for key in needed:
-        if key not in nodes:
+        if key not in items:
             _refuse(node, f"{place} has no {key!r}")
-    return {key: fields[key](value, key) for key, (_, value) in nodes.items()}
+    return {key: fields[key](value, key) for key, (_, value) in items.items()}
 
 
-def _children(node: yaml.Node, place: str) -> dict[str, tuple[yaml.Node, yaml.Node]]:
-    """Return keys and values of a mapping by the text of the key."""
-    if not isinstance(node, yaml.MappingNode):
+def _children(node: Item, place: str) -> dict[str, tuple[FilePlace, Item]]:
+    """Return the values of a mapping, and the places of their keys, by the text of the key."""
+    if not node.is_mapping:
         _refuse(node, f"{place} is written 'key: value', this is not")
-    nodes: dict[str, tuple[yaml.Node, yaml.Node]] = {}
-    for key_node, value in node.value:
-        key = str(key_node.value)
-        if key in nodes:
-            _refuse(key_node, f"{place}: {key!r} is there twice")
-        nodes[key] = (key_node, value)
-    return nodes
+    for key in node.fields:
+        if isinstance(key, bool) or not isinstance(key, str | int):
+            _refuse(node.keys[key], f"{place}: YAML reads a key as {key}; put it into quotes")
+    return {str(key): (node.keys[key], value) for key, value in node.fields.items()}
 
 
 def table(fields: Mapping[str, _Reader], *needed: str) -> _Reader:
@@ -95,13 +86,13 @@ def table(fields: Mapping[str, _Reader], *needed: str) -> _Reader:
     return lambda node, place: _read_table(node, place, fields, needed)
 
 
-def mapping(key: Callable[[yaml.Node, str], str], value: _Reader) -> _Reader:
+def mapping(key: Callable[[Item, str], str], value: _Reader) -> _Reader:
     """Read a mapping with checked keys."""
 
-    def read(node: yaml.Node, place: str) -> dict[str, Any]:
+    def read(node: Item, place: str) -> dict[str, Any]:
         return {
-            key(key_node, place): value(child, f"{place}.{name}")
-            for name, (key_node, child) in _children(node, place).items()
+            key(Item(name, key_place, name), place): value(child, f"{place}.{name}")
+            for name, (key_place, child) in _children(node, place).items()
         }
 
     return read
@@ -110,10 +101,10 @@ def mapping(key: Callable[[yaml.Node, str], str], value: _Reader) -> _Reader:
 def many(item: _Reader) -> _Reader:
     """Read a list."""
 
-    def read(node: yaml.Node, place: str) -> tuple[Any, ...]:
-        if not isinstance(node, yaml.SequenceNode):
+    def read(node: Item, place: str) -> tuple[Any, ...]:
+        if not node.is_list:
             _refuse(node, f"{place} is a list, this is not")
-        return tuple(item(child, place) for child in node.value)
+        return tuple(item(child, place) for child in node.items)
 
     return read
 
@@ -121,10 +112,10 @@ def many(item: _Reader) -> _Reader:
 def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
     """Read a list whose items differ in the text that `twice` makes of each: `node 5 is there`."""
 
-    def read(node: yaml.Node, place: str) -> tuple[Any, ...]:
+    def read(node: Item, place: str) -> tuple[Any, ...]:
         seen: set[str] = set()
 
-        def unlike(child: yaml.Node, place: str) -> Any:
+        def unlike(child: Item, place: str) -> Any:
             value = item(child, place)
             if (words := twice(value)) in seen:
                 _refuse(child, f"{place}: {words} twice")
@@ -140,7 +131,7 @@ def once(item: _Reader, twice: Callable[[Any], str]) -> _Reader:
 def whole(low: int, high: int) -> _Reader:
     """Read a whole number of a range, decimal or 0x.."""
 
-    def read(node: yaml.Node, place: str) -> int:
+    def read(node: Item, place: str) -> int:
         value = plain(node)
         if type(value) is not int or not low <= value <= high:
             _refuse(node, f"{place}: {value!r} is not a whole number in {low}..{high}")
@@ -149,7 +140,7 @@ def whole(low: int, high: int) -> _Reader:
     return read
 
 
-def rate(node: yaml.Node, place: str) -> float:
+def rate(node: Item, place: str) -> float:
     """Read a number of Hz, above 0 and up to 1 kHz."""
     value = plain(node)
     if type(value) not in (int, float) or not 0 < value <= 1_000:
@@ -157,7 +148,7 @@ def rate(node: yaml.Node, place: str) -> float:
     return float(value)
 
 
-def _flag(node: yaml.Node, place: str) -> bool:
+def _flag(node: Item, place: str) -> bool:
     """Read true or false."""
     value = plain(node)
     if type(value) is not bool:
@@ -165,17 +156,18 @@ def _flag(node: yaml.Node, place: str) -> bool:
     return value
 
 
-def text(node: yaml.Node, place: str) -> str:
+def text(node: Item, place: str) -> str:
     """Read a text, quoted or not."""
-    if not isinstance(node, yaml.ScalarNode) or not node.value:
+    value = node.value if isinstance(node.value, str) else node.text
+    if not value:
         _refuse(node, f"{place} is a text, this is not")
-    return str(node.value)
+    return value
 
 
-def _matching(pattern: re.Pattern[str], like: str) -> Callable[[yaml.Node, str], str]:
+def _matching(pattern: re.Pattern[str], like: str) -> Callable[[Item, str], str]:
     """Read a text of a pattern; `like` shows one to people."""
 
-    def read(node: yaml.Node, place: str) -> str:
+    def read(node: Item, place: str) -> str:
         value = text(node, place)
         if pattern.fullmatch(value) is None:
             _refuse(node, f"{place}: {value!r} is not like {like}")
@@ -187,7 +179,7 @@ def _matching(pattern: re.Pattern[str], like: str) -> Callable[[yaml.Node, str],
 def _one_of(*words: str) -> _Reader:
     """Read one of some words."""
 
-    def read(node: yaml.Node, place: str) -> str:
+    def read(node: Item, place: str) -> str:
         if (value := text(node, place)) not in words:
             _refuse(node, f"{place}: {value!r} is none of: {', '.join(words)}")
         return value
@@ -195,16 +187,15 @@ def _one_of(*words: str) -> _Reader:
     return read
 
 
-def plain(node: yaml.Node) -> Any:
-    """Return what YAML makes of a scalar; of anything else, what it is called."""
-    if not isinstance(node, yaml.ScalarNode):
-        return "a list" if isinstance(node, yaml.SequenceNode) else "a table"
-    try:
-        return yaml.SafeLoader("").construct_object(node)
-    except (yaml.YAMLError, ValueError):  # a date that is none, say
-        return node.value
+def plain(node: Item) -> Any:
+    """Return a scalar; of anything else, what it is called."""
+    if node.is_list:
+        return "a list"
+    return "a table" if node.is_mapping else node.value
 
 
+_OF_BUS_FILES: Final = ("yaml-number", "yaml-value")
+"""Rules of `read_yaml` for values; the readers here say what they take."""
 _LEAVE: Final = ("pre_operational", "stopped")
 _SIZES: Final = (1, 2, 4, 8)
 
@@ -263,12 +254,12 @@ def _fields(ids: Collection[int]) -> dict[str, _Reader]:
     }
 
 
-def _bus(node: yaml.Node, place: str) -> BusEntry:
+def _bus(node: Item, place: str) -> BusEntry:
     fields = {"channel": text, "interface": text, "bitrate": whole(1, 1_000_000)}
     return BusEntry(**_read_table(node, place, fields))
 
 
-def _master(node: yaml.Node, place: str, ids: Collection[int]) -> MasterEntry:
+def _master(node: Item, place: str, ids: Collection[int]) -> MasterEntry:
     fields: dict[str, _Reader] = {
         "node": _NODE_ID,
         "heartbeat_ms": _U16,
@@ -287,10 +278,10 @@ def _master(node: yaml.Node, place: str, ids: Collection[int]) -> MasterEntry:
     return master
 
 
-def _read_nodes(node: yaml.Node) -> tuple[NodeEntry, ...]:
+def _read_nodes(node: Item) -> tuple[NodeEntry, ...]:
     seen: set[int | str] = set()
 
-    def read(node: yaml.Node, place: str) -> NodeEntry:
+    def read(node: Item, place: str) -> NodeEntry:
         entry = _node(node, "a node")
         for word in (entry.id, entry.name):
             if word in seen:
@@ -302,7 +293,7 @@ def _read_nodes(node: yaml.Node) -> tuple[NodeEntry, ...]:
     return entries
 
 
-def _node(node: yaml.Node, place: str) -> NodeEntry:
+def _node(node: Item, place: str) -> NodeEntry:
     pdo = _matching(_PDO, "tpdo2")
     fields: dict[str, _Reader] = {
         "id": _NODE_ID,
@@ -326,7 +317,7 @@ def _node(node: yaml.Node, place: str) -> NodeEntry:
     return NodeEntry(**values)
 
 
-def _ports(node: yaml.Node, place: str) -> dict[str, str]:
+def _ports(node: Item, place: str) -> dict[str, str]:
     names: dict[str, str] = mapping(_matching(_PDO, "tpdo2"), _matching(_NAME, "ai"))(node, place)
     for name, count in Counter(names.values()).items():
         if count > 1:
@@ -334,7 +325,7 @@ def _ports(node: yaml.Node, place: str) -> dict[str, str]:
     return names
 
 
-def _pdo(node: yaml.Node, place: str) -> PdoEntry:
+def _pdo(node: Item, place: str) -> PdoEntry:
     fields: dict[str, _Reader] = {
         "mapping": _mapping,
         "cob_id": whole(0x181, 0x6DF),
@@ -345,7 +336,7 @@ def _pdo(node: yaml.Node, place: str) -> PdoEntry:
     return PdoEntry(**_read_table(node, place, fields))
 
 
-def _sdo_port(node: yaml.Node, place: str) -> SdoPortEntry:
+def _sdo_port(node: Item, place: str) -> SdoPortEntry:
     fields: dict[str, _Reader] = {
         "index": whole(0x1000, 0xFFFF),
         "direction": _one_of(*(item.value for item in PortDirection)),
@@ -355,7 +346,7 @@ def _sdo_port(node: yaml.Node, place: str) -> SdoPortEntry:
     return SdoPortEntry(**{**values, "direction": PortDirection(values["direction"])})
 
 
-def _mapping(node: yaml.Node, place: str) -> tuple[MappedObject, ...]:
+def _mapping(node: Item, place: str) -> tuple[MappedObject, ...]:
     entries = many(whole(0, 0xFFFF_FFFF))(node, place)
     mapped = tuple(MappedObject.parse(entry) for entry in entries)
     if (bits := sum(entry.bits for entry in mapped)) > MAX_PDO_BITS:
@@ -363,7 +354,7 @@ def _mapping(node: yaml.Node, place: str) -> tuple[MappedObject, ...]:
     return mapped
 
 
-def _sdo(node: yaml.Node, place: str, ids: Collection[int]) -> SdoEntry:
+def _sdo(node: Item, place: str, ids: Collection[int]) -> SdoEntry:
     fields: dict[str, _Reader] = {
         "node": _NODE_ID,
         "index": _U16,
@@ -380,11 +371,11 @@ def _sdo(node: yaml.Node, place: str, ids: Collection[int]) -> SdoEntry:
     return entry
 
 
-def _link(node: yaml.Node, place: str, ids: Collection[int]) -> PdoLink:
-    def end(node: yaml.Node, place: str, kind: str) -> PdoName:
+def _link(node: Item, place: str, ids: Collection[int]) -> PdoLink:
+    def end(node: Item, place: str, kind: str) -> PdoName:
         match = _NODE_PDO.fullmatch(text(node, place))
         if match is None or match[2][:4] != kind:
-            _refuse(node, f"{place}: {node.value!r} is not like 16.{kind}2")
+            _refuse(node, f"{place}: {plain(node)!r} is not like 16.{kind}2")
         _check_number(node, place, match[2])
         name = PdoName(int(match[1]), match[2])
         _check_known(node, place, name.node, ids)
@@ -398,7 +389,7 @@ def _link(node: yaml.Node, place: str, ids: Collection[int]) -> PdoLink:
     return PdoLink(ends["from"], ends["to"])
 
 
-def _rt_connection(node: yaml.Node, place: str) -> RtConnection:
+def _rt_connection(node: Item, place: str) -> RtConnection:
     port = _matching(_PORT, "Palette0.ai")
     properties = mapping(text, text)
     fields: dict[str, _Reader] = {"from": port, "to": port, "properties": properties}
@@ -406,8 +397,8 @@ def _rt_connection(node: yaml.Node, place: str) -> RtConnection:
     return RtConnection(values["from"], values["to"], values.get("properties", {}))
 
 
-def _start(node: yaml.Node, place: str, ids: Collection[int]) -> StartEntry:
-    def known(node: yaml.Node, place: str) -> int:
+def _start(node: Item, place: str, ids: Collection[int]) -> StartEntry:
+    def known(node: Item, place: str) -> int:
         node_id: int = _NODE_ID(node, place)
         _check_known(node, place, node_id, ids)
         return node_id
@@ -416,11 +407,11 @@ def _start(node: yaml.Node, place: str, ids: Collection[int]) -> StartEntry:
     return StartEntry(**table({"order": order, "autoactivate": _flag})(node, place))
 
 
-def _check_number(node: yaml.Node, place: str, pdo: str) -> None:
+def _check_number(node: Item, place: str, pdo: str) -> None:
     if int(pdo[4:]) > PDO_COUNT:
         _refuse(node, f"{place}: {pdo}, there are {PDO_COUNT} at most")
 
 
-def _check_known(node: yaml.Node, place: str, node_id: int, ids: Collection[int]) -> None:
+def _check_known(node: Item, place: str, node_id: int, ids: Collection[int]) -> None:
     if node_id not in ids:
         _refuse(node, f"{place}: node {node_id} is none of: {', '.join(map(str, ids)) or 'none'}")

@@ -155,7 +155,7 @@ def test_without_pyyaml_the_extra_is_named(
     write_bus(folder, NODE)
     (folder / "rig.toml").write_text('bus = "bus.yml"\n')
     monkeypatch.setitem(sys.modules, "yaml", None)
-    monkeypatch.delitem(sys.modules, "tickrig.host.canopen.bus_file.yaml_tree", raising=False)
+    monkeypatch.delitem(sys.modules, "tickrig.host.text.yaml_reader", raising=False)
     command = {"tickrig": main, "canopen-slave-emu": emulator}[script]
     result = CliRunner().invoke(command, words.split())
     assert result.exit_code == 2, result.output

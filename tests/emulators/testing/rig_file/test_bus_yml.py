@@ -196,7 +196,7 @@ def test_without_yaml_it_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_system(tmp_path)
-    monkeypatch.delitem(sys.modules, "tickrig.host.canopen.bus_file.yaml_tree", raising=False)
+    monkeypatch.delitem(sys.modules, "tickrig.host.text.yaml_reader", raising=False)
     monkeypatch.setitem(sys.modules, "yaml", None)
     with pytest.raises(RigFileError, match=r"a bus.yml needs PyYAML: pip install 'tickrig\[bus\]'"):
         read_rig_file(path)

@@ -10,11 +10,11 @@ from __future__ import annotations
 import datetime
 import re
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Final
 
 import yaml
 
-from tickrig.host.canopen.bus_file.notes import FilePlace, Item, Key, Scalar
+from tickrig.host.text.document import FileMistake, FilePlace, Item, Key, Scalar
 from tickrig.wire.canopen.eds.eds_file import shorten
 
 _WIDEST: Final = 1_000
@@ -54,16 +54,8 @@ _MEANT: Final = {
 """What is meant by the words of PyYAML, by how they begin."""
 
 
-class YamlFault(NamedTuple):
-    """What is wrong with the YAML: rule, place, reason."""
-
-    rule: str
-    place: FilePlace
-    text: str
-
-
 @lru_cache(maxsize=4)  # PyYAML takes ten times as long as all that is made of its nodes
-def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[YamlFault, ...]]:
+def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...]]:
     """Read a text.
 
     Args:
@@ -76,7 +68,7 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[YamlFault, ...]]
     try:
         root = yaml.compose(text, yaml.SafeLoader)
         if root is None:
-            return None, (YamlFault("yaml", FilePlace(name, 1), "the file is empty"),)
+            return None, (FileMistake(FilePlace(name, 1), "the file is empty", "yaml"),)
         tree = _Tree(name)
         return tree.item(root), tuple(tree.wrong)
     except yaml.reader.ReaderError as error:
@@ -88,7 +80,7 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[YamlFault, ...]]
         line, reason = 1, str(error)
     except RecursionError:
         line, reason = 1, "lists or mappings nest too deep"
-    return None, (YamlFault("yaml", FilePlace(name, line), f"not YAML: {_in_a_line(reason)}"),)
+    return None, (FileMistake(FilePlace(name, line), f"not YAML: {_in_a_line(reason)}", "yaml"),)
 
 
 def _said(problem: str) -> str:
@@ -109,7 +101,7 @@ class _Tree:
     """Makes items of nodes; what an anchor names is made once, so that no file can grow."""
 
     def __init__(self, name: str) -> None:
-        self.wrong: list[YamlFault] = []
+        self.wrong: list[FileMistake] = []
         self._name = name
         self._plain = yaml.constructor.SafeConstructor()
         self._done: dict[int, Item] = {}
@@ -198,7 +190,7 @@ class _Tree:
         return value if value is None or isinstance(value, str | int | float) else str(node.value)
 
     def _wrong(self, rule: str, node: yaml.Node, text: str) -> None:
-        self.wrong.append(YamlFault(rule, self._place(node), text))
+        self.wrong.append(FileMistake(self._place(node), text, rule))
 
     def _place(self, node: yaml.Node) -> FilePlace:
         return FilePlace(self._name, node.start_mark.line + 1)
