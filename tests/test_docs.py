@@ -135,6 +135,22 @@ def decided() -> Iterator[str]:
                 yield first
 
 
+def test_the_architecture_names_rooms_and_modules_that_are_there() -> None:
+    text = (ROOT / "docs/architecture.md").read_text("utf-8")
+    section = text[text.index("## Where is ...?") : text.index("## To add ...")]
+    rows = re.findall(r"^\| \[([\w/]+)\]\([^)]*\) \| (.*) \|$", section, re.MULTILINE)
+    named = [
+        ROOT / room / name
+        for room, cell in rows
+        for item in cell.split("; ")
+        if (head := re.match(r"(?:`\w+`(?:, )?)+(?=: )", item))
+        for name in re.findall(r"\w+", head[0])
+    ]
+    assert len(rows) > 40
+    assert len(named) > 200
+    assert [path for path in named if not (path.with_suffix(".py").exists() or path.is_dir())] == []
+
+
 def test_a_decision_that_is_cited_is_on_a_page() -> None:
     there = set(decided())
     assert {"K3", "K11", "L16", "R28", "U11"} <= there
