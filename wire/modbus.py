@@ -53,6 +53,7 @@ def silence_us(baud: int, frame_bits: int = 10) -> int:
     """
     if baud > 19_200:
         return SHORTEST_SILENCE_US
+    # 3.5 characters, rounded up: 7/2 in whole numbers.
     return -(-7 * frame_bits * 1_000_000 // (2 * baud))
 
 
@@ -133,6 +134,8 @@ def encode_request(request: Request) -> bytes:
         first, values = request.write
         if request.function == WRITE_ONE:
             return out + _PAIR.pack(first, *values)
+        # 10h: 01 00 00 04 08, values: first register, number, bytes. 17h: the same behind
+        # 02 00 00 0C.
         out += _WRITE_HEAD.pack(first, len(values), 2 * len(values)) + _pack_registers(values)
     return out
 
@@ -164,6 +167,8 @@ def encode_response(request: Request, values: Sequence[int] = ()) -> bytes:
         return out + bytes([2 * len(values)]) + _pack_registers(values)
     assert request.write is not None
     first, written = request.write
+    # 01 06 00 11 00 01 is its own echo; 10h and 17h answer differently: 10h with first
+    # register and number (01 10 01 00 00 04), 17h only with what it read.
     return out + _PAIR.pack(first, written[0] if request.function == WRITE_ONE else len(written))
 
 
@@ -193,6 +198,8 @@ def _write(data: bytes, most: int) -> tuple[int, tuple[int, ...]]:
     if len(data) < _WRITE_HEAD.size:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
     first, count, size = _WRITE_HEAD.unpack_from(data)
+    # A wrong byte count is an illegal value (03), whatever the registers are: the standard
+    # judges the numbers of a request before its addresses.
     if not size == 2 * count == len(data) - _WRITE_HEAD.size:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
     _checked(first, count, most)
@@ -202,6 +209,7 @@ def _write(data: bytes, most: int) -> tuple[int, tuple[int, ...]]:
 def _checked(first: int, count: int, most: int) -> int:
     if not 1 <= count <= most:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
+    # Register FFFFh is the last one; a range does not go round to 0000h.
     if first + count > 0x1_0000:
         raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS)
     return count

@@ -25,6 +25,7 @@ ROUNDS: Final = 1 << 16
 
 MAX_LEVEL: Final = 100
 _UCODE: Final = re.compile(r"[0-9A-Fa-f]{32}", re.ASCII)
+# A field holds none of `$`, `,` and `*`: two lines that a lost LF has joined do not match.
 _LINE: Final = re.compile(rb"\$([A-Z]{2}(?:,[0-9A-Za-z]*)*)\*([0-9A-F]{4})")
 
 
@@ -134,6 +135,7 @@ def parse_line(line: bytes) -> UcodeLine:
 def _field(word: str, limit: int | None) -> int | str:
     if limit is None:
         return parse_ucode(word)
+    # The length is looked at before `int`, which would take long for a million digits.
     if not word.isdigit() or len(word) > len(str(limit)):
         raise FieldError(f"{word[:40]!r} is no number of 0..{limit}")
     return int(word)

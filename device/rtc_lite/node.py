@@ -17,6 +17,54 @@ from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteLinkFa
 from tickrig.wire.rtc_lite.frame import REQUESTS, Framing, LiteDecoder, LiteFrame, fault_frame
 from tickrig.wire.rtc_lite.rtno import RtnoDecoder, encode_packet
 
+# Theory of operation
+# ===================
+#
+# The node is the main loop of a small processor: one thing at a time, and a receive buffer
+# of 64 bytes. In each tick of 1 ms, in this order:
+#
+# 1. supply: without power nothing happens, and everything is forgotten
+# 2. `_finish`: the answer whose dead time is over leaves; a frame that was broken off is dropped
+# 3. bytes of the line into the buffer, in pieces of at most 64, and after each piece
+#    the requests in it, one after the other, while the processor is free
+# 4. the timer of an execution context of type 22h, if the processor is free
+#
+# `_free_us` is the processor: 0 while it is free, else the time at which it is free again.
+# Callbacks act at once, and only their answer waits (`callback_ms` for each callback,
+# `slow_answer` beside). Until then no request is read and the timer does not execute: bytes
+# beyond 64 are lost and counted, which is how a proxy with a wrong time-out shows. Whatever
+# sends must go through `_send`, because the dead time begins there.
+#
+# Time-outs of the receiver (DECISION L7) need the time of the latest byte, so they are here
+# and not in the decoder, which knows no time:
+#
+# - 100 ms of silence inside a frame: it is dropped and answered `F K`. Not while bytes wait
+#   in the buffer: those came in time, only the processor was busy.
+# - after `F U` (an unknown command, whose length nobody knows) everything is thrown away
+#   until 20 ms of silence; then the decoder begins to look for a header again.
+#
+# The frames of a dialogue, proxy to device and back (vectors L01 to L14 of the
+# specification):
+#
+# 0A 43 58 9B                               C X        state?
+#       0A 43 58 40 43 1E                   C X '@' 'C'  OK, Created
+# 0A 50 53 02 04 69 6E 2A 00 00 00 AA       P S        2 and 4 bytes: "in" = 42
+#       0A 50 53 40 E3                      P S '@'
+# 0A 41 45 86                               A E        execute
+#       0A 51 56 03 04 6F 75 74 2A .. 30    Q V        "out" = 42: before the reply (L12)
+#       0A 41 45 40 41 07                   A E '@' 'A'  OK, Active
+#
+# What couples to what: server.py answers a request and knows no time; life_cycle.py holds
+# states and callbacks; both can be used without a line. A new request needs its letters
+# (wire codes.py), its lengths in both directions (wire frame.py, because no frame says how
+# long it is) and a case in `LiteServer.answer`; in bridge mode it exists only if RTno has a
+# letter for it (wire rtno.py). The timer follows the state after each request
+# (`_update_timer`): Active and Error are timed, because `on_error` is called once a period
+# as `on_execute` is.
+#
+# Numbers: 64 bytes and 100 ms are RTno's, 20 ms is L7's own, the tick a choice; rates go up
+# to 1000 Hz, what a tick of 1 ms can hold.
+
 # Bytes from the line: a buffer of 64, frames out of it, and time-outs (DECISION L7).
 
 BUFFER_BYTES: Final = 64
@@ -67,6 +115,8 @@ class LiteReceiver:
         """Take bytes from the line, as many as there is room for."""
         if not data:
             return
+        # Before the byte is noted: the silence is the time between the last byte and this
+        # one.
         if self.decoder.lost and now_us - self._received_us >= SILENCE_US:
             self.decoder.clear()
         self._received_us = now_us
@@ -86,6 +136,7 @@ class LiteReceiver:
         """Return the next frame or fault, and leave what follows it in the buffer."""
         for at in range(len(self._waiting)):
             for found in self.decoder.push(self._waiting[at : at + 1]):
+                # After an unknown command the rest of the buffer is noise, too.
                 self._waiting = b"" if self.decoder.lost else self._waiting[at + 1 :]
                 return found
         self._waiting = b""
@@ -276,10 +327,14 @@ class RtcLiteNode(Copyable):
         if not self._on:
             self._boot()
         sent = self._finish(now_us) if self._free_us <= now_us else b""
+        # A tick may bring more than 64 bytes at a high bit rate; a free processor reads
+        # them as they come, so they must not count as one burst. `or 1`: what waits is
+        # served without bytes, too.
         for at in range(0, len(rx) or 1, BUFFER_BYTES):
             self._receiver.push(now_us, rx[at : at + BUFFER_BYTES])
             self._serve(now_us)
         self._run_timer(now_us)
+        # With a dead time the frames stay in `_unsent` until `_finish`.
         return sent if self._free_us else sent + self._take()
 
     def _finish(self, now_us: int) -> bytes:

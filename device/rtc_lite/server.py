@@ -108,7 +108,12 @@ class LiteServer:
             status = LiteStatus.UNSUPPORTED
         else:
             status = self.life.obey(command)
+        # Refused in this state (`H`) or by the timer context (`!`): nothing ran, so nothing
+        # is new. After a failure (`x`) what on_execute wrote before it failed still goes
+        # out.
         executed = command is LiteCommand.EXECUTE and status in (LiteStatus.OK, LiteStatus.ERROR)
+        # The state after the command; with `!` the reply ends behind the status, because
+        # the parser of the proxy takes the length from it (spec, section 4).
         fields = bytes([self.life.state]) if status in WITH_FIELDS else b""
         reply = LiteFrame(command, LiteReply(status, fields).encode())
         return [*self._fresh_data(), reply] if executed else [reply]
@@ -137,6 +142,7 @@ class LiteServer:
         if self.context is not LiteContextType.TIMER or rate_hz not in _RATE_HZ:
             return LiteStatus.UNSUPPORTED
         self.timer.rate_hz = rate_hz
+        # `_update_timer` of the node starts it again, with the new period from now on.
         self.timer.stop()
         return LiteStatus.OK
 

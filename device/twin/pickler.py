@@ -9,6 +9,37 @@ from enum import Enum
 from io import BytesIO
 from typing import Any, Final, NoReturn, TypeVar
 
+# Theory of operation
+# ===================
+#
+# A twin is made by pickling a machine into memory and loading it again, in the same
+# process. `copy.deepcopy` would be the natural way and cannot be used: it takes the bound
+# methods of compiled classes (mypyc) for atoms, and such a copy goes on acting on the
+# original. Pickle asks each object, so it sees them. Rules:
+#
+# - State is data. Attributes may be values, names, bound methods and `functools.partial` of
+#   these; a lambda or a closure cannot be pickled, and `twin` raises TypeError.
+# - Three things are shared and not copied: enumerations, classes, and whatever has the
+#   attribute `shared_by_twins` (descriptions that never change). The pickler puts them into
+#   a list and writes `_shared(place)` in their place; the unpickler finds the name
+#   `_shared` and takes the item from the list. So a stream with shared items can only be
+#   loaded by the call that wrote it, and `_shared` itself raises. A real pickle
+#   (`pickle.dumps`) does not come through `_Pickler` and has everything by value.
+# - Listeners and caches begin empty in a twin (listeners.py), attributes named in
+#   `_new_in_twins` begin with what stands there: the callbacks of the original belong to
+#   somebody outside.
+# - In a `copy.deepcopy` of something larger, `memo` carries over what was copied before and
+#   takes in what is copied here. Pickler and unpickler number their memos alike, which
+#   gives the pairs of original and copy; two twins of one deepcopy then share what their
+#   originals share.
+#
+# `state_of` and `restore` are the two halves of one format. They exist because a compiled
+# class keeps its attributes outside `__dict__` and names them in `__mypyc_attrs__`, which
+# pickle does not know; an interpreted one uses `object.__getstate__`. A class that defines
+# one of `__getstate__` and `__setstate__` by itself must define the other, and hold both
+# kinds. Run `tests/device/ test_twin.py` and `test_copies.py` pure and compiled after a
+# change: most faults here show in one of them only.
+
 T = TypeVar("T")
 
 _NOTHING: Final[Mapping[str, object]] = {}
@@ -88,6 +119,8 @@ class _Pickler(pickle.Pickler):
     def reducer_override(self, item: object) -> Any:
         if isinstance(item, (Enum, type)) or getattr(type(item), "shared_by_twins", False):
             self.shared.append(item)
+        # `_shared` is a function and may be in a memo of before; it must go out by its
+        # name, or the unpickler would not recognise it.
         elif id(item) in self._known and item is not _shared:
             self.shared.append(self._known[id(item)])
         else:

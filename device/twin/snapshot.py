@@ -33,6 +33,31 @@ from typing import Any, Final
 
 from tickrig.device.twin.copyable import NonCopyable
 
+# Theory of operation
+# ===================
+#
+# A snapshot walks over everything that machines refer to, once for each object (`_seen`, by
+# id, which also keeps the objects alive so that no id is used twice), and notes for each
+# what puts it back. It makes no copies of objects: the same ones get their old contents
+# again, so whoever holds one of them need not be told. Kinds of objects, in the order in
+# which they are tried:
+#
+# has `way_back`             asked, not looked into
+# `_NEVER_CHANGES`           not put back, but looked through: a tuple may hold a list
+# `_is_left`                 neither: numbers, classes, modules, loggers, what twins share
+# functions, cells           what they enclose
+# generators, coroutines     only checked: one that has gone on cannot be wound back
+# containers                 contents, then attributes of their subclasses
+# all others                 attributes, in `__dict__` and in slots
+#
+# Whatever keeps state in C and is none of these is refused with TypeError (`_is_plain`): a
+# file or a socket would silently not be put back. So a new kind of state needs a line here
+# or a `way_back` of its own, and the error names its class and its owner.
+#
+# Two details matter. A dictionary is cleared and filled by the methods of `dict` itself,
+# because a subclass may act in its own. An attribute that was not there is deleted again,
+# but only in interpreted classes: compiled ones cannot lose an attribute.
+
 _PutBack = Callable[[], object]
 """Makes one object what it was."""
 
@@ -165,6 +190,7 @@ class _Walk:
         slots = [name for name in _slots_of(kind) if name != "__dict__"]
         values = {name: getattr(item, name) for name in slots if hasattr(item, name)}
         self._find(item, (*kept.values(), *values.values()))
+        # What it refers to was found above; the object itself cannot have changed.
         if getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
             return
         if hasattr(item, "__dict__"):

@@ -57,6 +57,7 @@ def _counted(data: bytes | bytearray) -> int:
 
 
 def _port_data(data: bytes | bytearray) -> int:
+    # 02 04 69 6E 2A 00 00 00: length of the name, length of the data, name, data.
     return 2 + data[0] + data[1] if len(data) >= 2 else 2
 
 
@@ -67,6 +68,7 @@ def _reply(size: int, data: bytes | bytearray) -> int:
 
 def _component(data: bytes | bytearray) -> int:
     if data and data[0] in WITH_FIELDS:
+        # 40 01 01 05 45 63 68 6F 30: '@', one in-port, one out-port, 5 characters "Echo0".
         return 4 + data[3] if len(data) >= 4 else 4
     return 1
 
@@ -217,11 +219,18 @@ class LiteDecoder:
         frame = self._frame
         if len(frame) < 3:
             return None
+        # 0A, Cmnd0, Cmnd1: three bytes are enough to know the layout.
         command = _COMMANDS.get(bytes(frame[1:3]))
         layout = None if command is None else self.layouts.get(command)
+        # Four bytes are the shortest frame, so the checksum that an empty frame would have
+        # is read, too.
         if command is None or layout is None:  # taken as having no data (DECISION L7)
             return LiteLinkFault.UNKNOWN if len(frame) == 4 else None
+        # The checksum, once it has come, is in this slice too. Counts stand before what
+        # they count, so it is never taken for one of them.
         size = layout(frame[3:])
+        # The counts of a damaged frame may announce up to 512 bytes; waiting for them would
+        # swallow the frames behind it.
         if size > MAX_DATA_BYTES:
             return LiteLinkFault.UNKNOWN
         if len(frame) < 4 + size:

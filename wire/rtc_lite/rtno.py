@@ -86,6 +86,7 @@ def _packet_data(frame: LiteFrame) -> bytes:
     if frame.command in _WITHOUT_STATUS or frame.command in _PROFILES:
         return frame.data[1:]
     if frame.command in FAULT_COMMANDS.values():
+        # RTno tells faults as negative numbers: FF, FD and BF for 1, 3 and 65.
         return bytes([-frame.data[0] & 0xFF])
     return frame.data if frame.command is LiteCommand.DATA else frame.data[:1]
 
@@ -125,6 +126,9 @@ class RtnoPacketDecoder:
             if self.lost:
                 break
             self._packet.append(code)
+            # Two header bytes: a single 0A that something else follows is noise. A byte
+            # that is no header is dropped with what came before it, so `0A 41 0A 0A` still
+            # finds the packet.
             if not HEADER.startswith(self._packet[:2]):
                 self._packet.clear()
             elif (found := self._parse()) is not None:
@@ -213,6 +217,8 @@ class RtnoReplies(RtnoPacketDecoder):
         if command in {LiteCommand.STATE, LiteCommand.CONTEXT}:
             return bytes([LiteStatus.OK]) + data
         if command in _PROFILES:
+            # RTno sends no counts with the profile; the P and Q packets before it are
+            # counted instead.
             self._ports[command] = self._ports.get(command, 0) + 1
             return bytes([len(data)]) + data
         if not data or data[0] not in WITH_FIELDS:

@@ -105,6 +105,7 @@ _OCTET: Final = LitePortType("o", "TimedOctet", 1, "B", 0)
 SHORT: Final = LitePortType("s", "TimedShort", 2, "h", 0)
 LONG: Final = LitePortType("l", "TimedLong", 4, "i", 0)
 FLOAT: Final = LitePortType("f", "TimedFloat", 4, "f", 0.0)
+# Four bytes: a double of avr-gcc is a float (DECISION L10).
 _DOUBLE: Final = LitePortType("d", "TimedDouble", 4, "f", 0.0)
 _BOOLEAN_SEQ: Final[LitePortType[tuple[bool, ...]]] = LitePortType(
     "B", "TimedBooleanSeq", 1, "?", ()
