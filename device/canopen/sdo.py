@@ -45,6 +45,62 @@ if TYPE_CHECKING:
     from tickrig.device.canopen.slave import CanopenSlave
 
 
+# Theory of operation
+# ===================
+#
+# A server is in one state at a time, and a state is the method that takes the next request
+# (`State`). Without a transfer that is `_without_transfer`; a transfer object (segmented or
+# block, up or down) hands its own methods to `SdoServer.wait` and ends with `end`. There is
+# one transfer at a time, and the object holds everything about it, so that dropping the
+# state drops the transfer.
+#
+# The frames, client left and server right (CiA 301, 7.2.4.3): toggle bit 10h, n unused bytes,
+# last segment 01h. ii ii ss is the multiplexer: index with its low byte first, sub-index.
+#
+# read, up to 4 bytes     40 17 10 00 ..             4B 17 10 00 E8 03   (43 47 4B 4F: 4 to 1)
+# read, segments          40 08 10 00 ..             41 08 10 00 0A 00 00 00   10 bytes follow
+#                         60                         00 d1 d2 d3 d4 d5 d6 d7
+#                         70                         19 d8 d9 dA   toggle, n = 4, last
+# write, up to 4 bytes    2B 17 10 00 E8 03          60 17 10 00   (22: size of the object)
+# write, segments         21 ii ii ss 0A 00 00 00    60 ii ii ss   (20: no size)
+#                         00 d1 d2 d3 d4 d5 d6 d7    20
+#                         19 d8 d9 dA                30
+# block write             C6 ii ii ss 11 00 00 00    A4 ii ii ss 7F   CRC; 127 in a block
+#                         01 .., 02 .., 83 ..        A2 03 7F   3 came in sequence
+#                         D1 crc crc   n = 4         A1
+# block read              A4 ii ii ss 7F pst         C6 ii ii ss 11 00 00 00
+#                         A3                         01 .., 02 .., 83 ..
+#                         A2 03 7F                   D1 crc crc
+#                         A1
+# abort, either way       80 ii ii ss code
+#
+# Rules that hold for all transfers:
+#
+# - A value is taken or given whole: an upload gives the value of the moment of its first
+#   request, a download changes the object with its last frame or not at all. Watchers and
+#   RPDOs may change the object in between; nobody sees a half-written one.
+# - Refusals are exceptions: whatever raises SdoAbort while a request is worked on (entry,
+#   guard, size check, transfer) ends the transfer in `receive`, with the multiplexer of the
+#   transfer or 0.
+# - A request that does not continue the transfer is judged by `initiate`: a new initiate
+#   ends the old transfer silently, an abort ends it, anything else is 0504 0001h. For
+#   segments a wrong toggle bit is 0503 0000h first. Inside a block there is no such
+#   judgement: each frame but 80h is a segment.
+# - The clock (`due_us`) starts again with each request; after `timeout_us` of silence
+#   `tick` aborts with 0504 0000h. `wait` also wakes the service, `go_on` does not: it runs
+#   for each segment, and the service comes back at the old deadline and sees that there is
+#   a later one.
+# - What comes is counted against the announced size, the object and the memory while it
+#   comes (`DownloadSize`), so that a client cannot fill the memory before it is refused.
+#
+# `_without_transfer` answers the commonest request itself: reading up to four bytes that
+# nobody makes on demand. It must answer exactly as `initiate` would; `by_multiplexer` holds
+# readable entries only, for that reason.
+#
+# Other ends of this dialogue: `wire/canopen/sdo_frame.py` has the command bytes, the client
+# is `host/canopen`. A change of the rules has to be made with the rules of `canmon` and the
+# conformance checks in mind, which judge exactly these points.
+
 # Segmented transfer of one object (CiA 301, SDO download and SDO upload segment).
 
 # Whole numbers and bytes at hand: segments come by the thousand.
@@ -143,9 +199,11 @@ class SegmentedDownload(Part):
         if command & _REQUESTED != _DOWNLOAD_SEGMENT | toggle:
             self._server.go_on_otherwise(request, _DOWNLOAD_SEGMENT)
             return
+        # Bits 3 to 1: how many of the seven bytes are no data.
         data += request[1 : FRAME_BYTES - (command >> 1 & 7)]
         if len(data) > self._most:
             self._size.check(len(data))
+        # Written before the answer: the answer says that the object has the value.
         if command & LAST:
             self._commit()
         self._put(self._taken[toggle])
@@ -182,6 +240,7 @@ class BlockDownload(Part):
         self._server, self._entry = server, entry
         self._data, self._in_sequence, self._finished = bytearray(), 0, False
         self._crc = request[0] & BLOCK_CRC
+        # C2: size indicated; C4: the client can do the CRC; C0: neither.
         indicated = request[0] & BLOCK_SIZE_INDICATED
         announced = int.from_bytes(request[4:], "little") if indicated else None
         self._size = DownloadSize(server, entry, announced)
@@ -197,6 +256,7 @@ class BlockDownload(Part):
             self._in_sequence = due
             self._data += request[1:]
             self._server.go_on()
+        # 80h would be segment 0, which there is not: sequence numbers begin with 1.
         elif head == ClientCommand.ABORT:
             self._server.end()
         else:
@@ -216,8 +276,11 @@ class BlockDownload(Part):
 
     def _acknowledge(self) -> None:
         """Say how far the block was received, and begin the next."""
+        # How much of the last segment is data is said at the end only: seven bytes may be
+        # fill.
         self._size.check(len(self._data) - SEGMENT_BYTES)
         self._block_size = self._server.block_size
+        # A2, the last one in sequence (0 for none), segments of the next block.
         head = bytes([BLOCK_ACKNOWLEDGE, self._in_sequence, self._block_size])
         self._server.respond(head + bytes(5))
         self._in_sequence = 0
@@ -228,6 +291,8 @@ class BlockDownload(Part):
         if request[0] & _END_MASK != BLOCK_END:
             self._server.initiate(request)
             return
+        # C1 with n in bits 4 to 2: bytes of the last segment that are no data. CRC in bytes
+        # 1 and 2.
         data = bytes(self._data[: len(self._data) - (request[0] >> 2 & 7)])
         self._size.check(len(data))
         if len(data) < (self._size.announced or 0):
@@ -254,6 +319,8 @@ class BlockUpload(Part):
         self._next = self._sent = 0
         self._segments = max(1, -(-len(data) // SEGMENT_BYTES))
         self._use_block_size(request[4])
+        # Protocol switch threshold: 0 forbids the switch (CiA 301, initiate SDO block
+        # upload).
         threshold = request[5]
         if threshold and len(data) <= threshold:
             server.upload(data)
@@ -294,6 +361,7 @@ class BlockUpload(Part):
             return
         if request[1] > self._sent:
             raise SdoAbort(AbortCode.SEQUENCE_NUMBER)
+        # Segments behind the acknowledged one are sent again, first in the next block.
         self._next += request[1]
         if self._next == self._segments:
             self._finish()
@@ -502,6 +570,8 @@ class SdoServer(Part):
         if not command & EXPEDITED:
             SegmentedDownload(self, entry, request)
             return
+        # 23, 27, 2B, 2F: 4, 3, 2, 1 bytes; without bit 0 (22h) the size is that of the
+        # object.
         size = EXPEDITED_BYTES - (command >> 2 & 3)
         if not command & SIZE_INDICATED:
             size = min(entry.size or EXPEDITED_BYTES, EXPEDITED_BYTES)
@@ -585,6 +655,8 @@ class SdoServers(Service):
         self._end_all()
         self.default.request_id = REQUEST_COB_ID + self.node.node_id
         self.default.response_id = RESPONSE_COB_ID + self.node.node_id
+        # After a change of the node-ID 1200h follows; it is made read-only whatever the EDS
+        # says.
         self._describe(_CLIENT_TO_SERVER, self.default.request_id)
         self._describe(_SERVER_TO_CLIENT, self.default.response_id)
         for additional in self._additional:
@@ -631,6 +703,8 @@ class SdoServers(Service):
         """Follow a COB-ID that the bus has changed."""
         for additional in self._additional:
             additional.configure()
+            # The CAN-IDs stay in the server until it is valid again; nothing listens to
+            # them meanwhile.
             if not additional.exists:
                 additional.server.end()
         self.node.rewire()

@@ -17,21 +17,34 @@ from tickrig.device.canopen.slave import Application, CanopenSlave, Nonvolatile,
 from tickrig.device.canopen.sync import Sync, TimeStamp
 
 SERVICES: Final[tuple[ServiceMaker, ...]] = (
+    # First of all at boot: the boot-up message and Pre-operational come before what others
+    # do there.
     NmtSlave,
+    # Listens in every state, also without a node-ID.
     LssSlave,
     TimeStamp,
+    # The slave's own SYNC: RPDOs act on it at once, the application and TPDOs behind it in this
+    # tick. A SYNC from the bus is announced when its frame comes.
     Sync,
     PdoConsumer,
+    # Requests act when they come; at this place a server only looks for silent clients.
     SdoServers,
     ParameterStore,
+    # Between what comes in and what goes out: inputs of the tick are read, outputs are
+    # worked out.
     Application,
+    # Carries what the application has left, also in answer to a SYNC of this tick.
     PdoProducer,
     EmcyConsumer,
+    # These three raise errors; the EMCY producer behind them sends the messages in this tick.
     HeartbeatConsumer,
     NodeGuarding,
     ErrorStateEmcy,
     EmcyProducer,
+    # Behind the EMCY producer: the EMCY leaves before the node is Stopped, where it could
+    # not.
     ErrorBehaviour,
+    # Last: the heartbeat shows the state that the tick has led to.
     HeartbeatProducer,
 )
 """NMT, SYNC, RPDO, SDO, application, TPDO, EMCY, heartbeat."""
