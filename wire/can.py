@@ -153,6 +153,26 @@ Frames = tuple[CanFrame, ...]
 """The traffic of one tick on a CAN bus."""
 
 
+# How `frame_bits` counts without looking at single bits.
+#
+# A frame is, from start of frame to the end of the CRC, bits in which a bit of the other
+# value is stuffed behind five equal ones, and then a fixed tail. How many bits are stuffed
+# depends on all of them. An automaton of eight states (value of the last bit, length of its
+# run 1 to 4) reads the bits; a ninth and a tenth state begin a frame in the middle of a
+# byte, because eleven or 29 bits of identifier do not fill bytes: SOF, identifier and
+# control field are put together so that they end on a byte, and the zeros that fill the
+# front are skipped.
+#
+# `_feed` works one byte out for each state; `_rows` turns that into lists that refer to
+# each other, one set for each number of bits stuffed so far (at most 29). Following a byte
+# is then one index into a list, `reduce(getitem, data, row)` follows all of them in C, and
+# the number stands at the end of the row that is reached. `_head` keeps where a frame
+# stands behind its DLC, since the same identifiers come again and again. The CRC of 15 bits
+# is fed like data, with one more bit that differs from its last one and so never completes
+# a run itself.
+#
+# Changes here are judged by tests/wire/test_can_bits.py, which counts single bits. `fd_bits`
+# has the same automaton for the data; in its CRC field the stuff bits stand at fixed places.
 INTERFRAME_BITS: Final = 3
 """Bits of the interframe space (intermission), included in `frame_bits`."""
 
@@ -163,6 +183,8 @@ _CRC_POLYNOMIAL: Final = 0x4599
 # bytes can be fed. Zeros in front of a stream change nothing: the seed is 0.
 _crc16 = crcmod.mkCrcFun(1 << 16 | _CRC_POLYNOMIAL << 1, initCrc=0, rev=False, xorOut=0)
 
+# SOF, identifier, RTR IDE r0, DLC, CRC, then CRC delimiter, ACK slot and delimiter and the
+# seven bits of end of frame. 29 bits: 18 more of the identifier, SRR and r1.
 STANDARD_BITS: Final = 1 + 11 + 3 + 4 + 15 + 10 + INTERFRAME_BITS
 EXTENDED_BITS: Final = STANDARD_BITS + 20
 """Bits of an empty frame without stuff bits."""
@@ -388,6 +410,8 @@ class FdBits(NamedTuple):
     fast: int
 
 
+# Stuff count with its parity (4), CRC 17 or 21, and a fixed stuff bit before each four bits
+# of these.
 _CRC_FIELD: Final = {False: 4 + 17 + 6, True: 4 + 21 + 7}
 """Stuff count, CRC and fixed stuff bits: of no more than 16 bytes, and of more."""
 
@@ -407,6 +431,8 @@ def fd_bits(frame: FdFrame) -> FdBits:
         place = state << 8 | byte
         fast += STUFFED[place]
         state = NEXT[place] >> 8
+    # The automaton stuffs behind the fifth equal bit of the data; there a fixed stuff bit
+    # stands anyway.
     fast -= state >> 2 != (data[-1] if data else length) & 1  # the last bit was a stuff bit
     fast += 8 * len(data) + _CRC_FIELD[len(data) > 16]
     return FdBits(nominal, fast) if frame.flags & BRS else FdBits(nominal + fast, 0)
@@ -417,6 +443,8 @@ def _fd_head(can_id: int, extended: bool, flags: int, dlc: int) -> tuple[int, in
     """Return the bits at each rate but those of data and CRC, and the state before the data."""
     brs, esi = flags & BRS, flags >> 1 & 1
     if extended:
+        # SOF, 11 bits, SRR IDE, 18 bits, RRS FDF r0, BRS; below: SOF, 11 bits, RRS IDE FDF
+        # r0, BRS.
         stream = f"0{can_id >> 18:011b}11{can_id & 0x3_FFFF:018b}010{brs}"
     else:
         stream = f"0{can_id:011b}0010{brs}"
@@ -630,6 +658,7 @@ def parse_line(line: str, number: int = 1) -> LogLine:
             f"line {number} is not like '(0000000000.010000) vcan0 705#7F': {line!r:.60}"
         )
     seconds, micros, channel, text = match.groups()
+    # Bit 29 in eight digits: SocketCAN's mark of an error frame.
     kind: type[CanFrame | ErrorFrame] = ErrorFrame if _ERROR.fullmatch(text) else CanFrame
     try:
         return LogLine(int(seconds) * 1_000_000 + int(micros), channel, kind.parse(text))

@@ -70,6 +70,8 @@ class UartSetting:
         Args:
             characters: how many.
         """
+        # Twice as many half bits: 1.5 stop bits stay whole numbers. Rounded once, over all
+        # characters.
         return int(characters * 2 * self.frame_bits) * PS_PER_S // (2 * self.baud)
 
     def parity_bit(self, value: int) -> int:
@@ -174,6 +176,7 @@ class UartReceiver:
         while self._next < end:
             if self._sampled is not None:
                 yield from self._sample(self._sampled, level)
+            # Nothing can begin: skip to the end of this level at once.
             elif level or not self._idle:
                 self._idle, self._next = bool(level), end
             else:
@@ -187,6 +190,9 @@ class UartReceiver:
         self._next += _OVERSAMPLING
         false_start = len(frame) == 1 and level
         if false_start or len(frame) == self._frame_samples:
+            # Look for an edge from the next sample on, in the middle of the stop bit: a
+            # sender that is a little fast begins its next character before this one has
+            # quite ended.
             self._next = taken + 1
             self._sampled, self._idle = None, bool(level)
             if not false_start:
@@ -211,6 +217,8 @@ class UartReceiver:
 
     def _sample_from(self, t_ps: int) -> int:
         """Return the number of the first sample at or after a time."""
+        # From the number of the sample and not step by step: 16 x 115 200 samples a second
+        # are no whole number of picoseconds apart, and rounding errors would add up.
         return -(-t_ps * _OVERSAMPLING * self.setting.baud // PS_PER_S)
 
     def _time_of(self, sample: int) -> int:

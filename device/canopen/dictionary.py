@@ -35,6 +35,40 @@ def whole_number(value: Value) -> int:
     return value
 
 
+# Theory of operation
+# ===================
+#
+# An entry keeps the bytes that go over the wire, and no other form of the value. Four doors
+# lead to them, and which one is taken decides who is asked and who is told:
+#
+#            access  size  guard  limits   watchers  written   used by
+# download     x      x     x      x          x         x      SDO
+# receive      x      x     x      x          x         x      PDO; what is refused is dropped
+# force                                       x         x      tools inside, in place of the bus
+# assign                                      x                the device itself, resets
+#
+# `watchers` hear of a value that has changed, `written` of each write, the same value too.
+# A service whose object starts something when it is written (1017h, "save") takes
+# `written`, one that follows a value takes `watch`.
+#
+# The order of the checks is that of the abort codes which a client gets: access (0601
+# 0001h, 2h), size (0607 0012h, 13h), what the object itself refuses (its own code), limits
+# (0609 0031h, 32h). The guard stands before the limits because its code says more.
+# Conformance checks judge these codes.
+#
+# `source` makes bytes when the bus reads them (`present`), and then `data` is old. `value`
+# and `number` ask it only if `measured` says that asking has no consequences; a source
+# without it may clear what it reads (interrupt sources of CiA 401) or raise (1003h).
+#
+# `takes_all` opens the straight way for RPDOs (`pdo_mapping._make_write`): with no guard,
+# no `written` and no limits, `download` would end in `assign` anyway. Therefore guards must
+# be hung onto an entry when services are made, before a PDO prepares its mapping; a guard
+# that comes later is not seen until the mapping is prepared again.
+#
+# The description of a dictionary is shared by all slaves of one type and never changes;
+# values are of one slave. `by_multiplexer` is a cache and holds readable entries only (see
+# sdo.py).
+
 # One entry of the object dictionary of a slave: its value, and who acts on it.
 
 _TRUTH: Final = (0, 1)
@@ -132,6 +166,8 @@ class Entry(Part):
 
     def watch(self, changed: OnEntry) -> None:
         """Have `changed` called whenever the value has changed from what it is now."""
+        # The watcher is told of changes from now on, so there must be a value to compare
+        # with.
         if self.measured:
             self.data = self.present()
         self.watchers = (*self.watchers, changed)

@@ -24,6 +24,37 @@ from tickrig.wire.canopen.nmt import CAN_ID_MASK, NmtState
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.errors import FramingError
 
+# Theory of operation
+# ===================
+#
+# Three services turn one event into frames and states, and their order in stack.py is part
+# of it:
+#
+# ErrorStateEmcy, NodeGuarding, HeartbeatConsumer, ...   see the cause: node.emergency(...)
+# EmcyProducer        keeps what is active, 1001h and 1003h, and sends
+# ErrorBehaviour      changes the NMT state afterwards (1029h)
+#
+# An error is a pair of code and five manufacturer-specific bytes, and it is active until
+# the same pair is cleared. `emergency` of an active error does nothing, so whoever sees a
+# cause may raise it in each tick; `emergency_clear` of one that is not active does nothing
+# either. Two RPDOs that are late are two errors, because their numbers are in the bytes.
+# 1001h is the union of the register bits of all that is active, so clearing one error must
+# not clear a bit that another one holds.
+#
+# Two messages of one error, raised and gone, with node-ID 5 and the heartbeat of node 7:
+#
+# 085   30 81 11 07 00 00 00 00    8130h, register: generic and communication, node 7
+# 085   00 00 00 07 00 00 00 00    0000h, nothing is left, the same bytes
+#
+# The register in a message is that of its own moment: `_queue_message` reads it when the
+# message is queued, not when it is sent. Messages wait in Stopped (no EMCY there), in
+# bus-off, and for the inhibit time; 16 at most, and later ones are lost. A reset forgets
+# errors and messages; whoever still sees the cause must raise it again
+# (`ErrorStateEmcy.booted` does). It does so one tick later, because the boot-up message has
+# the larger CAN-ID and would leave behind the EMCY.
+#
+# Numbers: codes and register bits are CiA 301's; the length of the queue is a choice.
+
 # Error behaviour (CiA 301, object dictionary; object 1029h).
 
 _ERROR_BEHAVIOUR: Final = 0x1029
@@ -73,6 +104,8 @@ class ErrorBehaviour(Service):
 
     def act(self, error: int) -> None:
         """Act in this tick on an error, given by its sub-index."""
+        # Noted, and acted on at its place in the tick: the EMCY of the same error leaves
+        # first.
         self._errors.append(error)
         self.schedule(self.node.now_us)
 
@@ -188,6 +221,8 @@ class EmcyProducer(Service):
     def tick(self, now_us: int) -> None:
         """Send what the inhibit time lets pass."""
         cob_id = self._cob_id
+        # Without a valid 1014h nothing will ever be sent: old messages must not come out
+        # when it is set.
         if cob_id is None or not is_valid(cob_id.number):
             self._queue.clear()
             return
@@ -204,6 +239,7 @@ class EmcyProducer(Service):
         register = self.register
         if self._register is not None:
             self._register.assign(bytes([register]))
+        # 1001h above follows the error even if its message is lost.
         if len(self._queue) < _QUEUE_LENGTH:
             self._queue.append(Emcy(code, register, text).encode())
         self.schedule(self._free_us)
@@ -236,6 +272,8 @@ class ErrorHistory(Part):
         count = min(self._count.number + 1, len(self._fields))
         for sub in reversed(range(1, count)):
             self._fields[sub].assign(self._fields[sub - 1].data)
+        # 1003h:01 = 07 00 81 30h as a number: the error code in the low half, additional
+        # information above.
         self._fields[0].assign(code.to_bytes(2, "little") + text[:2].ljust(2, b"\0"))
         self._count.assign(bytes([count]))
 
@@ -354,6 +392,8 @@ class ErrorStateEmcy(Service):
         if state is ErrorState.BUS_OFF:
             node.communication_error()
             return
+        # Raised and cleared at once: 8140h says that something is over, and nothing is
+        # wrong any more.
         if old is ErrorState.BUS_OFF:
             node.emergency(EmcyCode.BUS_OFF_RECOVERED, ErrorRegister.COMMUNICATION)
             node.emergency_clear(EmcyCode.BUS_OFF_RECOVERED)

@@ -57,6 +57,9 @@ class MessageSequence(Part):
 
     def take(self, step: int, address: LssAddress, number: int) -> bool:
         """Take a message. Returns: whether it was the last one and all of them fit."""
+        # 40h vendor, 41h product, 42h revision, 43h serial number: the first one begins
+        # anew, and one that does not fit or is out of order spoils the whole until the next
+        # first one.
         if step == 0:
             self._step = 0
         part, fits = self._tests[step]
@@ -80,8 +83,11 @@ class FastScanner(Part):
             return LssMode.WAITING
         if request.bit_check > _MAX_BIT or request.sub != self._sub:
             return None
+        # Bits from 31 down to `bit_check` must agree; those below are not asked for yet.
         if (address[self._sub] ^ request.id_number) >> request.bit_check:
             return None
+        # Bit 0 agrees, so the whole part is known: only then the scan goes on to the next
+        # one.
         if request.bit_check:
             return LssMode.WAITING
         return self._advance(request)
@@ -165,6 +171,7 @@ class LssSlave(Service):
         self._answer(command, LssError.NONE if allowed else LssError.OUT_OF_RANGE)
 
     def _switch_global(self, data: bytes) -> None:
+        # 04 01: all slaves to configuration; 04 00: back to waiting.
         if data[1] == LssMode.CONFIGURATION:
             self._mode = LssMode.CONFIGURATION
         elif data[1] == LssMode.WAITING:
@@ -197,18 +204,23 @@ class LssSlave(Service):
             self._answer(LssCommand.IDENTIFIED)
 
     def _configure_node_id(self, data: bytes) -> None:
+        # 11 nn: the node-ID of the next reset; FFh makes the slave unconfigured again.
         allowed = data[1] in _NODE_IDS
         if allowed:
             self.node.pending_id = data[1]
         self._acknowledge(LssCommand.CONFIGURE_NODE_ID, allowed)
 
     def _configure_bit_timing(self, data: bytes) -> None:
+        # 13 table index: 13 00 04 is 125 kbit/s.
         allowed = data[1] == STANDARD_TABLE and data[2] in BIT_RATES
         if allowed:
             self._bit_rate_index = data[2]
         self._acknowledge(LssCommand.CONFIGURE_BIT_TIMING, allowed)
 
     def _activate_bit_timing(self, data: bytes) -> None:
+        # 15 ll hh: switch delay in ms. It passes twice: until the switch, so that all nodes
+        # are quiet when the first of them changes, and after it, so that all have changed
+        # when the first one sends.
         delay_us = int.from_bytes(data[1:3], "little") * 1_000
         self._switch_us = self.node.now_us + delay_us
         self.node.silent_until_us = self._switch_us + delay_us
@@ -216,6 +228,8 @@ class LssSlave(Service):
 
     def _store(self, data: bytes) -> None:
         nonvolatile = self.node.nonvolatile
+        # 17: what was configured and not what is active; it may not have been activated
+        # yet.
         nonvolatile.node_id = self.node.pending_id
         nonvolatile.bit_rate_index = self._bit_rate_index
         nonvolatile.changed()

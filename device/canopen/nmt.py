@@ -49,6 +49,8 @@ class NmtSlave(Service):
         self.node.send(ERROR_CONTROL_COB_ID + self.node.node_id, bytes([NmtState.INITIALISING]))
         self.node.enter(NmtState.PRE_OPERATIONAL)
         startup = self.node.dictionary.find(_NMT_STARTUP)
+        # 1F80h = 8: bits 0 (is the NMT master), 2 and 3 are 0, 0 and 1; bit 1 concerns
+        # masters only.
         if startup is not None and startup.number & _SELF_START_MASK == _SELF_START:
             self.node.enter(NmtState.OPERATIONAL)
 
@@ -63,6 +65,7 @@ class NmtSlave(Service):
 
     def _receive(self, frame: CanFrame) -> None:
         """Obey; what is not a command for this node is ignored."""
+        # 000#8105: command, node-ID; 000#8100: all nodes.
         if len(frame.data) != 2 or frame.data[1] not in (ALL_NODES, self.node.node_id):
             return
         try:
@@ -116,6 +119,7 @@ class HeartbeatProducer(Service):
         else:
             node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
         self._begins = False
+        # From the last due time, not from now: no drift.
         self._due_us += period_us
         self.schedule(self._due_us if period_us else NEVER)
 
@@ -124,6 +128,8 @@ class HeartbeatProducer(Service):
 
     def _begin(self) -> None:
         """Count from the next tick on, or from this one; not before the boot-up message."""
+        # While the node initialises the values of a reset arrive here, too; `booted` begins
+        # then.
         if self.node.state is not NmtState.INITIALISING:
             self._begins = True
             self.schedule(0)
@@ -185,6 +191,7 @@ class NodeGuarding(Service):
         if self._heartbeat_instead:
             return
         node = self.node
+        # 705#7F, 705#FF, 705#7F: the toggle bit is bit 7, Pre-operational the other seven.
         node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([self._toggle | node.state]))
         self._toggle ^= _TOGGLE
         node.emergency_clear(EmcyCode.HEARTBEAT, b"")
@@ -241,6 +248,8 @@ class Monitor(Part):
             return
         self.nmt_state = frame.data[0]
         before, self.watch = self.watch, Watch.ALIVE
+        # The deadline moves, the schedule stays: the service wakes at the old one and looks
+        # again. Rescheduling at each heartbeat would cost more than that one look.
         self.deadline_us = self._consumer.node.now_us + self.period_us
         if before is not Watch.ALIVE:
             if before is Watch.LOST:
@@ -330,6 +339,7 @@ class HeartbeatConsumer(Service):
 
 
 def _node_id(value: int) -> int:
+    # 1016h: 00 nn tttt: node-ID in bits 16 to 23, time in ms in bits 0 to 15.
     return value >> 16 & 0xFF
 
 

@@ -68,6 +68,7 @@ class ParameterStore(Service):
         ]
         for entry in self._entries:
             entry.guard, entry.written = _check_signature, self._act
+            # "save" is 65766173h, beyond any limits of what the object reads as.
             entry.takes_commands = True
 
     def start(self) -> None:
@@ -86,6 +87,8 @@ class ParameterStore(Service):
         for entry in self.node.dictionary:
             if entry.index not in area or not self._is_parameter(entry):
                 continue
+            # A default that was stored as a number would stay with the old node-ID for
+            # ever.
             if entry.data == entry.description.power_on_data(node_id):
                 stored.pop(entry.key, None)
             else:
@@ -228,6 +231,7 @@ class BootLoader(Part):
 
     def _flash(self, entry: Entry) -> None:
         self._keep(entry.data)
+        # The program is in the flash; 1F50h itself holds nothing to be read or stored.
         entry.assign(b"")
 
     def _keep(self, program: bytes) -> None:
@@ -246,6 +250,7 @@ class BootLoader(Part):
 
     def _status(self, entry: Entry) -> bytes:
         busy = self._node.now_us < self._busy_us
+        # 1F57h: bit 0 busy, bits 1 to 7 the error.
         return (busy | self._error << 1).to_bytes(4, "little")
 
 

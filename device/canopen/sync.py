@@ -107,8 +107,12 @@ class Sync(Service):
             self._due_us = now_us + self.period_us
             self.schedule(self._due_us)
             return
+        # From the last due time, without drift; a period below the tick still means one
+        # SYNC a tick.
         self._due_us = max(self._due_us + self.period_us, now_us + 1)
         self.schedule(self._due_us)
+        # 080#01, 080#02, ..., 080#nn, 080#01: counts from 1, and 0 stands for "without a
+        # counter".
         self._counter = self._counter % self.overflow + 1 if self.overflow else 0
         self.node.send(self.can_id, bytes([self._counter] if self._counter else []))
         self._announce(self._counter)
@@ -127,6 +131,8 @@ class Sync(Service):
 
     def _announce(self, counter: int) -> None:
         node = self.node
+        # In the order of the list: RPDOs, TPDOs, application. Observers of the slave come
+        # after all.
         for notify in node.sync_handlers:
             notify(counter)
         for notify in node.on_sync:
@@ -150,6 +156,8 @@ class Sync(Service):
         can_id, producer = cob_id & CAN_ID_MASK, bool(cob_id & FLAG_30)
         if cob_id & _NOT_IN_A_CAN_ID or is_restricted(can_id):
             raise SdoAbort(AbortCode.VALUE_RANGE)
+        # A producer needs 1006h; while it produces, the CAN-ID must not change (CiA 301,
+        # 1005h).
         if producer and (self._period is None or (self._produces and can_id != self.can_id)):
             raise SdoAbort(AbortCode.VALUE_RANGE)
 

@@ -187,6 +187,7 @@ def _encode(kind: DataType, value: Value) -> bytes:
 DAY_MS: Final = 86_400_000
 _MAX_DAYS: Final = 0xFFFF
 
+# B0 A4 29 04 31 43: 28 bits of milliseconds, 4 reserved, 16 bits of days.
 _LAYOUT: Final = struct.Struct("<IH")
 _MS_MASK: Final = 0x0FFF_FFFF
 """The upper four bits are reserved."""

@@ -16,6 +16,8 @@ from tickrig.wire.errors import FramingError
 
 TEXT_BYTES: Final = 5
 
+# 30 81 11 07 00 00 00 00: error code 8130h, error register 11h, five manufacturer-specific
+# bytes.
 _LAYOUT: Final = struct.Struct("<HB5s")
 
 
@@ -116,6 +118,8 @@ def describe(code: int) -> str:
     >>> describe(0xFF01), describe(0x4711), describe(0x0001)
     ('CANopen device specific, generic error', 'temperature, generic error', 'unknown')
     """
+    # From the code itself to its class: 8131h reads as 8130h, 8190h as 8100h. 0000h is no
+    # class.
     for mask in (0xFFFF, 0xFFF0, 0xFF00, 0xF000):
         text = _TEXTS.get(code & mask)
         if text is not None and (code & mask or not code):

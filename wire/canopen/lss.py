@@ -38,8 +38,10 @@ BIT_RATES: Final = {
 FASTSCAN_RESET: Final = 0x80
 """Bit Check that begins a fastscan."""
 
+# cs, four bytes with the low one first, three reserved: 40 9A 02 00 00 00 00 00.
 _NUMBER: Final = struct.Struct("<xI3x")
 _MESSAGE: Final = struct.Struct("<BI3x")
+# 51, IDNumber (4), BitCheck, LSSSub, LSSNext.
 _FASTSCAN: Final = struct.Struct("<BIBBB")
 
 

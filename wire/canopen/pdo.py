@@ -51,6 +51,7 @@ class MappedObject:
     @classmethod
     def parse(cls, value: int) -> MappedObject:
         """Read the 32 bits of an entry."""
+        # 6040 00 10h: index, sub-index, length in bits.
         return cls(value >> 16 & 0xFFFF, value >> 8 & 0xFF, value & 0xFF)
 
     def encode(self) -> int:
@@ -75,6 +76,7 @@ class Scanned:
     @classmethod
     def parse(cls, value: int) -> Scanned:
         """Read the 32 bits of an entry."""
+        # bb iiii ss: block size, index, first sub-index.
         return cls(value >> 8 & 0xFFFF, value & 0xFF, value >> 24 & 0xFF)
 
     def encode(self) -> int:
@@ -160,6 +162,7 @@ class Mpdo:
 
     def encode(self) -> bytes:
         """Return the data of a frame."""
+        # 85 00 20 01 d1 d2 d3 d4: destination mode and node 5, index, sub-index, data.
         address = self.node_id | (_DESTINATION if self.destination else 0)
         head = bytes((address, self.index & 0xFF, self.index >> 8, self.sub))
         return head + self.data.ljust(MPDO_DATA_BYTES, b"\0")

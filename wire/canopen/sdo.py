@@ -108,6 +108,7 @@ class _Initiate:
         indicated = bool(command & SIZE_INDICATED)
         if not command & EXPEDITED:
             return cls(*at, size=int.from_bytes(frame[4:], "little") if indicated else None)
+        # 22h: no size is said, so all four bytes are data as far as the frame goes.
         size = EXPEDITED_BYTES - (command >> 2 & 3) if indicated else EXPEDITED_BYTES
         return cls(*at, frame[4 : 4 + size], size if indicated else None)
 

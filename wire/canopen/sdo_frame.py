@@ -111,6 +111,20 @@ EXPEDITED_BYTES: Final = 4
 SEGMENT_BYTES: Final = 7
 MAX_BLOCK_SIZE: Final = 127
 
+# The command byte, bit by bit (CiA 301, 7.2.4.3):
+#
+#                          7 6 5   4    3 2    1    0
+# initiate, both ways      cs      0    n      e    s    n: bytes of 4 that are unused
+# segment, both ways      0 0 0    t    n n    n    c    n: bytes of 7 that are unused
+# other segment frame      cs      t    0 0    0    0
+# block segment             c      sequence number 1..127
+# block initiate           cs      0    0 crc  s    subcommand   s: size indicated
+# block end                cs      n    n n    0    subcommand   n: of the last segment
+# ... of an upload         cs      0    0 crc  subcommand, two bits
+#
+# The specifiers of client and server differ (a download is 20h there and 60h here), and in
+# a block the first byte has no specifier at all: who reads a frame must know which side
+# sent it, and whether a block is running.
 TOGGLE: Final = 0x10
 LAST: Final = 0x01
 """Bit c of a segment: no more segments."""
@@ -162,6 +176,7 @@ def frame_at(command: int, index: int, sub: int, rest: bytes = b"") -> bytes:
     """Return a frame of command byte, multiplexer and up to 4 bytes."""
     if not 0 <= index <= 0xFFFF or not 0 <= sub <= 0xFF:
         raise FieldError(f"{index:X}h:{sub:X} is not in 0000h:00 to FFFFh:FF")
+    # 40 17 10 00 00 00 00 00 reads 1017h:00.
     return bytes([command, index & 0xFF, index >> 8, sub]) + rest.ljust(4, b"\0")
 
 
@@ -227,6 +242,7 @@ class _BlockInitiate:
 
     def encode(self) -> bytes:
         """Return the 8 bytes."""
+        # C0h both ways: a client's block download and a server's answer to block upload.
         command = 0xC0 | self.crc * BLOCK_CRC
         if self.size is not None:
             command |= BLOCK_SIZE_INDICATED
@@ -377,6 +393,8 @@ class BlockEnded:
         return cls()
 
 
+# x^16 + x^12 + x^5 + 1 from 0, not reflected: "123456789" gives 31C3h (CiA 301, CRC of SDO
+# block).
 _crc: Final = crcmod.mkCrcFun(0x1_1021, initCrc=0, rev=False, xorOut=0)
 
 

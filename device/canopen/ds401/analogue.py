@@ -76,6 +76,7 @@ class Converter(Immutable):
     def counts(self, quantity: float) -> int:
         """Return what the object holds for a quantity, which is limited to the range."""
         part = (min(max(quantity, self.low), self.high) - self.low) / (self.high - self.low)
+        # Half up; the shift is that of CiA 401, which wants counts left-justified.
         return floor(self.low_raw + part * (self.high_raw - self.low_raw) + 0.5) << self.shift
 
     def quantity(self, counts: int) -> float:
@@ -231,6 +232,8 @@ class EventRule(Part):
         change = now - self._sent
         delta, negative, positive = (_quantity(entry) for entry in self._deltas)
         events = (
+            # The bits of 6421h: 0 upper limit, 1 lower limit, 2 delta, 3 negative, 4
+            # positive delta.
             self._upper is not None and before < _quantity(self._upper) <= now,
             self._lower is not None and before >= _quantity(self._lower) > now,
             abs(change) > delta,
@@ -373,6 +376,7 @@ class AnalogueInput(Part):
 
 def _justified(counts: int, from_bits: int, to_bits: int) -> int:
     """Return left-justified counts in another width."""
+    # A power of two is exact in floating point, for either direction; floor keeps the sign.
     return floor(counts * 2.0 ** (to_bits - from_bits))
 
 

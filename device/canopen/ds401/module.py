@@ -30,6 +30,42 @@ from tickrig.device.twin import Immutable, Part
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
 
+# Theory of operation
+# ===================
+#
+# The module works once a tick, in `on_execute`, and only in ticks in which something asks
+# for it: a physical input was set, one of its objects was written, the NMT state changed,
+# or the input filter of the digital inputs is due. In it, in this order:
+#
+# 1. faults of the module: EMCY and 1029h; outputs go to their error values at once
+# 2. digital inputs: filter, polarity, then which objects changed by the interrupt masks
+# 3. analogue inputs: converter, scaling, then limits and deltas (`EventRule`)
+# 4. outputs: from the objects, or the error values while `failed`
+#
+# Inputs come before TPDOs and outputs after RPDOs because the application stands between
+# both in the tick (stack.py). A value that is read at 2 or 3 leaves in the TPDO of the same
+# tick.
+#
+# Who decides about an event: the PDO producer takes each change of a mapped object for one,
+# unless its key is in `quiet`. The module puts all its input objects there in `power_on`
+# and calls `request_for` itself. So a mapped input whose masks forbid the event stays
+# silent, though its object changes. `_sent` closes the circle: deltas of analogue inputs
+# count from what was sent last, by whatever TPDO and for whatever reason, so the producer
+# reports each transmission.
+#
+# `power_on` sets these lists anew and does not append: it runs at each power-on of the same
+# objects.
+#
+# Outputs have two masters, the objects and the error mode. Stopped, a communication error
+# (lost heartbeat, bus-off) and a fault set `failed`; Operational ends it, unless a fault
+# that stops outputs is still there. Both directions go through `_fail`, which asks for a
+# tick: `state_changed` and `communication_error` may come in ticks in which nothing else
+# happens.
+#
+# Sources: CiA 401 for objects, masks, triggers, error modes and defaults (families.py has
+# its tables); where an object is missing, digital events are on (6005h), analogue ones too
+# (6423h), and a scaling of 0 counts as 1, because many EDS files leave it so.
+
 # What a module finds wrong with itself, and what it reports.
 
 _NO_BEHAVIOUR: Final = 0

@@ -77,6 +77,7 @@ def make_pack(slots: tuple[Slot, ...]) -> Pack:
         return _Bits(slots).pack
     if any(entry.source is not None for entry in entries):
         return partial(_join_present, entries)
+    # `partial` and attribute getters in place of lambdas: a slave is copied by pickle.
     return partial(_data, entries[0]) if len(entries) == 1 else partial(_join, entries)
 
 
@@ -99,6 +100,8 @@ def make_unpack(slots: tuple[Slot, ...]) -> Unpack:
 
 def _make_write(entry: Entry) -> Unpack:
     """Return what writes an entry from a PDO: the straight way if nobody judges the entry."""
+    # A read-only object that a default mapping names is written, too; `download` would
+    # refuse it.
     straight = entry.takes_all or not entry.description.writable
     return entry.assign if straight else entry.receive
 
@@ -214,6 +217,7 @@ class MpdoQueue(TpdoMode):
         while self._waiting and self._free_us <= now_us:
             frame = self._waiting.pop(next(iter(self._waiting)))
             self.sender.send(frame if isinstance(frame, bytes) else self._frame_of(frame))
+            # The inhibit time is between frames of this CAN-ID, whatever object they carry.
             self._free_us = now_us + self._inhibit_us
         self.due_us = self._free_us if self._waiting else NEVER
 
@@ -357,6 +361,8 @@ class PdoMapping(Part):
 
     def _slot(self, mapped: MappedObject) -> Slot:
         """Find an object; SdoAbort if there is none or it has not so many bits."""
+        # 0005 00 08h: eight bits that an RPDO carries and nobody takes (CiA 301, dummy
+        # mapping).
         if mapped.sub == 0 and mapped.index in _DUMMIES and self._direction is Access.RPDO:
             if not 0 < mapped.bits <= _DUMMIES[mapped.index]:
                 raise SdoAbort(AbortCode.NOT_MAPPABLE)
@@ -372,6 +378,8 @@ class PdoMapping(Part):
             raise SdoAbort(AbortCode.NOT_MAPPABLE)
 
     def _check_object(self, entry: Entry, value: Value) -> None:
+        # Mapping procedure (CiA 301, PDO mapping parameter): bit 31 of the COB-ID, then
+        # sub-index 0 to 0, then the objects, then sub-index 0, then the COB-ID.
         if self._parameters.valid or self.count:
             raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
         mapped = MappedObject.parse(whole_number(value))

@@ -68,6 +68,8 @@ class PdoParameters(Part):
     def valid(self) -> bool:
         """Whether the PDO exists, with a CAN-ID that it may have."""
         cob_id = self._number(COB_ID, INVALID)
+        # A default of an EDS may hold what a write would be refused for: such a PDO does
+        # not exist.
         return not cob_id & (INVALID | _NOT_IN_A_CAN_ID) and not is_restricted(cob_id & CAN_ID_MASK)
 
     @property
@@ -235,6 +237,8 @@ class SynchronousCyclic(TpdoMode):
 
     def _await_start(self, counter: int) -> None:
         if counter in (0, self._start):
+            # The SYNC with the start value is the first transmission; without a counter the
+            # n-th is.
             self._left = 1 if counter else self._period
             self.on_sync = self._counting
             self.on_sync(counter)
@@ -294,6 +298,8 @@ class EventDriven(TpdoMode):
         elif now_us < self._free_us:
             self._marked, self.due_us = True, self._free_us
         else:
+            # Cleared before it is sent: what the transmission itself sets off is an event
+            # of the next one.
             self._marked, self._free_us = False, now_us + self._inhibit_us
             self._time_anew(now_us)
             self.sender.send()

@@ -89,6 +89,8 @@ class Rpdo(Part):
             return None
         self._unpack, self._length = target
         self._event_us = self.parameters.event_us
+        # With no error noted and no deadline a frame of the right length has nothing to
+        # judge: the common case is one comparison in `_take` and `_keep`.
         self._supervised = bool(self._errors or self._event_us)
         if self.synchronous:
             return self._keep
@@ -135,6 +137,8 @@ class Rpdo(Part):
     def _keep(self, frame: CanFrame) -> None:
         """Keep a frame for the next SYNC."""
         data = frame[1]
+        # Synchronous window (1007h): a frame that comes later than so long after SYNC is
+        # dropped.
         if self._consumer.window_is_over:
             return
         if (len(data) == self._length and not self._supervised) or self._passes(data):
@@ -147,6 +151,7 @@ class Rpdo(Part):
 
     def _passes(self, data: bytes) -> bool:
         """Judge length and time. Returns: whether the frame can be used."""
+        # Too short: not used (8210h). Too long: used, and the bytes behind ignored (8220h).
         if len(data) < self._length:
             self._break(EmcyCode.PDO_TOO_SHORT)
             return False
@@ -228,6 +233,7 @@ class PdoConsumer(Service):
         """Listen to the RPDOs that exist."""
         if state is not NmtState.OPERATIONAL:
             return
+        # `listen` also prepares the mapping: rewiring is what makes a new mapping count.
         listening = [(rpdo, rpdo.listen()) for rpdo in self.rpdos]
         self._synchronous = tuple(
             rpdo for rpdo, handler in listening if handler is not None and rpdo.synchronous
@@ -242,6 +248,7 @@ class PdoConsumer(Service):
             return
         rpdos = [rpdo for rpdo in self.rpdos if rpdo.parameters.valid and rpdo.reconfigures]
         yield from (rpdo.parameters.can_id for rpdo in rpdos)
+        # SYNC hands over what synchronous RPDOs hold, so it can reconfigure what they can.
         sync = self.node.dictionary.find(COB_ID_SYNC)
         if sync is not None and any(rpdo.synchronous for rpdo in rpdos):
             yield sync.number & CAN_ID_MASK

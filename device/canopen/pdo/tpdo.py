@@ -38,6 +38,43 @@ from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import DAM_MPDO, SAM_MPDO
 from tickrig.wire.instant import NEVER
 
+# Theory of operation
+# ===================
+#
+# A TPDO is parameters (1800h..), a mapping (1A00h..) and a mode, which is its transmission
+# type at work. Parameters and mapping live as long as the slave; the mode lives from
+# `begin` to `end`, that is while the node is Operational and the PDO as it is now. Every
+# change of a parameter but the event timer makes a new mode, so a mode never has to follow
+# a change, and what it remembers (a mark, an inhibit time, a count of SYNCs) ends with it.
+# A valid TPDO begins with an event, therefore each event-driven one is sent once when the
+# node becomes Operational, as CANopenNode does it.
+#
+# What leads to a transmission, and when:
+#
+# type        on SYNC                            otherwise
+# 0           if an event has happened since     -
+# 1 to 240    each n-th                          -
+# 252         the sample is taken                a remote frame fetches the sample
+# 253         -                                  a remote frame fetches the present values
+# 254, 255    -                                  event or event timer, inhibit time permitting
+#
+# Everything is sent at the place of the producer in the tick (stack.py): SYNC only notes
+# its counter in `_counters`, an event only sets `due_us` and wakes the producer. So a TPDO
+# carries what RPDOs and application have left at the end of the tick, and one tick sends
+# one frame for ten events. Only the answer to a remote frame leaves at once; every type
+# gives it, if bit 30 of the COB-ID is 0.
+#
+# An event is the change of a mapped object (watched from `begin` to `end`), unless a device
+# profile says when there is one: then its entries are in `quiet`, and the profile calls
+# `request_for`. `quiet` must be complete before the node is Operational, as `begin` reads
+# it.
+#
+# The bytes are made by a function that is chosen once (`make_pack`): for one whole object
+# that is its own bytes (`_alone`), else joined objects, else bits. Entries with a `source`
+# are asked each time. `on_change` modes must be made before they are watched and unwatched
+# before they are dropped: `begin` calls `end` first, and `end` takes the bound method of
+# the old mode off the entries.
+
 _TPDO_PARAMETERS: Final = range(0x1800, 0x1A00)
 _TPDO_MAPPINGS: Final = 0x1A00
 
@@ -103,6 +140,8 @@ class Tpdo(Part):
 
     def send(self, data: bytes | None = None) -> None:
         """Send bytes, or the mapped objects as they are now."""
+        # MPDOs and samples bring their own bytes, and are no transmission of the mapped
+        # objects.
         if data is not None:
             self._node.send(self._can_id, data)
             return
@@ -122,6 +161,8 @@ class Tpdo(Part):
             entry.watch(self.mode.request)
 
     def _changed(self, entry: Entry) -> None:
+        # The event timer may change at any time, without a new beginning (CiA 301, PDO
+        # parameter).
         if entry.sub == EVENT_TIMER:
             self.mode.retime(self._node.now_us)
         else:
@@ -132,6 +173,7 @@ class Tpdo(Part):
         kind, count = self.parameters.transmission_type, self.mapping.count
         if not self.parameters.valid:
             return Silent(self)
+        # Sub-index 0 is FEh or FFh: no number of mapped objects but a kind of PDO.
         if count in (SAM_MPDO, DAM_MPDO):
             if kind not in EVENT_DRIVEN:
                 return Silent(self)
@@ -241,6 +283,8 @@ class PdoProducer(Service):
     def tick(self, now_us: int) -> None:
         """Send what SYNC has asked for, then what events have."""
         if self._counters:
+            # All SYNCs that came in this tick, each with its counter: two of them send two
+            # frames.
             counters, self._counters = self._counters, ()
             for counter in counters:
                 for mode in self._synchronous:
