@@ -13,6 +13,36 @@ from tickrig.host.control.requests import RequestDispatcher, refusal_line
 from tickrig.host.control.unix_socket import listen_at
 from tickrig.host.links.ready import ready
 
+# Theory of operation
+# ===================
+#
+# The server has no thread and no loop of its own. Who runs the emulator gives it time:
+# `serve(wait_us)` does one round and returns. A clock in real time (`ServingClock`) calls
+# it in place of sleeping, so a request is answered between two ticks and never inside one:
+# a verb may touch the rig freely.
+#
+# One round, in this order: answers that were left over go out, bytes come in, attached
+# sources run, each client has one line answered, one new client is accepted. One line a
+# round keeps a client that sends a thousand from holding up the others and the tick.
+# Bounds, all of them constants:
+#
+# - a line longer than `MAX_LINE` is refused while it comes, and thrown away up to its end;
+# - a client with `MAX_UNSENT` bytes unread is not answered and so not read from
+#   (`wants_more` is false while a line waits): back-pressure, and the memory for a client
+#   is bounded;
+# - 32 clients; where all places are taken the one that has been silent longest goes, after
+#   60 s.
+#
+# A line is found once (`_end`), from where the last search ended, or a client that sends a
+# long line byte by byte would cost the square of it.
+#
+# A client is closed when its last answer has left and not when it hangs up its half: `echo
+# ... | nc -N` sends and closes at once, and still gets its answer. `gone` is judged after
+# `_answer` only.
+#
+# The socket appears under its path when it already listens (unix_socket.py), and disappears
+# only if the path still is the inode of this server: another one may have taken its place.
+
 # Lines and their answers over a listening socket: many clients, no thread, bounded work.
 
 MAX_LINE: Final = 4_096
@@ -75,6 +105,7 @@ class LineServer:
         clients = self._clients.values()
         readers = [client.connection for client in clients if client.wants_more]
         writers = [client.connection for client in clients if client.has_unsent]
+        # A second line of a client is already here; no descriptor will announce it.
         wait_us = 0 if any(client.has_line for client in clients) else max(0, wait_us)
         attached = [source for source in self._attached if source.fileno() >= 0]
         sources = [self._listener, *readers, *attached]

@@ -122,4 +122,6 @@ def _is_socket(path: Path) -> bool:
 def _is_live(path: Path) -> bool:
     with unix_socket() as probe:
         probe.setblocking(False)
+        # The file of a killed process stays and refuses; a full queue of a live one
+        # (EAGAIN) does not.
         return probe.connect_ex(str(path)) != errno.ECONNREFUSED

@@ -37,6 +37,40 @@ from tickrig.wire.can import (
     Frames,
 )
 
+# Theory of operation
+# ===================
+#
+# python-can gives one interface to two dozen drivers, and they differ exactly where a bench
+# is sensitive. This file is the one place that knows it; everything behind sees frames,
+# times of the machine's monotonic clock, and LinkClosed.
+#
+# - Reading (`BusReceiver`). A driver may raise anything for a damaged line: it is counted,
+#   told at the 1st, 10th, 100th time, and reading goes on. The bus is given up for an error
+#   code that says the adapter is gone (`GONE`), or when 100 reads in a row have failed for
+#   a second. Messages that can be no frame (`_odd`: an identifier too large, fewer bytes
+#   than the DLC says) are such faults.
+# - Waiting. `BusABC.recv` measures by the wall clock; `_receive` goes round it and measures
+#   by the monotonic one. It uses `_recv_internal`, which is not public: a driver that
+#   overrides `recv` is called as it is.
+# - Times (`StampClock`). Stamps of a driver are on a clock of its own. The least difference
+#   to ours that was seen is taken, since a frame is never read before it has arrived, and
+#   it may grow by the drift of two clocks. A frame is never older than the last look that
+#   found nothing: so a bad stamp can only matter while this process was late.
+# - Lateness. `receive_stamped` returns a time from before its last look. Whoever judges
+#   silence takes that time for now; a process that was stopped behind the look thus finds
+#   itself late, not the bus.
+# - Queues. The kernel's queue is enlarged when a bus is prepared: 300 frames, its usual
+#   size, are 40 ms at 1 Mbit/s. Sending tries again while the driver's queue is full (ten
+#   frames in SocketCAN) for 1 s; a link that `drops` counts instead, for traffic that
+#   nobody may wait for.
+# - The multicast bus of python-can binds to a port without its group, and hears its own
+#   frames. The first is mended in `prepare_bus`, the second is for the link above
+#   (`echo.py`).
+#
+# What each driver does stands beside the line that it concerns. Before you change one: most
+# of these lines are covered by tests with the real driver only (tests/host/links,
+# tests/interop).
+
 
 def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
     """Return a message; its timestamp is in seconds, as python-can wants it."""
@@ -132,6 +166,7 @@ class StampClock:
         stamp_us = round(stamp_s * 1e6)
         if stamp_us <= 0:
             return now_us
+        # The smallest of these differences is the one of the frame that was read soonest.
         ahead_us = now_us - stamp_us
         if self._stamp_us is not None and stamp_us >= self._stamp_us:
             least_us = self._ahead_us + (stamp_us - self._stamp_us) // _DRIFT
@@ -160,6 +195,7 @@ def _receive(recv: Callable[[float], can.Message | None], timeout_s: float) -> c
         recv: of the bus. One that is not python-can's own is called as it is.
         timeout_s: how long to wait, in seconds; 0 only looks.
     """
+    # A bus that has a `recv` of its own waits in its own way: leave it.
     if getattr(recv, "__func__", None) is not can.BusABC.recv:
         return recv(timeout_s)
     bus: can.BusABC = recv.__self__  # type: ignore[attr-defined] # a bound method has it
@@ -329,6 +365,8 @@ class BusReceiver:
 
     def _recover(self, error: Exception) -> None:
         """Have a driver drop what it could not read, and would read again with what comes next."""
+        # slcan keeps the line that it could not decode in its buffer and fails with it for
+        # ever.
         if isinstance(error.__cause__ or error, UnicodeError) and hasattr(self._bus, "flush"):
             with suppress(can.CanError):
                 self._bus.flush()  # of slcan
@@ -350,6 +388,7 @@ def _odd(message: can.Message) -> str:
     if message.arbitration_id >> (29 if message.is_extended_id else 11):
         return f"{message.arbitration_id:X}h is no CAN-ID"
     most, size = 64 if message.is_fd else 8, len(message.data)
+    # DLC 9 to 15 stands for 8 bytes in a classic frame.
     whole = message.is_remote_frame or min(message.dlc, most) <= size <= most
     return "" if whole else f"{size} of {message.dlc} bytes came"
 
@@ -538,6 +577,7 @@ def _has_no_room(error: Exception) -> bool:
 
 def _error_state(message: can.Message) -> ErrorState | None:
     """Return the error state that an error frame of SocketCAN tells, None if it tells none."""
+    # Bits 0 to 8: the classes of linux/can/error.h that were there from the beginning.
     error = ErrorClass(message.arbitration_id & 0x1FF)
     if ErrorClass.BUS_OFF in error:
         return ErrorState.BUS_OFF
@@ -546,6 +586,8 @@ def _error_state(message: can.Message) -> ErrorState | None:
     if ErrorClass.CONTROLLER not in error or len(message.data) <= CONTROLLER_BYTE:
         return None
     flags = ControllerFlag(message.data[CONTROLLER_BYTE] & 0x7F)
+    # 20000004#0020...: byte 1 of a controller problem, 10h receiver, 20h transmitter
+    # passive.
     if flags & _PASSIVE:
         return ErrorState.PASSIVE
     return ErrorState.ACTIVE if ControllerFlag.ACTIVE in flags else None

@@ -164,6 +164,7 @@ class ReopeningLink(Generic[W]):
 
     def send(self, traffic: W, /) -> None:
         """Send traffic, on a new link if the line was gone; LinkClosed if it is."""
+        # Only sending opens again: a reader in a loop would try as often as it looks.
         if self._gone and not self._closed:
             self._link, self._gone = self._open_link(), False
         try:

@@ -41,6 +41,45 @@ from tickrig.wire.rrc.replies import (
     StatusA,
 )
 
+# Theory of operation
+# ===================
+#
+# A channel keeps four things apart that all come over one line of text without numbers:
+# whose answer a line is, how busy the RRC is, whether the watchdog needs a renewal, and
+# whether the RRC refuses so often that it is safer to stop. Nothing runs in the background:
+# all of it happens while the program waits in `_listen`.
+#
+# - Answers (reply_matcher.py). The RRC answers in the order of the lines, an OK names its
+#   command, an ER often does not. A reply belongs to the oldest command of its name that is
+#   not settled; one that nobody waits for is settled after 100 ms without an ER. After
+#   EV:Initialized commands may still wait in the receive buffer of the RRC: until that
+#   doubt ends (`doubt_ends_us`) `_wait_turn` lets only `poweroff` pass. With stablemode
+#   there is no OK at all, so a request is followed by `device`, whose answer comes in any
+#   mode and proves that the line before it was worked on (inbox.py, `Exchange`).
+# - Pace. `_free_us` is when the RRC will have worked on all that was sent. Each line adds
+#   what it costs by the load model of the RRC (DECISION R27, `wire/rrc/message.py`) out of
+#   the 40 % of a period that its own work, a status line and a margin of 10 % leave: 6.25
+#   ms a line, 3.75 ms an answer. An overflow or an ER with stablemode was not planned for
+#   and is added when it comes.
+# - Watchdog. `_renewed_us` is the latest line that may have renewed it; a third of its time
+#   later `watchdog` is sent again with the same value. An ER sets it to long ago, because a
+#   refused command renews nothing. While a request that changes the protocol is open
+#   (`changes_protocol`) no renewal is sent: nobody could tell in which mode it must be
+#   written.
+# - Refusals. Too many in a row of one command set `_alarm`, which `request` or `step`
+#   raises, once, after all bytes of this read are delivered. From then on only `poweroff`
+#   passes. Stopping sends it, too; with `OnRefusals.WATCHDOG` and a watchdog it is left to
+#   trip, because nothing renews it.
+#
+# `_receive` reads until the line is dry before `settle` decides that a command had its
+# time: an ER that waits unread in the buffer of this machine must not be taken for silence.
+#
+# Forgetting is part of it: EV:PowerOffFinished and EV:Initialized mean that the RRC has
+# none of its settings (DECISION R5), so the matcher drops its own copy, stablemode and
+# watchdog among them.
+#
+# Simulated and real time are the same here: every time is the link's.
+
 _ONLY_WHILE_ON: Final = (
     "allowed only while VR2 is on, from EV:PowerOnSuccess up to EV:PowerOffWaitBy...;"
     " was its power button pressed?"
@@ -171,6 +210,7 @@ class Channel:
         self._wait_turn(command)
         exchange = Exchange(command, stable=self.matcher.settings.stable)
         for line in exchange.lines:
+            # The answers of all lines of an exchange are planned with its last one.
             self._put(line, exchange.replies if line is exchange.lines[-1] else 0)
         deadline_us = self._link.now_us + timeout_us
         while not exchange.done and self._link.now_us < deadline_us:
@@ -242,6 +282,7 @@ class Channel:
 
         `poweroff` never waits, and always may be sent.
         """
+        # It must not wait for pace or doubt: it is the way to stop.
         if isinstance(command, PowerOff):
             return
         refusals, unconfirmed = self.matcher.refusals, self.matcher.unconfirmed
