@@ -29,6 +29,30 @@ from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 
+# Theory of operation
+# ===================
+#
+# A sequence is a tree of steps (host/text/steps.py), read from TOML or from plain lines,
+# and a run of it is a generator: it yields a pause and is sent whether the pause was met.
+# `SequenceRun.tick` is told the time and the frames and returns what to send; it sleeps and
+# reads nothing, so the same run serves `canmon send`, the screen and tests in virtual time.
+#
+# Time. Waits count from when the step before was due, not from when `tick` was called, so a
+# loop of +10 lines keeps its rate however late the caller is. An expectation that is met
+# goes on from the time of this call, because its frame has no due time. Within one `tick`
+# frames are looked at before the time runs out: a frame that came in time is never missed
+# because the caller was late.
+#
+# An expectation waits for several frames in any order; each frame meets one condition, the
+# first that fits, and is used up by it. Frames that this program sent are passed over. Only
+# one pause is open at a time, so frames that come while nothing is expected are gone.
+#
+# `forever` needs a step that takes time in it, or one tick would never end: both readers
+# refuse it.
+#
+# Places. A step knows its path in the document and not its line; `locate` finds the line
+# when somebody asks. So the run costs nothing for messages that nobody sees.
+
 _NOTATION: Final = re.compile(
     r"([0-9A-Fa-f?]{3}|[0-9A-Fa-f?]{8})#(R[0-8]?|(?:[0-9A-Fa-f?]{2}\.?){0,8}\*?)"
 )
@@ -48,6 +72,8 @@ def parse_pattern(text: str) -> FrameCondition:
         raise ValueError(f"{text!r} is not a frame like 705#05, 585#60??????* or 705#R")
     can_id, data = (part.upper().replace(".", "") for part in match.groups())
     body = data.replace("?", "[0-9A-F]").replace("*", "[0-9A-F]*")
+    # `?` may stand in the CAN-ID, too; `*` is any number of digits, which is any number of
+    # bytes.
     regex = re.compile(f"{can_id.replace('?', '[0-9A-F]')}#{body}")
     return Condition(text, lambda record: regex.fullmatch(str(record.frame)) is not None)
 
@@ -160,6 +186,8 @@ class SequenceRun:
         for one in records:
             if self._pause.conditions and not one.sent:
                 self._receive(one, now_us)
+        # Several steps may have become due since the last call; each is carried out at its
+        # own due time.
         while self.due_us <= now_us:
             self._resume(self._pause.until_us, not self._pause.conditions)
         out, self._out = tuple(self._out), []

@@ -116,6 +116,8 @@ class Alarms:
         """
         if self._begin_us is None:
             self._lost = lost
+        # Before the first frame the time is this machine's; the first frame may have an
+        # earlier one.
         if self._begin_us is None or now_us < self._begin_us:  # until a frame has told its time
             self._begin_us = now_us
         if lost > self._lost and self.rules.no_loss:

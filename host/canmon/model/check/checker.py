@@ -31,6 +31,36 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
 
 
+# Theory of operation
+# ===================
+#
+# There are three kinds of rules and two ways to hold them against traffic.
+#
+# Kinds: `Rule` sees frames (rule.py, frame_rules.py, time_rules.py), `MaxLoad` sees seconds
+# of a bus, `ExpressionRule` sees decoded frames (demands.py). Ways: `Checker` takes frames
+# one by one, live or from a log; `ColumnChecker` takes a log in blocks of numpy and lets
+# rules of the first two kinds see only the frames that they ask for. Both must find the
+# same, in the same order: for a frame the load first, then the rules in the order of
+# `Rules.make`, then expressions. So a rule may keep state only from frames that its
+# `selection` names; whatever else it looks at must not change what it finds.
+#
+# A rule is asked three times. `judge` at each frame that it `wants`. `end` at the end, for
+# what is missing; it changes nothing, because a live check asks it again and again
+# (`missing`). `unjudged` at last: a rule that judged nothing is no rule that holds, and a
+# report must not count it as passed. A new rule answers all three; the base class answers
+# `unjudged` from `wants` and `end` alone.
+#
+# Time is that of the frames. `advance` says what has not come in time where no frame tells
+# the time; it is called with the time of the next frame before that frame is judged, so a
+# deadline that has passed is told before the frame that came too late.
+#
+# What is kept grows with identifiers and not with frames: `_seen` has first and last time
+# and a count. A gap is never below 0, since clocks of loggers go back; the statistics say
+# how often.
+#
+# Text of findings is read by people and by tests, and is the same for both ways.
+
+
 class Checker:
     """Holds frames against rules; what it keeps grows with identifiers, not with frames.
 

@@ -87,6 +87,8 @@ class ColumnChecker:
             gaps_us.append(gaps)
             self._last_us = int(columns.at_us[-1])
         placed += self._judged(columns, np.concatenate(found), np.concatenate(gaps_us))
+        # Row, then place among the rules (0 is the load): the order in which `Checker`
+        # finds them.
         placed.sort(key=lambda one: one[:2])
         return [finding for _, _, finding in placed]
 
@@ -207,10 +209,12 @@ class BusSelection:
 
     def _add(self, number: int, selection: FrameSelection) -> None:
         below_us, above_us, first_bytes, firsts = selection
+        # A selection that says nothing asks for all frames.
         self._all[number] |= selection == FrameSelection()
         self._firsts[number] |= firsts
         self._bytes[number, sorted(first_bytes)] = True
         if below_us is not None:
+            # The widest of what several rules ask for; each rule still judges for itself.
             self._below_us[number] = max(self._below_us[number], below_us)
         if above_us is not None:
             self._above_us[number] = min(self._above_us[number], above_us)

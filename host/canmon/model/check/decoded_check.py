@@ -131,6 +131,7 @@ class DecodedCheck:
         """
         if now_us - self._latest_us <= _QUIET_US:
             return []
+        # A pipe may be late by any time: there only frames tell that a deadline has passed.
         return self._around.flush(self._checker.advance(now_us - _QUIET_US) if has_clock else ())
 
     def end(

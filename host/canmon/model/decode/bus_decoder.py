@@ -46,6 +46,45 @@ from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.sdo import SdoChannel, SdoStep
 
+# Theory of operation
+# ===================
+#
+# What a CAN-ID means is said by three voices, the later ones louder: the pre-defined
+# connection set, an EDS of the node, and SDO traffic that was heard. The decoder never asks
+# a node; it learns, and may learn in the middle of a log that it was wrong until then.
+# Nothing is decoded again: a frame means what was known when it came.
+#
+# `_routes` is a cache: by CAN-ID the function that decodes its frames. `_route` fills it,
+# in this order:
+#
+# 1. `_configured`    COB-IDs of SYNC, TIME, EMCY and additional SDO servers that were told
+# 2. NMT, SYNC, TIME, LSS
+# 3. `PdoTable`       PDOs whose CAN-ID and content are told; who sends goes before who receives
+# 4. 080h, 580h, 600h, 700h + node-ID, by the pre-defined connection set
+# 5. 181h to 57Fh with a node-ID: a PDO that nobody described (`unmapped`); all else is `raw`
+#
+# Whatever may change an answer of `_route` must take the CAN-ID out of the cache and add to
+# `changes`: `_refresh` does it for PDOs, `_configure` for the others. `changes` is how
+# `ColumnNodes` notices that it has to go on frame by frame.
+#
+# What is learnt, and where it takes effect:
+#
+# - a transfer that ended well (`_learn`): values of the communication area go into
+#   `NodeMemory`; 1400h to 1BFFh read the PDO anew, COB-ID objects are learnt, and whether a
+#   node is a drive changes the names of its objects, so all its known PDOs are read anew;
+# - a boot-up: the node has its power-on values again, unless it stored others (1010h);
+# - a guarding request (700h + node-ID, RTR): what follows on this CAN-ID is an answer with
+#   a toggle bit, not a heartbeat, until a frame comes without a request.
+#
+# `effect` must stay true to all of this: it says of which frames a block-wise reader may
+# leave some out. A new way to learn from a frame needs its line there, or `canmon nodes` of
+# a log shows something else than the same log frame by frame (tests/host/canmon compare the
+# two).
+#
+# SDO channels are one for each server and request CAN-ID (sdo.py); imports of rare decoders
+# stand in functions because `canmon check` of three lines has to start quickly
+# (tests/test_start_up.py).
+
 _Route = Callable[[int, CanFrame], Decoded]
 
 _SYNC_ID: Final = 0x080
@@ -115,6 +154,8 @@ class BusDecoder:
             alone = route.func in (self._error_control, _emcy)
             return Effect.ALONE if alone else Effect.EACH
         layout = getattr(route, "__self__", None)
+        # A TPDO shows at most its latest values; an RPDO changes nothing that is known of
+        # its node.
         if isinstance(layout, PdoDecoder):
             return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
         return Effect.NONE if layout is None and route is not decode_nmt else Effect.EACH
@@ -165,6 +206,8 @@ class BusDecoder:
         return partial(self._sdo, node, take)
 
     def _error_control(self, node: int, at_us: int, frame: CanFrame) -> Decoded:
+        # A node with a producer heartbeat time answers no guarding (CiA 301, error
+        # control).
         guarded = node in self._guarded and not self.memory(node).number(*HEARTBEAT_TIME)
         decoded = decode_error_control(node, frame, guarded=guarded)
         if frame.remote:
@@ -241,6 +284,8 @@ class BusDecoder:
 
     def _configured_id(self, node: int, index: int, sub: int) -> int | None:
         cob_id = self.memory(node).number(index, sub)
+        # 1005h and 1012h: bits 31 and 30 say who consumes and produces, not that the object
+        # is off.
         flags = EXTENDED if index in (COB_ID_SYNC, COB_ID_TIME) else EXTENDED | INVALID
         return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
 

@@ -124,6 +124,7 @@ class NodeMemory:
     def read(self, entry: Entry, data: bytes) -> None:
         """Learn a value that was uploaded."""
         self._keep(entry, data)
+        # A value that was read before anybody wrote it is what the node booted with.
         if entry not in self._written:
             self._power_on[entry] = data
 
@@ -131,6 +132,8 @@ class NodeMemory:
         """Learn a value that was downloaded and confirmed."""
         if entry[0] == _STORE:
             if data == _SAVE:
+                # "save" makes all present values those of the next boot-up, the read ones
+                # too.
                 self._power_on, self._written = dict(self._now), set()
             return
         self._keep(entry, data)
@@ -198,6 +201,8 @@ class NodeMemory:
         16 bits does.
         """
         device_type = self.number(*DEVICE_TYPE)
+        # 1000h: profile in the low half; FFFFh above it stands for several of them (CiA
+        # 301).
         if device_type is None or device_type >> 16 == _SEVERAL_PROFILES:
             return self._has_statusword
         return device_type & 0xFFFF == _DRIVE_PROFILE

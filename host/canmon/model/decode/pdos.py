@@ -74,6 +74,7 @@ class PdoDecoder:
         signals = []
         for name, shift, mask, sign, convert, unit, write in self._fields:
             raw = number >> shift & mask
+            # Two's complement without a branch: `sign` is 0 for a type without one.
             value: Value = (raw ^ sign) - sign if convert is None else convert(raw)
             signals.append(Signal(name, value, unit, "" if write is None else write(raw)))
         said = " ".join([*map(str, signals), self._note]) if self._note else None
@@ -197,6 +198,8 @@ class PdoTable:
     def layout(self, can_id: int) -> _Layout | None:
         """Return what carries this CAN-ID: who sends it, rather than who receives it."""
         claims = self._by_can_id.get(can_id)
+        # `NodePdo` sorts those that are sent first, so a TPDO names the fields of a shared
+        # CAN-ID.
         return claims[min(claims)] if claims else None
 
     def update(self, pdo: NodePdo, memory: NodeMemory) -> set[int]:

@@ -44,6 +44,36 @@ from tickrig.wire.canopen.sdo_frame import (
 )
 from tickrig.wire.errors import WireError
 
+# Theory of operation
+# ===================
+#
+# A third party hears both sides of an SDO dialogue, starts listening anywhere, and may miss
+# frames. So this is no client and no server, and it never refuses a frame: it holds what
+# was heard against what was expected (`TransferPhase`) and says what does not fit in
+# `flaws`, `retries` and `partial`.
+#
+# - One `SdoChannel` is one client and one server (a pair of CAN-IDs). It has at most one
+#   transfer that runs; a new initiate ends it, as `unanswered` if no answer came and
+#   `broken off` otherwise. It knows no time-outs, which are the client's own.
+# - A repeated request (same bytes, no answer yet) is a retry and not a second transfer.
+# - Toggle bits tell a repeated segment from the next one. A segment of a download counts
+#   when its receipt comes, one of an upload when it comes.
+# - Inside a block the first byte has no command specifier. `_is_block_segment` decides by
+#   the state alone, and by three exceptions: 80h is an abort, a frame of the other
+#   direction is none, and C1h with fill is the end once the last segment was heard.
+#   Segments are kept by number and count only up to the acknowledged one, because the
+#   others are sent again.
+# - Beginning in the middle: a segment without a transfer opens one that is `partial`, with
+#   no object; an answer without a request opens one that knows its object. A block cannot
+#   be taken up like that, because its frames cannot be told apart: they are `_ORPHAN`.
+# - An abort ends the transfer that runs only if it names its object, or none (0000h:00, as
+#   some clients send it); with another object it is a transfer of its own that was not
+#   heard.
+#
+# `done` is set by whoever sees the last frame; `SdoChannel` then closes the transfer into a
+# `Transfer`, the value that everything else works with. `BusDecoder` learns only from those
+# without flaws.
+
 # An SDO transfer while it runs.
 
 
@@ -134,6 +164,7 @@ class OpenTransfer:
         if any(seqno not in self._block for seqno in range(1, ackseq + 1)):
             self.add_flaw("segments not heard")
         self.data += b"".join(self._block.get(seqno, b"") for seqno in range(1, ackseq + 1))
+        # Segments behind the acknowledged one come again, in the next block.
         self.retries += max(self._block, default=0) > ackseq
         if self.block_last == ackseq:
             self.phase = TransferPhase.BLOCK_ENDING
@@ -212,6 +243,8 @@ def answers(running: OpenTransfer, answer: _Answer) -> bool:
         and running.entry == (answer.index, answer.sub)
         and running.direction
         is (TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD)
+        # A server may answer a block upload by an expedited or segmented one (protocol
+        # switch threshold).
         and (upload or running.mode is not TransferMode.BLOCK)
     )
 
@@ -294,6 +327,8 @@ def _is_block_segment(running: OpenTransfer, sender: TransferDirection, data: by
         return False
     if len(data) != FRAME_BYTES or not data[0] & BLOCK_SEQNO:
         return False  # 80h, an abort: no segment has the number 0
+    # E3h: bits of an end without n, C1h | n << 2. Before the last segment such a byte is
+    # segment 41h.
     return running.block_last is None or data[0] & _END_MASK != BLOCK_END
 
 

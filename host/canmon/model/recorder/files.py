@@ -174,6 +174,8 @@ class Index:
         text = path.read_text("utf-8", "replace") if path.exists() else ""
         for said in _objects(text):
             self._take(said)
+        # Each line is one `write` in append mode: a kill leaves whole lines and at most
+        # half of the last.
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
         if text and not text.endswith("\n"):  # somebody was killed in the middle of a line
             os.write(self._file, b"\n")
@@ -286,6 +288,8 @@ class Files:
         while begin < len(records) and not self.ended:
             part = self._part_for(records[begin])
             end = min(begin + min(_BLOCK_FRAMES, max(1, self._room(part))), len(records))
+            # The first frame of the next part is the one that is due; it begins that part,
+            # not this one.
             end = self._up_to_due(part, records, begin, end)
             part.write(records[begin:end])
             self._latest_us = records[end - 1].at_us
@@ -382,6 +386,8 @@ class Files:
         if self._index is not None:
             self._number += 1
             path = self._plan.part(self._number)
+            # Before the file exists: a recorder that is killed here leaves a name to look
+            # for (`_recover`).
             self._index.write(_OPEN, at_us, file=path.name)
         self.parts += 1
         return RecordingPart(path)
@@ -410,6 +416,8 @@ class Files:
         part = self._part
         under_way = 0 if part is None else part.bytes
         while disk_bytes is not None:
+            # The part under way counts; `RESERVE_BYTES` is for frames that are not written
+            # yet.
             if index.bytes + under_way + RESERVE_BYTES <= disk_bytes:
                 break
             if self._plan.at_limit is AtLimit.END or not self._remove_oldest(index):
@@ -418,6 +426,8 @@ class Files:
         if self._looked_frames + _LOOK_FRAMES > self.frames:
             return
         self._looked_frames = self.frames
+        # The disk of others may fill up, too: own old parts go if the plan allows that,
+        # else the end is clean.
         while shutil.disk_usage(self._plan.path.parent).free < RESERVE_BYTES:
             may_remove = disk_bytes is not None and self._plan.at_limit is AtLimit.OLDEST
             if not (may_remove and self._remove_oldest(index)):

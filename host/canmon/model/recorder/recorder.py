@@ -26,6 +26,35 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
 
+# Theory of operation
+# ===================
+#
+# A recorder is fed (`take`) and never reads anything itself. It is one of three, by its
+# plan: all frames into files; frames around triggers (`around`), where `_before` keeps the
+# latest in a ring and `_window` is what is recorded behind a trigger; and either of these
+# through a filter (`wanted`). Triggers see every frame, also those that the filter keeps
+# out.
+#
+# The order for one frame in `_watch`: the frame ends a window that does not take it; then
+# it is recorded or kept; then the triggers look at it. So the frame that triggers is the
+# last of what came before and is recorded with it, if the filter lets it through.
+#
+# Two clocks. Frames have times of their source, `now_us` goes on from the latest of them. A
+# window in time ends by a frame that is later, or by `now_us` with a second's grace
+# (`_LATE_US`), because frames may still be on their way through this machine. Marks (gaps
+# of a bus, losses, triggers) have the time of this machine where no frame tells it, so they
+# are ordered by their place among the frames and never by their time; in the ring they go
+# when all frames before them have gone.
+#
+# What may be lost. `store` gives frames to the file under way, `flush` gives them to the
+# operating system; `safe_frames` counts only those. If writing fails, everything after that
+# is counted as `missing`, and `rescue` cuts the file behind what was flushed last. A
+# recorder never raises once it runs: it fails, and says why in `failed`, because whoever
+# feeds it must go on.
+#
+# files.py has parts, limits and the index; a mark that waited in the ring is written into
+# the file but not into the index again (`mark_again`), which had it when it happened.
+
 # What came before a trigger.
 
 _Entry = Record | Mark
@@ -306,6 +335,7 @@ class Recorder:
 
     def _take_marks(self, lost: int, marks: Sequence[Mark], now_us: int) -> None:
         if lost != self._lost:
+            # The source counts what it lost; the difference is a mark at this place.
             marks = [dropped(now_us, lost - self._lost), *marks]
             self._lost = lost
         for mark in marks:
@@ -316,6 +346,8 @@ class Recorder:
     def _pass_time(self, now_us: int, lost: int) -> None:
         if self._window is not None and self._window.over(now_us):
             self._end_window()
+        # `not 0 <=`: the clock of the source may be set back, and rules must not sleep
+        # until it is there.
         if self._triggers and not 0 <= now_us - self._look_us < _LOOK_US:
             self._look_us = now_us
             for trigger in self._triggers:
