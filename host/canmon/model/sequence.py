@@ -35,7 +35,7 @@ from tickrig.wire.instant import NEVER
 # A sequence is a tree of steps (host/text/steps.py), read from TOML or from plain lines,
 # and a run of it is a generator: it yields a pause and is sent whether the pause was met.
 # `SequenceRun.tick` is told the time and the frames and returns what to send; it sleeps and
-# reads nothing, so the same run serves `canmon send`, the screen and tests in virtual time.
+# reads nothing, so the same run serves `canmon seq`, the screen and tests in virtual time.
 #
 # Time. Waits count from when the step before was due, not from when `tick` was called, so a
 # loop of +10 lines keeps its rate however late the caller is. An expectation that is met

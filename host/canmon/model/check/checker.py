@@ -41,8 +41,9 @@ if TYPE_CHECKING:
 # one by one, live or from a log; `ColumnChecker` takes a log in blocks of numpy and lets
 # rules of the first two kinds see only the frames that they ask for. Both must find the
 # same, in the same order: for a frame the load first, then the rules in the order of
-# `Rules.make`, then expressions. So a rule may keep state only from frames that its
-# `selection` names; whatever else it looks at must not change what it finds.
+# `Rules.make`, last the expressions, which `Checker` alone holds. So a rule may keep state
+# only from frames that its `selection` names; whatever else it looks at must not change
+# what it finds.
 #
 # A rule is asked three times. `judge` at each frame that it `wants`. `end` at the end, for
 # what is missing; it changes nothing, because a live check asks it again and again

@@ -73,13 +73,13 @@ if TYPE_CHECKING:
 #   `NodeMemory`; 1400h to 1BFFh read the PDO anew, COB-ID objects are learnt, and whether a
 #   node is a drive changes the names of its objects, so all its known PDOs are read anew;
 # - a boot-up: the node has its power-on values again, unless it stored others (1010h);
-# - a guarding request (700h + node-ID, RTR): what follows on this CAN-ID is an answer with
-#   a toggle bit, not a heartbeat, until a frame comes without a request.
+# - a guarding request (700h + node-ID, RTR): the next frame on this CAN-ID is an answer
+#   with a toggle bit and no heartbeat. Without a request a set bit 7 alone tells it.
 #
 # `effect` must stay true to all of this: it says of which frames a block-wise reader may
 # leave some out. A new way to learn from a frame needs its line there, or `canmon nodes` of
-# a log shows something else than the same log frame by frame (tests/host/canmon compare the
-# two).
+# a log shows something else than the same log frame by frame (test_column_nodes.py compares
+# the two).
 #
 # SDO channels are one for each server and request CAN-ID (sdo.py); imports of rare decoders
 # stand in functions because `canmon check` of three lines has to start quickly

@@ -154,6 +154,8 @@ class AscLines:
             return
         if self._pending:
             self._pending = False
+            # Nearer to the header's count than to a count from the block: times go on from
+            # the header.
             if abs(self._header_us + span_us - self._block_us) < span_us:
                 self._block_us = self._header_us
         self._now_us = self._block_us + span_us
@@ -189,6 +191,7 @@ class AscLines:
     ) -> CanFrame:
         """Return a frame; of a length code above 8 it has 8 bytes."""
         words, size = rest.split(), 0 if length is None else self._length(length)
+        # Three digits a byte: `007 255` is decimal, hexadecimal bytes have two.
         if self._guessed and any(len(word) == _DECIMAL_DIGITS for word in words[:size]):
             self._base = 10  # BUSMASTER does not always write what the base is
         can_id, extended = self._can_id(ident, extended)
@@ -200,6 +203,8 @@ class AscLines:
 
     def _length(self, text: str) -> int:
         """Read a length code, one hexadecimal digit or more of the base."""
+        # `d 8`, `d f`: one digit is hexadecimal whatever the base, codes above 8 mean eight
+        # bytes.
         return min(MAX_DATA_BYTES, int(text, 16 if len(text) == 1 else self._base))
 
     def _can_id(self, digits: str, extended: bool) -> tuple[int, bool]:

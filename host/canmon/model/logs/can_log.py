@@ -47,6 +47,42 @@ from tickrig.host.links.can_link import to_error_frame, to_fd_frame, to_frame, t
 from tickrig.wire.can import STANDARD_MAX, ErrorClass, ErrorFrame
 from tickrig.wire.errors import WireError
 
+# Theory of operation
+# ===================
+#
+# A BLF file (Vector's binary log) as python-can 4 reads and writes it, and what is added
+# here.
+#
+# file     LOGG, header size (4), file size (16), objects (32), start and end as SYSTEMTIME (40)
+# object   LOBJ, header size (4), header version (6), object size (8), type (12), then by version
+#            1: flags (16), client, version, time (24), body from 32
+#            2: flags (16), ..., time (24), original time, body from 40
+# container  object of type 10: compression (16; 2 is zlib), size when unpacked (24), data from 32
+#
+# Objects are padded to four bytes, in the file and in a container; `_SEARCHED` is the
+# window in which the next one must begin. Contents of containers follow each other as one
+# stream, so an object may begin in one and end in the next; what is left of one is carried
+# over (`held` in `_missing_end`).
+#
+# What python-can does not say, and how it is found:
+#
+# - a log that was cut. It stops in silence. `_missing_end` walks over the file again and
+#   compares what is whole with what the header declares; only logs whose counts differ are
+#   walked twice.
+# - a log whose recorder was killed. Its header still has the size of an empty file
+#   (`_has_end`), and it is read as far as it goes, with an error at its end.
+# - error frames of types 2 and 104, and statistics and driver errors (4, 31). `BlfReader`
+#   takes the data apart before python-can does, hands it the parts between, and puts its
+#   own messages among them: so the order stays that of the file.
+#
+# Writing. Times are relative to a start that the header holds in milliseconds: BLF begins
+# at a second, ASC at a millisecond, TRC at a multiple of 2^-13 days, each the finest start
+# that its text or number holds exactly. Otherwise every time in the log would be off by a
+# rounding of the start. BLF cannot hold a frame from before the start: it gets the time of
+# the start, and is counted (`early`).
+#
+# Everything that a format cannot hold is counted in `messages`, never dropped in silence.
+
 # What python-can heard.
 
 
@@ -191,6 +227,8 @@ class BlfReader(can.BLFReader):
     tally: LogTally
 
     def _parse_data(self, data: bytes) -> Iterator[can.Message]:
+        # `begin` is behind the last object that was taken out; python-can gets what lies
+        # between.
         begin = at = 0
         for at, size, kind in _objects(data):
             if kind in (ERROR, FD_ERROR):
@@ -206,11 +244,14 @@ class BlfReader(can.BLFReader):
         try:
             yield from super()._parse_data(data[begin:end] if begin or end < len(data) else data)
         finally:
+            # python-can notes how far it came in the part that it was given; add what lies
+            # before it.
             self._pos += begin
 
     def _error_frame(self, item: bytes, kind: int) -> can.Message:
         flags, stamp = _STAMP.unpack_from(item.ljust(_OBJECT.size + _STAMP.size), _OBJECT.size)
         body = _body(item)
+        # CAN_ERROR has its channel in two bytes, CAN_FD_ERROR_64 in one; both count from 1.
         channel = body[0] if kind == FD_ERROR else int.from_bytes(body[:2], "little")
         return can.Message(
             timestamp=stamp * (1e-5 if flags == _IN_10_US else 1e-9) + self.start_timestamp,
@@ -279,6 +320,8 @@ def _contents(file: BinaryIO) -> Iterator[bytes | None]:
             return
         _, _, _, size, kind = _OBJECT.unpack(head)
         body = file.read(max(0, size - _OBJECT.size))
+        # The padding has as many bytes as the size is beyond a multiple of four: so
+        # python-can writes it.
         file.read(size % 4)
         if len(body) < size - _OBJECT.size:
             yield None
@@ -388,6 +431,7 @@ def _event(message: can.Message) -> str:
 def _fd_event(message: can.Message, channel: int, ident: str, direction: str) -> str:
     """Write what stands behind the time; durations, bit timings and CRC, never told, are 0."""
     brs, esi = int(message.bitrate_switch), int(message.error_state_indicator)
+    # 1000h FDF, 2000h BRS, 4000h ESI.
     flags = _FD_FLAGS * (1 + 2 * brs + 4 * esi)
     data = f" {message.data.hex(' ').upper()}" if message.data else ""
     return (

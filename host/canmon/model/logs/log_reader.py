@@ -81,6 +81,7 @@ class WholeLines:
         return rest
 
     def _hold(self, rest: bytes) -> None:
+        # What is beyond is thrown away while it comes; the line is bad in any case.
         if self._held < LONGEST:
             self._pieces.append(rest)
             self._held += len(rest)
@@ -187,6 +188,8 @@ class LogLines:
         count, begin = text.count("\n") + 1, self._number
         self._number += count
         usual = _USUAL.findall(text)
+        # All lines or none: if one is unusual the block is read line by line, so that the
+        # order, the numbers of bad lines and the marks are right.
         records = _usual_frames(usual) if len(usual) == count else self._any_frames(text, begin)
         self._latest_us = records[-1].at_us if records else self._latest_us
         return records

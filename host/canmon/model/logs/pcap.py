@@ -53,6 +53,13 @@ from tickrig.wire.can import (
     FdFrame,
 )
 
+# A block: type (4), size (4), content, size again (4); each is a multiple of four bytes.
+# The type of a section is the same in both byte orders, and the magic behind its size tells
+# which it is:
+#
+# 0A0D0D0A size 1A2B3C4D 1 0 -1 options size     section
+# 00000001 size 227 0 snap options size          interface: link type, name, resolution of times
+# 00000006 size interface high low len len data  packet, padded, then options
 SECTION: Final = 0x0A0D_0D0A
 _ORDER_MAGIC: Final = 0x1A2B_3C4D
 INTERFACE: Final = 1
@@ -118,6 +125,9 @@ _FDF: Final = 0x4
 """Flag of a packet: it is of CAN FD, however short it was cut."""
 _XL: Final = 0x80
 
+# struct can_frame: id (4, network order), length (1), 3 reserved, 8 data; struct
+# canfd_frame: id (4), length (1), flags (1), 2 reserved, 64 data. The flags of the id are
+# those of linux/can.h: 80000000h extended, 40000000h remote, 20000000h error.
 _CLASSIC_BYTES: Final = 16
 _FD_BYTES: Final = 72
 _CLASSIC: Final = struct.Struct(">IB3x8s")
@@ -150,6 +160,7 @@ def _parse_packet(data: bytes) -> AnyFrame | str | None:
     can_id = flagged & (EXTENDED_MAX if extended else STANDARD_MAX)
     if flagged & _REMOTE:
         return CanFrame(can_id, b"", True, extended, min(length, MAX_DATA_BYTES))
+    # Older captures leave the flags empty: then the size of the structure tells CAN FD.
     is_fd = flags & _FDF or len(data) == _FD_BYTES
     if len(content) < length or length > (MAX_FD_BYTES if is_fd else MAX_DATA_BYTES):
         return None
@@ -243,6 +254,8 @@ class PcapngReader:
         """Add the frames of the blocks that are whole; return where the next one begins."""
         at, self._wanted = 0, _READ_BYTES
         while len(data) - (at := self._take_usual(data, at, records)) >= _BLOCK_BYTES:
+            # A section may begin anywhere in a file, in the other byte order (files put one
+            # behind the other).
             if data.startswith(SECTION.to_bytes(4, "big"), at):
                 self._begin(data[at + 8 : at + _BLOCK_BYTES])
             kind, size = struct.unpack_from(f"{self._order}II", data, at)
@@ -266,6 +279,8 @@ class PcapngReader:
         add, new, none, first = records.append, tuple.__new__, bytes(3), at
         for parts in layout.iter_unpack(memoryview(data)[at:end]):
             head, number, high, low, sizes, ident, length, flags, content, tail = parts
+            # One comparison for each part that must be as usual; anything else goes the
+            # slow way from here.
             if head != usual_head or sizes != usual_sizes or tail != usual_tail or flags != none:
                 break
             known = idents.get(ident) or self._ident(ident)
@@ -307,6 +322,7 @@ class PcapngReader:
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == _OBSOLETE_PACKET:
                 number, drops, high, low, size, _ = struct.unpack_from(f"{order}HH4I", content)
+                # FFFFh in the obsolete packet block: nobody counted.
                 self._drop(drops if drops < 0xFFFF else 0, records)
                 self._add(number, high << 32 | low, content[20:], size, records)
             elif kind == _SIMPLE_PACKET:
@@ -324,6 +340,7 @@ class PcapngReader:
         told = dict(options(self._order, content[8:]))
         name = "_".join(told.get(_IF_NAME, b"").decode("utf-8", "replace").split())[:LONGEST_NAME]
         resolution = told.get(_TIME_RESOLUTION, b"\x06")[:1] or b"\x06"
+        # if_tsresol: 6 is 10^-6 s, 89h is 2^-9 s; without it microseconds.
         power, binary = resolution[0] & 0x7F, resolution[0] & 0x80
         offset = told.get(_TIME_OFFSET, b"")
         offset_s = struct.unpack(f"{self._order}q", offset)[0] if len(offset) == 8 else 0
@@ -455,6 +472,7 @@ class PcapReader:
         if len(head) < _HEAD_BYTES - 4:
             raise LogError(f"{self._path}: it is cut in its header")
         (link_type,) = struct.unpack_from(f"{order}I", head, _LINK_TYPE_AT - 4)
+        # Seconds, fraction, bytes that are here, bytes that were on the wire.
         heading, count = struct.Struct(f"{order}4I"), 0
         while begun := file.read(heading.size):
             size = heading.unpack(begun)[2] if len(begun) == heading.size else 0
@@ -465,6 +483,7 @@ class PcapReader:
                 raise LogError(f"{self._path}: it is cut after {count} packets")
             count += 1
             seconds, fraction, _, _ = heading.unpack(begun)
+            # Above 16 bits pcap keeps the length of a frame check sequence.
             if link_type & 0xFFFF != _LINK_TYPE:
                 self.tally.passed_over[OTHER_PACKETS] += 1
                 continue

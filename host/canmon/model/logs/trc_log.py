@@ -161,6 +161,8 @@ class TrcLines:
         if match is None:
             raise ValueError(f"{offset!r} is no offset")
         sign, whole, part = match.groups()
+        # Milliseconds with up to six digits behind the dot, in whole numbers: a float would
+        # lose the last microseconds of a long trace.
         nanos = int(whole) * 1_000_000 + int(f"{part or '':0<6.6}")
         return self._start_us + int(f"{sign}1") * ((nanos + 500) // 1_000)
 
@@ -169,6 +171,8 @@ class TrcLines:
         names = list(self._columns)
         place = names.index("T") if "T" in names else len(words)
         kind = words[place] if place < len(words) else ""
+        # From 2.0 on errors, counters, states and events leave out columns, the CAN-ID at
+        # least: bus and direction are found by what they look like.
         if kind not in ("ER", "EC", "ST", _EVENT):
             count = names.index("D")
             return _Row(dict(zip(names, words[:count], strict=False)), words[count:])
@@ -189,6 +193,7 @@ def _aside(row: _Row, kind: str, tally: LogTally) -> str:
     """Say what a line is that is no frame of CAN or CAN FD, and note what it says of errors."""
     if kind == "XL":
         return CAN_XL
+    # Version 1.0 has no type; a status has the CAN-ID FFFFFFFFh there.
     if kind in _STATES or row.cells.get("I") == "FFFFFFFF":
         _note_status(row.hex_bytes(), tally)
     elif kind == _COUNTERS:
@@ -207,6 +212,7 @@ def _start_us(days: str) -> int | None:
         return None
     if not _DAYS_TO_1970 <= value <= _LATEST_DAYS:
         return None
+    # STARTTIME is a date of Delphi: days since 30 December 1899 with a fraction.
     return round((value - _DAYS_TO_1970) * _DAY_US)
 
 
@@ -248,6 +254,7 @@ def _error(row: _Row) -> ErrorFrame:
     data = [*_Row({}, [word for word in row.data if word != ERROR]).hex_bytes()]
     if "I" in row.cells:
         data.insert(0, int(row.cells["I"], 16))
+    # 0008 4 00 19 08 08: type 8 (other), sending, place 19h (ACK slot), REC 8, TEC 8.
     kind, direction, place, received, sent = (data + [0] * 5)[:5]
     transmitting = ProtocolFlag.TRANSMITTING * (len(data) > 1 and not direction)
     said = bytearray(8)
