@@ -91,6 +91,8 @@ class Bridge:
         else:
             self._pending = self._outside.poll(now_us)
         if self._pending:
+            # As of the last look: as of now, a line of 115 200 baud would lose the time of
+            # 115 bytes in each tick of 10 ms.
             room = self._end.room(self._looked_us)
             self._end.send(self._looked_us, self._pending[:room])
             self._pending = self._pending[room:]

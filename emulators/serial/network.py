@@ -98,6 +98,8 @@ class DismissedHost:
         connection.setblocking(False)
         with suppress(OSError):  # gone already
             connection.send(f"{reason}\r\n".encode())
+            # The end of the reason is seen at once; the connection stays until the host has
+            # read it.
             connection.shutdown(socket.SHUT_WR)
 
     def is_gone(self, now_us: int) -> bool:
@@ -305,6 +307,8 @@ class SafePortManager(PortManager):
             return
         if command in _KNOWN_VALUES and value[0] not in _KNOWN_VALUES[command]:
             suboption = option + command + b"\0"  # it is told what is set
+        # IAC SB 2C 00 IAC SE asks for the signature; 64h is the answer's command (RFC 2217:
+        # server + 100).
         if command == b"\0":
             self.rfc2217_send_subnegotiation(b"\x64", _SIGNATURE)
         elif command == rfc2217.SET_CONTROL and (state := self._control_state(value[0])):
@@ -317,6 +321,8 @@ class SafePortManager(PortManager):
     def _control_state(self, request: int) -> int:
         """Return what is answered to SET-CONTROL where pyserial has no answer, else 0."""
         port = self.serial
+        # SET-CONTROL: 4, 7, 10 ask for break, DTR, RTS; the next number says on, the one
+        # after it off.
         for query, is_on in ((4, port.break_condition), (7, port.dtr), (10, port.rts)):
             if request == query:
                 return query + 1 if is_on else query + 2

@@ -60,6 +60,9 @@ class PtyLink:
             lock = os.open(self._note, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # Between `open` and `flock` the owner may have removed the note and another
+                # have made a new one: then this lock is of a file that nobody finds any
+                # more. Try again.
                 if os.path.samestat(os.fstat(lock), self._note.stat()):
                     return lock
             except BlockingIOError:
@@ -201,6 +204,8 @@ class PtyPort(NonCopyable):
     why_not_copied = "it is a pty of this machine"
 
     def __init__(self, link: Path | None = None, buffer_bytes: int = 4_096) -> None:
+        # The slave stays open here: on Linux reading the master fails with EIO while nobody
+        # has it open.
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -264,6 +269,7 @@ class PtyPort(NonCopyable):
 
     def send(self, now_us: int, traffic: bytes, /) -> None:
         """Write as much as fits; keep the rest for later."""
+        # A whole send or nothing: half a line would reach the host as another line.
         if len(self._unsent) + len(traffic) > self._buffer_bytes:
             self.lost += len(traffic)
         else:

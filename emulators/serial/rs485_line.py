@@ -99,10 +99,13 @@ class Rs485Line(Copyable):
         Returns:
             When the last has passed, in us.
         """
+        # A burst is cut at whole microseconds once, at its end; single bytes are worked out
+        # from its start.
         end_us = start_us + self.after(len(data))
         burst = _Burst(sender, start_us, end_us, bytearray(data))
         self._air = [other for other in self._air if other.end_us > now_us]
         for other in self._air:
+            # Each pair of senders is looked at once, when the later of the two begins.
             if other.sender is not sender:
                 self._collide(burst, other)
         self._air.append(burst)
@@ -125,6 +128,8 @@ class Rs485Line(Copyable):
         for burst in self._air:
             if burst.sender is sender and burst.end_us > now_us:
                 begun_us = now_us - burst.start_us
+                # The byte whose start bit has gone out goes on to its end, as in a UART
+                # whose buffer is emptied.
                 begun = 1 + begun_us * self._baud // self._byte_cost if begun_us >= 0 else 0
                 del burst.data[begun:]
                 burst.end_us = burst.start_us + self.after(len(burst.data))
@@ -186,6 +191,8 @@ class Rs485Line(Copyable):
         for mine, start_us, end_us in self._bytes(burst):
             for theirs, from_us, to_us in self._bytes(other):
                 if start_us < to_us and from_us < end_us:
+                    # Dominant 0: two drivers on the pair give the bits that both have set;
+                    # garbled bytes arrive.
                     both = burst.data[mine] & other.data[theirs]
                     burst.data[mine] = other.data[theirs] = both
                     self.collisions += 1

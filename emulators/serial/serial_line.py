@@ -13,6 +13,33 @@ from tickrig.device.twin import Copyable
 from tickrig.emulators.rig.faults import FaultType
 from tickrig.wire.instant import NEVER
 
+# Theory of operation
+# ===================
+#
+# A line is two directions, and a direction is a queue of bursts: bytes that leave back to
+# back from `start_us` on. A byte has no event of its own. Everything is worked out from the
+# burst when somebody asks: byte n has arrived at start + n * frame_bits / baud, rounded up
+# to a whole microsecond. So a megabyte costs as much as a byte, and looking does not change
+# anything.
+#
+# Rules:
+#
+# - Only the last burst can still be on its way, because a burst that begins while the line
+#   is busy is joined to the one before. `unsent`, `drop_unsent` and `last_us` rest on that.
+# - Times are never added up. A burst that goes on for hours is shortened at its front
+#   (`_forget_taken`) by a number of bytes that takes whole microseconds, so no arrival
+#   moves.
+# - Two buffers. What the sender's does not take is lost at `put`, what the receiver's does
+#   not hold is lost at `take`: both are counted in `lost` of the end that would have
+#   received it.
+# - `first_us` and `last_us` are kept up to date by `_note_due` after each change, because a
+#   rig asks for them far more often than bytes come. `poll` before `first_us` returns at
+#   once.
+#
+# The host's bridge looks once a tick and takes what was written as written right after its
+# last look (bridge.py); therefore `_arrived` may be asked for a time before the start of a
+# burst.
+
 
 class SerialLine(Copyable):
     """Two ends joined by two independent directions.
@@ -180,6 +207,8 @@ class _Direction:
     def room(self, now_us: int) -> int:
         """Return what the sender's buffer takes; the receiver's may overflow later."""
         free = self._buffer_bytes - self.unsent(now_us)
+        # A receiver that takes nothing would let bursts pile up: both buffers together are
+        # the most.
         return min(free, 2 * self._buffer_bytes - self._held)
 
     def unsent(self, now_us: int) -> int:

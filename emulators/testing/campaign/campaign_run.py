@@ -35,6 +35,33 @@ from tickrig.host.text.names import known
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file
 
+# Theory of operation
+# ===================
+#
+# A campaign is a list of runs (test x seed), each with a number. What was done is in the
+# journal and nowhere else: whoever is killed, and whenever, the next start reads it, leaves
+# out what it has, and goes on. From that follow the rules here:
+#
+# - A verdict counts when it is on the disk (`CampaignJournal.add` syncs), not when it
+#   arrives. The bar and the table are made of what `add` returned.
+# - A verdict depends on test and seed alone, so it does not matter who did a run, how
+#   often, or in which order. A run that was done twice is written once.
+# - The head of the journal (`CampaignPlan.head`) has what a verdict depends on: tests,
+#   seeds, shard, rig file, version, and a digest of the files of the tests. A journal with
+#   another head is refused, or results of two programs would stand in one table.
+# - Workers only answer. One may die (its run is tried three times, then it is `died`) or
+#   hang (it is killed, its run is `hung`): crew.py waits for each verdict with a time-out,
+#   so that a batch always ends.
+#
+# Batches. A run takes a millisecond or a minute, and nobody knows before. A batch grows
+# while it takes less than a second and shrinks above four, its time in the queue included;
+# towards the end batches get smaller, so that all workers end together. Two batches a
+# worker are under way: one is done, one waits.
+#
+# Three ends: all done (table written, journal removed), interrupted or full disk (journal
+# kept, the command to go on is printed), refused (nothing begun). The table is written
+# before the journal goes.
+
 # A campaign under way: runs are handed out, and verdicts come back, until all are done.
 
 _BATCH_S: Final = 1.0

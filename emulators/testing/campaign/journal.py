@@ -65,6 +65,8 @@ class CampaignJournal:
                 self._keep(RunVerdict(*entry))
         lines = [_line({"campaign": _VERSION, **head})]
         lines += [_line(list(verdict)) for verdict in self.verdicts.values()]
+        # A torn line at the end, or lines of a run that is there twice: written anew, as a
+        # whole, beside it.
         if (whole := b"".join(lines)) != data:
             self._rewrite(whole)
         os.lseek(self._fd, 0, os.SEEK_END)
@@ -96,6 +98,7 @@ class CampaignJournal:
         try:
             while data:
                 data = data[os.write(self._fd, data) :]
+            # One sync a batch: a second of work is what a power loss costs.
             os.fsync(self._fd)
         except OSError as error:
             for verdict in new:

@@ -32,6 +32,39 @@ from tickrig.emulators.testing.host_clock.patches import (
 
 # What hosts find in place of functions that tell the time, and that wait.
 
+# Theory of operation
+# ===================
+#
+# A host that calls `time.sleep` lives in the time of a rig if three things hold together,
+# and this folder is these three: the functions of the clock are replaced wherever a host's
+# code may have kept them (patches.py), each call decides by its caller whether it is a
+# host's (host_code.py), and what waits makes the rig's time pass (this file, and
+# bench_loop.py for asyncio).
+#
+# - Who is a host. Everything but Python itself, pytest and the like, our own packages, and
+#   the three libraries that have objects of ours on the rig. A patch looks at the frame
+#   that calls it, so the standard library under a host (queue, threading) keeps the
+#   machine's clock: its waits are patched at their own doors (`Event.wait`, `Queue.get`,
+#   ...) and not by its calls of `time`.
+# - Which thread. Only the owner, the thread that patches, makes time pass. Threads that ran
+#   before keep real time. A thread that a host starts may look at the clock, which stands
+#   still for it, and is refused if it waits: two threads that both drive one rig could not
+#   be repeated.
+# - A look costs 100 us of virtual time (`LOOK_US`), a sleep at least as much. Otherwise a
+#   loop that only polls the clock would never end.
+# - A wait without a timeout ends when the rig makes its condition true. If nothing on the
+#   bench can do that, it is refused (`_ForEver`) in place of hanging the test.
+# - Refusals are raised where they happen and again at the end, because hosts swallow
+#   exceptions.
+#
+# `_wait_condition` does what `threading.Condition.wait` does with its waiter locks, by
+# names that begin with an underscore: it has to leave the condition exactly as CPython
+# does, or `notify` of a host wakes nobody. Check it against each new version of Python.
+#
+# The order at the end matters: patches come off in the reverse order, a patch is switched
+# off before its place is given back, and a place that somebody else has filled meanwhile is
+# left alone.
+
 _FOR_EVER: Final = (
     "waits for ever: nothing that happens on the bench ends it, and another thread cannot"
 )
@@ -125,6 +158,8 @@ class ClockWaits:
     def _select(
         self, original: Callable[..., Any], r: Any, w: Any, x: Any, timeout: float | None = None
     ) -> Any:
+        # With descriptors it waits for this machine; only `select([], [], [], t)` is a
+        # sleep.
         if timeout is None or [*r, *w, *x]:
             return original(r, w, x, timeout)
         self._sleep(original, timeout)

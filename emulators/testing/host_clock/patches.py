@@ -41,6 +41,8 @@ class Patch:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Look who calls."""
         __tracebackhide__ = True
+        # The caller alone decides; one level up, because nothing stands between it and this
+        # call.
         frame = sys._getframe(1)
         name = frame.f_globals.get("__name__") or ""
         if self.on and is_host(name, frame.f_code.co_filename):
@@ -105,6 +107,8 @@ class HostModules:
     def places(self) -> Iterator[Alias]:
         """Yield all places where functions were kept; something else may be there by now."""
         modules = tuple(sys.modules.values())
+        # By identity and in order: comparing by equality would call `__eq__` of strange
+        # modules.
         if len(modules) != len(self._modules) or not all(map(is_, modules, self._modules)):
             self._renew(modules)
         counts = list(map(len, self._hosts.values()))
@@ -235,6 +239,8 @@ class Patches:
             new[id(root_of(before))] = switch
             self._undo.callback(setattr, owner, name, before)
             setattr(owner, name, switch)
+            # Whoever has kept the switch itself meanwhile finds the original in it from
+            # then on.
             self._undo.callback(setattr, switch, "on", False)
         for place in _HOST_MODULES.places():
             switch_of_it, kept = new.get(id(place.function)), place.kept()

@@ -232,6 +232,8 @@ class HostRuns:
             HostHangsError: the host waits for ever.
             Exception: what the machine, or the host in it, raised.
         """
+        # All runs begin at one snapshot: the same objects, so hosts that hold a device need
+        # not be told.
         self._snapshot.restore()
         self.done, self._broken = list(steps), None
         self._end_us = self.machine.bench.now_us + us_of(self.machine.longest)
@@ -300,6 +302,8 @@ class HostRuns:
     def _watch(self, now_us: int) -> None:
         """Look after each step of the rig; the first that is broken counts."""
         if hangs := self._hangs(now_us):
+            # Raised in the rig, amid the host's call; and kept, because a host may swallow
+            # it.
             self._broken = HostHangsError(hangs)
             raise self._broken
         if self._broken is None:

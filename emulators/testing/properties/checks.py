@@ -30,6 +30,33 @@ from tickrig.emulators.testing.properties.device_bench import (
 from tickrig.emulators.testing.properties.strategies import Session, Word
 from tickrig.host.text.trace import Header
 
+# Theory of operation
+# ===================
+#
+# Each check plays a drawn session on two benches that differ in one thing which must not
+# matter, and compares what was sent, with its time, and all outputs: dense and sparse
+# ticks, pieces and whole writes, a pause inside a word, one reset and two, a device that
+# was reset and a fresh one, an original and its copy, a recording and its replay. No check
+# knows what the device should do; the device is compared with itself. So they hold for
+# devices that nobody here has seen.
+#
+# The order in `check_ticks` is by cost and by what a finding means: two fresh devices
+# first, because chance or shared state would make every later comparison fail for the wrong
+# reason; then dense against sparse ticks, the commonest fault (`due_us` too late); then the
+# rest.
+#
+# `_check_due_us` finds timers of hours without ticking for hours. A tick before `due_us`
+# must change nothing, so copies are ticked at a few times up to just before it: whatever
+# changes shows that `due_us` was too late. `_refuse` then looks for the first such tick by
+# halving, for the message.
+#
+# What is not compared: state that no output shows. It is found where it acts, when a word
+# is sent after such a tick (`check_answers`).
+#
+# Devices that work ahead (`horizon`) are looked at between ticks here, so copies are made
+# to work tick by tick. RS485 lines are left out of the check of pieces: there each piece
+# ends on a whole microsecond, and that is the line's doing.
+
 # Words that come with a pause in them: a line means the same, whenever its second half comes.
 
 _WORDS_WITH_PAUSES: Final = 2
@@ -58,12 +85,16 @@ def _check_pauses(played: DeviceBench, session: Session) -> None:
     """
     words = list(dict.fromkeys(what for _, _, what in session if isinstance(what, Word)))
     for word in words[:_WORDS_WITH_PAUSES]:
+        # The first byte like the last one ends the beginning: `a\nb\n` is cut within `a\n`,
+        # where a pause inside one line is meant and not one between two.
         inside = word.index(word[-1:])
         wanted = _answer(played, b"", word)
         for at in sorted({1, inside // 2, inside} - {0}):
             if at > inside:
                 continue
             answer = _answer(played, word[:at], word[at:])
+            # Sorted: what the device sends by itself (a status line) may come before or
+            # after the answer.
             same = sorted(answer[0]) == sorted(wanted[0]) and answer[1] == wanted[1]
             must(same, _message(word, at, wanted, answer))
 

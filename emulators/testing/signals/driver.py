@@ -20,6 +20,39 @@ from tickrig.wire.instant import NEVER
 # Signals that run: each has a value of now, and knows when it may have another.
 
 
+# Theory of operation
+# ===================
+#
+# Signals are a graph: sources of time (ramp, wave, noise, table), formulas of other signals
+# and of what devices show, and filters with a memory (lag, integral). `SignalDriver`
+# evaluates it at the ticks of the rig and sets inputs whose value is another. It is a
+# coupling: the rig calls `act` between the ticks of devices, and a device sees an input at
+# its next tick.
+#
+# One evaluation has three passes, in this order:
+#
+# 1. filters move on, up to now, by what they saw before
+# 2. all others take their value of now, each behind those that it needs (`SignalScope.ordered`)
+# 3. filters look at what moves them (`observe`)
+#
+# A filter is therefore one step behind its source, and that is what makes circles through a
+# filter possible: a formula may use a lag that follows the formula. Circles without a
+# filter are refused.
+#
+# Values must not depend on how often somebody asks. Sources of time are pure functions of
+# time, noise is drawn by number and not in order, and a filter moves in steps of `every_us`
+# whatever the ticks are. `due_us` is the earliest time at which a value may be another: it
+# may be too early, never too late. A rig that jumps there sees the same as one that ticks
+# all the time.
+#
+# At the start the graph is evaluated as many times as there are filters, and once more: a
+# lag without a start begins where its source is, which may be another lag.
+#
+# An input that was set by hand keeps that value until its signal changes, because `_Target`
+# compares with what the signal had and not with what the input has. nan leaves an input
+# alone, and is told once.
+
+
 class RunningSignal(Copyable):
     """A signal that runs.
 
@@ -74,6 +107,7 @@ class TimeNode(RunningSignal):
         next_us = self.source.next_us(at_us)
         if spec.every_us:
             next_us = -(-next_us // spec.every_us) * spec.every_us
+        # `from_us` shifts the source; `every_us` rounds the next change up to its grid.
         self.due_us = min(NEVER, next_us + spec.from_us)
 
 

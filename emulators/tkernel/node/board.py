@@ -115,6 +115,7 @@ class Board:
 
     def _inputs_changed(self, now_us: int) -> None:
         self._changed = False
+        # Holding the reset button is being without supply; letting it go begins the boot.
         off = bool(self.inputs["power_cut"] or self.inputs["reset"])
         if off and self._state is not BoardState.OFF:
             self._lose()
@@ -133,5 +134,7 @@ class Board:
         for what in REFUSED:
             self._refused[what] += self.manager.refused[what] if self.manager else 0
         self._state, self.manager, self._up_us = BoardState.OFF, None, NEVER
+        # Lines before the stack: a power cut says nothing to anybody, and closing doors in
+        # order would.
         self._lines.cut()
         self._stack.close()

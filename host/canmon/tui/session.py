@@ -35,6 +35,30 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.sources.bus_source import OpenBus
 
 
+# Theory of operation
+# ===================
+#
+# One thread reads the source, decodes, counts and sends; the other paints the screen. They
+# share the model and the tasks under one lock (`Session.lock`), which whoever reads the
+# model or touches a task must hold. `armed` is the exception: it is a plain flag that is
+# looked at again before each frame leaves, and that the end of the program clears without
+# the lock, so that it need not wait for a session that is busy.
+#
+# A step: wait for a frame, or until a task is due; then, under the lock, frames go to the
+# model and to every task in the order of arrival, tasks say what they want to send, and
+# outside the lock it is sent. Sending may block on a slow bus, and the screen must not.
+#
+# What this program sends comes back as a record of the next step (`_echo`), with the time
+# of the source, because a bus does not give a program its own frames. Tasks hear it, too.
+#
+# Two times: `now_us` of the session, on a monotonic clock, is for tasks; `model.now_us` is
+# the time at the source, that of the frames, and goes on by itself while a live source is
+# silent.
+#
+# Nothing is sent before `arm`, and `disarm` stops all tasks, so arming again sends nothing
+# by itself. What was wanted meanwhile is counted as withheld. A bus that fails to send
+# disarms, and says why.
+
 DecodedFrame = tuple[Record, Decoded]
 """A frame and what it means."""
 

@@ -20,6 +20,36 @@ from tickrig.wire.canopen.eds.eds_value import (
 )
 from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
+# Theory of operation
+# ===================
+#
+# EDS files are written by hand and by tools, and hardly one keeps to CiA 306 throughout.
+# The rule for all readers here: what has one meaning is read, with a warning that says what
+# is taken; what has none, or would make it another device than its author meant, is an
+# error. Readers do not raise: `EdsFile` collects all findings, each once, with line and
+# rule name, and whoever reads a file sees them all at once.
+#
+# The readers stand on each other, and each knows only the one below:
+#
+# eds_value.py    lines, section names, numbers and values as text
+# xdd.py          XML as the lines that an EDS would have, so that all above read both
+# eds_file.py     sections and keywords; findings with their places
+# eds_entry.py    one object: type, access, default, limits
+# eds_device.py   the whole: kinds of objects, CompactPDO, modules, commissioning
+#
+# Order matters in a few places. The first of two equal keywords counts, as most readers
+# have it. Keywords are compared in lower case, sections in the spelling of CiA 306
+# (`canonical_section`). Of values `ParameterValue` goes before `[INDEXValue]`, and that
+# before `DefaultValue`. A `;` behind a blank begins a comment everywhere; `#` and `//` do
+# so behind numbers and words, but in a text they may be meant and stay.
+#
+# Rule names (`no-number`, `access-form`, ...) are public: `canmon eds check` prints them and
+# its JSON and JUnit reports have them, so that others filter by them. A message says what
+# came and what is taken.
+#
+# The same files are read for each node of a network, so the plain case is quick:
+# `is_plain_number` and the caches of section names are what the time of a file goes into.
+
 _LONGEST: Final = 40
 _LONGEST_TITLE: Final = len("1018sub01")
 """Of a sub-index by CiA 311."""
@@ -265,6 +295,8 @@ class EdsFile:
 
     def _add(self, section: _Section, line: EdsLine) -> None:
         key = line.key.lower()
+        # `[OptionalObjects] 01=0x1005`: some tools fill the numbers of a list up with
+        # zeros.
         if key[:1] == "0" and key.isascii() and key.isdigit():
             key = key.lstrip("0") or "0"  # a number of a list
         if not key:
