@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -75,6 +77,20 @@ def test_every_link_and_named_test_is_there(page: Path) -> None:
             assert (page.parent / target).exists(), f"{page.name} points to {target}"
     for named in re.findall(r"`(tests/[\w/]+\.py)`", text):
         assert (ROOT / named).exists(), f"{page.name} names {named}"
+
+
+def test_the_readme_is_short_and_its_commands_have_these_options() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert len(text.splitlines()) <= 120
+    commands = re.findall(r"^\| [^|]+ \| `([^`]+)` \|", text, re.MULTILINE)
+    assert len(commands) > 8
+    ours = [words for words in map(str.split, commands) if words[0] != "pytest"]
+    for program, *words in ours:
+        script = Path(sys.executable).with_name(program)
+        done = subprocess.run(
+            [sys.executable, script, *words, "--help"], capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, ""), (program, *words)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])

@@ -34,3 +34,12 @@ def test_a_picture_shows_what_the_commands_say(name: str) -> None:
     again = f"python tools/terminal_picture.py {name} {picture.relative_to(ROOT)}"
     assert shown(picture.read_text("utf-8")) == shown(now), again
     assert Path(picture).stat().st_size < 40_000
+
+
+@pytest.mark.parametrize("name", TOOL["SCRIPTS"])
+def test_a_picture_begins_with_its_last_screen(name: str) -> None:
+    """Nothing is hidden but by an animation, and that begins later."""
+    picture = (ROOT / "docs" / "pictures" / f"{name}.svg").read_text("utf-8")
+    style, _, _ = picture.partition("@keyframes")
+    assert f"animation:0s step-end {TOOL['READ_S']}s infinite" in style
+    assert "opacity" not in re.sub(r"@keyframes \w+\{(?:[\d.]+%\{[^}]*\})+\}", "", picture)

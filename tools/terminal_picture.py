@@ -3,7 +3,8 @@
     python tools/terminal_picture.py first-test docs/pictures/first-test.svg
 
 The words are those of the run, with their colours; the times are those of a person who types and
-reads. Where nothing moves (a reader who wants no motion, a printer) the last screen is shown.
+reads. The last screen is shown first, for READ_S seconds, and where nothing moves (a preview, a
+printer, a reader who wants no motion): a picture that begins empty is an empty picture there.
 """
 
 from __future__ import annotations
@@ -63,6 +64,14 @@ SCRIPTS: Final = {
             "canmon check drive.log -t z --rule dlc --rule 'emcy never' --around 1; echo status $?",
         ),
         columns=128,
+    ),
+    "canopen-master": Script(
+        "docs/tutorials/canopen-master.md",
+        (
+            "tail -7 rig.toml",
+            "grep -A 5 'loses_supply' test_master.py",
+            "pytest -v --no-header --bench rig.toml test_master.py",
+        ),
     ),
     "robot": Script(
         "docs/tutorials/robot.md",
@@ -158,7 +167,7 @@ def svg(lines: list[Line], columns: int) -> str:
     end_s = lines[-1].at_s + END_S
     rules = [
         "text{font:13.3px monospace;white-space:pre}.b{font-weight:bold}",
-        f"g,text{{animation:0s step-end infinite;animation-duration:{end_s:.2f}s}}",
+        f"g,text{{animation:0s step-end {READ_S}s infinite;animation-duration:{end_s:.2f}s}}",
         _scrolling(lines, end_s),
         *(_appearing(row, line, end_s) for row, line in enumerate(lines)),
         "@media (prefers-reduced-motion){g,text{animation:none!important}}",
