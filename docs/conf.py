@@ -56,6 +56,11 @@ LONG_WORD = re.compile(r'(?<=<span class="pre">)[^<]{20,}(?=</span>)')
 """Of code: the name of a test, mostly. Unbroken it takes the room of its neighbours in a table."""
 
 
+TABLE = re.compile(r"<table\b.*?</table>", re.DOTALL)
+PROOF = re.compile(r"(?:tests?|checks?|proven by|held by)")
+"""Head of a last column that names the tests of each row: most readers want the others."""
+
+
 def setup(app: Sphinx) -> None:
     """Mend what is right on a code host and not on a site."""
     # A toctree ends with `*`, for pages that it does not name; that there is none is no mistake.
@@ -64,6 +69,7 @@ def setup(app: Sphinx) -> None:
     )
     app.connect("source-read", _unlink)
     app.connect("html-page-context", _let_words_break)
+    app.connect("html-page-context", _fold_proofs)
 
 
 def _unlink(app: Sphinx, page: str, source: list[str]) -> None:
@@ -80,3 +86,20 @@ def _let_words_break(
     parted = r'\1</span><wbr><span class="pre">'
     if "body" in context:
         context["body"] = LONG_WORD.sub(lambda word: place.sub(parted, word[0]), context["body"])
+
+
+def _fold_proofs(
+    app: Sphinx, page: str, template: str, context: dict[str, Any], doctree: object
+) -> None:
+    """Fold the cells of a last column of tests: on a telephone it takes a third of the width."""
+    if "body" in context:
+        context["body"] = TABLE.sub(_folded, context["body"])
+
+
+def _folded(table: re.Match[str]) -> str:
+    heads = re.findall(r"<th\b[^>]*>(?:<p>)?(.*?)(?:</p>)?</th>", table[0], re.DOTALL)
+    if not heads or not PROOF.fullmatch(heads[-1]):
+        return table[0]
+    cell = r"<td>((?:(?!<td>).)*\S(?:(?!<td>).)*)</td>(\s*</tr>)"
+    fold = r"<td><details><summary>show</summary>\1</details></td>\2"
+    return re.sub(cell, fold, table[0], flags=re.DOTALL)
