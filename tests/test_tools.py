@@ -57,4 +57,15 @@ def test_random_lines_are_thrown_at_a_device() -> None:
         text=True,
         check=False,
     )
-    assert done.stdout.startswith("seed 3: 1 files, {"), done.stderr
+    assert done.stdout.startswith("1,000 lines, seed 3: no exception, never silent"), done.stderr
+
+
+@pytest.mark.parametrize(
+    "row", ["SDO download of 6040h through a bench", "RRC output", "canmon check of three lines"]
+)
+def test_a_trip_is_counted(row: str) -> None:
+    tool = runpy.run_path(str(TOOLS / "trips"), run_name="tool")
+    counter = tool["counted"](tool["TRIPS"][row])
+    assert 5 < len(counter.own_files) < 50
+    assert all((TOOLS.parent / file).is_file() for file in counter.own_files)
+    assert counter.calls > len(counter.own_files)
