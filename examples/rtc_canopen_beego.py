@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from tickrig import CanWire
-from tickrig.emulators.can.outside.host import CanHost  # internal
-from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
-from tickrig.emulators.canopen.rig_file import read_rig  # internal
+from tickrig import open_bench
 from tickrig.host.rtc.canopen.robots import Beego, Joystick  # internal
 from tickrig.host.rtc.canopen.serve import open_server, serve  # internal
 
@@ -16,19 +14,18 @@ WAY = ((0, 0, 1), (60, 0, 3), (40, 50, 2), (0, -100, 1), (0, 0, 1))
 
 def main() -> None:
     """Drive straight on, along an arc, on the spot; stand before and after."""
-    here, wire = Path(__file__).parent, CanWire()
-    file = read_rig(here / "rigs" / "beego.toml")
-    bench = make_bench(wire, make_nodes(describe_nodes(file.nodes), wire), file.body)
+    here = Path(__file__).parent
+    bench = open_bench(here / "rigs" / "beego.toml")
     server = open_server(here / "rtc_canopen" / "beego.yaml")
     stick = server.manager.add(Joystick("Joystick0"), rate_hz=20.0)
     base = server.manager.add(Beego("Beego0"), rate_hz=100.0)
     server.manager.activate("Joystick0", "Beego0")
-    link = CanHost(bench.rig, wire.end())  # on a robot: CanLink.open("can0", "socketcan")
+    link: Any = bench.link  # on a robot: CanLink.open("can0", "socketcan")
     server.start()
     for forward_pct, left_pct, duration_s in WAY:
         stick.tilt(forward_pct, left_pct)
         serve(server, link, link.now_us + 1_000_000 * duration_s)
-        x_m, y_m = (float(bench.device.read(f"body/{name}")) for name in ("x_m", "y_m"))
+        x_m, y_m = (float(bench.get(f"body/{name}")) for name in ("x_m", "y_m"))
         print(f"at {x_m:.2f} {y_m:.2f}; thinks {base.pose.x:.2f} {base.pose.y:.2f}")
 
 

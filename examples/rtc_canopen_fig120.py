@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from tickrig import CanWire
-from tickrig.emulators.can.outside.host import CanHost  # internal
-from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
-from tickrig.emulators.canopen.rig_file import read_rig  # internal
+from tickrig import open_bench
 from tickrig.host.rtc.canopen.definition import RtConnection  # internal
 from tickrig.host.rtc.canopen.definition_reader import read_definition  # internal
 from tickrig.host.rtc.canopen.serve import read_files, serve  # internal
@@ -23,15 +21,15 @@ def turn(*, pc: bool) -> float:
     if pc:
         ports = (RtConnection("Palette0.ai", "Motor0.angle"),)
         definition = replace(definition, pdo_links=(), rt_connections=ports)
-    nodes = describe_nodes(read_rig(HERE / "rigs" / "fig120.toml").nodes)
-    bench = make_bench(wire := CanWire(), make_nodes(nodes, wire))
     server = RtcCanopenServer(definition, read_files(definition, HERE / "rtc_canopen"))
-    serve(server, link := CanHost(bench.rig, wire.end()), 1_000_000)
-    bench.operator.set("16/ai1_v", 2.5)
-    if pc:
-        serve(server, link, 2_000_000)
-    bench.rig.run_to(2_000_000)
-    return float(bench.device.read("32/angle_deg"))
+    with open_bench(HERE / "rigs" / "fig120.toml") as bench:
+        link: Any = bench.link
+        serve(server, link, 1_000_000)
+        bench["palette"].set("ai1_v", 2.5)
+        if pc:
+            serve(server, link, 2_000_000)
+        bench.run_for(2_000_000 - bench.now_us)
+        return float(bench["motor"].get("angle_deg"))
 
 
 if __name__ == "__main__":

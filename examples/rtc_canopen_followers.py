@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from tickrig import CanWire
-from tickrig.emulators.can.outside.host import CanHost  # internal
-from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes  # internal
-from tickrig.emulators.canopen.rig_file import read_rig  # internal
+from tickrig import open_bench
 from tickrig.host.rtc.canopen.definition import PdoName  # internal
 from tickrig.host.rtc.canopen.serve import open_server, serve  # internal
 from tickrig.host.rtc.canopen.view import ServerView  # internal
@@ -18,10 +16,10 @@ HERE = Path(__file__).parent
 
 def main() -> None:
     """Let one follow through the PC, then the other, then both, one of them by PDO link."""
-    nodes = describe_nodes(read_rig(HERE / "rigs" / "followers.toml").nodes)
-    bench = make_bench(wire := CanWire(), make_nodes(nodes, wire))
+    bench = open_bench(HERE / "rigs" / "followers.toml")
     server = open_server(HERE / "rtc_canopen" / "followers.yaml")
-    view, link = ServerView(server), CanHost(bench.rig, wire.end())
+    link: Any = bench.link
+    view = ServerView(server)
     serve(server, link, until_us=1_000_000)
     view.connect("Leader.angle", "Second.reference")
     for degrees in (30, 60, 90):
@@ -30,7 +28,7 @@ def main() -> None:
             view.connect("Leader.angle", "Third.reference")
         server.put("Leader.reference", TimedShort(Time(), degrees * 32_767 // 180))
         serve(server, link, link.now_us + 1_000_000)
-        print(*(f"{float(bench.device.read(f'{n}/angle_deg')):.1f}" for n in (32, 33, 34)))
+        print(*(f"{float(bench[name].get('angle_deg')):.1f}" for name in bench.devices))
         if degrees == 60:
             view.link(PdoName(32, "tpdo2"), PdoName(33, "rpdo2"))
 

@@ -24,7 +24,6 @@ from tests.emulators.scenario.test_scenario import parse as parse_scenario
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
 from tickrig.emulators.canopen.bus_file.urdf import parse_urdf
-from tickrig.emulators.canopen.rig_file import read_rig
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.comparison import parse_number_rule
 from tickrig.emulators.record.replay import read_bench_recording, read_recording
@@ -173,7 +172,6 @@ READERS: Final = {
     "emulators.testing.rig_file": Reader(
         lambda text: parse_rig_file(text, Path("rig.toml")), ("[device.a]\ntype = ", "# ")
     ),
-    "emulators.canopen.rig_file": Reader(of_file(read_rig, "rig.toml"), ("x = ", "a.")),
     "emulators.canopen.store_file": Reader(of_file(StoreFile, "store.json"), ('{"a": ',)),
     "emulators.scenario": Reader(
         lambda text: parse_scenario(text, Emulator("lamp", Lamp())),

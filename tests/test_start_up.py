@@ -53,7 +53,7 @@ MOST = {
     "ucode-reader-emu TAB": 17,
     "ucode-resolver TAB": 17,
     "tkernel-emu TAB": 19,
-    "canopen-slave-emu --model TAB": 17,
+    "canopen-slave-emu --model TAB": 19,
     "canmon TAB": 15,
     "canmon --help": 15,
     "rtc-canopen-builder TAB": 26,

@@ -9,12 +9,9 @@ import asyncio
 import re
 import sys
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from tickrig.emulators.can.outside.host import CanHost
-from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
-from tickrig.emulators.canopen.rig_file import read_rig
+from tickrig import open_bench
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
 from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.host.rtc.canopen.serve import open_server
@@ -37,15 +34,14 @@ def picture(examples: Path) -> str:
     Args:
         examples: the folder with rigs and System Definitions.
     """
-    wire, nodes = CanWire(), describe_nodes(read_rig(examples / "rigs" / "fig120.toml").nodes)
-    bench = make_bench(wire, make_nodes(nodes, wire))
-    bench.operator.set("16/ai1_v", 2.5)
+    bench = open_bench(examples / "rigs" / "fig120.toml")
+    bench["palette"].set("ai1_v", 2.5)
     path = examples / "rtc_canopen" / "fig120.yaml"
-    link = CanHost(bench.rig, wire.end())
+    link: Any = bench.link
     return asyncio.run(_draw(EditorSession(open_server(path), path, link), link))
 
 
-async def _draw(session: EditorSession, link: CanHost) -> str:
+async def _draw(session: EditorSession, link: Any) -> str:
     editor = SystemEditor(session, "can0")
     async with editor.run_test(size=(140, 32)) as pilot:
         _pass_time(editor, link)
@@ -57,7 +53,7 @@ async def _draw(session: EditorSession, link: CanHost) -> str:
         return FONTS.sub("", editor.export_screenshot(title="rtc-canopen-editor fig120.yaml"))
 
 
-def _pass_time(editor: SystemEditor, link: CanHost) -> None:
+def _pass_time(editor: SystemEditor, link: Any) -> None:
     for _ in range(LOOKS):
         until_us = link.now_us + LOOK_US
         while link.now_us < until_us:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from math import degrees, radians
 from typing import Final, NamedTuple
 
-from tickrig.device.body import SIDES, BodyParameters, WheeledBody
+from tickrig.device.body import BodyParameters, WheeledBody
 from tickrig.device.canopen.slave import TICK_US
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.signals import NodeSignal
-from tickrig.host.cli.messages import Refused
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
 
@@ -215,86 +214,28 @@ def _set(bank: QuantityBank, name: str, value: float) -> None:
         bank.set(name, value)
 
 
-# A body as a rig file describes it.
-
-_NUMBERS: Final = ("wheel_radius_m", "tread_m", "mass_kg", "friction")
-_NEEDED: Final = ("wheel_radius_m", "tread_m")
-_MIRRORED: Final = "mirrored"
-
-
-@dataclass(frozen=True, slots=True)
-class BodySpec:
-    """A body and its drives.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodyPlan:
+    """What drives move, as a rig file says.
 
     Attributes:
-        place: where it is written, for errors.
-        parameters: what it is like.
-        drives: node-ID of the drive of each wheel.
+        kind: of `wheeled_body.SIDES`.
+        drives: for each wheel the name of its device.
         mirrored: wheels whose drive is mounted the other way round.
+        parameters: the other arguments of `BodyParameters` that are given.
     """
 
-    place: str
-    parameters: BodyParameters
-    drives: Mapping[str, int]
+    kind: str
+    drives: Mapping[str, str]
     mirrored: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
-    def put_on(self, nodes: Sequence[Node]) -> BodyOnDrives:
-        """Put it on the shafts of its drives; Refused if one of them is missing or none."""
+    def put_on(self, nodes: Iterable[Node]) -> BodyOnDrives:
+        """Put the body on the shafts of its drives, which are among the nodes."""
         by_name = {node.name: node for node in nodes}
-        wheels = []
-        for name, node_id in self.drives.items():
-            node = by_name.get(str(node_id))
-            if node is None:
-                raise Refused(f"{self.place}: {name} = {node_id}, but there is no such node")
-            wheels.append(DrivenWheel(name, node, -1 if name in self.mirrored else 1))
-        try:
-            return BodyOnDrives(WheeledBody(self.parameters), wheels)
-        except ValueError as error:
-            raise Refused(f"{self.place}: {error}") from None
-
-
-def read_body(place: str, table: object) -> BodySpec:
-    """Read the table [body]; Refused with the key if it cannot be used."""
-    if not isinstance(table, dict):
-        raise Refused(f"{place}: it is a table [body]")
-    kind = table.get("kind")
-    if not isinstance(kind, str) or kind not in SIDES:
-        raise Refused(f"{place}: kind {kind!r} is not one of {', '.join(SIDES)}")
-    wheels = [name for side in SIDES[kind] for name in side]
-    known = ["kind", *wheels, *_NUMBERS, _MIRRORED]
-    if unknown := [key for key in table if key not in known]:
-        raise Refused(f"{place}: no key {unknown[0]}; known: {', '.join(known)}")
-    if missing := [key for key in (*wheels, *_NEEDED) if key not in table]:
-        raise Refused(f"{place}: {missing[0]} is missing")
-    return BodySpec(
-        place,
-        _parameters(place, kind, table),
-        {name: _node_id(place, name, table[name]) for name in wheels},
-        _mirrored(place, wheels, table.get(_MIRRORED, [])),
-    )
-
-
-def _parameters(place: str, kind: str, table: Mapping[str, object]) -> BodyParameters:
-    numbers = {}
-    for key in _NUMBERS:
-        if key in table:
-            value = table[key]
-            if not isinstance(value, int | float) or isinstance(value, bool):
-                raise Refused(f"{place}: {key} {value!r} is not a number")
-            numbers[key] = float(value)
-    try:
-        return BodyParameters(kind=kind, **numbers)
-    except ValueError as error:
-        raise Refused(f"{place}: {error}") from None
-
-
-def _node_id(place: str, name: str, value: object) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= 127:
-        raise Refused(f"{place}: {name} {value!r} is not a node-ID in 1..127")
-    return value
-
-
-def _mirrored(place: str, wheels: Sequence[str], value: object) -> tuple[str, ...]:
-    if not isinstance(value, list) or not all(name in wheels for name in value):
-        raise Refused(f"{place}: {_MIRRORED} {value!r} is not a list of {', '.join(wheels)}")
-    return tuple(value)
+        wheels = [
+            DrivenWheel(wheel, by_name[drive], -1 if wheel in self.mirrored else 1)
+            for wheel, drive in self.drives.items()
+        ]
+        parameters = BodyParameters(kind=self.kind, **self.parameters)
+        return BodyOnDrives(WheeledBody(parameters), wheels)

@@ -15,8 +15,8 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body import BodySpec
-from tickrig.emulators.canopen.choices import AUTO, is_bus_node
+from tickrig.emulators.canopen.body import BodyPlan
+from tickrig.emulators.canopen.choices import AUTO, LSS, NodeSpec, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm
@@ -25,11 +25,9 @@ from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.station import Station
-from tickrig.host.cli.messages import Refused, refuse_path, say, show_findings
 from tickrig.host.text.log import log_of
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error, find_class
-from tickrig.wire.canopen.eds.eds_file import EdsError
 from tickrig.wire.rtc_canopen import device_info
 
 if TYPE_CHECKING:
@@ -54,9 +52,7 @@ class Described:
 
 
 def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Described]:
-    """Read the files; Refused if one cannot be used, or a node-ID is missing or there twice.
-
-    What is not by the standard in a file is told on standard error.
+    """Read the files; ValueError if one cannot be used, or a node-ID is missing or there twice.
 
     Args:
         specs: the nodes.
@@ -67,43 +63,24 @@ def describe_nodes(specs: Iterable[NodeSpec], profile: str = AUTO) -> list[Descr
         description = describe(cache, spec.device, spec.profile or profile)
         node_id = spec.node_id if spec.node_id is not None else description.node_id
         if node_id is None:
-            raise Refused(
+            raise ValueError(
                 f"{spec.device} gives no node-ID: add --node-id 1..127, or --node-id {LSS} for a"
                 " node that waits for LSS"
             )
         name = _name(node_id, found)
         if name in found:
-            raise Refused(
+            raise ValueError(
                 f"node {name} is there twice: {found[name].description.file}, {spec.device}"
             )
         found[name] = Described(name, node_id, description)
-    show_findings(odd for item in found.values() for odd in item.description.warnings)
     return list(found.values())
 
 
-def describe_bus(file: Path, urdf: Path | None = None, profile: str = AUTO) -> list[Described]:
-    """Read a bus.yml; Refused with all that is wrong. What is odd is told on standard error.
-
-    Args:
-        file: the bus.yml.
-        urdf: the robot with its joints, None for that which it names.
-        profile: of `choices.PROFILES`, for nodes that name none.
-    """
-    bus = _read_bus(file, urdf, EdsCache(), profile)
-    for remark in bus.remarks:
-        say(remark)
-    show_findings(odd for node in bus.nodes for odd in node.description.warnings)
-    return [Described(node.name, node.node_id, node.description, node.about) for node in bus.nodes]
-
-
 def describe_device(name: str) -> DeviceDescription:
-    """Describe a model, or the DeviceRTC of a user's file; Refused if there is none."""
+    """Describe a model, or the DeviceRTC of a user's file; ValueError if there is none."""
     if name in MODELS:
         return MODELS[name].describe()
-    try:
-        return describe_rtc(name)
-    except ValueError as error:
-        raise Refused(str(error)) from None
+    return describe_rtc(name)
 
 
 def make_nodes(
@@ -125,7 +102,7 @@ def make_nodes(
 
 
 def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> DeviceDescription:
-    """Describe the node that a file, a model or a user's class stands for; Refused if none can be.
+    """Describe the node that a file, a model or a user's class stands for; ValueError if none.
 
     Args:
         cache: of files.
@@ -138,34 +115,47 @@ def describe(cache: EdsCache, device: Path | str, profile: str = AUTO) -> Device
     return _read(cache, device, profile)
 
 
-def _read_bus(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
+def read_bus_file(file: Path, urdf: Path | None, cache: EdsCache, profile: str = AUTO) -> BusNodes:
+    """Read a bus.yml.
+
+    Args:
+        file: the bus.yml.
+        urdf: the robot with its joints, None for that which it names.
+        cache: of EDS files.
+        profile: of `choices.PROFILES`, for nodes that name none.
+
+    Raises:
+        ValueError: all that is wrong, a line each.
+    """
     from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus  # noqa: PLC0415 - slow
 
     try:
         return read_bus(file, urdf, cache, profile)
     except OSError as error:
-        refuse_path("file", error)
-    except (ImportError, ValueError) as error:  # no YAML; all mistakes
-        raise Refused(str(error)) from None
+        raise ValueError(_unreadable(error)) from None
+    except ImportError as error:  # no YAML
+        raise ValueError(str(error)) from None
+
+
+def _unreadable(error: OSError) -> str:
+    return f"file {error.filename}: {error.strerror or error}"
 
 
 def _bus_node(cache: EdsCache, spec: str) -> DeviceDescription:
     """Describe the node that `FILE.yml:NODE` stands for."""
     file, _, name = spec.rpartition(":")
-    nodes = _read_bus(Path(file), None, cache).nodes
+    nodes = read_bus_file(Path(file), None, cache).nodes
     found = next((node for node in nodes if node.name == name), None)
     if found is None:
-        raise Refused(f"{file}: no node {name!r}; {near(name, [node.name for node in nodes])}")
+        raise ValueError(f"{file}: no node {name!r}; {near(name, [node.name for node in nodes])}")
     return found.description
 
 
 def _read(cache: EdsCache, file: Path, profile: str) -> DeviceDescription:
     try:
         return cache.read(file, profile)
-    except EdsError as error:
-        raise Refused(str(error)) from None
     except OSError as error:
-        refuse_path("file", error)
+        raise ValueError(_unreadable(error)) from None
 
 
 def _name(node_id: int, found: dict[str, Described]) -> str:
@@ -209,7 +199,7 @@ _logger = log_of(__name__)
 def make_bench(  # noqa: PLR0913 - options, by keyword
     wire: CanWire,
     nodes: Sequence[Node],
-    body: BodySpec | None = None,
+    body: BodyPlan | None = None,
     *,
     outside: CountingPort | None = None,
     link: str = "",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -11,10 +11,13 @@ from tickrig.emulators.canopen.choices import AUTO, MODEL_FAULTS, MODELS, NODE_F
 from tickrig.emulators.commands.run_options import run_options
 from tickrig.host.cli.can_options import BusCommand, bus_options
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
+
+
+_RUN: Final = "tickrig.emulators.testing.commands.canopen_run"
 
 
 def _complete_node(
@@ -52,7 +55,7 @@ def _device_faults(context: click.Context) -> tuple[str, ...]:
     shell_complete=_complete_node,
     help="One more node, as 5=a.eds or 5=epos; 1-20=a.eds makes twenty; may be repeated.",
 )
-@click.option("--rig", type=PATH, help="TOML file with tables [[node]], and [body] if it has one.")
+@click.option("--rig", type=PATH, help="Rig file: its nodes, and the body that they move.")
 @click.option(
     "--bus",
     "bus_file",
@@ -123,10 +126,7 @@ def main(  # noqa: PLR0913 - options
     Completion of options in the shell:
     eval "$(_CANOPEN_SLAVE_EMU_COMPLETE=bash_source canopen-slave-emu)"
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.canopen import run  # noqa: PLC0415 - slow
-
     if write_eds:
-        run.write_eds(options["model"], options["rtc"], write_eds)
+        load(f"{_RUN}:write_eds")(options["model"], options["rtc"], write_eds)
     else:
-        context.exit(run.emulate(node_id, nodes, rig, run.BusYml(bus_file, urdf), options))
+        context.exit(load(f"{_RUN}:emulate")(node_id, nodes, rig, (bus_file, urdf), options))

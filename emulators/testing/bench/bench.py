@@ -332,7 +332,7 @@ class Bench(BenchDevice, Closing):
             terminal: where the operator of real devices is; standard input and output unless given.
 
         Raises:
-            Refused: a device cannot be made.
+            ValueError: a device cannot be made.
             ValueError: an option, input, fault or mode that there is not.
             PortGone: a bus cannot be opened, or an emulator that plays a device is not there.
             OSError: no port is to be had, or no link or socket can be made.
@@ -583,7 +583,7 @@ def open_bench(path: Path | str, *, mode: str = VIRTUAL, seed: int | None = None
     Raises:
         OSError: the file cannot be read, or a port cannot be had.
         RigFileError: all that is wrong with the file.
-        Refused: a device cannot be made.
+        ValueError: a device cannot be made.
         PortGone: a bus cannot be opened.
     """
     plan = read_rig_file(Path(path))

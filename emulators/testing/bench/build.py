@@ -19,8 +19,7 @@ from tickrig.emulators.testing.bench.plan_parts import NoNodeIdError, slave_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.devices import RIG_SUFFIXES, kind_of
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
-from tickrig.emulators.testing.rig_file.schema import node_id as read_node_id
-from tickrig.host.cli.messages import Refused
+from tickrig.emulators.testing.rig_file.section import node_id as read_node_id
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.trace import Config
 
@@ -112,8 +111,6 @@ def _slave(mount: BusMount, plan: DevicePlan) -> tuple[CanopenSlave, DeviceEntry
         raise ValueError(
             f"{plan.name}: {plan.type} gives no node-ID: write '5={plan.type}'"
         ) from None
-    except Refused as refused:
-        raise ValueError(str(refused)) from None
     for other, node in mount.nodes.items():
         if node.slave.configured_id == (taken := slave.configured_id):
             text = f"node-ID {taken} is that of {other!r} already: write '{taken % 127 + 1}=..."

@@ -8,14 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tickrig.device.body import BodyParameters, WheeledBody
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.bench.fault_spec import FaultOrder
-from tickrig.emulators.canopen.body import BodyOnDrives, DrivenWheel
 from tickrig.emulators.canopen.build import describe, store_keeper
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure
 from tickrig.emulators.rig.port import ByteLine
@@ -26,7 +23,6 @@ from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
 from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.plan import (
-    BodyPlan,
     DeviceKind,
     DevicePlan,
     RigPlan,
@@ -55,8 +51,8 @@ def parts_of(plan: RigPlan) -> Parts:
     """Make the devices of a rig file and put them on their wires.
 
     Raises:
-        Refused: a device cannot be made, such as of an EDS that cannot be read.
-        ValueError: options that its type does not take, or a signal that cannot be.
+        ValueError: a device cannot be made, such as of an EDS that cannot be read; options that
+            its type does not take; a signal that cannot be.
     """
     alone = len(plan.wires) == 1
     stores: dict[Path, StoreFile] = {}
@@ -67,7 +63,8 @@ def parts_of(plan: RigPlan) -> Parts:
             mounts.append(_bus(wire, devices, seed, stores))
         elif devices:
             mounts.append(_line(wire, devices, seed))
-    bodies = [_body(plan.body, mounts)] if plan.body else []
+    nodes = [node for bus in mounts if isinstance(bus, BusMount) for node in bus.nodes.values()]
+    bodies = [plan.body.put_on(nodes)] if plan.body else []
     return Parts(
         mounts=mounts,
         bodies=bodies,
@@ -148,7 +145,7 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
     """Return a slave, and what a trace says of it; the files of `stores` are entered there.
 
     Raises:
-        Refused: its file cannot be read.
+        ValueError: its file cannot be read.
         NoNodeIdError: nobody gives it a node-ID.
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
@@ -166,20 +163,6 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
     slave = make_slave(dictionary, node_id, memory, description.application, device.sdo)
     profile, files = device.profile or AUTO, description.files
     return slave, node_entry(device.wire, slave, kind, profile, files)
-
-
-def _body(plan: BodyPlan, mounts: Iterable[Mount]) -> BodyOnDrives:
-    nodes: Mapping[str, Node] = {
-        name: node
-        for mount in mounts
-        if isinstance(mount, BusMount)
-        for name, node in mount.nodes.items()
-    }
-    wheels = [
-        DrivenWheel(wheel, nodes[drive], -1 if wheel in plan.mirrored else 1)
-        for wheel, drive in plan.drives.items()
-    ]
-    return BodyOnDrives(WheeledBody(BodyParameters(kind=plan.kind, **plan.parameters)), wheels)
 
 
 # The rig of a bench, with all that a rig file says of it.

@@ -19,7 +19,6 @@ from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.store_file import drop_misfits, memory_values, parse_memory
 from tickrig.emulators.commands.device_type import build_recorded, check_no_code
-from tickrig.host.cli.messages import Refused
 from tickrig.host.text.bench_header import BenchHeader, DeviceEntry
 from tickrig.host.text.trace import Header
 from tickrig.host.text.user_file import SUFFIX
@@ -92,8 +91,6 @@ def make_recorded(
         if entry.node_id is None:
             return build_recorded(Header(entry.type, entry.config), run_code=run_code)
         return _node(name, entry, folder, cache)
-    except Refused as refused:
-        raise ValueError(f"device {name}: {refused}") from None
     except ValueError as error:
         raise ValueError(f"device {name}: {error}") from None
 

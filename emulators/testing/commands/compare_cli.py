@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.emulators.commands.run_options import type_option
-from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say
+from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, show_findings
 from tickrig.host.cli.options import PATH, add_options, run_code_option, time_option
 from tickrig.host.cli.start import loading
 
@@ -175,10 +175,14 @@ def _on_bus(
     from tickrig.emulators.canopen.node_spec import parse_node  # noqa: PLC0415
     from tickrig.emulators.testing.commands.compare import compare_bus  # noqa: PLC0415
 
-    specs = [spec for text in options["nodes"] for spec in parse_node(text)]
+    try:
+        specs = [spec for text in options["nodes"] for spec in parse_node(text)]
+        described = describe_nodes(specs)
+    except ValueError as error:
+        raise Refused(str(error)) from None
     if not specs:
         raise ValueError("which nodes were on the bus? add --node, as --node 5=epos")
-    described = describe_nodes(specs)
+    show_findings(odd for item in described for odd in item.description.warnings)
     wire = recording.header.wires[recording.header.devices[name].wire]
     bit_rate = wire.config.get("bit_rate", _BIT_RATE)
     if not isinstance(bit_rate, int):

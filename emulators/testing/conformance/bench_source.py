@@ -267,7 +267,7 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
     Raises:
         OSError: it cannot be read.
         ValueError: something is wrong in it, or no node of it has this node-ID.
-        Refused: a device cannot be made.
+        ValueError: a device cannot be made.
     """
     plan = read_rig_file(path)
     bench = Bench.of_plan(plan)

@@ -38,7 +38,6 @@ from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make_error
 from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
-from tickrig.host.cli.messages import Refused
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.plugin.bench_evidence import (
@@ -258,5 +257,5 @@ def _opened(test: BenchedTest) -> Bench:
     """Open the bench; what is wrong with what was asked needs no traceback."""
     try:
         return test.open()
-    except (ValueError, OSError, Refused) as error:
+    except (ValueError, OSError) as error:
         raise pytest.fail.Exception(f"no bench: {error}", pytrace=False) from None

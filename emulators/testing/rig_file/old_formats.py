@@ -1,22 +1,15 @@
-"""Files of before the rig file, put into its words: CANopen rigs, and where a real RRC is.
-
-Each value keeps the line and the name that it has in its file, for mistakes.
-"""
+"""Files that are no rig file, and tables of files of before: what to write in their place."""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
-from tickrig.emulators.canopen.models import MODELS
-from tickrig.emulators.canopen.node_spec import LSS, parse_ids
-from tickrig.emulators.canopen.rig_file import DEVICE_KEYS, NODE_KEYS
-from tickrig.host.cli.messages import Refused
-from tickrig.host.text.names import closest
-from tickrig.host.text.section import Notes, Section, dotted, is_broken, shown
-from tickrig.host.text.toml_reader import BROKEN, TomlDocument, TomlPath
+from tickrig.emulators.testing.rig_file.section import (
+    RigFileTable,
+)
+from tickrig.host.text.toml_reader import BROKEN
 from tickrig.host.text.trace import BEGIN
 
 _SYSTEM: Final = (
@@ -29,19 +22,17 @@ _URDF: Final = (
     "it is a URDF: a bus.yml names it, options: {tickrig: {urdf: FILE}}, and tickrig check of that"
     " checks both"
 )
+_NODE: Final = "[[node]] is a device now, one for each node-ID: {new}"
+_DUT: Final = (
+    'a real RRC is a device now: [device.rrc] with type = "rrc", [hardware.rrc] with port = "...";'
+    " [tolerance] is [hardware.tolerance], [operator] is [hardware]"
+)
 _EDS: Final = re.compile(r"\s*\[(FileInfo|DeviceInfo|DeviceComissioning)\]", re.IGNORECASE)
 _HEAD: Final = 2_000
 """Characters at its beginning by which a URDF is known."""
 _SCENARIO: Final = re.compile(
     r"(?:[^\S\n]*+(?:#.*+)?\n)*+[^\S\n]*+\+?[0-9][0-9.]*(s|ms|us)?[ \t]+[a-z]+\b(?!\s*=)"
 )
-_HIL: Final = {
-    ("dut", "rrc", "port"): ("hardware", "rrc", "port"),
-    ("tolerance", "stick_pct"): ("hardware", "tolerance", "stick_pct"),
-    ("tolerance", "time_ms"): ("hardware", "tolerance", "time_ms"),
-    ("operator", "control"): ("hardware", "control"),
-}
-"""What becomes of the keys of the file for tests on a real RRC."""
 
 
 def no_rig_file(text: str) -> str:
@@ -60,38 +51,8 @@ def no_rig_file(text: str) -> str:
     return SCENARIO if _SCENARIO.match(text) else ""
 
 
-@dataclass(slots=True)
-class _Translation:
-    """A document in the words of rig files, and what is wrong with the old one."""
-
-    old: Section
-    values: dict[str, Any] = field(default_factory=dict)
-    lines: dict[TomlPath, int] = field(default_factory=dict)
-    names: dict[TomlPath, str] = field(default_factory=dict)
-
-    def put(self, keys: TomlPath, value: Any, old: TomlPath) -> None:
-        """Enter a value that stood somewhere else."""
-        table = self.values
-        for at, key in enumerate(keys[:-1], 1):
-            table = table.setdefault(str(key), {})
-            self._place(keys[:at], old[:-1])
-        table[str(keys[-1])] = value
-        self._place(keys, old)
-
-    def _place(self, keys: TomlPath, old: TomlPath) -> None:
-        self.lines.setdefault(keys, self.old.notes.document.line_of(old))
-        self.names.setdefault(keys, dotted(old))
-
-    @property
-    def section(self) -> Section:
-        """The document as a section, with the mistakes of the old one."""
-        old = self.old.notes
-        document = TomlDocument(self.values, self.lines, old.document.mistakes, old.document.whole)
-        return Section(Notes(document, old.mistakes, self.names), (), self.values)
-
-
-def in_new_words(top: Section) -> Section:
-    """Return an old file as if it were a rig file, a rig file as it is.
+def refuse_old_tables(top: RigFileTable) -> RigFileTable:
+    """Return a rig file as it is; note what replaces the tables of files of before.
 
     Args:
         top: the whole file.
@@ -99,102 +60,22 @@ def in_new_words(top: Section) -> Section:
     given = top.values
     if "device" in given:
         return top
-    if isinstance(given.get("node"), list):
-        return _canopen_rig(top)
+    nodes = given.get("node")
+    if isinstance(nodes, list):
+        for at, node in enumerate(nodes):
+            if node is not BROKEN:
+                top.wrong(_NODE.format(new=_device(node, at + 1)), "node", at)
     if isinstance(given.get("dut"), dict):
-        return _hil(top)
+        top.wrong(_DUT, "dut")
     if isinstance(given.get("component"), list):
         top.wrong(_SYSTEM, "component")
-        return Section(top.notes, (), {"device": {}})
-    return top
+    return RigFileTable(top.notes, (), {"device": {}}) if top.notes.all else top
 
 
-def _hil(top: Section) -> Section:
-    """Read the file that tells where a real RRC is."""
-    new = _Translation(top)
-    new.put(("device", "rrc", "type"), "rrc", ("dut", "rrc"))
-    new.put(("hardware", "rrc"), {}, ("dut", "rrc"))
-    _check_keys(top, [keys[0] for keys in _HIL])
-    dut = top.sub("dut")
-    for table in (dut, top.sub("tolerance"), top.sub("operator"), dut and dut.sub("rrc")):
-        if table is not None:
-            depth = len(table.keys)
-            known = [keys[depth] for keys in _HIL if keys[:depth] == table.keys]
-            if _check_keys(table, known) & {"rrc", "port"}:
-                new.put(_HIL["dut", "rrc", "port"], BROKEN, ("dut", "rrc"))
-    for old, keys in _HIL.items():
-        if (value := _value(top.values, old)) is not None:
-            new.put(keys, value, old)
-    return new.section
-
-
-def _check_keys(section: Section, known: Iterable[str]) -> set[str]:
-    """Note the keys that are not known, and return those that may be meant."""
-    known = list(dict.fromkeys(known))
-    unknown = [key for key in section.values if key not in known]
-    for key in unknown:
-        section.no_key(key, known)
-    return {each for key in unknown for each in closest(key, known)}
-
-
-def _value(values: Mapping[str, Any], keys: TomlPath) -> Any:
-    value: Any = values
-    for key in keys:
-        value = value.get(key) if isinstance(value, dict) else None
-    return value
-
-
-def _canopen_rig(top: Section) -> Section:
-    """Read tables [[node]] and [body]."""
-    new = _Translation(top)
-    for at, table in enumerate(top.values["node"]):
-        if isinstance(table, dict):
-            section = Section(top.notes, ("node", at), table)
-            for name, values in _nodes(section, list(new.values.get("device", {}))):
-                for key, (value, old) in values.items():
-                    new.put(("device", name, key), value, ("node", at, *old))
-        elif table is not BROKEN:
-            top.wrong(f"it is a table [[node]], not {shown(table)}", "node", at)
-    new.values.setdefault("device", {})
-    for key, value in top.values.items():
-        if key == "body":
-            for inner, each in value.items() if isinstance(value, dict) else ():
-                new.put(("body", inner), each, ("body", inner))
-        elif key != "node":
-            new.put((key,), value, (key,))
-    return new.section
-
-
-_Keys = dict[str, tuple[Any, TomlPath]]
-"""Values by their keys, with the keys that they had."""
-
-
-def _nodes(section: Section, taken: list[str]) -> Iterator[tuple[str, _Keys]]:
-    """Yield the nodes of a table: each name, and its keys with what they were."""
-    given = section.values
-    misspelt = _check_keys(section, NODE_KEYS)
-    devices = [key for key in DEVICE_KEYS if key in given]
-    if len(devices) != 1:
-        if devices or not misspelt & {*DEVICE_KEYS}:
-            section.wrong(f"it has one of {', '.join(DEVICE_KEYS)}")
-        return
-    values: _Keys = {"type": (given[devices[0]], (devices[0],))}
-    if "profile" in given:
-        values["profile"] = given["profile"], ("profile",)
-    if "id" not in given or is_broken(given["id"]):
-        model = MODELS.get(given[devices[0]]) if isinstance(given[devices[0]], str) else None
-        yield str(model.node_id) if model else f"node{len(taken) + 1}", values
-        return
-    try:
-        ids = list(parse_ids(f"id {shown(given['id'])}", str(given["id"])))
-    except Refused as error:
-        section.wrong(str(error), "id")
-        return
-    for number in ids:
-        waits = given["id"] == LSS
-        count = sum(each.startswith(LSS) for each in taken)
-        name = str(number) if not waits else f"{LSS}{count + 1}" if count else LSS
-        if name in taken:
-            section.wrong(f"node {name} is there twice", "id")
-        else:
-            yield name, {**values, "node_id": (LSS if waits else number, ("id",))}
+def _device(node: object, number: int) -> str:
+    """Return a table [[node]] as a table [device.NAME]."""
+    old: dict[str, object] = node if isinstance(node, dict) else {}
+    device = next((old[key] for key in ("eds", "model", "rtc") if key in old), "FILE.eds")
+    keys = {"type": device, "node_id": old.get("id"), "profile": old.get("profile")}
+    shown = ", ".join(f"{key} = {json.dumps(x)}" for key, x in keys.items() if x is not None)
+    return f"[device.node{number}] with {shown}"

@@ -15,7 +15,8 @@ from typing import Final
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.canopen.node_spec import LSS
+from tickrig.emulators.canopen.body import BodyPlan
+from tickrig.emulators.canopen.choices import LSS
 from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text.values import Setting
 
@@ -120,23 +121,6 @@ class FaultPlan:
 
     owner: str
     spec: FaultSpec
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BodyPlan:
-    """What drives move.
-
-    Attributes:
-        kind: of `wheeled_body.SIDES`.
-        drives: for each wheel the name of its device.
-        mirrored: wheels whose drive is mounted the other way round.
-        parameters: the other arguments of `BodyParameters` that are given.
-    """
-
-    kind: str
-    drives: Mapping[str, str]
-    mirrored: tuple[str, ...] = ()
-    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,7 +22,6 @@ from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, 
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
 from tickrig.host.cli.extensions import ExtensionError
-from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 from tickrig.host.text.values import Setting
@@ -89,7 +88,7 @@ def probe(plan: DevicePlan) -> Probe | list[WrongDevice]:
     device = Path(plan.type) if plan.kind is DeviceKind.EDS else plan.type
     try:
         found = describe(eds_cache(), device, plan.profile or AUTO)
-    except Refused as error:
+    except ValueError as error:
         return [WrongDevice(reason, ("type",)) for reason in str(error).splitlines()]
     except SystemExit as error:  # a user's file may do anything
         return [WrongDevice(f"{plan.type}: {explain_error(error)}", ("type",))]

@@ -14,7 +14,7 @@ from tickrig.device.chance import check_rate
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
-from tickrig.emulators.canopen.body import SHAFTS
+from tickrig.emulators.canopen.body import SHAFTS, BodyPlan
 from tickrig.emulators.canopen.choices import is_bus_node
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.bus_yml import bus_as_rig, is_bus_yml, with_nodes
@@ -25,9 +25,8 @@ from tickrig.emulators.testing.rig_file.devices import (
     read_wires,
 )
 from tickrig.emulators.testing.rig_file.doors import DoorReader
-from tickrig.emulators.testing.rig_file.old_formats import in_new_words, no_rig_file
+from tickrig.emulators.testing.rig_file.old_formats import no_rig_file, refuse_old_tables
 from tickrig.emulators.testing.rig_file.plan import (
-    BodyPlan,
     DeviceKind,
     DevicePlan,
     FaultPlan,
@@ -230,7 +229,7 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
     if reason := no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
-    top = in_new_words(Section(Notes(document), (), document.values))
+    top = refuse_old_tables(RigFileTable(RigFileNotes(document), (), document.values))
     return _plan(with_nodes(top, path.parent), path)
 
 

@@ -204,36 +204,40 @@ def test_a_rig_file_names_the_nodes(tmp_path: Path) -> None:
     eds = ROOT / EDS
     rig = tmp_path / "rig.toml"
     rig.write_text(
-        f'[[node]]\nid = 5\neds = "{eds}"\n[[node]]\nid = "7-8"\neds = "{eds}"\n'
-        f'[[node]]\nid = "lss"\neds = "{eds}"\n[[node]]\neds = "{ROOT / DCF}"\n'
-        '[[node]]\nmodel = "f-palette"\nid = 17\n'
-        f'[[node]]\nid = 9\neds = "{eds}"\nprofile = "none"\n'
+        f'[device.a]\ntype = "{eds}"\nnode_id = 5\n[device.b]\ntype = "{eds}"\nnode_id = 7\n'
+        f'[device.c]\ntype = "{eds}"\nnode_id = "lss"\n[device.d]\ntype = "{ROOT / DCF}"\n'
+        '[device.palette]\ntype = "f-palette"\nnode_id = 17\n'
+        f'[device.bare]\ntype = "{eds}"\nnode_id = 9\nprofile = "none"\n'
     )
-    result = play("1ms set 5/di1 1\n10ms end\n", "--rig", rig)
-    assert {"705#00", "707#00", "708#00", "709#00", "711#00"} < set(frames(result))
+    result = play("1ms set a/di1 1\n10ms end\n", "--rig", rig, "--node", f"20={eds}")
+    assert {"705#00", "707#00", "709#00", "711#00", "714#00"} < set(frames(result))
     assert len(frames(result)) == 6
-    assert "no input '9/di1'" in play("1ms set 9/di1 1\n", "--rig", rig).stderr
+    assert "no input 'bare/di1'" in play("1ms set bare/di1 1\n", "--rig", rig).stderr
+
+
+EPOS = '[device.a]\ntype = "epos"\n'
 
 
 @pytest.mark.parametrize(
     ("text", "error"),
     [
-        ("node = 5", "it consists of tables [[node]]"),
-        ("node = [5]", "node 1: it is a table with the keys id, eds, model, rtc, profile"),
-        ("", "it consists of tables [[node]]"),
-        ("[nodes]", "it consists of tables [[node]] and perhaps one table [body], not [nodes]"),
-        ("[[node]]\nid = 1\nedds = 'x'", "node 1: no key edds; known: id, eds, model, rtc"),
-        ("[[node]]\nid = 1", "node 1: give eds, the name of an EDS or DCF file, or model"),
-        ("[[node]]\neds = 5", "node 1: eds 5 is not the name of an EDS or DCF file"),
-        ("[[node]]\neds = 'x'\nmodel = 'y'", "node 1: give eds, the name of an EDS"),
-        ("[[node]]\nmodel = 'toaster'", "node 1: model 'toaster' is not one of f-palette"),
-        ("[[node]]\nmodel = 'f-palette'\nprofile = '401'", "node 1: profile belongs to eds"),
-        ("[[node]]\nrtc = 'a.py:A'\nprofile = '401'", "profile belongs to eds; each rtc has"),
-        ("[[node]]\nrtc = 'gripper'", "node 1: rtc 'gripper' is not FILE.py:Class"),
-        ("[[node]]\neds = 'x'\nprofile = 401", "node 1: profile 401 is not one of auto, none"),
-        ("[[node]]\nid = 0\neds = 'x'", "node 1: id 0: a node-ID is 1..127"),
-        ("[[node", "rig.toml: "),
-        ("[device.a]", "rig.toml: it describes a bench: tickrig run"),
+        ("", "rig.toml:1: no device: a rig file has tables [device.NAME] with a type"),
+        (
+            '[[node]]\nid = 5\neds = "a.eds"',
+            "rig.toml:1: node[1]: [[node]] is a device now, one for each node-ID: [device.node1]"
+            ' with type = "a.eds", node_id = 5',
+        ),
+        ("[[node", "rig.toml:1: "),
+        (EPOS + "node_id = 0", "rig.toml:3: device.a.node_id: "),
+        (EPOS + '[device.b]\ntype = "rrc"', "more than nodes on one bus (device b): tickrig run"),
+        (EPOS + '[fault]\na = "power_off"', "more than nodes on one bus (faults): tickrig run"),
+        (EPOS + "[device.a.start]\nsupply_v = {sine = [20, 28], period = '1s'}", "(signals)"),
+        (EPOS + "[signal]\nx = {sine = [20, 28], period = '1s'}", "(signals): tickrig run"),
+        (
+            EPOS + "wire='x'\n[device.b]\ntype = 'epos'\nwire='y'\n[wire.x]\ntype='can'\n"
+            "[wire.y]\ntype='can'",
+            "(several wires): tickrig run",
+        ),
     ],
 )
 def test_a_wrong_rig_file_is_one_line(tmp_path: Path, text: str, error: str) -> None:
@@ -242,6 +246,14 @@ def test_a_wrong_rig_file_is_one_line(tmp_path: Path, text: str, error: str) -> 
     result = play("10ms end\n", "--rig", rig)
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
     assert error in result.stderr
+
+
+def test_a_node_of_a_rig_file_begins_as_the_file_says(tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text(f"{EPOS}[device.a.start]\nsupply_v = 20\n")
+    assert "* supply_v 20" in play("1ms watch supply_v\n2ms end\n", "--rig", rig).stderr
+    twice = play("1ms end\n", "--rig", rig, "--node", "1=epos")
+    assert (twice.exit_code, twice.stderr) == (2, "Error: node 1 is there twice: epos, a\n")
 
 
 def test_what_is_stored_outlives_the_run(tmp_path: Path) -> None:

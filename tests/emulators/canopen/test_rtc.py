@@ -155,6 +155,8 @@ def test_what_is_no_file_with_a_class_is_one_line() -> None:
 
 def test_a_rig_file_names_components_beside_it(tmp_path: Path, mine: Path) -> None:
     rig = tmp_path / "rig.toml"
-    rig.write_text('[[node]]\nid = 5\nrtc = "mine.py:Mine"\n[[node]]\nmodel = "rtc-echo"\n')
+    rig.write_text(
+        '[device.a]\ntype = "mine.py:Mine"\nnode_id = 5\n[device.b]\ntype = "rtc-echo"\n'
+    )
     result = run("--rig", rig, scenario="20ms end\n")
     assert (result.exit_code, frames(result)) == (0, ["705#00", "730#00"])

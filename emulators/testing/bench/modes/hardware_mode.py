@@ -78,8 +78,7 @@ class HardwareMode:
         terminal: where the human is.
 
     Raises:
-        ValueError: the plan does not say where the devices are.
-        Refused: it names a device that there is not.
+        ValueError: the plan does not say where the devices are, or names one that there is not.
         PortGone: an emulator is not there.
     """
 

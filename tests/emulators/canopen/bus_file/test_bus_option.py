@@ -85,7 +85,7 @@ def test_a_bus_yml_is_no_rig_and_a_rig_no_bus_yml(tmp_path: Path) -> None:
     path = write_system(tmp_path)
     assert play("--rig", path).stderr == f"Error: rig {path}: it is a bus.yml: --bus {path}\n"
     rig = tmp_path / "rig.toml"
-    rig.write_text('[[node]]\nmodel = "epos"\n')
+    rig.write_text('[device.a]\ntype = "epos"\n')
     assert play("--bus", rig).stderr.startswith(f"Error: {rig}:")
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.rig_file.plan import (
-    BodyPlan,
     DeviceKind,
     DevicePlan,
     FaultPlan,
@@ -17,7 +17,6 @@ from tickrig.emulators.testing.rig_file.plan import (
     WireType,
 )
 from tickrig.emulators.testing.signals.spec_reader import read_signal_spec
-from tickrig.host.cli.messages import Refused
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.modbus import encode_frame, parse_frame
 
@@ -103,7 +102,7 @@ def test_an_eds_becomes_a_node(tmp_path: Path) -> None:
     with Bench.of_plan(plan_of(io, wires=(BUS,))) as bench:
         assert bench.wait_until(bench.on_line("709#00"), within="10ms")
     lost = DevicePlan(name="io", kind=DeviceKind.EDS, type="lost.eds", wire="bus", node_id=9)
-    with pytest.raises(Refused, match="No such file"):
+    with pytest.raises(ValueError, match="No such file"):
         Bench.of_plan(plan_of(lost, wires=(BUS,)))
 
 

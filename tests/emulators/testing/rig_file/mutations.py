@@ -22,8 +22,8 @@ SEEDS.append(
     f'{WHOLE}[safe.vr2]\nout_v_pct = 0\nstate = "WaitPowerOn"\n[safe]\nleft.shaft_deg = 0\n'
 )
 SEEDS.append(
-    '[dut.rrc]\nport = "/dev/ttyACM0"\n[tolerance]\nstick_pct = 5\ntime_ms = 20\n'
-    '[operator]\ncontrol = "rrc.ctl"\n'
+    '[device.rrc]\ntype = "rrc"\n[hardware]\ncontrol = "rrc.ctl"\n[hardware.rrc]\n'
+    'port = "/dev/ttyACM0"\n[hardware.tolerance]\nstick_pct = 5\ntime_ms = 20\n'
 )
 
 PIECES = ["[", "]", "{", "}", "=", ",", '"', "'", '"""', "\n", "#", ".", "\\", "\x00", "\r", "é"]

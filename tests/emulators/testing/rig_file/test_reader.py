@@ -6,8 +6,8 @@ import pytest
 
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.fault_spec import FaultSpec
+from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.testing.rig_file.plan import (
-    BodyPlan,
     BusPlan,
     DeviceKind,
     DevicePlan,

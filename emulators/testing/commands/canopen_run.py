@@ -15,26 +15,37 @@ from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmu
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bus_port import open_bus
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body import BodySpec
+from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.build import (
     Described,
-    describe_bus,
+    describe,
     describe_device,
     describe_nodes,
     make_bench,
     make_nodes,
+    read_bus_file,
     store_keeper,
 )
-from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.eds import profile_name
-from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
-from tickrig.emulators.canopen.rig_file import RigFile, read_rig
+from tickrig.emulators.canopen.choices import (
+    AUTO,
+    UNCONFIGURED,
+    NodeSpec,
+    parse_ids,
+    parse_node,
+)
+from tickrig.emulators.canopen.eds import EdsCache, profile_name
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import CandumpFile
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep, Send
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, RigPlan
+from tickrig.emulators.testing.rig_file.probe import eds_cache
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
+from tickrig.emulators.testing.rig_file.section import RigFileError
+from tickrig.emulators.testing.signals.sources import SignalSpec
+from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, refuse_path, say, show_findings
 from tickrig.host.text.values import counted, parse_size, parse_time_us
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import CanFrame, LogLine
@@ -60,14 +71,26 @@ class BusYml(NamedTuple):
     urdf: Path | None = None
 
 
+class RigNodes(NamedTuple):
+    """What a rig file says.
+
+    Attributes:
+        nodes: its nodes, by the names that it gives them.
+        body: what they move, None if nothing.
+    """
+
+    nodes: tuple[Described, ...] = ()
+    body: BodyPlan | None = None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CanopenOptions(RunOptions):
     """The command line.
 
     Attributes:
         specs: the nodes.
-        bus_yml: what names the nodes instead of `specs`.
-        body: what they move, None if nothing.
+        rig: nodes of a rig file, beside `specs`, and the body that they move.
+        bus_yml: what names the nodes instead of both.
         profile: of nodes of files; see `choices.PROFILES`.
         bus: the bus outside.
         store: file in which nodes keep what 1010h and LSS store.
@@ -75,8 +98,8 @@ class CanopenOptions(RunOptions):
     """
 
     specs: tuple[NodeSpec, ...] = ()
+    rig: RigNodes = field(default_factory=RigNodes)
     bus_yml: BusYml = field(default_factory=BusYml)
-    body: BodySpec | None = None
     profile: str = AUTO
     bus: BusOptions = field(default_factory=BusOptions)
     store: Path | None = None
@@ -98,17 +121,36 @@ class CanopenRun(EmulatorRun):
         self._channel = _VIRTUAL_CHANNEL
 
     def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
-        file, urdf = self._options.bus_yml
-        if file is None:
-            self._described = describe_nodes(self._options.specs, self._options.profile)
-        else:
-            self._described = describe_bus(file, urdf, self._options.profile)
+        try:
+            self._described = self._describe()
+        except ValueError as error:
+            raise Refused(str(error)) from None
         if not self._described:
             raise Refused(_NO_NODE)
+        show_findings(odd for item in self._described for odd in item.description.warnings)
         wire = self._make_wire()
-        bench = make_bench(wire, make_nodes(self._described, wire), self._options.body)
+        bench = make_bench(wire, make_nodes(self._described, wire), self._options.rig.body)
         senders = {"send": parse_send}
         return bench, ScenarioParser(bench.device, bench.operator, senders=senders)
+
+    def _describe(self) -> list[Described]:
+        """Read the files of the nodes; ValueError with all that is wrong."""
+        options, (file, urdf) = self._options, self._options.bus_yml
+        if file is None:
+            given = describe_nodes(options.specs, options.profile)
+            taken = {item.node_id: item for item in given if item.node_id != UNCONFIGURED}
+            for item in options.rig.nodes:
+                if first := taken.get(item.node_id):
+                    raise ValueError(
+                        f"node {item.node_id} is there twice: {first.description.file}, {item.name}"
+                    )
+            return [*given, *options.rig.nodes]
+        bus = read_bus_file(file, urdf, EdsCache(), options.profile)
+        for remark in bus.remarks:
+            say(remark)
+        return [
+            Described(node.name, node.node_id, node.description, node.about) for node in bus.nodes
+        ]
 
     def _make_wire(self) -> CanWire:
         options = self._options
@@ -129,7 +171,7 @@ class CanopenRun(EmulatorRun):
         bench = make_bench(
             wire,
             nodes,
-            self._options.body,
+            self._options.rig.body,
             outside=outside,
             link=link,
             trace=trace,
@@ -219,27 +261,74 @@ def emulate(
     node_id: str | None,
     nodes: tuple[str, ...],
     rig: Path | None,
-    bus_yml: BusYml,
+    bus_yml: tuple[Path | None, Path | None],
     options: dict[str, Any],
 ) -> int:
     """Run slaves as the command line says, and return the exit status."""
     given = {f"--{name}": options.pop(name) for name in _DEVICES}
-    _check_bus_yml(bus_yml, {**given, "--node-id": node_id, "--node": nodes, "--rig": rig})
+    _check_bus_yml(*bus_yml, {**given, "--node-id": node_id, "--node": nodes, "--rig": rig})
     bus = BusOptions(**{name: options.pop(name) for name in _BUS_FIELDS})
-    file = RigFile(()) if rig is None else read_rig(rig)
-    specs = (*_specs(given, node_id), *_more(nodes), *file.nodes)
+    try:
+        specs = (*_specs(given, node_id), *_more(nodes))
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    file = RigNodes() if rig is None else read_rig(rig)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
     run = CanopenRun(
-        CanopenOptions(specs=specs, bus_yml=bus_yml, body=file.body, bus=bus, sdo=sdo, **options)
+        CanopenOptions(specs=specs, rig=file, bus_yml=BusYml(*bus_yml), bus=bus, sdo=sdo, **options)
     )
-    with mistakes_in(spec.device for spec in specs):
+    files = [node.description.file for node in file.nodes]
+    with mistakes_in([*(spec.device for spec in specs), *files]):
         return run.run()
 
 
-def _check_bus_yml(bus_yml: BusYml, others: Mapping[str, object]) -> None:
+_MORE_THAN_NODES: Final = "there is more than nodes on one bus ({what}): tickrig run {path}"
+
+
+def read_rig(path: Path) -> RigNodes:
+    """Read the nodes of a rig file, and the body that they move.
+
+    Raises:
+        Refused: it cannot be read, has mistakes, or has more than nodes on one bus.
+    """
+    try:
+        if is_bus_file(path.read_bytes()):
+            raise Refused(f"rig {path}: it is a bus.yml: --bus {path}")
+        plan = read_rig_file(path)
+    except RigFileError as error:
+        raise Refused(str(error)) from None
+    except OSError as error:
+        refuse_path("rig", error)
+    if what := _beyond_nodes(plan):
+        raise Refused(f"rig {path}: {_MORE_THAN_NODES.format(what=what, path=path)}")
+    return RigNodes(tuple(map(_described, plan.devices.values())), plan.body)
+
+
+def _beyond_nodes(plan: RigPlan) -> str:
+    """Return what of a rig file this command does not run, empty if nothing."""
+    for device in plan.devices.values():
+        if device.kind is DeviceKind.SERIAL:
+            return f"device {device.name}"
+        if any(isinstance(value, SignalSpec) for value in device.start.values()):
+            return "signals"
+    if len(plan.wires) > 1:
+        return "several wires"
+    return "signals" if plan.signals else "faults" if plan.faults else ""
+
+
+def _described(device: DevicePlan) -> Described:
+    kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
+    found = describe(eds_cache(), kind, device.profile or AUTO)
+    node_id = device.node_id if device.node_id is not None else found.node_id
+    assert node_id is not None  # the reader wants one
+    start = {key: value for key, value in device.start.items() if not isinstance(value, SignalSpec)}
+    return Described(device.name, node_id, replace(found, start=start))
+
+
+def _check_bus_yml(file: Path | None, urdf: Path | None, others: Mapping[str, object]) -> None:
     """Refuse --bus beside what names nodes too, and --urdf without --bus."""
-    if bus_yml.file is None:
-        if bus_yml.urdf is not None:
+    if file is None:
+        if urdf is not None:
             raise Refused("--urdf belongs to --bus: it has the joints of a bus.yml")
         return
     if beside := [option for option, value in others.items() if value]:
@@ -250,7 +339,10 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
     """Write the EDS of a model or a component."""
     if not (model or rtc):
         raise Refused("--write-eds belongs to --model or --rtc")
-    description = describe_device(model or rtc or "")
+    try:
+        description = describe_device(model or rtc or "")
+    except ValueError as error:
+        raise Refused(str(error)) from None
     text = format_eds(description.template.description, description.info)
     if path == _STANDARD_OUTPUT:
         click.echo(text, nl=False)
