@@ -21,11 +21,10 @@ from tickrig.emulators.testing.conformance.slave import Crashes, guarded
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, RigPlan
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.canmon.conform.conform_source import ConformSource
+from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.bus.exchange import NotAllowed
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.errors import FieldError
 
 # Moves the inputs of a slave of ours from the inside, in the words of the tester.
@@ -192,7 +191,8 @@ def bench_source(
         mode.act(lambda rig: _mount(rig, bus).wire.bit_rate),
         virtual=True,
         nodes=dict(sorted(names.items())),
-        eds={slave.node_id: eds_of(slave, f"{each}.eds") for each, slave in slaves.items()},
+        eds={number: f"{each}.eds" for number, each in names.items()},
+        describe=lambda number: describe_slave(slaves[names[number]]) if number in names else None,
         stimulus=lambda number: guarded(
             BenchStimulus(BenchDevice(mode, names[number]), slaves[names[number]])
         ),
@@ -215,9 +215,10 @@ def _bus_of(buses: _Buses, node_id: int | None, name: str) -> str:
     return next(iter(found))
 
 
-def eds_of(slave: CanopenSlave, name: str) -> EdsFile:
+def describe_slave(slave: CanopenSlave) -> NodeDescription:
     """Return what the EDS of a slave of ours would say."""
-    return EdsFile(name, write_eds(slave.dictionary.description))
+    description = slave.dictionary.description
+    return NodeDescription.of_table(description, description.objects)
 
 
 def _slaves(rig: BenchRig) -> _Buses:
@@ -273,12 +274,19 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
     bench = Bench.of_plan(plan)
     source = bench_source(bench._mode, node_id, str(path))
     files = dict(_eds_files(plan, source.nodes))
-    return replace(source, eds={**source.eds, **files}, close=bench.close)
+
+    def describe(number: int) -> NodeDescription | None:
+        if number in files:
+            return NodeDescription.of_file(open_eds(files[number]))
+        return source.describe(number)
+
+    eds = source.eds | {number: str(file) for number, file in files.items()}
+    return replace(source, eds=eds, describe=describe, close=bench.close)
 
 
-def _eds_files(plan: RigPlan, nodes: dict[int, str]) -> Iterator[tuple[int, EdsFile]]:
+def _eds_files(plan: RigPlan, nodes: dict[int, str]) -> Iterator[tuple[int, Path]]:
     """Yield the files that nodes were made of: what they say is judged too."""
     for node_id, name in nodes.items():
         device = plan.devices[name]
         if device.kind is DeviceKind.EDS:
-            yield node_id, open_eds(Path(device.type))
+            yield node_id, Path(device.type)

@@ -15,7 +15,11 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.bench.bench import BenchDevice
-from tickrig.emulators.testing.conformance.bench_source import SlaveStimulus, bench_source, eds_of
+from tickrig.emulators.testing.conformance.bench_source import (
+    SlaveStimulus,
+    bench_source,
+    describe_slave,
+)
 from tickrig.emulators.testing.conformance.slave import (
     CalledSlave,
     Crashes,
@@ -29,6 +33,7 @@ from tickrig.host.canmon.conform.chosen import patterns, unknown
 from tickrig.host.canmon.conform.conform_source import ConformSource
 from tickrig.host.canmon.conform.consent import Consent
 from tickrig.host.canmon.conform.report_files import decoded_frames, file_text
+from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.bus.exchange import NotAllowed
 from tickrig.host.canopen.conform.check import ConformancePlan, Level, Stimulus
 from tickrig.host.canopen.conform.conform_run import ConformRun
@@ -40,7 +45,6 @@ from tickrig.host.canopen.eds import open_eds
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import Frames
-from tickrig.wire.canopen.eds.eds_device import read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.instant import NEVER
 
@@ -220,9 +224,14 @@ def conformance(  # noqa: PLR0913 - by keyword
             stimulus=source.stimulus(number) if source.stimulus else None,
             confirm=Consent(yes=False, virtual=True, alone=len(source.nodes) <= 1).confirm,
         )
-        file = _eds(eds) or source.eds.get(number)
-        device = None if file is None else read_device(file)
-        run = ConformRun(source.link, number, plan, device=device, eds=file, source=source.name)
+        file = _eds(eds)
+        known = source.describe(number) if file is None else NodeDescription.of_file(file)
+        run = ConformRun(
+            *(source.link, number, plan),
+            device=known.device if known else None,
+            claims=known.claims if known else None,
+            source=source.name,
+        )
         source.watch(number, run)
         return run.run()
 
@@ -233,8 +242,12 @@ def _source(
     """Return the bus on which a node is."""
     if isinstance(node, CanopenSlave):  # alone: a bench and its journal took a quarter more
         source = SlaveBench(node, bit_rate, stimulus or SlaveStimulus(node)).source
-        name = f"node{node.node_id}"
-        return replace(source, name="can", eds={node.node_id: eds_of(node, f"{name}.eds")})
+        own = node.node_id
+        return replace(
+            source,
+            name="can",
+            describe=lambda number: describe_slave(node) if number == own else None,
+        )
     if isinstance(node, BenchDevice):
         source = bench_source(node._mode, node_id, device=node.name)
         return replace(source, stimulus=lambda number: guarded(stimulus)) if stimulus else source

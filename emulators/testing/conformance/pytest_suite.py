@@ -13,7 +13,7 @@ import pytest
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.bench.errors import BenchBlocked
-from tickrig.emulators.testing.conformance.bench_source import eds_of
+from tickrig.emulators.testing.conformance.bench_source import describe_slave
 from tickrig.emulators.testing.conformance.conformance import (
     Node,
     conformance,
@@ -24,15 +24,14 @@ from tickrig.emulators.testing.conformance.conformance import (
 )
 from tickrig.emulators.testing.conformance.slave import is_step
 from tickrig.host.canmon.conform.report_files import decoded_frames
-from tickrig.host.canopen.conform.check import ConformancePlan
+from tickrig.host.canopen.conform.check import Check, ConformancePlan
 from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.report.baseline import Baseline
 from tickrig.host.canopen.conform.report.overview import cut, hint
-from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks
 from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 
 _MOST_LINES: Final = 60
 _ANY_NODE_ID: Final = 1
@@ -76,16 +75,18 @@ def conformance_tests(
     """
     __tracebackhide__ = True
     plan = ConformancePlan(level_of(level), names_of(only))
-    known = open_eds(Path(eds)) if eds is not None else None
+    known = read_device(open_eds(Path(eds))) if eds is not None else None
     given = options.get("node_id")
     if not isinstance(node, str) and (known is None or given is None):
         made = _judged_of(node)
         node_id_of(made, given)
         known = known or _told_by(made)
     options |= {"eds": eds, "level": level}
-    objects = object_checks(read_device(known), _ANY_NODE_ID) if known else ()
+    objects: tuple[Check, ...] = ()
+    if known is not None and plan.may_choose(OBJECTS):
+        objects = object_checks(known, _ANY_NODE_ID, may_choose=plan.may_choose)
     known_to_fail = known_failures(baseline)
-    names = [check.id for check in (*suite_checks(), *objects) if plan.chooses(check)]
+    names = [check.id for check in (*chosen_checks(plan), *filter(plan.chooses, objects))]
     parametrised = pytest.mark.parametrize("check_id", names)
     if isinstance(node, str):
         return parametrised(_test_on_bench(node, options, known_to_fail))
@@ -98,9 +99,9 @@ def _judged_of(make: Callable[[], Node]) -> Node:
     return cast("Node", make) if is_step(made) else made
 
 
-def _told_by(made: Node) -> EdsFile | None:
+def _told_by(made: Node) -> EdsDevice | None:
     """Return what a slave of ours tells of itself."""
-    return eds_of(made, "slave.eds") if isinstance(made, CanopenSlave) else None
+    return describe_slave(made).device if isinstance(made, CanopenSlave) else None
 
 
 def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Test:

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
-from tickrig.host.canopen.conform.object_checks import object_checks
-from tickrig.host.canopen.conform.suite import OBJECTS, group_titles, suite_checks
+from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks, group_titles, suite_checks
 from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
@@ -29,14 +28,13 @@ def unknown(words: Iterable[str]) -> list[str]:
     Args:
         words: groups or ids, with * and ?.
     """
-    suite = suite_checks()
 
     def is_one(word: str) -> bool:
-        plan = ConformancePlan(Level.INTRUSIVE, (word,))
-        return word.upper().startswith(OBJECTS) or any(map(plan.chooses, suite))
+        found = chosen_checks(ConformancePlan(Level.INTRUSIVE, (word,)))
+        return word.upper().startswith(OBJECTS) or next(found, None) is not None
 
-    none = (word for word in words if not is_one(word))
-    return [f"{word}: no such group or check; {_near(word, suite)}" for word in none]
+    none = [word for word in words if not is_one(word)]
+    return [f"{word}: no such group or check; {_near(word)}" for word in none]
 
 
 def chosen(only: Sequence[str]) -> list[Check]:
@@ -50,13 +48,13 @@ def chosen(only: Sequence[str]) -> list[Check]:
     """
     for text in unknown(only):
         raise Refused(f"--only {text}; see --list")
-    return list(filter(ConformancePlan(Level.INTRUSIVE, tuple(only)).chooses, suite_checks()))
+    return list(chosen_checks(ConformancePlan(Level.INTRUSIVE, tuple(only))))
 
 
-def _near(word: str, suite: list[Check]) -> str:
+def _near(word: str) -> str:
     """Say which name could be meant, or which groups there are."""
     groups = list(group_titles())
-    if close := closest(word.upper(), sorted([*groups, *(check.id for check in suite)])):
+    if close := closest(word.upper(), sorted([*groups, *(check.id for check in suite_checks())])):
         return f"did you mean {close[0]!r}?"
     return f"groups: {', '.join(groups)}"
 

@@ -22,10 +22,10 @@ from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.links.link import LinkClosed
 
 if TYPE_CHECKING:
+    from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
     from tickrig.host.canopen.conform.conform_run import ConformRun
     from tickrig.host.links.can_link import CanLink
     from tickrig.host.links.link import StampedLink
-    from tickrig.wire.canopen.eds.eds_file import EdsFile
 
 RIG_FILE: Final = ".toml"
 
@@ -47,6 +47,10 @@ def _leave() -> None:
     """Leave all as it is."""
 
 
+def _know_nothing(node_id: int) -> None:
+    """Know no node beforehand."""
+
+
 def _watch_nothing(node_id: int, run: ConformRun) -> None:
     """Nothing disturbs here."""
 
@@ -63,7 +67,8 @@ class ConformSource:
         virtual: nobody else is on it, and its time is none of this machine.
         shared_host: its nodes may be processes of this machine.
         nodes: what is known to be on it, by node-ID.
-        eds: what is known of these nodes beforehand.
+        eds: names of the EDS of these nodes, by node-ID; the files need not exist.
+        describe: returns what is known about a node beforehand, None if it has no EDS.
         stimulus: makes what moves the inputs of a node; None where nobody can.
         close: gives the bus back.
         watch: tells a run at a node what disturbs on the bus, and what programs of nodes raise.
@@ -76,7 +81,8 @@ class ConformSource:
     virtual: bool = False
     shared_host: bool = False
     nodes: dict[int, str] = field(default_factory=dict)
-    eds: dict[int, EdsFile] = field(default_factory=dict)
+    eds: dict[int, str] = field(default_factory=dict)
+    describe: Callable[[int], NodeDescription | None] = _know_nothing
     stimulus: Callable[[int], Stimulus] | None = None
     close: Callable[[], object] = _leave
     watch: Callable[[int, ConformRun], None] = _watch_nothing

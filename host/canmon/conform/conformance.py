@@ -25,6 +25,7 @@ from tickrig.host.canmon.conform.stimulus import CONTROL, open_stimulus
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.output.listening import until_interrupted
+from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
@@ -38,8 +39,6 @@ from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import VERSION
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.text.page_text import one_line
-from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import EdsFile
 
 _FILES: Final = ("html", "junit", "badge", "issue", "write_baseline")
 
@@ -97,7 +96,7 @@ class Conformance:
             held.callback(source.close)
             if node_id is None:
                 return list_nodes(source)
-            keep_inputs(self._files, [Path(eds.name) for eds in source.eds.values()])
+            keep_inputs(self._files, map(Path, source.eds.values()))
             report = self._judge(source, node_id)
         return INTERRUPTED if report is None else self._show(report)
 
@@ -108,8 +107,7 @@ class Conformance:
         )
         plan = self._plan(source, node_id, consent)
         progress = Progress(shown=sys.stderr.isatty())
-        document = self._document
-        eds = document.file if document else source.eds.get(node_id)
+        known = self._describe(source, node_id)
         judged: list[Report] = []
         with until_interrupted():
             if not source.virtual and self._level > Level.READ_ONLY:
@@ -118,8 +116,8 @@ class Conformance:
                 consent.begin(node_id, self._level, heard)
             run = ConformRun(
                 *(source.link, node_id, plan),
-                device=None if eds is None else read_device(eds),
-                eds=eds,
+                device=known.device if known else None,
+                claims=known.claims if known else None,
                 source=source.name,
                 on_result=progress.take,
             )
@@ -127,18 +125,26 @@ class Conformance:
             progress.begin(node_id)
             judged.append(run.run())
         progress.end()
-        return self._completed(judged[0], source, eds) if judged else None
+        return self._completed(judged[0], source, known) if judged else None
 
-    def _completed(self, report: Report, source: ConformSource, eds: EdsFile | None) -> Report:
+    def _describe(self, source: ConformSource, node_id: int) -> NodeDescription | None:
+        """Return what an EDS says about the node: the file of --eds, or that of the source."""
+        if self._document is not None:
+            return NodeDescription.of_file(self._document.file)
+        return source.describe(node_id)
+
+    def _completed(
+        self, report: Report, source: ConformSource, known: NodeDescription | None
+    ) -> Report:
         """Add what the tester itself does not know: versions, adapter, what is wrong in the EDS."""
         settings = {"tickrig": VERSION, "adapter": source.adapter, **report.settings}
-        if eds is None:
+        if known is None:
             return replace(report, settings=settings)
-        settings["EDS"] = Path(eds.name).name
-        if self._document is not None:
-            settings["EDS findings"] = _findings(self._document)
-        wrong = tuple(map(str, (*eds.errors, *eds.warnings)))
-        return replace(report, settings=settings, findings=(*wrong, *report.findings))
+        document = self._document
+        settings["EDS"] = Path(document.file.name if document else source.eds[report.node_id]).name
+        if document is not None:
+            settings["EDS findings"] = _findings(document)
+        return replace(report, settings=settings, findings=(*known.wrong, *report.findings))
 
     def _plan(self, source: ConformSource, node_id: int, consent: Consent) -> ConformancePlan:
         options, stimulus = self._options, self._stimulus

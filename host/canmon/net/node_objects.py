@@ -23,7 +23,7 @@ from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.object_table import (
     OFF,
@@ -78,6 +78,8 @@ class NamedObjects:
     Args:
         node_id: the node.
         file: its EDS, None without one.
+        known: what the EDS says, where it is known without a file.
+        name: of the EDS then.
 
     Attributes:
         node_id: as given.
@@ -86,12 +88,17 @@ class NamedObjects:
         rows: its entries, by index and sub-index.
     """
 
-    def __init__(self, node_id: int, file: EdsFile | None = None) -> None:
+    def __init__(
+        self,
+        node_id: int,
+        file: EdsFile | None = None,
+        known: EdsDevice | None = None,
+        name: str = "",
+    ) -> None:
         self.node_id, self.file = node_id, file
-        self.device = device = None if file is None else read_device(file)
-        eds = None
-        if file is not None and device is not None:
-            eds = eds_objects(device, node_id, Path(file.name).stem)
+        self.device = device = known if file is None else read_device(file)
+        name = name if file is None else file.name
+        eds = None if device is None else eds_objects(device, node_id, Path(name).stem)
         self._memory = NodeMemory(eds)
         entries = device.entries if device is not None else ()
         self.rows: dict[Entry, EntryDescription] = {(one.index, one.sub): one for one in entries}
@@ -191,8 +198,12 @@ def known_objects(
         Refused: the EDS cannot be used.
         SdoFailed: the node does not answer.
     """
-    file = read_device_document(eds, what).file if eds else session.source.eds.get(node_id)
-    objects = NamedObjects(node_id, file)
+    if eds is not None:
+        objects = NamedObjects(node_id, read_device_document(eds, what).file)
+    else:
+        known = session.source.describe(node_id)
+        name = session.source.eds.get(node_id, "")
+        objects = NamedObjects(node_id, None, known and known.device, name)
     data = _device_type(session, node_id)
     objects.learn(DEVICE_TYPE, data)
     if eds is not None:

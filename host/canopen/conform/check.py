@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -59,6 +60,9 @@ class Check:
 
 # What a run of the tester was told to do.
 
+_WILD: Final = re.compile(r"[*?[]")
+"""Begins what is not fixed in a pattern."""
+
 Stimulus = Callable[..., str]
 """Moves the inputs of the device: takes words as `input 6000:01 01`, returns what it answers.
 
@@ -106,3 +110,18 @@ class ConformancePlan:
         return not self.only or any(
             fnmatchcase(name, pattern.upper()) for pattern in self.only for name in named
         )
+
+    def may_choose(self, group: str, place: str = "") -> bool:
+        """Say whether a check of a group may be chosen, before it is made.
+
+        Args:
+            group: of the check.
+            place: what follows the group in its id: `1017.00` for those of this object.
+        """
+        begun = f"{group}-{place}".upper()
+        for pattern in map(str.upper, self.only):
+            fixed = _WILD.split(pattern, maxsplit=1)[0]
+            wild = fixed != pattern and begun.startswith(fixed)
+            if wild or fixed.startswith(begun) or fnmatchcase(group, pattern):
+                return True
+        return not self.only

@@ -8,6 +8,7 @@ from functools import partial
 from random import Random
 from typing import Final
 
+from tickrig.host.canopen.conform.binding.capabilities import EdsClaims
 from tickrig.host.canopen.conform.bus.exchange import (
     ASSUMED_BIT_RATE,
     HOST_GAP_US,
@@ -28,7 +29,7 @@ from tickrig.host.canopen.conform.notation import ANSWER_MS
 from tickrig.host.canopen.conform.object_checks import object_checks, play_object_step
 from tickrig.host.canopen.conform.permission import Permission
 from tickrig.host.canopen.conform.subject import Subject, examine, other_device
-from tickrig.host.canopen.conform.suite import suite_checks
+from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks
 from tickrig.host.canopen.conform.verdict import (
     INTERRUPTED,
     CheckOutcome,
@@ -39,7 +40,6 @@ from tickrig.host.canopen.conform.verdict import (
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.host.links.link import LinkClosed, StampedLink
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 
 # What a report says of how the run judged: for people, by name.
@@ -151,7 +151,7 @@ class ConformRun:
         node_id: of the node, 1..127.
         plan: what was chosen.
         device: what the EDS says of the node, None to ask the node itself.
-        eds: the file that says it.
+        claims: what it says beside the objects.
         source: the bus, as the user named it.
         on_result: called with each result when it is there.
     """
@@ -163,12 +163,12 @@ class ConformRun:
         plan: ConformancePlan,
         *,
         device: EdsDevice | None = None,
-        eds: EdsFile | None = None,
+        claims: EdsClaims | None = None,
         source: str = "",
         on_result: Callable[[Result], object] = lambda result: None,
     ) -> None:
         self._node_id, self._plan, self._source = node_id, plan, source
-        self._device, self._eds, self._on_result = device, eds, on_result
+        self._device, self._claims, self._on_result = device, claims, on_result
         self._permission = Permission(plan.level, plan.allow, node_id, plan.confirm, plan.never)
         self._exchange = BusExchange(
             link,
@@ -235,8 +235,7 @@ class ConformRun:
         except (SdoFailed, StepFailed, Disturbed) as error:
             return self._give_up(error)
         assert self._subject is not None
-        checks = [*suite_checks(), *self._object_checks()]
-        self._judge_all([check for check in checks if self._plan.chooses(check)])
+        self._judge_all([*chosen_checks(self._plan), *self._object_checks()])
         return ""
 
     def _give_up(self, error: Exception) -> str:
@@ -244,7 +243,7 @@ class ConformRun:
         presence = self._exchange.presence
         crashed = next(iter(self._crashes), "")
         if crashed or presence is Presence.ONE:
-            self._block(suite_checks(), crashed or str(error))
+            self._block(chosen_checks(self._plan), crashed or str(error))
             return ""
         self._absent = True
         if presence is Presence.NONE:
@@ -252,7 +251,7 @@ class ConformRun:
         else:
             reason = f"each request is answered twice: two nodes have ID {self._node_id}?"
             verdict = CheckVerdict.INCONCLUSIVE
-        self._block(suite_checks(), reason, verdict)
+        self._block(chosen_checks(self._plan), reason, verdict)
         return reason
 
     def _nobody(self) -> str:
@@ -262,7 +261,7 @@ class ConformRun:
     def _examine(self) -> None:
         self._subject = examine(
             *(self._client, self._node_id, self._plan),
-            *(self._device, self._eds, self._exchange.others),
+            *(self._device, self._claims, self._exchange.others),
         )
         if self._exchange.presence is Presence.TWO:
             raise Disturbed("two nodes answer")
@@ -272,14 +271,22 @@ class ConformRun:
         self._care.prepare(self._subject.restorable(self._plan.level))
 
     def _object_checks(self) -> list[Check]:
-        """Make the checks of each object of the EDS; without one there are none."""
-        if self._device is None:
-            return []
+        """Make the chosen checks of the objects of the EDS; without one there are none."""
         plan = self._plan
-        checks = [*object_checks(self._device, self._node_id, allow=plan.allow, never=plan.never)]
-        if self._plan.seed:
-            Random(self._plan.seed).shuffle(checks)
-        return checks
+        if self._device is None or not plan.may_choose(OBJECTS):
+            return []
+        may_choose = plan.may_choose if not plan.seed else _any  # a seed gives all an order
+        checks = [
+            *object_checks(
+                *(self._device, self._node_id),
+                allow=plan.allow,
+                never=plan.never,
+                may_choose=may_choose,
+            )
+        ]
+        if plan.seed:
+            Random(plan.seed).shuffle(checks)
+        return list(filter(plan.chooses, checks))
 
     def _judge_all(self, checks: list[Check]) -> None:
         assert self._subject is not None
@@ -294,11 +301,10 @@ class ConformRun:
             self._keep(self._judge.result(check, self._subject))
 
     def _block(
-        self, checks: list[Check], reason: str, verdict: CheckVerdict = CheckVerdict.BLOCKED
+        self, checks: Iterable[Check], reason: str, verdict: CheckVerdict = CheckVerdict.BLOCKED
     ) -> None:
         for check in checks:
-            if self._plan.chooses(check):
-                self._keep(Result(check, CheckOutcome(verdict, reason)))
+            self._keep(Result(check, CheckOutcome(verdict, reason)))
 
     def _keep(self, result: Result) -> None:
         self._results.append(result)
@@ -344,6 +350,10 @@ class ConformRun:
             absent=self._absent,
             doubt=other_device(self._device, subject.about) if subject else "",
         )
+
+
+def _any(group: str, place: str) -> bool:
+    return True
 
 
 def _typed(data: bytes) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
 from typing import Any, Final, Protocol
@@ -180,6 +180,7 @@ def object_checks(
     *,
     allow: Collection[int] = (),
     never: Collection[int] = (),
+    may_choose: Callable[[str, str], bool] = lambda group, place: True,
 ) -> tuple[Check, ...]:
     """Make the checks of all objects, sorted by index and sub-index.
 
@@ -192,16 +193,24 @@ def object_checks(
         node_id: of the node, 1..127; for defaults with $NODEID.
         allow: indices of the profile area, 6000h to 9FFFh, that may be written.
         never: indices that are never written.
+        may_choose: whether a check of this group whose id goes on so is wanted; others may be left
+            out, and the rest is the same.
     """
     maker, checks = _Maker(node_id, allow, never), list[Check]()
     entries = sorted(device.entries, key=attrgetter("key"))
     objects = [(index, list(rows)) for index, rows in groupby(entries, attrgetter("index"))]
     for number, (index, rows) in enumerate(objects):
+        place = f"{index:04X}"
+        if not may_choose(_GROUP, place):
+            continue
         for entry in rows:
-            checks += maker.of_entry(entry, counts=entry.sub == 0 and len(rows) > 1)
-        share = range(number % len(objects), _HIGHEST_SUB + 1, len(objects))
-        checks.append(_absent_subs(index, rows, share))
-    checks.append(_absent_objects([index for index, _ in objects]))
+            if may_choose(_GROUP, f"{place}.{entry.sub:02X}"):
+                checks += maker.of_entry(entry, counts=entry.sub == 0 and len(rows) > 1)
+        if may_choose(_GROUP, f"{place}-"):
+            share = range(number % len(objects), _HIGHEST_SUB + 1, len(objects))
+            checks.append(_absent_subs(index, rows, share))
+    if may_choose(_GROUP, "absent"):
+        checks.append(_absent_objects([index for index, _ in objects]))
     return (*checks, *_profile_checks(device, node_id))
 
 

@@ -14,7 +14,11 @@ from tickrig.host.canopen.conform.binding.binding import (
     BoundPlace,
     bind,
 )
-from tickrig.host.canopen.conform.binding.capabilities import NodeFeatures, find_features
+from tickrig.host.canopen.conform.binding.capabilities import (
+    EdsClaims,
+    NodeFeatures,
+    find_features,
+)
 from tickrig.host.canopen.conform.binding.pdo_binding import CARRIED, RPDOS, BoundPdo
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, SizeOf, multiplexer
 from tickrig.host.canopen.conform.check import ConformancePlan, Level, Step
@@ -24,7 +28,6 @@ from tickrig.host.canopen.errors import SdoFailed
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import standard_object
-from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, EXTENDED, FLAG_30, INVALID
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
@@ -418,7 +421,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     node_id: int,
     plan: ConformancePlan,
     device: EdsDevice | None,
-    eds: EdsFile | None,
+    claims: EdsClaims | None,
     others: Collection[int],
 ) -> Subject:
     """Find out what a node has; it is only read.
@@ -428,7 +431,7 @@ def examine(  # noqa: PLR0913, PLR0917 - all that is known
     """
     client.size_of = _standard_size if device is None else _sizes(device)
     binding = bind(device, client.upload, allow=plan.allow, never=plan.never)
-    features = find_features(binding, client, eds)
+    features = find_features(binding, client, claims)
     names = NodeNames(node_id, binding, client.number, others)
     entries = binding.device.entries
     has = frozenset((entry.index, entry.sub) for entry in entries)

@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform import checks
-from tickrig.host.canopen.conform.check import STIMULUS, Check, Level, Step
+from tickrig.host.canopen.conform.check import STIMULUS, Check, ConformancePlan, Level, Step
 from tickrig.host.canopen.conform.notation import parse_step
 
 _HEAD: Final = re.compile(r"([A-Z0-9]+-\d+) (.+)")
@@ -37,14 +37,14 @@ class Group(NamedTuple):
 
 
 @cache
+def read_group(name: str) -> Group:
+    """Return a group that comes with the package."""
+    return parse_group(_text(name))
+
+
 def read_suite() -> tuple[Group, ...]:
     """Return all groups that come with the package, in the order in which they are judged."""
-    found = [
-        parse_group(path.read_text("utf-8"))
-        for path in files(checks).iterdir()
-        if path.name.endswith(".txt")
-    ]
-    return tuple(sorted(found, key=lambda group: ORDER.index(group.name)))
+    return tuple(map(read_group, ORDER))
 
 
 def suite_checks() -> list[Check]:
@@ -52,11 +52,22 @@ def suite_checks() -> list[Check]:
     return [check for group in read_suite() for check in group.checks]
 
 
+def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
+    """Yield the checks of the suite that a plan chooses; the files of other groups are not read."""
+    for name in ORDER:
+        if plan.may_choose(name):
+            yield from filter(plan.chooses, read_group(name).checks)
+
+
 @cache
 def group_titles() -> Mapping[str, str]:
     """Return what the groups are about, by name; the last one is that of objects."""
-    titles = {group.name: group.title for group in read_suite()}
+    titles = {name: _head(_text(name).split("\n", 1)[0])[2] for name in ORDER}
     return {**titles, OBJECTS: _OF_EACH_OBJECT}
+
+
+def _text(name: str) -> str:
+    return files(checks).joinpath(f"{name.lower()}.txt").read_text("utf-8")
 
 
 def parse_group(text: str) -> Group:
@@ -66,10 +77,15 @@ def parse_group(text: str) -> Group:
         ValueError: a line is none of the notation; it says which.
     """
     blocks = re.split(r"\n\s*\n", re.sub(r"^#.*\n", "", text, flags=re.MULTILINE).strip())
-    match = _GROUP.fullmatch(blocks[0])
-    if match is None:
-        raise ValueError(f"{blocks[0]!r} is no head like 'group: NMT, what it is about'")
+    match = _head(blocks[0])
     return Group(match[1], match[2], tuple(_checks(match[1], blocks[1:])))
+
+
+def _head(text: str) -> re.Match[str]:
+    match = _GROUP.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is no head like 'group: NMT, what it is about'")
+    return match
 
 
 def _checks(group: str, blocks: list[str]) -> Iterator[Check]:

@@ -16,8 +16,10 @@ from tickrig.host.canopen.conform.binding.wanted import (
     PROFILE_AREA,
     TEXTS,
     WANTED,
+    EntryFacts,
     Use,
     WantedObject,
+    facts_of,
 )
 from tickrig.host.canopen.conform.check import Level
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
@@ -157,6 +159,8 @@ class _Search:
     allow: Collection[int]
     never: Collection[int]
     known: bool
+    entries: Mapping[_Place, EntryDescription]
+    facts: list[EntryFacts]
     bound: dict[str, Bound] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     findings: list[str] = field(default_factory=list)
@@ -188,7 +192,9 @@ def bind(
     """
     reader = ObjectReader(upload)
     found = device or probe_device(reader)
-    search = _Search(found, reader, allow, never, device is not None)
+    entries = {(entry.index, entry.sub): entry for entry in found.entries}
+    facts = list(map(facts_of, found.entries))
+    search = _Search(found, reader, allow, never, device is not None, entries, facts)
     for wanted in WANTED:
         _bind_object(search, wanted)
     for places in _absent_places(found, reader):
@@ -197,13 +203,15 @@ def bind(
     search.bound.update(pdos)
     search.reasons.update(missing)
     findings = (*reader.findings, *search.findings)
-    entries = {(entry.index, entry.sub): entry for entry in found.entries}
     return Binding(found, search.bound, search.reasons, findings, search.known, entries)
 
 
 def _bind_object(search: _Search, wanted: WantedObject) -> None:
     """Take the best object that fits, may be used so and can be read."""
-    fitting = [entry for entry in search.device.entries if wanted.fits(entry)]
+    if wanted.at is None:
+        fitting = wanted.fitting(search.facts)
+    else:
+        fitting = [search.entries[wanted.at]] if wanted.at in search.entries else []
     if not fitting:
         where = "the EDS has no" if search.known else "without an EDS nobody knows of any"
         search.reasons[wanted.name] = f"{where} {wanted.what}"

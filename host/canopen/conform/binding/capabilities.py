@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.binding import Binding, BoundObject
 from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoMisnamed, SdoTimeout
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
+from tickrig.wire.canopen.eds.object_table import DeviceInfo, EntryDescription, ObjectDescription
 from tickrig.wire.canopen.sdo import Abort
 from tickrig.wire.canopen.sdo_frame import (
     AbortCode,
@@ -59,8 +61,81 @@ _ON_COMMAND: Final = {"store": 0x1010, "restore": 0x1011}
 _STORE: Final = 0x1010
 _AUTONOMOUSLY: Final = 2
 _LSS_ADDRESS: Final = 0x1018
-_DUMMIES: Final = {"dummy5": "Dummy0005", "dummy6": "Dummy0006"}
-"""Objects of the data types that checks map in place of an object, and what an EDS calls them."""
+_LSS_NUMBERS: Final = frozenset(range(1, 5))
+"""Its sub-indices that an LSS address needs (CiA 305)."""
+
+
+class EdsClaims(NamedTuple):
+    """What an EDS says about a node beside its objects.
+
+    Attributes:
+        lss: it has LSS.
+        dummies: dummy objects may be mapped.
+        identity: the first numbers of 1018h, by sub-index, as its head has them.
+    """
+
+    lss: bool
+    dummies: bool
+    identity: Mapping[int, int]
+
+    @classmethod
+    def of_file(cls, file: EdsFile) -> EdsClaims:
+        """Read the claims of a file."""
+        info, dummies = (file.sections.get(name, {}) for name in ("DeviceInfo", "DummyUsage"))
+        numbers = {sub: _number(info.get(key.lower(), "")) for sub, key in _IDENTITY}
+        return cls(
+            bool(_number(info.get("lss_supported", ""))),
+            any(map(_number, dummies.values())),
+            {sub: number for sub, number in numbers.items() if number is not None},
+        )
+
+
+class NodeDescription(NamedTuple):
+    """What is known about a node before it is asked.
+
+    Attributes:
+        device: its objects.
+        claims: what its EDS says beside them.
+        wrong: the errors and warnings of the EDS.
+    """
+
+    device: EdsDevice
+    claims: EdsClaims
+    wrong: tuple[str, ...] = ()
+
+    @classmethod
+    def of_file(cls, file: EdsFile) -> NodeDescription:
+        """Read the description in a file."""
+        device = read_device(file)
+        return cls(device, EdsClaims.of_file(file), tuple(map(str, (*file.errors, *file.warnings))))
+
+    @classmethod
+    def of_table(
+        cls, entries: Iterable[EntryDescription], objects: Mapping[int, ObjectDescription]
+    ) -> NodeDescription:
+        """Return the description that an EDS of these objects has, without writing the EDS.
+
+        An EDS has no word for "no default": it gives the power-on value of every number, and no
+        value of an empty text.
+        """
+        rows = tuple(entries)
+        said = (row if row.has_default is bool(row.default) else _as_said(row) for row in rows)
+        address = {row.sub: row.default for row in rows if row.index == _LSS_ADDRESS}
+        identity = {sub: int.from_bytes(address.get(sub, b""), "little") for sub, _ in _IDENTITY}
+        claims = EdsClaims(address.keys() >= _LSS_NUMBERS, True, identity)
+        return cls(EdsDevice(DeviceInfo(), tuple(said), objects), claims)
+
+
+def _as_said(row: EntryDescription) -> EntryDescription:
+    """Return an entry with the default that its EDS says."""
+    if row.default:
+        return row.with_default(row.default, relative=row.relative)
+    return EntryDescription(
+        *(row.index, row.sub, row.name, row.data_type, row.access),
+        max_bytes=row.max_bytes,
+        unit=row.unit,
+        factor=row.factor,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +153,9 @@ class NodeFeatures:
     findings: tuple[str, ...] = ()
 
 
-def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = None) -> NodeFeatures:
+def find_features(
+    binding: Binding, client: SdoClient, claims: EdsClaims | None = None
+) -> NodeFeatures:
     """Find out what a node can do; the node is only read.
 
     Whether it has LSS can only be said by its EDS: to try it would change the state of all
@@ -87,30 +164,25 @@ def find_features(binding: Binding, client: SdoClient, file: EdsFile | None = No
     Args:
         binding: its objects.
         client: reads it.
-        file: its EDS.
+        claims: what its EDS says, None without one.
     """
-    info = file.sections.get("DeviceInfo", {}) if file else {}
-    dummies = file.sections.get("DummyUsage", {}) if file else {}
     reasons = dict(_missing(binding))
-    for word, key in _DUMMIES.items():
-        if not _number(dummies.get(key.lower(), "")):
-            reasons[word] = _unsaid(file, key, "this dummy may be mapped")
-    if (client.number(_STORE, 1) or 0) & _AUTONOMOUSLY:
-        reasons["unsaved"] = f"{_STORE:04X}h:01 says that the node saves by itself (bit 1)"
+    if claims is None or not claims.dummies:
+        reasons["dummy"] = _unsaid(claims, "DummyUsage", "dummy objects may be mapped")
     for word, index in _ON_COMMAND.items():
         said = client.number(index, 1)
         if said is not None and not said & 1:
             reasons[word] = f"{index:04X}h:01 says that the node does not do it on command (bit 0)"
     if _has_constant_heartbeat(binding):
         reasons["guarding"] = "1017h is constant and not 0: heartbeat takes the place of guarding"
-    findings = [*_profile(binding), *_identity(binding, info)]
-    if _number(info.get("lss_supported", "")) and not _has_lss_address(binding):
+    findings = [*_profile(binding), *_identity(binding, claims.identity if claims else {})]
+    if claims is not None and claims.lss and not _has_lss_address(binding):
         reasons |= dict.fromkeys(_LSS, "1018h has not the four numbers of an LSS address")
         findings.append(
             "the EDS says that it has LSS, and 1018h has not the numbers of its address"
         )
-    if not _number(info.get("lss_supported", "")):
-        reasons |= dict.fromkeys(_LSS, _unsaid(file, "LSS_Supported", "it has LSS"))
+    if claims is None or not claims.lss:
+        reasons |= dict.fromkeys(_LSS, _unsaid(claims, "LSS_Supported", "it has LSS"))
     if not _has_block_upload(client):
         reasons["block"] = "it refuses a block upload of 1000h"
     words = {*_OF_OBJECTS, *_PROFILES, *_LSS, *_DUMMIES, "unsaved", "block"} - reasons.keys()
@@ -146,8 +218,8 @@ def _missing(binding: Binding) -> Iterator[tuple[str, str]]:
             yield word, f"1000h does not say that it is a device of CiA {number}"
 
 
-def _unsaid(file: EdsFile | None, key: str, what: str) -> str:
-    if file is None:
+def _unsaid(claims: EdsClaims | None, key: str, what: str) -> str:
+    if claims is None:
         return f"without an EDS nobody knows whether {what}"
     return f"{key} of the EDS does not say that {what}"
 
@@ -162,7 +234,7 @@ def _number(text: str) -> int | None:
 def _has_lss_address(binding: Binding) -> bool:
     """Return whether 1018h has vendor, product, revision and serial number (CiA 305)."""
     present = {(entry.index, entry.sub) for entry in binding.device.entries}
-    return present.issuperset((_LSS_ADDRESS, sub) for sub in range(1, 5))
+    return present.issuperset((_LSS_ADDRESS, sub) for sub in _LSS_NUMBERS)
 
 
 def _has_constant_heartbeat(binding: Binding) -> bool:
@@ -189,10 +261,10 @@ def _profile(binding: Binding) -> Iterator[str]:
             yield f"1000h says that it is a device of CiA {wanted}, and it has none of {names}"
 
 
-def _identity(binding: Binding, info: Mapping[str, str]) -> Iterator[str]:
+def _identity(binding: Binding, claimed: Mapping[int, int]) -> Iterator[str]:
     """Compare 1018h with what the head of the EDS says."""
     for sub, key in _IDENTITY:
-        said, bound = _number(info.get(key.lower(), "")), binding.bound.get(f"identity_{sub}")
+        said, bound = claimed.get(sub), binding.bound.get(f"identity_{sub}")
         if said is None or not isinstance(bound, BoundObject) or bound.value is None:
             continue
         held = int.from_bytes(bound.value, "little")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from enum import Enum
 from typing import Final, NamedTuple
 
@@ -26,7 +26,8 @@ _EXPEDITED_BYTES: Final = 4
 _SEGMENT_BYTES: Final = 7
 _SIZES: Final = (8, 16, 32, 64)
 
-_Fits = Callable[[EntryDescription], bool]
+_R, _W, _C = Access.READ.value, Access.WRITE.value, Access.CONST.value
+_T, _P = Access.TPDO.value, Access.RPDO.value
 
 
 class Use(Enum):
@@ -37,6 +38,32 @@ class Use(Enum):
     WRITE = "written, and restored"
 
 
+class EntryFacts(NamedTuple):
+    """What decides for which names an entry can stand, found out once for all names.
+
+    Attributes:
+        entry: the entry.
+        access: the bits of its access.
+        kind: the number of its data type.
+        free: it takes what its description says, without rules of CiA 301.
+    """
+
+    entry: EntryDescription
+    access: int
+    kind: int
+    free: bool
+
+
+def facts_of(entry: EntryDescription) -> EntryFacts:
+    """Find out the facts about an entry."""
+    free = entry.index not in COMMUNICATION_AREA or entry.index in HARMLESS
+    return EntryFacts(entry, entry.access.value, int(entry.data_type), free)
+
+
+def _any(value: bytes) -> bool:
+    return True
+
+
 class WantedObject(NamedTuple):
     """A name and what it stands for.
 
@@ -44,176 +71,149 @@ class WantedObject(NamedTuple):
         name: in checks, after `$`.
         what: for people.
         use: what is done with it.
-        fits: whether a description is of this kind.
-        suits: whether a value is.
+        access: the bits of the access that are asked for: those that count, and their values.
+        kinds: numbers of the data types; None for any.
+        free: it must be free of rules of CiA 301.
+        limited: there must be values of its type on both sides of its limits.
+        at: the only place where it can be, and then nothing else counts.
+        suits: whether a value is of this kind.
     """
 
     name: str
     what: str
     use: Use
-    fits: _Fits
+    access: tuple[int, int] = (0, 0)
+    kinds: Collection[int] | None = None
+    free: bool = False
+    limited: bool = False
+    at: tuple[int, int] | None = None
     suits: Callable[[bytes], bool] = bool
 
+    def fitting(self, facts: Iterable[EntryFacts]) -> list[EntryDescription]:
+        """Return the entries that are of this kind, in their order.
 
-def _any(value: bytes) -> bool:
-    return True
+        One loop without calls: a tenth of a run of one check was here.
+        """
+        (mask, wanted), kinds, anyway = self.access, self.kinds, not self.free
+        found = [
+            entry
+            for entry, access, kind, free in facts
+            if access & mask == wanted and (kinds is None or kind in kinds) and (free or anyway)
+        ]
+        return list(filter(_is_limited, found)) if self.limited else found
 
 
-def _free(entry: EntryDescription) -> bool:
-    """Return whether an object takes what its description says, without rules of CiA 301."""
-    return entry.index not in COMMUNICATION_AREA or entry.index in HARMLESS
+def _is_limited(entry: EntryDescription) -> bool:
+    """Return whether there are values of its type on both sides of its limits."""
+    if entry.low is None or entry.high is None:
+        return False
+    lowest, highest = entry.data_type.limits
+    return lowest < entry.low and entry.high < highest
 
 
-def _both(entry: EntryDescription) -> bool:
-    return entry.readable and entry.writable and _free(entry)
+_INTEGERS: Final = frozenset(int(kind) for kind in DataType if kind.is_integer)
+_OF_SIZE: Final = {
+    bits: frozenset(int(kind) for kind in DataType if kind.is_integer and kind.bits == bits)
+    for bits in _SIZES
+}
+_TEXT_KINDS: Final = frozenset(map(int, TEXTS))
+_BOTH: Final = (_R | _W, _R | _W)
+_READ_ONLY: Final = (_R | _W, _R)
+_WRITE_ONLY: Final = (_R | _W, _W)
 
 
-def _integer(entry: EntryDescription, bits: int) -> bool:
-    return entry.data_type.is_integer and entry.data_type.bits == bits
+def _both(
+    name: str,
+    what: str,
+    kinds: Collection[int],
+    mapped: int = 0,
+    suits: Callable[[bytes], bool] = bool,
+) -> WantedObject:
+    """Want an object that may be read and written, and be mapped so."""
+    access = (_BOTH[0] | mapped, _BOTH[1] | mapped)
+    return WantedObject(name, what, Use.WRITE, access, kinds, free=True, suits=suits)
 
 
 def _rw(bits: int) -> WantedObject:
     what = f"integer of {bits} bits that may be read and written"
-    return WantedObject(
-        f"rw_u{bits}", what, Use.WRITE, lambda entry: _both(entry) and _integer(entry, bits)
-    )
+    return _both(f"rw_u{bits}", what, _OF_SIZE[bits])
 
 
 def _ro(bits: int) -> WantedObject:
     what = f"integer of {bits} bits that may only be read"
-    return WantedObject(
-        f"ro_u{bits}",
-        what,
-        Use.REFUSED,
-        lambda entry: entry.readable and not entry.writable and _integer(entry, bits),
-    )
+    return WantedObject(f"ro_u{bits}", what, Use.REFUSED, _READ_ONLY, _OF_SIZE[bits])
 
 
-def _mapped(way: str, access: Access, bits: int) -> WantedObject:
+def _mapped(way: str, access: int, bits: int) -> WantedObject:
     what = f"integer of {bits} bits that may be read, written and mapped into {way.upper()}s"
-    return WantedObject(
-        f"{way}_u{bits}",
-        what,
-        Use.WRITE,
-        lambda entry: _both(entry) and access in entry.access and _integer(entry, bits),
-    )
-
-
-def _limited(entry: EntryDescription) -> bool:
-    """Return whether there are values of its type on both sides of its limits."""
-    kind = entry.data_type
-    if not _both(entry) or not kind.is_integer or entry.low is None or entry.high is None:
-        return False
-    lowest, highest = kind.limits
-    return lowest < entry.low and entry.high < highest
-
-
-def _mapping(entry: EntryDescription) -> Access:
-    return entry.access & (Access.TPDO | Access.RPDO)
+    return _both(f"{way}_u{bits}", what, _OF_SIZE[bits], access)
 
 
 def _fixed(name: str, index: int, sub: int, what: str, use: Use = Use.WRITE) -> WantedObject:
-    where = f"{index:04X}h:{sub:02X}, {what}"
-    return WantedObject(name, where, use, lambda entry: (entry.index, entry.sub) == (index, sub))
+    return WantedObject(name, f"{index:04X}h:{sub:02X}, {what}", use, at=(index, sub))
 
+
+_BOOLEAN: Final = (int(DataType.BOOLEAN),)
 
 WANTED: Final[tuple[WantedObject, ...]] = (
     *(_rw(bits) for bits in _SIZES),
     *(_ro(bits) for bits in _SIZES),
-    *(_mapped("tpdo", Access.TPDO, bits) for bits in _SIZES),
-    *(_mapped("rpdo", Access.RPDO, bits) for bits in _SIZES),
+    *(_mapped("tpdo", _T, bits) for bits in _SIZES),
+    *(_mapped("rpdo", _P, bits) for bits in _SIZES),
+    _both("tpdo_bool", "BOOLEAN that may be read, written and mapped into TPDOs", _BOOLEAN, _T),
+    _both("rpdo_bool", "BOOLEAN that may be read, written and mapped into RPDOs", _BOOLEAN, _P),
+    _both("rw_bool", "BOOLEAN that may be read and written", _BOOLEAN),
+    _both("rw_real32", "REAL32 that may be read and written", (int(DataType.REAL32),)),
     WantedObject(
-        "tpdo_bool",
-        "BOOLEAN that may be read, written and mapped into TPDOs",
+        "limited",
+        "writable integer with both limits inside its type",
         Use.WRITE,
-        lambda entry: (
-            _both(entry) and Access.TPDO in entry.access and entry.data_type is DataType.BOOLEAN
-        ),
+        _BOTH,
+        _INTEGERS,
+        free=True,
+        limited=True,
     ),
-    WantedObject(
-        "rpdo_bool",
-        "BOOLEAN that may be read, written and mapped into RPDOs",
-        Use.WRITE,
-        lambda entry: (
-            _both(entry) and Access.RPDO in entry.access and entry.data_type is DataType.BOOLEAN
-        ),
-    ),
-    WantedObject(
-        "rw_bool",
-        "BOOLEAN that may be read and written",
-        Use.WRITE,
-        lambda entry: _both(entry) and entry.data_type is DataType.BOOLEAN,
-    ),
-    WantedObject(
-        "rw_real32",
-        "REAL32 that may be read and written",
-        Use.WRITE,
-        lambda entry: _both(entry) and entry.data_type is DataType.REAL32,
-    ),
-    WantedObject(
-        "limited", "writable integer with both limits inside its type", Use.WRITE, _limited
-    ),
-    WantedObject("ro", "read-only object", Use.REFUSED, lambda e: e.readable and not e.writable),
-    WantedObject(
-        "wo",
-        "write-only object",
-        Use.REFUSED,
-        lambda entry: entry.writable and not entry.readable,
-        _any,
-    ),
-    WantedObject("const", "constant", Use.REFUSED, lambda entry: Access.CONST in entry.access),
-    WantedObject(
-        "ro_string",
-        "string that may only be read",
-        Use.REFUSED,
-        lambda entry: entry.readable and not entry.writable and entry.data_type in TEXTS,
-    ),
+    WantedObject("ro", "read-only object", Use.REFUSED, _READ_ONLY),
+    WantedObject("wo", "write-only object", Use.REFUSED, _WRITE_ONLY, suits=_any),
+    WantedObject("const", "constant", Use.REFUSED, (_C, _C)),
+    WantedObject("ro_string", "string that may only be read", Use.REFUSED, _READ_ONLY, _TEXT_KINDS),
     WantedObject(
         "long_string",
         "readable string of more than 7 bytes, which has at least two segments",
         Use.READ,
-        lambda entry: entry.readable and entry.data_type in TEXTS,
-        lambda value: len(value) > _SEGMENT_BYTES,
+        (_R, _R),
+        _TEXT_KINDS,
+        suits=lambda value: len(value) > _SEGMENT_BYTES,
     ),
     WantedObject(
         "short_string",
         "readable string of 1 to 4 bytes",
         Use.READ,
-        lambda entry: entry.readable and entry.data_type in TEXTS,
-        lambda value: 1 <= len(value) <= _EXPEDITED_BYTES,
+        (_R, _R),
+        _TEXT_KINDS,
+        suits=lambda value: 1 <= len(value) <= _EXPEDITED_BYTES,
     ),
-    WantedObject(
-        "string",
-        "string that may be read and written",
-        Use.WRITE,
-        lambda entry: _both(entry) and entry.data_type in TEXTS,
-        _any,
-    ),
-    WantedObject(
-        "domain",
-        "domain that may be read and written",
-        Use.WRITE,
-        lambda entry: _both(entry) and entry.data_type is DataType.DOMAIN,
-        _any,
-    ),
+    _both("string", "string that may be read and written", _TEXT_KINDS, suits=_any),
+    _both("domain", "domain that may be read and written", (int(DataType.DOMAIN),), suits=_any),
     WantedObject(
         "tpdo_only",
         "readable object that may be mapped into TPDOs and not into RPDOs",
         Use.READ,
-        lambda entry: entry.readable and not entry.writable and _mapping(entry) is Access.TPDO,
+        (_R | _W | _T | _P, _R | _T),
     ),
     WantedObject(
         "rpdo_only",
         "write-only object that may be mapped into RPDOs",
         Use.REFUSED,
-        lambda entry: not entry.readable and _mapping(entry) is Access.RPDO,
-        _any,
+        (_R | _T | _P, _P),
+        suits=_any,
     ),
     WantedObject(
         "unmappable",
         "integer that may not be mapped",
         Use.READ,
-        lambda entry: entry.data_type.is_integer and not _mapping(entry) and entry.readable,
+        (_R | _T | _P, _R),
+        _INTEGERS,
     ),
     _fixed("device_type", 0x1000, 0, "the device type", Use.READ),
     _fixed("error_register", 0x1001, 0, "the error register", Use.READ),

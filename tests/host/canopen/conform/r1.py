@@ -18,6 +18,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.conformance import PoweredSlave
+from tickrig.host.canopen.conform.binding.capabilities import EdsClaims
 from tickrig.host.canopen.conform.check import ConformancePlan
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.verdict import Report
@@ -110,10 +111,11 @@ class R1:
         """Run the tester against it."""
         link = given.pop("link", self.link)
         file = open_eds(EDS)
+        claims = EdsClaims.of_file(file)
         dictionary = self.slave.dictionary
         entries = tuple(entry.description for entry in dictionary)
         device = EdsDevice(read_device(file).info, entries, dictionary.objects)
-        return ConformRun(link, NODE_ID, plan, device=device, eds=file, **given).run()
+        return ConformRun(link, NODE_ID, plan, device=device, claims=claims, **given).run()
 
 
 def yes(question: str) -> bool:

@@ -12,11 +12,11 @@ from tickrig.emulators.canopen.build import describe
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
+from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.check import ConformancePlan
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
 from tickrig.host.canopen.eds import open_eds
-from tickrig.wire.canopen.eds.eds_device import read_device
 
 HARMLESS = {CheckVerdict.PASS, CheckVerdict.NOT_APPLICABLE, CheckVerdict.IMPLEMENTATION_DEFINED}
 
@@ -41,9 +41,9 @@ class Judged:
 
     def judge(self, plan: ConformancePlan, eds: Path | None = None) -> Report:
         """Run the tester."""
-        file = open_eds(eds) if eds else None
-        device = read_device(file) if file else None
-        return ConformRun(self.link, self.slave.node_id, plan, device=device, eds=file).run()
+        known = NodeDescription.of_file(open_eds(eds)) if eds else None
+        device, claims = (known.device, known.claims) if known else (None, None)
+        return ConformRun(self.link, self.slave.node_id, plan, device=device, claims=claims).run()
 
 
 def slave_of(device: Path | str) -> CanopenSlave:

@@ -6,7 +6,6 @@ import pytest
 
 from tests.host.canopen.conform.r1 import EDS
 from tickrig.device import make_epos
-from tickrig.emulators.testing.conformance.bench_source import eds_of
 from tickrig.host.canopen.conform.binding.binding import BoundPlace, bind
 from tickrig.host.canopen.conform.verdict import CheckVerdict
 from tickrig.host.canopen.eds import read_sound
@@ -14,6 +13,8 @@ from tickrig.host.canopen.errors import SdoAborted
 from tickrig.testing import conformance
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
+from tickrig.wire.canopen.eds.eds_file import EdsFile
+from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.sdo_frame import AbortCode
 
 NO_SUBINDEX = bytes.fromhex("11000906")
@@ -84,7 +85,7 @@ class Slave:
 @pytest.mark.parametrize("anywhere", [True, False])
 def test_a_node_that_has_every_sub_index_fails(known: bool, anywhere: bool) -> None:
     slave = Slave(anywhere)
-    eds = eds_of(slave.slave, "epos.eds") if known else None
+    eds = EdsFile("epos.eds", write_eds(slave.slave.dictionary.description)) if known else None
     report = conformance(slave, node_id=5, eds=eds, only=("UE-07", "UE-08", "DE-10"))
     verdict = CheckVerdict.FAIL if anywhere else CheckVerdict.PASS
     assert [result.outcome.verdict for result in report.results] == [verdict] * 3

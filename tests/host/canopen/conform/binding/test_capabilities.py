@@ -9,7 +9,7 @@ from tests.host.canopen.conform.bench import Bench, make_bench
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.binding.binding import bind
-from tickrig.host.canopen.conform.binding.capabilities import NodeFeatures, find_features
+from tickrig.host.canopen.conform.binding.capabilities import EdsClaims, NodeFeatures, find_features
 from tickrig.host.canopen.eds import open_eds
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
@@ -29,7 +29,7 @@ OF_R1 = {*WITHOUT_EDS, "dummy5", "dummy6", "bits", "lss", "lssident", "unconfigu
 
 def features(bench: Bench, file: EdsFile | None) -> NodeFeatures:
     binding = bind(read_device(file) if file else None, bench.upload)
-    return find_features(binding, bench.client, file)
+    return find_features(binding, bench.client, EdsClaims.of_file(file) if file else None)
 
 
 def test_r1_has_all_but_what_it_has_no_objects_for() -> None:
@@ -83,7 +83,7 @@ def test_lss_without_an_address_is_a_finding() -> None:
     bare = [entry for entry in make_dictionary() if (entry.index, entry.sub) != (0x1018, 4)]
     bench = make_bench(Dictionary(entry.description for entry in bare))
     device = EdsDevice(DeviceInfo(), tuple(entry.description for entry in bare), {})
-    found = find_features(bind(device, bench.upload), bench.client, open_eds(R1))
+    found = find_features(bind(device, bench.upload), bench.client, EdsClaims.of_file(open_eds(R1)))
     assert found.reasons["lss"] == "1018h has not the four numbers of an LSS address"
     assert found.findings == (
         "the EDS says that it has LSS, and 1018h has not the numbers of its address",

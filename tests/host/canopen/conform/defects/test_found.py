@@ -27,6 +27,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.conformance.conformance import PoweredSlave
+from tickrig.host.canopen.conform.binding.capabilities import EdsClaims
 from tickrig.host.canopen.conform.check import ConformancePlan, Level
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.verdict import CheckVerdict, Report
@@ -55,7 +56,8 @@ class DefectiveR1(R1):
     def judge(self, plan: ConformancePlan, **given: Any) -> Report:
         """Run the tester against it."""
         file = open_eds(EDS)
-        return ConformRun(self.link, NODE_ID, plan, device=self._eds, eds=file, **given).run()
+        claims = EdsClaims.of_file(file)
+        return ConformRun(self.link, NODE_ID, plan, device=self._eds, claims=claims, **given).run()
 
 
 def judge(defect: Defect, *only: str) -> Report:
