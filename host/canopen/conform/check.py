@@ -1,16 +1,228 @@
-"""What a conformance check is: its clause, what it may do, what it needs, and its steps."""
+"""What a conformance check is: its clause, what it may do, what it needs, and its steps.
+
+A step is an action, as `Write` or `Expect`. docs/reference/canopen/conform.md has the notation of
+steps, and `parse_step` reads it. Where the notation has names, as `$heartbeat`, `bind_check` puts
+the numbers of one node.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from fnmatch import fnmatchcase
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
-Step = Mapping[str, Any]
-"""One step, in the terms of the notation of checks (docs/reference/canopen/conform.md)."""
+Address = tuple[int, int]
+"""Index and sub-index."""
+
+ANSWER_MS: Final = 1_000
+"""How long a check waits for an answer where it says nothing: CiA 301 gives no time."""
+
+# What a step does on the bus.
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Send a frame, as candump writes it."""
+
+    frame: str
+    extended: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Expect:
+    """Wait for the next frame on a CAN-ID; it must match one of the patterns."""
+
+    patterns: tuple[str, ...]
+    within_ms: int = ANSWER_MS
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectNone:
+    """Wait; no frame on this CAN-ID may come."""
+
+    can_id: str
+    for_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Count:
+    """Wait; so many frames that match must come."""
+
+    pattern: str
+    for_ms: int
+    least: int
+    most: int
+
+
+@dataclass(frozen=True, slots=True)
+class Period:
+    """Wait; frames that match must come each so many milliseconds."""
+
+    pattern: str
+    each_ms: int
+    times: int
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Let time pass."""
+
+    for_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Forget:
+    """Drop the frames of a CAN-ID that have come."""
+
+    can_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """Move an input of the device, compare an output, or switch the power.
+
+    Attributes:
+        words: for the stimulus, as `input`, `6000:01`, `01`.
+        within_ms: a longer act disturbs the check; None allows any time.
+    """
+
+    words: tuple[str, ...]
+    within_ms: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Macro:
+    """Do what takes many frames.
+
+    Attributes:
+        words: texts, and addresses of objects once they are bound.
+    """
+
+    name: str
+    words: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class OfObject:
+    """A step about one object.
+
+    Attributes:
+        at: the object: a name, or `1017:00`; once it is bound, index and sub-index.
+    """
+
+    at: str | Address
+
+    @property
+    def address(self) -> Address:
+        """Index and sub-index of a bound step."""
+        assert not isinstance(self.at, str)
+        return self.at
+
+
+@dataclass(frozen=True, slots=True)
+class Write(OfObject):
+    """Write an object; the node must take the value."""
+
+    data: str
+
+
+@dataclass(frozen=True, slots=True)
+class RefuseWrite(OfObject):
+    """Write an object; the node must refuse it with one of the SDO abort codes."""
+
+    data: str
+    codes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Read(OfObject):
+    """Read an object; it must hold what the pattern says."""
+
+    data: str
+
+
+@dataclass(frozen=True, slots=True)
+class ReadOther(OfObject):
+    """Read an object; it must not hold this value."""
+
+    data: str
+
+
+@dataclass(frozen=True, slots=True)
+class RefuseRead(OfObject):
+    """Read an object; the node must refuse it with one of the SDO abort codes."""
+
+    codes: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Keep(OfObject):
+    """Say that the check changes an object by other means: it is written back at the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hold(OfObject):
+    """Read an object; it must have a value of its data type.
+
+    Attributes:
+        kind: name of the data type.
+        low: its lowest value, None for that of the type.
+        high: its highest.
+        value: the value in hex, None for any.
+        codes: SDO abort codes with which the node may refuse instead.
+    """
+
+    kind: str
+    low: int | float | None = None
+    high: int | float | None = None
+    value: str | None = None
+    codes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RefuseRewrite(OfObject):
+    """Read an object and write it back, so many bytes longer; the node must refuse that."""
+
+    grow: int
+    codes: tuple[str, ...]
+
+
+Action = (
+    Send
+    | Expect
+    | ExpectNone
+    | Count
+    | Period
+    | Wait
+    | Forget
+    | Act
+    | Macro
+    | Write
+    | RefuseWrite
+    | Read
+    | ReadOther
+    | RefuseRead
+    | Keep
+    | Hold
+    | RefuseRewrite
+)
+
+
+class Step(NamedTuple):
+    """One step of a check.
+
+    Attributes:
+        action: what is done.
+        given: it prepares: if the node does not do it, the check says nothing about the node.
+        at_end: it is done at the end, however the check went, and fails no check.
+    """
+
+    action: Action
+    given: bool = False
+    at_end: bool = False
 
 
 class Level(IntEnum):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
-from functools import partial
 from random import Random
 from typing import Final
 
@@ -22,11 +21,10 @@ from tickrig.host.canopen.conform.bus.exchange import (
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
 from tickrig.host.canopen.conform.bus.sdo import SdoClient
 from tickrig.host.canopen.conform.bus.steps import StepPlayer
-from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.check import ANSWER_MS, Check, ConformancePlan, Level
 from tickrig.host.canopen.conform.judge import Judge
 from tickrig.host.canopen.conform.node_care import HEARTBEAT, NodeCare
-from tickrig.host.canopen.conform.notation import ANSWER_MS
-from tickrig.host.canopen.conform.object_checks import object_checks, play_object_step
+from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.permission import Permission
 from tickrig.host.canopen.conform.subject import Subject, examine, other_device
 from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks
@@ -182,8 +180,7 @@ class ConformRun:
         self._client = SdoClient(self._exchange, node_id)
         self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
         self._stray = StrayHeartbeat(self._exchange, node_id)
-        more = partial(play_object_step, self._client)
-        player = StepPlayer(self._exchange, node_id, plan.stimulus, more)
+        player = StepPlayer(self._exchange, node_id, plan.stimulus, self._client)
         self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
         self._longest_us = round(plan.longest_s * 1e6)
         self._results: list[Result] = []

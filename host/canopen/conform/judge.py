@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import BusExchange, Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.frame_pattern import abort_of
 from tickrig.host.canopen.conform.bus.steps import StepPlayer
-from tickrig.host.canopen.conform.check import STIMULUS, Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.check import (
+    STIMULUS,
+    Action,
+    Check,
+    ConformancePlan,
+    Hold,
+    Level,
+    Macro,
+    Read,
+    ReadOther,
+    Send,
+    Step,
+    Write,
+)
 from tickrig.host.canopen.conform.node_care import NodeCare
 from tickrig.host.canopen.conform.notation import BoundCheck, Unbound, bind_check, step_head
 from tickrig.host.canopen.conform.permission import Permission
@@ -46,16 +58,21 @@ def _is_segment(command: str) -> bool:
     return command[:1] in {"0", "1"}
 
 
-def _enables(step: Mapping[str, Any]) -> bool:
+def _enables(action: Action) -> bool:
     """Return whether a step gives a PDO its COB-ID: every device takes its own."""
-    at = step.get("write", (0, 0))
-    return "macro" in step or (at[0] in _PDO_PARAMETERS and at[1] == 1)
+    index, sub = action.address if isinstance(action, Write) else (0, 0)
+    return isinstance(action, Macro) or (index in _PDO_PARAMETERS and sub == 1)
 
 
-def _is_constant(step: Mapping[str, Any], error: StepFailed) -> bool:
+def _is_constant(action: Action, error: StepFailed) -> bool:
     """Return whether the node keeps an object constant that CiA 301 lets be so."""
-    index, _ = step.get("write", (0, 0))
-    return index in _MAY_BE_CONSTANT and abort_of(error.got) in _READ_ONLY
+    written = isinstance(action, Write) and action.address[0] in _MAY_BE_CONSTANT
+    return written and abort_of(error.got) in _READ_ONLY
+
+
+def _starts(step: Step) -> bool:
+    """Return whether a step starts the node."""
+    return isinstance(step.action, Send) and step.action.frame.startswith(_START)
 
 
 class Judge:
@@ -124,14 +141,15 @@ class Judge:
             return str(error)
         return bound
 
-    def _as_found(self, step: Mapping[str, Any]) -> Mapping[str, Any]:
+    def _as_found(self, step: Step) -> Step:
         """Leave out a value that an object held before the run: the tester has written another."""
-        at, value = step.get("holds"), step.get("value")
-        if at is None or value is None or not self._care.is_quieted(at):
+        action = step.action
+        if not isinstance(action, Hold) or action.value is None:
             return step
-        if self._care.held(at).hex().upper() != value:
+        at = action.address
+        if not self._care.is_quieted(at) or self._care.held(at).hex().upper() != action.value:
             return step
-        return {key: each for key, each in step.items() if key != "value"}
+        return step._replace(action=replace(action, value=None))
 
     def _unread(self, bound: BoundCheck, subject: Subject) -> str:
         """Say what a check would write that could not be written back; empty if all can be."""
@@ -167,7 +185,7 @@ class Judge:
         try:
             for number, step in enumerate(bound.steps, 1):
                 where = ", ".join(filter(None, [f"step {number}", step_head(step)]))
-                if "finally" not in step:
+                if not step.at_end:
                     self._player.play(step)
                 if self._exchange.crashes:
                     raise StepFailed(self._crash())
@@ -179,14 +197,15 @@ class Judge:
             self._wanted = error.wanted
             if self._exchange.crashes:
                 return CheckVerdict.FAIL, f"{where}: {self._crash()}"
-            if "given" in step or _is_constant(step, error):
-                return self._unprepared(step, error, f"{where}: {error}")
-            misread = "read" in step and bound.check.group not in _UPLOADS and _is_misread(error)
+            if step.given or _is_constant(step.action, error):
+                return self._unprepared(step.action, error, f"{where}: {error}")
+            reads = isinstance(step.action, Read | ReadOther)
+            misread = reads and bound.check.group not in _UPLOADS and _is_misread(error)
             return self._failed(bound, f"{where}: {error}", misread=misread)
         return CheckVerdict.PASS, ""
 
     def _unprepared(
-        self, step: Mapping[str, Any], error: StepFailed, reason: str
+        self, action: Action, error: StepFailed, reason: str
     ) -> tuple[CheckVerdict, str]:
         """Return the verdict of a check that the node did not let come to its question.
 
@@ -198,14 +217,14 @@ class Judge:
             reason = f"{reason}; {', '.join(self._exchange.disturbances)}"
             return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
         code = abort_of(error.got)
-        if code in _READ_ONLY or (code in _NOT_SUPPORTED and not _enables(step)):
+        if code in _READ_ONLY or (code in _NOT_SUPPORTED and not _enables(action)):
             return CheckVerdict.NOT_APPLICABLE, f"the node need not take this: {reason}"
         return CheckVerdict.INCONCLUSIVE, f"{_UNPREPARED}: {reason}"
 
     def _end(self, bound: BoundCheck) -> None:
         """Do what is done at the end, however the check went."""
         for step in bound.steps:
-            if "finally" in step:
+            if step.at_end:
                 with suppress(StepFailed, Disturbed, NotAllowed):
                     self._player.play(step)
 
@@ -228,7 +247,7 @@ class Judge:
             known = ", ".join(map(str, sorted(others)))
             return CheckVerdict.INCONCLUSIVE, f"{reason}; other nodes may have answered: {known}"
         errors = self._care.errors
-        if errors and any(str(step.get("send", "")).startswith(_START) for step in bound.steps):
+        if errors and any(map(_starts, bound.steps)):
             why = f"1001h was {errors:02X}h before: with an error a node may leave Operational"
             return CheckVerdict.INCONCLUSIVE, f"{reason}; {why}"
         if bound.check.choice:

@@ -10,8 +10,8 @@ from typing import Final, TypeVar
 from tickrig.host.canopen.conform.binding.object_reader import PATIENCE
 from tickrig.host.canopen.conform.bus.exchange import MS_US, BusExchange, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, number_of
-from tickrig.host.canopen.conform.check import Level
-from tickrig.host.canopen.conform.notation import Address, BoundCheck
+from tickrig.host.canopen.conform.check import Address, Level
+from tickrig.host.canopen.conform.notation import BoundCheck
 from tickrig.host.canopen.conform.write_order import Values, Write, in_order, is_standard
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoMisnamed, SdoTimeout
 from tickrig.wire.can import data_frame

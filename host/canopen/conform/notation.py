@@ -2,25 +2,49 @@
 
 Steps of a check, one a line, in the notation of docs/reference/canopen/conform.md.
 
->>> parse_step("3..5 x $heartbeat#05 in 400 ms")
-{'count': '$heartbeat#05', 'for': 400, 'min': 3, 'max': 5}
->>> parse_step("refuse write $ro_u8 00 06010002 06010000")
-{'refuse write': '$ro_u8', 'data': '00', 'codes': ['06010002', '06010000']}
+>>> parse_step("3..5 x $heartbeat#05 in 400 ms").action
+Count(pattern='$heartbeat#05', for_ms=400, least=3, most=5)
+>>> parse_step("refuse write $ro_u8 00 06010002 06010000").action
+RefuseWrite(at='$ro_u8', data='00', codes=('06010002', '06010000'))
 
-Steps written as they are read, for people: what `step_text` reads, and steps of objects.
+Steps written as they are read, for people: what `parse_step` reads, and steps of objects.
 
->>> step_words({"refuse write": (0x1000, 0), "data": "00", "codes": ["06010002"]})
+>>> step_words(Step(RefuseWrite((0x1000, 0), "00", ("06010002",))))
 'refuse write 1000:00 00 06010002'
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, Protocol, assert_never
 
-from tickrig.host.canopen.conform.check import Check, Step
+from tickrig.host.canopen.conform.check import (
+    ANSWER_MS,
+    Act,
+    Action,
+    Address,
+    Check,
+    Count,
+    Expect,
+    ExpectNone,
+    Forget,
+    Hold,
+    Keep,
+    Macro,
+    OfObject,
+    Period,
+    Read,
+    ReadOther,
+    RefuseRead,
+    RefuseRewrite,
+    RefuseWrite,
+    Send,
+    Step,
+    Wait,
+    Write,
+)
 from tickrig.wire.canopen.sdo_frame import SPECIFIER, ClientCommand
 
 # Names in place of numbers: what stands for `$heartbeat` or `$rw_u8.new` on this node.
@@ -28,9 +52,6 @@ from tickrig.wire.canopen.sdo_frame import SPECIFIER, ClientCommand
 NAME: Final = re.compile(r"\$(?:\{([a-z][a-z0-9_]*)\}|([a-z][a-z0-9_]*)(?:\.([a-z]+))?)")
 """`$name`, `$name.attribute`, or `${name}` where a digit follows."""
 _ADDRESS: Final = re.compile(r"([0-9A-F]{4}):([0-9A-F]{2})")
-
-Address = tuple[int, int]
-"""Index and sub-index."""
 
 
 class Unbound(Exception):  # noqa: N818 - what the name is
@@ -153,9 +174,6 @@ _FINALLY: Final = "finally "
 _GIVEN: Final = "given "
 """Begins a step that prepares: if the node does not do it, the check says nothing of the node."""
 
-ANSWER_MS: Final = 1_000
-"""How long is waited for an answer where a check says nothing: CiA 301 gives no time."""
-
 
 def parse_step(line: str) -> Step:
     """Read a line.
@@ -164,140 +182,125 @@ def parse_step(line: str) -> Step:
         ValueError: it is none of the notation.
     """
     if line.startswith(_FINALLY):
-        return {**parse_step(line.removeprefix(_FINALLY)), "finally": True}
+        return parse_step(line.removeprefix(_FINALLY))._replace(at_end=True)
     if line.startswith(_GIVEN):
-        return {**parse_step(line.removeprefix(_GIVEN)), "given": True}
+        return parse_step(line.removeprefix(_GIVEN))._replace(given=True)
     for pattern, make in _NOTATIONS:
         match = pattern.fullmatch(line)
         if match is not None:
-            return make(*match.groups())
+            return Step(make(*match.groups()))
     raise ValueError(f"{line!r} is no step; docs/reference/canopen/conform.md has the notation")
 
 
-def _expect(patterns: str, within_ms: str | None) -> Step:
-    return {"expect": patterns.split(" or "), "in": int(within_ms or ANSWER_MS)}
+def _expect(patterns: str, within_ms: str | None) -> Expect:
+    return Expect(tuple(patterns.split(" or ")), int(within_ms or ANSWER_MS))
 
 
-def _count(least: str, most: str, pattern: str, for_ms: str) -> Step:
-    return {"count": pattern, "for": int(for_ms), "min": int(least), "max": int(most)}
+def _act(words: str, within_ms: str | None) -> Act:
+    return Act(tuple(words.split()), int(within_ms) if within_ms else None)
 
 
-def _period(times: str, pattern: str, period_ms: str) -> Step:
-    return {"period": pattern, "each": int(period_ms), "times": int(times)}
+_POWER_CYCLE: Final = Act(("power-cycle",))
 
-
-def _send(frame: str, extended: str | None) -> Step:
-    return {"send": frame, "ext": True} if extended else {"send": frame}
-
-
-def _act(words: str, within_ms: str | None) -> Step:
-    return {"app": words.split()} | ({"in": int(within_ms)} if within_ms else {})
-
-
-def _refuse_write(target: str, data: str, codes: str) -> Step:
-    return {"refuse write": target, "data": data, "codes": codes.split()}
-
-
-def _refuse_read(target: str, codes: str) -> Step:
-    return {"refuse read": target, "codes": codes.split()}
-
-
-def _macro(name: str, words: str) -> Step:
-    return {"macro": [name, *words.split()]}
-
-
-_LINES: Final[tuple[tuple[str, Callable[..., Step]], ...]] = (
-    (r"> (\S+)( \(29-bit\))?", _send),
+_LINES: Final[tuple[tuple[str, Callable[..., Action]], ...]] = (
+    (r"> (\S+)( \(29-bit\))?", lambda frame, extended: Send(frame, bool(extended))),
     (r"< (.+?)(?: within (\d+) ms)?", _expect),
-    (r"none on (\S+) for (\d+) ms", lambda can_id, ms: {"none": can_id, "for": int(ms)}),
-    (r"wait (\d+) ms", lambda ms: {"wait": int(ms)}),
-    (r"forget (\S+)", lambda can_id: {"forget": can_id}),
-    (r"(\d+)\.\.(\d+) x (\S+) in (\d+) ms", _count),
-    (r"(\d+) x (\S+) each (\d+) ms", _period),
-    (r"power cycle", lambda: {"app": ["power-cycle"]}),
+    (r"none on (\S+) for (\d+) ms", lambda can_id, ms: ExpectNone(can_id, int(ms))),
+    (r"wait (\d+) ms", lambda ms: Wait(int(ms))),
+    (r"forget (\S+)", Forget),
+    (
+        r"(\d+)\.\.(\d+) x (\S+) in (\d+) ms",
+        lambda least, most, pattern, ms: Count(pattern, int(ms), int(least), int(most)),
+    ),
+    (
+        r"(\d+) x (\S+) each (\d+) ms",
+        lambda times, pattern, ms: Period(pattern, int(ms), int(times)),
+    ),
+    (r"power cycle", lambda: _POWER_CYCLE),
     (r"app: (.+?)(?: within (\d+) ms)?", _act),
-    (r"macro (\w+)((?: \S+)*)", _macro),
-    (r"write (\S+) (\S+)", lambda target, data: {"write": target, "data": data}),
-    (r"read (\S+) not (\S+)", lambda target, data: {"read": target, "not": data}),
-    (r"read (\S+) (\S+)", lambda target, data: {"read": target, "data": data}),
-    (r"refuse write (\S+) (\S+) (.+)", _refuse_write),
-    (r"refuse read (\S+) (.+)", _refuse_read),
-    (r"keep (\S+)", lambda target: {"keep": target}),
+    (r"macro (\w+)((?: \S+)*)", lambda name, words: Macro(name, tuple(words.split()))),
+    (r"write (\S+) (\S+)", Write),
+    (r"read (\S+) not (\S+)", ReadOther),
+    (r"read (\S+) (\S+)", Read),
+    (
+        r"refuse write (\S+) (\S+) (.+)",
+        lambda at, data, codes: RefuseWrite(at, data, tuple(codes.split())),
+    ),
+    (r"refuse read (\S+) (.+)", lambda at, codes: RefuseRead(at, tuple(codes.split()))),
+    (r"keep (\S+)", Keep),
 )
 _NOTATIONS: Final = tuple((re.compile(pattern), make) for pattern, make in _LINES)
 
 
 _GROWN: Final = {0: "again", 1: "a byte longer", -1: "a byte shorter"}
-
-
-def step_words(step: Mapping[str, Any]) -> str:
-    """Write a step, with names or with the numbers of a node."""
-    head = _FINALLY * ("finally" in step) + _GIVEN * ("given" in step)
-    return head + (_of_bus(step) or _of_object(step))
-
-
-_TEMPLATES: Final = {
-    "send": "> {send}",
-    "none": "none on {none} for {for} ms",
-    "count": "{min}..{max} x {count} in {for} ms",
-    "period": "{times} x {period} each {each} ms",
-    "wait": "wait {wait} ms",
-    "forget": "forget {forget}",
-}
 _LONGEST: Final = 60
-_FRAMES: Final = frozenset({"send", "expect", "none", "count", "period", "wait", "forget"})
-"""Steps whose failure tells itself which frames were meant."""
 
 
-def step_head(step: Mapping[str, Any]) -> str:
-    """Write what a step does, without the codes that are wanted; empty if it is of frames."""
-    if _FRAMES & step.keys():
-        return ""
-    words = step_words({key: value for key, value in step.items() if key != "codes"})
+def step_words(step: Step) -> str:
+    """Write a step, with names or with the numbers of a node."""
+    return _FINALLY * step.at_end + _GIVEN * step.given + _words(step.action)
+
+
+def step_head(step: Step) -> str:
+    """Write what a step does, without the codes that are wanted; empty if it is of frames.
+
+    A step of frames that fails says itself which frames were meant.
+    """
+    match step.action:
+        case Send() | Expect() | ExpectNone() | Count() | Period() | Wait() | Forget():
+            return ""
+        case RefuseWrite() | RefuseRead() as action:
+            step = step._replace(action=replace(action, codes=()))
+    words = step_words(step)
     return words if len(words) <= _LONGEST else f"{words[:_LONGEST]}..."
 
 
-def _of_bus(step: Mapping[str, Any]) -> str:
-    for word, text in _TEMPLATES.items():
-        if word in step:
-            return text.format_map(step) + (" (29-bit)" if step.get("ext") else "")
-    match step:
-        case {"expect": patterns, "in": ms}:
+def _words(action: Action) -> str:  # noqa: PLR0911, PLR0912 - one line an action
+    match action:
+        case Send(frame, extended):
+            return f"> {frame}" + (" (29-bit)" if extended else "")
+        case Expect(patterns, ms):
             return f"< {' or '.join(patterns)}" + (f" within {ms} ms" if ms != ANSWER_MS else "")
-        case {"app": ["power-cycle"]}:
+        case ExpectNone(can_id, ms):
+            return f"none on {can_id} for {ms} ms"
+        case Count(pattern, ms, least, most):
+            return f"{least}..{most} x {pattern} in {ms} ms"
+        case Period(pattern, ms, times):
+            return f"{times} x {pattern} each {ms} ms"
+        case Wait(ms):
+            return f"wait {ms} ms"
+        case Forget(can_id):
+            return f"forget {can_id}"
+        case Act() if action == _POWER_CYCLE:
             return "power cycle"
-        case {"app": words}:
-            return f"app: {' '.join(words)}" + (f" within {step['in']} ms" if "in" in step else "")
-        case {"macro": words}:
-            return " ".join(["macro", *map(_word, words)])
-    return ""
-
-
-def _of_object(step: Mapping[str, Any]) -> str:
-    match step:
-        case {"refuse rewrite": at, "grow": grow}:
-            return f"write {_word(at)} {_GROWN[grow]}"
-        case {"holds": at}:
-            return f"read {_word(at)}"
-        case {"read": at, "not": data}:
+        case Act(words, within_ms):
+            within = f" within {within_ms} ms" if within_ms is not None else ""
+            return f"app: {' '.join(words)}{within}"
+        case Macro(name, words):
+            return " ".join(["macro", name, *map(_word, words)])
+        case Write(at, data):
+            return f"write {_word(at)} {data}"
+        case RefuseWrite(at, data, codes):
+            return " ".join(["refuse write", _word(at), data, *codes])
+        case Read(at, data):
+            return f"read {_word(at)} {data}"
+        case ReadOther(at, data):
             return f"read {_word(at)} not {data}"
-    verb = next(iter(step))
-    return " ".join([verb, _word(step[verb]), *_data(step)])
-
-
-def _data(step: Mapping[str, Any]) -> list[str]:
-    return [*([step["data"]] if "data" in step else []), *step.get("codes", ())]
+        case RefuseRead(at, codes):
+            return " ".join(["refuse read", _word(at), *codes])
+        case Keep(at):
+            return f"keep {_word(at)}"
+        case Hold(at):
+            return f"read {_word(at)}"
+        case RefuseRewrite(at, grow):
+            return f"write {_word(at)} {_GROWN[grow]}"
+        case _:
+            assert_never(action)
 
 
 def _word(word: object) -> str:
     return f"{word[0]:04X}:{word[1]:02X}" if isinstance(word, tuple) else str(word)
 
-
-_TARGETS: Final = frozenset(
-    {"write", "read", "refuse write", "refuse read", "keep", "holds", "refuse rewrite"}
-)
-"""Steps of an object; what their first word names is an address."""
-_REFUSED: Final = ("refuse write", "refuse rewrite")
 
 _MARGIN_US: Final = 2_000_000
 """Beyond the sum of all waits: for what is sent, when the load has to be kept low."""
@@ -310,6 +313,12 @@ _LONGEST_TRANSFER_MS: Final = 2_000
 
 _BLOCK_ENDS: Final = 1
 """Bit of a block download request that does not begin it."""
+_BEGIN_DOWNLOAD: Final = frozenset(
+    command
+    for command in range(0x100)
+    if command & SPECIFIER == ClientCommand.DOWNLOAD
+    or (command & SPECIFIER == ClientCommand.BLOCK_DOWNLOAD and not command & _BLOCK_ENDS)
+)
 _RESETS: Final = ("000#81", "000#82")
 NMT: Final = "000"
 _LSS: Final = "7E5"
@@ -339,7 +348,7 @@ class BoundCheck:
     """
 
     check: Check
-    steps: tuple[Mapping[str, Any], ...]
+    steps: tuple[Step, ...]
     changed: frozenset[Address]
     used: frozenset[Address]
     written: frozenset[Address]
@@ -352,39 +361,52 @@ class BoundCheck:
 def bind_check(check: Check, names: Names) -> BoundCheck:
     """Put numbers in place of names; Unbound if the node has nothing for one."""
     steps = tuple(_bind_step(step, names) for step in check.steps)
+    actions = [step.action for step in steps]
     request, sync = _resolve("$request", names), _resolve("$sync", names)
-    changed = frozenset(address for step in steps for address in _changed(step, request))
-    refused = frozenset(step[key] for step in steps for key in _REFUSED if key in step)
+    changed = frozenset(address for action in actions for address in _changed(action, request))
+    refused = {
+        action.address for action in actions if isinstance(action, RefuseWrite | RefuseRewrite)
+    }
     return BoundCheck(
         check,
         steps,
         changed,
-        frozenset(address for step in steps for address in _used(step)),
+        frozenset(address for action in actions for address in _used(action)),
         changed | refused,
-        frozenset(question for step in steps for question in _questions(step, sync)),
-        frozenset(text.partition("#")[0] for step in steps for text in _watched(step)),
-        _MARGIN_US + 1_000 * sum(map(_longest_ms, steps)),
-        any(map(_resets, steps)),
+        frozenset(question for action in actions for question in _questions(action, sync)),
+        frozenset(text.partition("#")[0] for action in actions for text in _watched(action)),
+        _MARGIN_US + 1_000 * sum(map(_longest_ms, actions)),
+        any(map(_resets, actions)),
     )
 
 
-def _bind_step(step: Step, names: Names) -> Mapping[str, Any]:
-    return {key: _bind(key, value, names) for key, value in step.items()}
+def _bind_step(step: Step, names: Names) -> Step:
+    action = step.action
+    if isinstance(action, OfObject) and isinstance(action.at, tuple):
+        return step  # made of an object: all its words are numbers
+    bind = _bind_word if isinstance(action, Macro) else _bind_value
+    values = [
+        resolve_address(getattr(action, name), names)
+        if name == "at"
+        else bind(getattr(action, name), names)
+        for name in action.__match_args__
+    ]
+    make: Callable[..., Action] = type(action)
+    return step._replace(action=make(*values))
 
 
-def _bind(key: str, value: object, names: Names) -> object:
-    if key in _TARGETS:
-        return resolve_address(str(value), names)
+def _bind_value(value: Any, names: Names) -> Any:
     if isinstance(value, str):
         return _resolve(value, names)
-    if isinstance(value, list):
-        bind = _bind_word if key == "macro" else _resolve
-        return [bind(str(word), names) for word in value]
+    if isinstance(value, tuple):
+        return tuple(_resolve(word, names) for word in value)
     return value
 
 
-def _bind_word(word: str, names: Names) -> object:
-    """Bind a word of a macro: an address, or a name without attribute, is an object."""
+def _bind_word(word: Any, names: Names) -> Any:
+    """Bind words of a macro: an address, or a name without attribute, is an object."""
+    if isinstance(word, tuple):
+        return tuple(_bind_word(each, names) for each in word)
     if _ADDRESS.fullmatch(word):
         return resolve_address(word, names)
     match = NAME.fullmatch(word)
@@ -396,65 +418,77 @@ def _bind_word(word: str, names: Names) -> object:
         return _resolve(word, names)
 
 
-def _longest_ms(step: Step) -> int:
+def _longest_ms(action: Action) -> int:
     """Return how long a step lasts at most."""
-    match step:
-        case {"expect": _, "in": ms} | {"none": _, "for": ms} | {"count": _, "for": ms}:
-            return int(ms)
-        case {"wait": ms}:
-            return int(ms)
-        case {"period": _, "each": ms, "times": times}:
-            return int(ms) * (int(times) + 2)
-        case {"macro": [name, *words]}:
+    match action:
+        case Expect(_, ms) | ExpectNone(_, ms) | Count(_, ms) | Wait(ms):
+            return ms
+        case Period(_, ms, times):
+            return ms * (times + 2)
+        case Macro(name, words):
             return longest_ms(name, words)
-        case {"app": _}:
+        case Act():
             return _STIMULUS_MS
-    return 0 if {"send", "forget", "keep"} & step.keys() else _LONGEST_TRANSFER_MS
+        case Send() | Forget() | Keep():
+            return 0
+        case _:
+            return _LONGEST_TRANSFER_MS
 
 
-def _resets(step: Step) -> bool:
-    return "app" in step or str(step.get("send", ""))[:6] in _RESETS
+def _resets(action: Action) -> bool:
+    return isinstance(action, Act) or (isinstance(action, Send) and action.frame[:6] in _RESETS)
 
 
-def _changed(step: Mapping[str, Any], request: str) -> Iterator[Address]:
-    yield from (step[key] for key in ("write", "keep") if key in step)
-    if "macro" in step:
-        yield from written_by(*step["macro"])
-    can_id, _, data = str(step.get("send", "")).partition("#")
-    if can_id == request and len(data) >= 8 and begins_download(int(data[:2], 16)):
-        yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)
+def _changed(action: Action, request: str) -> Iterator[Address]:
+    match action:
+        case Write() | Keep():
+            yield action.address
+        case Macro(name, words):
+            yield from written_by(name, *words)
+        case Send(frame):
+            can_id, _, data = frame.partition("#")
+            if can_id == request and len(data) >= 8 and begins_download(int(data[:2], 16)):
+                yield int(data[4:6] + data[2:4], 16), int(data[6:8], 16)
 
 
-def _used(step: Mapping[str, Any]) -> Iterator[Address]:
-    yield from (step[key] for key in ("write", "read") if key in step)
-    if "macro" in step:
-        yield from (word for word in step["macro"] if isinstance(word, tuple) and word[1])
-        yield from written_by(*step["macro"])
+def _used(action: Action) -> Iterator[Address]:
+    match action:
+        case Write() | Read() | ReadOther():
+            yield action.address
+        case Macro(name, words):
+            yield from (word for word in words if isinstance(word, tuple) and word[1])
+            yield from written_by(name, *words)
 
 
 def begins_download(command: int) -> bool:
     """Return whether a request begins to write the object that it names."""
-    specifier = command & SPECIFIER
-    begins = specifier == ClientCommand.BLOCK_DOWNLOAD and not command & _BLOCK_ENDS
-    return begins or specifier == ClientCommand.DOWNLOAD
+    return command in _BEGIN_DOWNLOAD
 
 
-def _questions(step: Mapping[str, Any], sync: str) -> Iterator[str]:
+def _questions(action: Action, sync: str) -> Iterator[str]:
     """Yield what concerns other nodes, or cannot be undone."""
-    can_id, _, data = str(step.get("send", "")).partition("#")
-    macro = step.get("macro", [""])
-    if can_id == NMT and data[2:4] == "00":
-        yield NMT_TO_ALL
-    if can_id == _LSS or macro[0] in ("fastscan", "lssstore"):
-        yield LSS_TO_ALL
-    if can_id == sync or macro[0] in ("sync", "syncperiod"):
-        yield SYNC_TO_ALL
-    if step.get("write", (0, 0))[0] in _STORAGE:
-        yield _STORED
+    match action:
+        case Send(frame):
+            can_id, _, data = frame.partition("#")
+            if can_id == NMT and data[2:4] == "00":
+                yield NMT_TO_ALL
+            if can_id == _LSS:
+                yield LSS_TO_ALL
+            if can_id == sync:
+                yield SYNC_TO_ALL
+        case Macro("fastscan" | "lssstore"):
+            yield LSS_TO_ALL
+        case Macro("sync" | "syncperiod"):
+            yield SYNC_TO_ALL
+        case Write() if action.address[0] in _STORAGE:
+            yield _STORED
 
 
-def _watched(step: Mapping[str, Any]) -> Iterator[str]:
-    yield from step.get("expect", ())
-    for key in ("none", "count", "period", "forget"):
-        if key in step:
-            yield step[key]
+def _watched(action: Action) -> Iterable[str]:
+    match action:
+        case Expect(patterns):
+            return patterns
+        case Count(text) | Period(text) | ExpectNone(text) | Forget(text):
+            return (text,)
+        case _:
+            return ()

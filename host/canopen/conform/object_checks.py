@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, Final, Protocol
+from typing import Final, Protocol
 
 from tickrig.host.canopen.conform.bus.exchange import StepFailed
 from tickrig.host.canopen.conform.bus.frame_pattern import codes_text
-from tickrig.host.canopen.conform.check import Check, Level, Step
+from tickrig.host.canopen.conform.check import (
+    Action,
+    Check,
+    Hold,
+    Level,
+    RefuseRead,
+    RefuseRewrite,
+    RefuseWrite,
+    Step,
+)
 from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
@@ -90,7 +99,7 @@ def _reads(
     for index in indices:
         entry = entries.get((index, 0))
         kind = "UNSIGNED8" if index not in _DRIVE_OBJECTS else "UNSIGNED16"
-        yield {"holds": f"{index:04X}:00", "type": entry.data_type.name if entry else kind}
+        yield Step(Hold((index, 0), entry.data_type.name if entry else kind))
 
 
 # Checks of every object that an EDS describes: readable and refused as it is declared.
@@ -160,8 +169,8 @@ class _Maker:
         if value is None or not entry.writable or entry.index not in _COMMUNICATION_AREA:
             return
         if entry.index != _ERROR_FIELD:
-            title, step = "as its DefaultValue says", _step(entry, value)
-            yield _check(entry, "default", title, _DEFAULTS, step, choice=_CONFIGURED)
+            title, action = "as its DefaultValue says", _hold(entry, value)
+            yield _check(entry, "default", title, _DEFAULTS, action, choice=_CONFIGURED)
 
     def _power_on(self, entry: EntryDescription) -> str | None:
         if not entry.has_default:
@@ -219,7 +228,7 @@ def _check(  # noqa: PLR0913, PLR0917 - a check, by its parts
     suffix: str,
     title: str,
     source: str,
-    step: Step,
+    action: Action,
     level: Level = Level.READ_ONLY,
     choice: str = "",
 ) -> Check:
@@ -227,34 +236,32 @@ def _check(  # noqa: PLR0913, PLR0917 - a check, by its parts
     name = f"{entry.index:04X}h:{entry.sub:02X} {entry.name}"
     return Check(
         *(f"OD-{where}-{suffix}", _GROUP, f"{name}: {title}", source, level),
-        *(frozenset(), (step,), choice),
+        *(frozenset(), (Step(action),), choice),
     )
 
 
 def _holds(entry: EntryDescription, constant: str | None) -> Check:
     """Make the check of what an entry holds."""
-    step = _step(entry, constant)
+    action = _hold(entry, constant)
     title = f"holds {entry.data_type.name}"
     if constant is None:
-        return _check(entry, "type", title, _TYPES, step)
-    return _check(entry, "type", f"{title}, its DefaultValue", f"{_TYPES}; {_DEFAULTS}", step)
+        return _check(entry, "type", title, _TYPES, action)
+    return _check(entry, "type", f"{title}, its DefaultValue", f"{_TYPES}; {_DEFAULTS}", action)
 
 
-def _step(entry: EntryDescription, value: str | None) -> dict[str, object]:
+def _hold(entry: EntryDescription, value: str | None) -> Hold:
     """Make the step that reads an entry; a value is hexadecimal."""
-    step: dict[str, object] = {"holds": _place(entry), "type": entry.data_type.name}
-    said = {"low": entry.low, "high": entry.high, "value": value}
-    if _may_have_none(entry):
-        step |= {"codes": list(_NO_VALUE_YET)}
-    return step | {key: number for key, number in said.items() if number is not None}
+    codes = _NO_VALUE_YET if _may_have_none(entry) else ()
+    at, kind = (entry.index, entry.sub), entry.data_type.name
+    return Hold(at, kind, entry.low, entry.high, value, codes)
 
 
 def _refused(
     entry: EntryDescription, suffix: str, title: str, grow: int, codes: Sequence[str]
 ) -> Check:
     """Make a check that writes what it has read, so many bytes longer: it must be refused."""
-    step = {"refuse rewrite": _place(entry), "grow": grow, "codes": _codes(entry, codes)}
-    return _check(entry, suffix, title, _ABORTS, step, Level.COMMUNICATION)
+    action = RefuseRewrite((entry.index, entry.sub), grow, _codes(entry, codes))
+    return _check(entry, suffix, title, _ABORTS, action, Level.COMMUNICATION)
 
 
 def _of_sizes(entry: EntryDescription) -> Iterator[Check]:
@@ -274,18 +281,18 @@ def _of_limits(entry: EntryDescription) -> Iterator[Check]:
         if isinstance(limit, int) and lowest <= limit + beyond <= highest:
             data = (limit + beyond).to_bytes(entry.size, "little", signed=entry.signed)
             title = f"{limit + beyond} is beyond its limit {limit}: refused"
-            row = {"refuse write": _place(entry), "data": data.hex().upper()}
-            step = {**row, "codes": _codes(entry, codes)}
-            yield _check(entry, suffix, title, _ABORTS, step, Level.COMMUNICATION)
+            at, refused = (entry.index, entry.sub), _codes(entry, codes)
+            action = RefuseWrite(at, data.hex().upper(), refused)
+            yield _check(entry, suffix, title, _ABORTS, action, Level.COMMUNICATION)
 
 
-def _codes(entry: EntryDescription, codes: Sequence[str]) -> list[str]:
+def _codes(entry: EntryDescription, codes: Sequence[str]) -> tuple[str, ...]:
     """Return the codes with which a write is refused: those of the value, or of what is in use."""
-    return [*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())])]
+    return (*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())]),)
 
 
-def _refuse_read(entry: EntryDescription) -> Step:
-    return {"refuse read": _place(entry), "codes": list(_WRITE_ONLY)}
+def _refuse_read(entry: EntryDescription) -> RefuseRead:
+    return RefuseRead((entry.index, entry.sub), _WRITE_ONLY)
 
 
 def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int]) -> Check:
@@ -293,14 +300,12 @@ def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int
     known = {row.sub for row in rows}
     behind = max(known) + 1
     asked = {*range(behind + 1), _HIGHEST_SUB - 1, *share} - known
-    steps: list[Step] = [
-        {"refuse read": f"{index:04X}:{sub:02X}", "codes": list(_ABSENT_SUB)}
-        for sub in sorted(asked)
-        if sub < _HIGHEST_SUB
+    steps = [
+        Step(RefuseRead((index, sub), _ABSENT_SUB)) for sub in sorted(asked) if sub < _HIGHEST_SUB
     ]
     if _HIGHEST_SUB not in known:
-        structure = {"holds": f"{index:04X}:FF", "type": "UNSIGNED32"}
-        steps.append({**structure, "codes": list(_ABSENT_SUB)})
+        structure = Hold((index, _HIGHEST_SUB), "UNSIGNED32", codes=_ABSENT_SUB)
+        steps.append(Step(structure))
     name = rows[0].name if len(rows) == 1 else "its sub-indices"
     title = f"{index:04X}h {name}: has no sub-index that is not described"
     level, source = Level.READ_ONLY, _ABORTS
@@ -312,15 +317,9 @@ def _absent_objects(indices: Collection[int]) -> Check:
     ends = (0x1FFF, 0x5FFF, 0x9FFF, 0xFFFF)
     behind = {index + 1 for index in indices if index < 0xFFFF} | set(ends)
     asked = sorted(behind - set(indices) - set(_DATA_TYPES))
-    steps = tuple(
-        {"refuse read": f"{index:04X}:00", "codes": list(_ABSENT_OBJECT)} for index in asked
-    )
+    steps = tuple(Step(RefuseRead((index, 0), _ABSENT_OBJECT)) for index in asked)
     title = "objects that are not described are not there"
     return Check("OD-absent", _GROUP, title, _ABORTS, Level.READ_ONLY, frozenset(), steps)
-
-
-def _place(entry: EntryDescription) -> str:
-    return f"{entry.index:04X}:{entry.sub:02X}"
 
 
 def _is_constant(entry: EntryDescription, counts: bool) -> bool:
@@ -349,61 +348,44 @@ class Client(Protocol):
         """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
 
 
-def play_object_step(client: Client, step: Mapping[str, Any]) -> bool:
-    """Do a step if it is one of an object.
-
-    `holds` reads an object: it has a size that its data type has, lies within `low` and
-    `high`, is `value`, where these are given; with `codes` it may be refused with one of
-    them. `refuse rewrite` reads an object and writes it again, `grow` bytes longer or
-    shorter: the node refuses that with one of `codes`.
-
-    Args:
-        client: of the node.
-        step: with index and sub-index in place of names.
-
-    Returns:
-        Whether it was one.
+def play_of_object(client: Client, action: Hold | RefuseRewrite) -> None:
+    """Do what only checks of objects do.
 
     Raises:
         StepFailed: the node does not do as the step says.
     """
     try:
-        match step:
-            case {"holds": (index, sub)}:
-                _hold(client, index, sub, step)
-            case {"refuse rewrite": (index, sub), "grow": grow, "codes": codes}:
-                _rewrite(client, index, sub, grow, codes)
-            case _:
-                return False
+        if isinstance(action, Hold):
+            _play_hold(client, action)
+        else:
+            _rewrite(client, *action.address, action.grow, action.codes)
     except (SdoMisnamed, SdoTimeout) as error:
         raise StepFailed(str(error)) from error
-    return True
 
 
-def _hold(client: Client, index: int, sub: int, step: Mapping[str, Any]) -> None:
+def _play_hold(client: Client, step: Hold) -> None:
     try:
-        data = client.upload(index, sub)
+        data = client.upload(*step.address)
     except SdoAborted as error:
-        if f"{error.code:08X}" in step.get("codes", ()):
+        if f"{error.code:08X}" in step.codes:
             return
         raise StepFailed(f"refused with {describe_abort(error.code)}, want its value") from error
-    kind = DataType[step["type"]]
+    kind = DataType[step.kind]
     if kind.size and len(data) != kind.size:
         raise StepFailed(f"{len(data)} bytes, want {kind.size} of {kind.name}: {data.hex()}")
-    if "value" in step and data.hex().upper() != step["value"]:
-        raise StepFailed(f"holds {data.hex().upper()}, want {step['value']}")
+    if step.value is not None and data.hex().upper() != step.value:
+        raise StepFailed(f"holds {data.hex().upper()}, want {step.value}")
     _check_limits(kind, data, step)
 
 
-def _check_limits(kind: DataType, data: bytes, step: Mapping[str, Any]) -> None:
-    low, high = step.get("low"), step.get("high")
+def _check_limits(kind: DataType, data: bytes, step: Hold) -> None:
     value = kind.decode(data)
     if not isinstance(value, int | float):
         return
-    if low is not None and value < low:
-        raise StepFailed(f"{value} is below its lower limit {low}")
-    if high is not None and value > high:
-        raise StepFailed(f"{value} is above its upper limit {high}")
+    if step.low is not None and value < step.low:
+        raise StepFailed(f"{value} is below its lower limit {step.low}")
+    if step.high is not None and value > step.high:
+        raise StepFailed(f"{value} is above its upper limit {step.high}")
 
 
 def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:

@@ -21,8 +21,16 @@ from tickrig.host.canopen.conform.binding.capabilities import (
 )
 from tickrig.host.canopen.conform.binding.pdo_binding import CARRIED, RPDOS, BoundPdo
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, SizeOf, multiplexer
-from tickrig.host.canopen.conform.check import ConformancePlan, Level, Step
-from tickrig.host.canopen.conform.notation import MAP, Address, BoundCheck, Unbound, written_by
+from tickrig.host.canopen.conform.check import (
+    Address,
+    ConformancePlan,
+    Level,
+    Macro,
+    RefuseWrite,
+    Step,
+    Write,
+)
+from tickrig.host.canopen.conform.notation import MAP, BoundCheck, Unbound, written_by
 from tickrig.host.canopen.conform.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
 from tickrig.host.canopen.errors import SdoFailed
 from tickrig.wire.canopen.datatypes import DataType
@@ -370,10 +378,12 @@ class Subject:
                 entry = self.entries.get(at)
                 if entry is not None and not entry.writable:
                     return f"{at[0]:04X}h:{at[1]:02X} is read-only"
-            entry = self.entries.get(step.get("write", (0, 0)))
-            if entry is not None and not _within(entry, bytes.fromhex(step["data"])):
-                at = step["write"]
-                return f"{at[0]:04X}h:{at[1]:02X} takes only {entry.low} to {entry.high}"
+            if not isinstance(step.action, Write):
+                continue
+            entry = self.entries.get(step.action.address)
+            if entry is not None and not _within(entry, bytes.fromhex(step.action.data)):
+                where = f"{entry.index:04X}h:{entry.sub:02X}"
+                return f"{where} takes only {entry.low} to {entry.high}"
         return None
 
     @property
@@ -400,12 +410,13 @@ class Subject:
 
 def _takes(step: Step) -> Iterator[Address]:
     """Yield what a step writes, and the node shall take, or refuse for what it is."""
-    if "write" in step:
-        yield step["write"]
-    if "refuse write" in step and _READ_ONLY not in step["codes"]:  # another reason is asked for
-        yield step["refuse write"]
-    if step.get("macro", [""])[0] == MAP:
-        yield from written_by(*step["macro"])
+    match step.action:
+        case Write() as action:
+            yield action.address
+        case RefuseWrite(_, _, codes) as action if _READ_ONLY not in codes:
+            yield action.address  # another reason is asked for
+        case Macro(name, words) if name == MAP:
+            yield from written_by(name, *words)
 
 
 def _within(entry: EntryDescription, data: bytes) -> bool:

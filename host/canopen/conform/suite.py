@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform import checks
-from tickrig.host.canopen.conform.check import STIMULUS, Check, ConformancePlan, Level, Step
+from tickrig.host.canopen.conform.check import STIMULUS, Act, Check, ConformancePlan, Level, Step
 from tickrig.host.canopen.conform.notation import parse_step
 
 _HEAD: Final = re.compile(r"([A-Z0-9]+-\d+) (.+)")
@@ -112,7 +112,7 @@ def _check(
     if missing:
         raise ValueError(f"{check_id} has no {' and no '.join(sorted(missing))}")
     needs = frozenset(words.get("needs", "").split())
-    if any("app" in step for step in steps):
+    if any(isinstance(step.action, Act) for step in steps):
         needs |= {STIMULUS}
     level = Level[words["level"].upper().replace("-", "_")]
     return Check(

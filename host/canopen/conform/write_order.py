@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
-from tickrig.host.canopen.conform.notation import Address
+from tickrig.host.canopen.conform.check import Address
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, FLAG_30, INVALID
 
 Values = dict[Address, bytes]

@@ -392,7 +392,7 @@ class BusExchange:
                 self.unanswered.append(index_sub(frame.data))
         self._link.send((frame,))
 
-    def expect(self, patterns: list[str], within_ms: int) -> str:
+    def expect(self, patterns: Sequence[str], within_ms: int) -> str:
         """Wait for the next frame on a CAN-ID, which must match one of the patterns.
 
         Returns:

@@ -9,7 +9,8 @@ from typing import Final
 from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.bus.frame_pattern import matches
 from tickrig.host.canopen.conform.bus.sdo import ABORTED, SdoFrames, multiplexer
-from tickrig.host.canopen.conform.notation import ANSWER_MS, TO_MAPPING, Address
+from tickrig.host.canopen.conform.check import ANSWER_MS, Address
+from tickrig.host.canopen.conform.notation import TO_MAPPING
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.sdo_frame import SEGMENT_BYTES, AbortCode
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 from typing import Final, TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import BusExchange, StepFailed
-from tickrig.host.canopen.conform.notation import ANSWER_MS, Address
+from tickrig.host.canopen.conform.check import ANSWER_MS, Address
 from tickrig.host.canopen.dialogue import Dialogue, Script
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.canopen.script_run import run_script

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Final
 
 from tickrig.host.canopen.conform.bus.exchange import (
     MS_US,
@@ -15,7 +15,27 @@ from tickrig.host.canopen.conform.bus.exchange import (
 )
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo import SdoFrames
-from tickrig.host.canopen.conform.check import Step
+from tickrig.host.canopen.conform.check import (
+    Act,
+    Count,
+    Expect,
+    ExpectNone,
+    Forget,
+    Hold,
+    Macro,
+    OfObject,
+    Period,
+    Read,
+    ReadOther,
+    RefuseRead,
+    RefuseRewrite,
+    RefuseWrite,
+    Send,
+    Step,
+    Wait,
+    Write,
+)
+from tickrig.host.canopen.conform.object_checks import Client, play_of_object
 from tickrig.wire.can import CanFrame
 
 _Stimulus = Callable[..., str]
@@ -31,7 +51,7 @@ class StepPlayer:
         exchange: the bus.
         node_id: of the node, 1..127.
         stimulus: moves the inputs of the device, None if nobody can.
-        play_more: does a step that is none of the notation.
+        client: reads and writes objects where a check does not look at the frames.
     """
 
     def __init__(
@@ -39,56 +59,54 @@ class StepPlayer:
         exchange: BusExchange,
         node_id: int,
         stimulus: _Stimulus | None,
-        play_more: Callable[[Step], object],
+        client: Client,
     ) -> None:
-        self._exchange, self._stimulus, self._play_more = exchange, stimulus, play_more
+        self._exchange, self._stimulus, self._client = exchange, stimulus, client
         self._sdo = SdoFrames(exchange, node_id)
 
-    def play(self, step: Mapping[str, Any]) -> None:
+    def play(self, step: Step) -> None:
         """Do one step; StepFailed if the node does not do as it says."""
-        bus = self._exchange
-        match step:
-            case {"send": text}:
+        action, bus = step.action, self._exchange
+        match action:
+            case OfObject():
+                self._play_sdo(action)
+            case Send(text, extended):
                 frame = CanFrame.parse(_REMOTE.sub(r"\1#R", text))
-                bus.send(frame._replace(extended=frame.extended or step.get("ext", False)))
-            case {"expect": patterns, "in": within_ms}:
+                bus.send(frame._replace(extended=frame.extended or extended))
+            case Expect(patterns, within_ms):
                 bus.expect(patterns, within_ms)
-            case {"none": can_id, "for": for_ms}:
+            case ExpectNone(can_id, for_ms):
                 bus.none(can_id, for_ms)
-            case {"count": pattern, "for": for_ms, "min": least, "max": most}:
+            case Count(pattern, for_ms, least, most):
                 bus.count(pattern, for_ms, least, most)
-            case {"period": pattern, "each": each_ms, "times": times}:
+            case Period(pattern, each_ms, times):
                 bus.period(pattern, each_ms, times)
-            case {"wait": for_ms}:
+            case Wait(for_ms):
                 bus.wait(for_ms)
-            case {"forget": can_id}:
+            case Forget(can_id):
                 bus.forget(can_id)
-            case {"app": words, "in": within_ms}:
+            case Act(words, int(within_ms)):
                 self._act_within(within_ms, *words)
-            case {"app": words}:
+            case Act(words):
                 self._act(*words)
-            case _:
-                self._play_sdo(step)
+            case Macro(name, words):
+                MACROS[name](self._sdo, *words)
 
-    def _play_sdo(self, step: Mapping[str, Any]) -> None:
-        sdo = self._sdo
-        match step:
-            case {"write": at, "data": data}:
-                sdo.write(at, bytes.fromhex(data))
-            case {"refuse write": at, "data": data, "codes": codes}:
-                sdo.refuse_write(at, bytes.fromhex(data), codes)
-            case {"read": at, "data": data}:
-                sdo.read(at, data)
-            case {"read": at, "not": data}:
-                sdo.read_other(at, data)
-            case {"refuse read": at, "codes": codes}:
+    def _play_sdo(self, action: OfObject) -> None:
+        sdo, at = self._sdo, action.address
+        match action:
+            case RefuseRead(_, codes):
                 sdo.refuse_read(at, codes)
-            case {"macro": [name, *words]}:
-                MACROS[name](sdo, *words)
-            case {"keep": _}:
-                pass
-            case _:
-                self._play_more(step)
+            case Hold() | RefuseRewrite():
+                play_of_object(self._client, action)
+            case Write(_, data):
+                sdo.write(at, bytes.fromhex(data))
+            case RefuseWrite(_, data, codes):
+                sdo.refuse_write(at, bytes.fromhex(data), codes)
+            case Read(_, data):
+                sdo.read(at, data)
+            case ReadOther(_, data):
+                sdo.read_other(at, data)
 
     def _act_within(self, within_ms: int, *words: str) -> None:
         """Act; Disturbed if that took longer than what is looked at then."""

@@ -11,7 +11,17 @@ from collections.abc import Iterator
 from random import Random
 from typing import Final
 
-from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.check import (
+    Act,
+    Check,
+    ConformancePlan,
+    Count,
+    Expect,
+    ExpectNone,
+    Level,
+    Period,
+    Wait,
+)
 from tickrig.host.canopen.conform.conform_run import ConformRun
 from tickrig.host.canopen.conform.report.report_json import report_json
 from tickrig.host.canopen.conform.report.text import text_report
@@ -29,10 +39,16 @@ LONGEST_CHECK_MS: Final = 150
 
 def _lasts_ms(check: Check) -> int:
     """Return how long a check waits, beside answers."""
-    waits = sum(step.get("wait", 0) + step.get("for", 0) for step in check.steps)
-    periods = sum(step.get("each", 0) * step.get("times", 0) for step in check.steps)
-    long_ms: int = sum(step.get("in", 0) // 2_000 * 1_000 for step in check.steps)
-    return int(waits + periods) + long_ms
+    total_ms = 0
+    for step in check.steps:
+        match step.action:
+            case Wait(ms) | ExpectNone(_, ms) | Count(_, ms):
+                total_ms += ms
+            case Period(_, ms, times):
+                total_ms += ms * times
+            case Expect(_, ms) | Act(_, int(ms)):
+                total_ms += ms // 2_000 * 1_000
+    return total_ms
 
 
 CHECKS: Final = tuple(

@@ -6,13 +6,27 @@ import pytest
 
 from tests.environment import ROOT
 from tests.host.canopen.conform.r1 import R1
-from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.check import (
+    Check,
+    ConformancePlan,
+    Count,
+    Expect,
+    ExpectNone,
+    Forget,
+    Level,
+    Macro,
+    Read,
+    ReadOther,
+    RefuseRead,
+    Send,
+    Wait,
+)
 from tickrig.host.canopen.conform.notation import NAME, parse_step
 from tickrig.host.canopen.conform.suite import ORDER, parse_group, read_suite, suite_checks
 
 CHECKS = suite_checks()
 SOURCE = re.compile(r"(practice: .+; )?CiA \d{3}(-\d)? v\d\.\d\.\d, .+|practice: .+")
-READS = {"read", "refuse read", "send", "expect", "none", "count", "wait", "forget", "macro"}
+READS = (Read, ReadOther, RefuseRead, Send, Expect, ExpectNone, Count, Wait, Forget, Macro)
 
 
 def words_of(check: Check) -> str:
@@ -37,8 +51,9 @@ def test_each_check_names_its_clause(check: Check) -> None:
 def test_what_only_reads_has_no_step_that_writes() -> None:
     reading = [check for check in CHECKS if check.level is Level.READ_ONLY]
     assert len(reading) > 30
-    assert all(READS & step.keys() for check in reading for step in check.steps)
-    macros = {step["macro"][0] for check in reading for step in check.steps if "macro" in step}
+    actions = [step.action for check in reading for step in check.steps]
+    assert all(isinstance(action, READS) for action in actions)
+    macros = {action.name for action in actions if isinstance(action, Macro)}
     assert macros == {"upload", "blockup"}
 
 

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -11,9 +10,16 @@ from tests.host.canopen.data_sheet.corpus import GOOD, counted_only
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.bus.exchange import StepFailed
-from tickrig.host.canopen.conform.check import Check, Level, Step
-from tickrig.host.canopen.conform.notation import resolve_address
-from tickrig.host.canopen.conform.object_checks import object_checks, play_object_step
+from tickrig.host.canopen.conform.check import (
+    Check,
+    Hold,
+    Level,
+    RefuseRead,
+    RefuseRewrite,
+    RefuseWrite,
+)
+from tickrig.host.canopen.conform.notation import bind_check
+from tickrig.host.canopen.conform.object_checks import object_checks, play_of_object
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.wire.canopen.datatypes import DataType, Value
@@ -35,14 +41,13 @@ FILES = [
     *sorted((ROOT / "examples").rglob("*.eds")),
 ]
 PROFILE = range(0x6000, 0xA000)
-OBJECT_STEPS = ("holds", "refuse read", "refuse write", "refuse rewrite")
 
 
 class NoNames:
     """Checks of objects name nothing."""
 
     def text(self, name: str, attribute: str, /) -> str:
-        raise AssertionError(name)
+        return {"request": "605", "sync": "080"}[name]
 
     def address(self, name: str, /) -> tuple[int, int]:
         raise AssertionError(name)
@@ -50,27 +55,25 @@ class NoNames:
 
 def play(bench: Bench, check: Check) -> None:
     """Play the steps of a check; StepFailed as in a run."""
-    for step in check.steps:
-        bound: dict[str, Any] = {
-            key: resolve_address(str(value), NoNames()) if key in OBJECT_STEPS else value
-            for key, value in step.items()
-        }
-        if not play_object_step(bench.client, bound):
-            play_refusal(bench, bound)
+    for step in bind_check(check, NoNames()).steps:
+        match step.action:
+            case Hold() | RefuseRewrite() as action:
+                play_of_object(bench.client, action)
+            case RefuseRead() | RefuseWrite() as action:
+                play_refusal(bench, action)
 
 
-def play_refusal(bench: Bench, step: Step) -> None:
+def play_refusal(bench: Bench, action: RefuseRead | RefuseWrite) -> None:
     try:
-        match step:
-            case {"refuse read": (index, sub)}:
-                bench.upload(index, sub)
-            case {"refuse write": (index, sub), "data": data}:
-                bench.client.download(index, sub, bytes.fromhex(data))
+        if isinstance(action, RefuseWrite):
+            bench.client.download(*action.address, bytes.fromhex(action.data))
+        else:
+            bench.upload(*action.address)
     except SdoAborted as error:
-        if f"{error.code:08X}" not in step["codes"]:
+        if f"{error.code:08X}" not in action.codes:
             raise StepFailed(str(error)) from error
     else:
-        raise StepFailed(f"{step} was not refused")
+        raise StepFailed(f"{action} was not refused")
 
 
 def failures(bench: Bench, checks: Collection[Check]) -> Iterator[str]:
@@ -142,7 +145,9 @@ def test_checks_are_the_same_each_time_and_their_names_differ(path: Path) -> Non
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_who_only_reads_has_no_step_that_writes(path: Path) -> None:
     for check in object_checks(read_sound(path)[0], NODE_ID, allow=PROFILE):
-        writes = [step for step in check.steps if step.keys() & {"refuse write", "refuse rewrite"}]
+        writes = [
+            step for step in check.steps if isinstance(step.action, RefuseWrite | RefuseRewrite)
+        ]
         assert bool(writes) == (check.level is Level.COMMUNICATION)
 
 
@@ -164,9 +169,9 @@ def test_objects_of_the_profile_are_written_only_if_they_are_allowed() -> None:
 
 def test_every_sub_index_is_read_in_some_object() -> None:
     checks = object_checks(read_sound(FILES[0])[0], NODE_ID)
-    steps = [step for check in checks for step in check.steps]
-    places = {step.get("refuse read") or step.get("holds") or "" for step in steps}
-    assert {place[5:] for place in places if place} == {f"{sub:02X}" for sub in range(256)}
+    actions = [step.action for check in checks for step in check.steps]
+    read = {action.address[1] for action in actions if isinstance(action, RefuseRead | Hold)}
+    assert read == set(range(256))
 
 
 def test_store_and_restore_are_never_written() -> None:

@@ -15,6 +15,7 @@ from tests.host.canopen.conform.defects.test_found import DefectiveR1, judge
 from tests.host.canopen.conform.report.sample import EVIDENCE, HOSTILE, SAMPLE, result
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.sequence import SequenceRun, TomlSequence
+from tickrig.host.canopen.conform.check import RefuseRead, Send, Step
 from tickrig.host.canopen.conform.report.baseline import Baseline, baseline_text
 from tickrig.host.canopen.conform.report.ci import badge, report_junit
 from tickrig.host.canopen.conform.report.issue import issue_text
@@ -109,7 +110,7 @@ def test_objects_that_fail_alike_are_one_cause() -> None:
 
 
 def test_steps_are_in_json_and_on_the_page_of_what_failed() -> None:
-    steps = ({"send": "605#40"}, {"refuse read": "$absent_object", "codes": ["06020000"]})
+    steps = (Step(Send("605#40")), Step(RefuseRead("$absent_object", ("06020000",))))
     checks = [
         replace(one, check=replace(one.check, steps=steps))
         for one in (result("UE-01"), result("UE-02", CheckVerdict.FAIL))
