@@ -15,7 +15,7 @@ from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.options.follower import Follower
 from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose_2d
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.rtc import Time
 
 _WIDE: Final = {"dataport.buffer.length": "64"}
 _STEP_US: Final = 1_000

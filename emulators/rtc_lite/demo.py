@@ -29,7 +29,7 @@ from tickrig.host.rtc.lite import ProxyEvent, ProxyEventType, ProxySettings, att
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.schedule import RealTime
-from tickrig.wire.rtc_types.basic import TimedLong
+from tickrig.wire.rtc_types.rtc import TimedLong
 
 # Where the demonstration is played: two devices on ptys in real time, or a rig in virtual time.
 

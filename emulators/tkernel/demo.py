@@ -32,8 +32,7 @@ from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ucode.lookup import Lookup
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rtc_types.basic import TimedLongSeq, TimedStringSeq
-from tickrig.wire.rtc_types.extended_2d import TimedPoint2D
+from tickrig.wire.rtc_types.rtc import TimedLongSeq, TimedPoint2D, TimedStringSeq
 from tickrig.wire.ucode import BAUD, MAX_LEVEL
 
 # Where a robot believes it is: odometry, set right by each place that it passes.

@@ -10,9 +10,9 @@ from tickrig.host.rtc.component import ModuleSpec, RtComponent
 from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import ReturnCode
-from tickrig.wire.rtc_types import basic
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types import rtc
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 _LOW: Final = -(2**31)
 _HIGH: Final = 2**31 - 1
@@ -31,7 +31,7 @@ _COUNTED: Final[Mapping[str, Callable[[int], float]]] = {
 """What SeqOut writes in period n, by the name of the port."""
 
 _SEQ_PORTS: Final[Mapping[str, Any]] = {
-    name + seq: getattr(basic, f"Timed{name}{seq}") for seq in ("", "Seq") for name in _COUNTED
+    name + seq: getattr(rtc, f"Timed{name}{seq}") for seq in ("", "Seq") for name in _COUNTED
 }
 """Ports of SeqIn and SeqOut: type by name, in the order of OpenRTM's SeqIn."""
 

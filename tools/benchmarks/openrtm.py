@@ -28,11 +28,10 @@ from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.rtc.system.schedule import RealTime
-from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedOctetSeq
 from tickrig.wire.rtc_types.cdr import decode, encode
-from tickrig.wire.rtc_types.extended_2d import Pose2D, Velocity2D
 from tickrig.wire.rtc_types.idl import Struct
 from tickrig.wire.rtc_types.iis import TimedPath2DSeq
+from tickrig.wire.rtc_types.rtc import Pose2D, Time, TimedLong, TimedOctetSeq, Velocity2D
 
 VALUE = TimedOctetSeq(Time(1, 2), bytes(52))
 PAYLOAD = encode(VALUE)

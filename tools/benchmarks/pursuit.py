@@ -18,7 +18,7 @@ from tickrig.host.rtc.motion.control_laws import VelocityLimits
 from tickrig.host.rtc.motion.geometry import Pose, Twist, wrap
 from tickrig.host.rtc.motion.ports import read_newest, to_pose
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 LOOKAHEAD_M: Final = 0.6
 MIN_RADIUS_M: Final = 0.9

@@ -31,9 +31,8 @@ from tickrig.host.rtc import (
 from tickrig.host.rtc.engines.engines_joined import engines_joined
 from tickrig.host.rtc.system.schedule import RealTime
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedLong
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, Time, TimedLong
 
 PORTS: Final = 100
 RATE_HZ: Final = 100.0

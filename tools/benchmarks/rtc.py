@@ -13,11 +13,10 @@ from tickrig.host.rtc import (
     RtComponent,
     connect,
 )
-from tickrig.wire.rtc_types.basic import Time, TimedLong
 from tickrig.wire.rtc_types.cdr import decode, encode
-from tickrig.wire.rtc_types.extended_2d import Pose2D, Velocity2D
 from tickrig.wire.rtc_types.idl import Struct
 from tickrig.wire.rtc_types.iis import TimedPath2DSeq
+from tickrig.wire.rtc_types.rtc import Pose2D, Time, TimedLong, Velocity2D
 
 COMPONENTS = 1_000
 PERIODS = 300

@@ -23,7 +23,7 @@ from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_canopen import LONG
-from tickrig.wire.rtc_types.basic import TimedOctet, TimedShortSeq
+from tickrig.wire.rtc_types.rtc import TimedOctet, TimedShortSeq
 
 EDS = Path(__file__).parents[2] / "examples" / "eds" / "f-palette.eds"
 NODES = 126

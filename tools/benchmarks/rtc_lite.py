@@ -18,7 +18,7 @@ from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
 from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect
 from tickrig.host.rtc.lite import RtcLiteProxy
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 BAUD = 57_600
 PERIODS = 2_000

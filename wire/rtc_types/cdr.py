@@ -1,6 +1,6 @@
 """Structs to CDR and back.
 
->>> from tickrig.wire.rtc_types.basic import Time, TimedShort
+>>> from tickrig.wire.rtc_types.rtc import Time, TimedShort
 >>> encode(TimedShort(Time(1, 2), -3)).hex()
 '0100000002000000fdff'
 >>> decode(TimedShort, bytes.fromhex("0000000100000002fffd"), Endian.BIG).data

@@ -14,8 +14,8 @@ from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.wire.can import CanFrame
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Time
 
 _Send = Callable[[int, bytes], None]
 

@@ -18,9 +18,9 @@ from tickrig.host.rtc.canopen.definition import TPDOS
 from tickrig.wire import rtc_canopen as table_4
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
-from tickrig.wire.rtc_types import basic
+from tickrig.wire.rtc_types import rtc
 from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.long_long import (
+from tickrig.wire.rtc_types.rtc import (
     TimedLongLong,
     TimedLongLongSeq,
     TimedULongLong,
@@ -55,19 +55,19 @@ class PdoFieldType:
 
 
 PORT_KINDS: Final = (
-    (table_4.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq),
-    (table_4.CHARACTER, basic.TimedChar, basic.TimedCharSeq),
-    (table_4.WIDE_CHARACTER, basic.TimedWChar, basic.TimedWCharSeq),
-    (table_4.STRING, basic.TimedString, basic.TimedStringSeq),
-    (table_4.WIDE_STRING, basic.TimedWString, basic.TimedWStringSeq),
-    (table_4.OCTET, basic.TimedOctet, basic.TimedOctetSeq),
-    (table_4.integer(8), basic.TimedShort, basic.TimedShortSeq),
-    (table_4.SHORT, basic.TimedShort, basic.TimedShortSeq),
-    (table_4.UNSIGNED_SHORT, basic.TimedUShort, basic.TimedUShortSeq),
-    (table_4.LONG, basic.TimedLong, basic.TimedLongSeq),
-    (table_4.UNSIGNED_LONG, basic.TimedULong, basic.TimedULongSeq),
-    (table_4.FLOAT, basic.TimedFloat, basic.TimedFloatSeq),
-    (table_4.DOUBLE, basic.TimedDouble, basic.TimedDoubleSeq),
+    (table_4.BOOLEAN, rtc.TimedBoolean, rtc.TimedBooleanSeq),
+    (table_4.CHARACTER, rtc.TimedChar, rtc.TimedCharSeq),
+    (table_4.WIDE_CHARACTER, rtc.TimedWChar, rtc.TimedWCharSeq),
+    (table_4.STRING, rtc.TimedString, rtc.TimedStringSeq),
+    (table_4.WIDE_STRING, rtc.TimedWString, rtc.TimedWStringSeq),
+    (table_4.OCTET, rtc.TimedOctet, rtc.TimedOctetSeq),
+    (table_4.integer(8), rtc.TimedShort, rtc.TimedShortSeq),
+    (table_4.SHORT, rtc.TimedShort, rtc.TimedShortSeq),
+    (table_4.UNSIGNED_SHORT, rtc.TimedUShort, rtc.TimedUShortSeq),
+    (table_4.LONG, rtc.TimedLong, rtc.TimedLongSeq),
+    (table_4.UNSIGNED_LONG, rtc.TimedULong, rtc.TimedULongSeq),
+    (table_4.FLOAT, rtc.TimedFloat, rtc.TimedFloatSeq),
+    (table_4.DOUBLE, rtc.TimedDouble, rtc.TimedDoubleSeq),
     (table_4.UNSIGNED_LONG_LONG, TimedULongLong, TimedULongLongSeq),
     (table_4.LONG_LONG, TimedLongLong, TimedLongLongSeq),
 )
@@ -95,7 +95,7 @@ PDO_FIELD_TYPES: Final[Mapping[tuple[int, int], PdoFieldType]] = {
 """By data type and bits in the PDO; strings are not among them."""
 
 
-def sequence_of(kind: type[Any], tm: basic.Time, values: tuple[Value, ...]) -> Struct:
+def sequence_of(kind: type[Any], tm: rtc.Time, values: tuple[Value, ...]) -> Struct:
     """Return a struct with several values."""
     if isinstance(kind().data, bytes):
         return kind(tm, bytes(map(int, values)))  # type: ignore[no-any-return]

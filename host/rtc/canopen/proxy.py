@@ -24,8 +24,8 @@ from tickrig.wire.rtc_canopen import (
     PortDirection,
     PortTransport,
 )
-from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Time
 
 # Ports of a PDO (ours: K2, K3, K4).
 

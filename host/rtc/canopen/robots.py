@@ -10,8 +10,14 @@ from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, Retu
 from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, moved, wheel_speeds
 from tickrig.host.rtc.motion.ports import plausible, read_all, read_newest, to_pose_2d
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedShort
-from tickrig.wire.rtc_types.extended_2d import TimedPose2D, TimedVelocity2D, Velocity2D
+from tickrig.wire.rtc_types.rtc import (
+    Time,
+    TimedLong,
+    TimedPose2D,
+    TimedShort,
+    TimedVelocity2D,
+    Velocity2D,
+)
 
 # A joystick as an RT component.
 

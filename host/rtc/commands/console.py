@@ -13,7 +13,7 @@ from tickrig.host.links.ready import ready
 from tickrig.host.rtc.components import ConsoleOut
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.lines import LineSplitter
-from tickrig.wire.rtc_types.basic import TimedLong
+from tickrig.wire.rtc_types.rtc import TimedLong
 
 _READ_BYTES: Final = 4_096
 

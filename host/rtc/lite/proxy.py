@@ -31,8 +31,8 @@ from tickrig.wire.rtc_lite.messages import (
     parse_component_profile,
 )
 from tickrig.wire.rtc_lite.values import PORT_TYPES, LitePortType
-from tickrig.wire.rtc_types import basic
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types import rtc
+from tickrig.wire.rtc_types.rtc import Time
 
 # What is said before a proxy is an RT component: state, profile, execution context, initialize.
 
@@ -124,10 +124,10 @@ def _demand(command: LiteCommand, reply: LiteReply | None) -> LiteReply:
 _KINDS: Final[dict[str, type[Any]]] = {
     kind.__name__: kind
     for kind in (
-        *(basic.TimedBoolean, basic.TimedChar, basic.TimedOctet, basic.TimedShort),
-        *(basic.TimedLong, basic.TimedFloat, basic.TimedDouble),
-        *(basic.TimedBooleanSeq, basic.TimedCharSeq, basic.TimedOctetSeq, basic.TimedShortSeq),
-        *(basic.TimedLongSeq, basic.TimedFloatSeq, basic.TimedDoubleSeq),
+        *(rtc.TimedBoolean, rtc.TimedChar, rtc.TimedOctet, rtc.TimedShort),
+        *(rtc.TimedLong, rtc.TimedFloat, rtc.TimedDouble),
+        *(rtc.TimedBooleanSeq, rtc.TimedCharSeq, rtc.TimedOctetSeq, rtc.TimedShortSeq),
+        *(rtc.TimedLongSeq, rtc.TimedFloatSeq, rtc.TimedDoubleSeq),
     )
 }
 
@@ -156,9 +156,9 @@ class InPortBridge:
         if value is None:
             return None
         bare = value.data
-        if self.port.data_type is basic.TimedOctetSeq:
+        if self.port.data_type is rtc.TimedOctetSeq:
             bare = tuple(bare)
-        elif self.port.data_type is basic.TimedCharSeq:
+        elif self.port.data_type is rtc.TimedCharSeq:
             bare = "".join(bare)
         return LitePortData(self.name, self.port_type.encode(bare))
 
@@ -180,9 +180,9 @@ class OutPortBridge:
         """Write a value that arrived; FieldError if it is not of the port's type."""
         kind = self.port.data_type
         value = self.port_type.decode(data)
-        if kind is basic.TimedOctetSeq:
+        if kind is rtc.TimedOctetSeq:
             value = bytes(value)
-        elif kind is basic.TimedCharSeq:
+        elif kind is rtc.TimedCharSeq:
             value = tuple(value)
         self.port.write(kind(Time.from_us(now_us), value))
 

@@ -10,7 +10,7 @@ from tickrig.host.rtc.motion.components.omni_to_2wd import plan
 from tickrig.host.rtc.motion.control_laws import VelocityLimits, steps
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.motion_run import MotionRun, TrackSample, least_time_s
-from tickrig.wire.rtc_types.rh2 import RunMode
+from tickrig.host.rtc.motion.ports import RunMode
 
 PERIOD_US: Final = 20_000
 SETTLE_US: Final = 500_000

@@ -3,19 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from enum import IntEnum
 from typing import Final, TypeVar
 
 from tickrig.host.rtc import ExecutionContext, InPort, OutPort
 from tickrig.host.rtc.motion.geometry import Pose, wrap
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, Time, Velocity2D
 
 T = TypeVar("T", bound=Struct)
 
 MOST: Final = 1e9
 """Numbers beyond it are no metres, radians or speeds of a cart."""
+
+
+class NavigationState(IntEnum):
+    """What `TimedState.data` says of a navigation."""
+
+    FINISH = 0
+    ANGLE_CHECK = 1
+    TURNING = 2
+    TURNING2 = 3
+    GOAL_CHECK = 4
+    SPEED_DOWN = 5
+    STOPPING = 6
+
+
+class RunMode(IntEnum):
+    """What `Path.type` asks for."""
+
+    FREE = 0
+    STOP = 1
+    LINEFOLLOW = 2
+    TO_POINT = 3
+    CIRCLEFOLLOW = 4
+    SPIN = 5
+    VEL = 6
+    WHEEL_VEL = 7
 
 
 def read_all(port: InPort[T]) -> Iterator[T]:

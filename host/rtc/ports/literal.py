@@ -3,7 +3,7 @@
 A struct is an object with its fields; what is no object with `data` stands
 for the `data` of a struct that has a time, and the time is the present:
 
->>> from tickrig.wire.rtc_types.basic import TimedLong
+>>> from tickrig.wire.rtc_types.rtc import TimedLong
 >>> read_literal(TimedLong, 5, now_us=1_500_000)
 TimedLong(tm=Time(sec=1, nsec=500000000), data=5)
 >>> literal(_)
@@ -19,9 +19,9 @@ from typing import Annotated, Any, Final, TypeVar, get_args, get_origin, get_typ
 
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_types.basic import Time
 from tickrig.wire.rtc_types.cdr import encode
 from tickrig.wire.rtc_types.idl import Primitive, Struct
+from tickrig.wire.rtc_types.rtc import Time
 
 S = TypeVar("S", bound=Struct)
 

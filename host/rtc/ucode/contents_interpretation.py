@@ -12,8 +12,7 @@ from tickrig.host.rtc.ports.data_port import OutPort
 from tickrig.host.rtc.ucode.cache import LookupCache, OpenSource
 from tickrig.host.rtc.ucode.http_source import HttpSource
 from tickrig.host.rtc.ucode.lookup import Lookup, WantedUcode
-from tickrig.wire.rtc_types.basic import TimedStringSeq
-from tickrig.wire.rtc_types.extended_2d import Point2D, TimedPoint2D
+from tickrig.wire.rtc_types.rtc import Point2D, TimedPoint2D, TimedStringSeq
 
 _FAR_M: Final = 1e6
 _MOST_PROPERTIES: Final = 32

@@ -16,7 +16,7 @@ from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
-from tickrig.wire.rtc_types.basic import Time, TimedLongSeq, TimedStringSeq
+from tickrig.wire.rtc_types.rtc import Time, TimedLongSeq, TimedStringSeq
 from tickrig.wire.ucode import BAUD, LineType, UcodeLine, parse_line
 
 # A host of an infra-red ucode reader that waits for nothing: look for rounds later.

@@ -12,7 +12,7 @@ from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc.ucode.cache import CacheLimits, LookupCache, OpenSource, Source
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_types.basic import Time, TimedLongSeq, TimedStringSeq
+from tickrig.wire.rtc_types.rtc import Time, TimedLongSeq, TimedStringSeq
 
 V = TypeVar("V")
 

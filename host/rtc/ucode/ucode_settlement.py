@@ -11,7 +11,7 @@ from tickrig.host.rtc.ucode.cache import LookupCache, OpenSource
 from tickrig.host.rtc.ucode.http_source import HttpSource
 from tickrig.host.rtc.ucode.lookup import Lookup, WantedUcode
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_types.basic import TimedStringSeq
+from tickrig.wire.rtc_types.rtc import TimedStringSeq
 from tickrig.wire.ucode import parse_ucode
 
 _SERVICE: Final = "http://127.0.0.1:8640"

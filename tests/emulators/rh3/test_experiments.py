@@ -12,7 +12,7 @@ from tickrig.emulators.rh3.convoy import Convoy, OmniCart
 from tickrig.host.rtc import Manager, OutPort, connect
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 SECOND_US = 1_000_000

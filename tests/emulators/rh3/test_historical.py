@@ -16,8 +16,9 @@ import pytest
 from tickrig.device.body import Pose
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc import OutPort
+from tickrig.host.rtc.motion.ports import RunMode
 from tickrig.host.rtc.ports.connect import connect
-from tickrig.wire.rtc_types.rh2 import Path, RunMode
+from tickrig.wire.rtc_types.rtc import Path
 
 OFFSET_M, SPEED_M_S, PERIODS = 0.05, 0.3, 1_000
 

@@ -14,7 +14,8 @@ from tickrig.host.rtc.motion.iis.interfaces import GoalInterface, RunningInforma
 from tickrig.host.rtc.motion.iis.path_interface import PASSED, STOPPED, PathInterface
 from tickrig.host.rtc.motion.ports import read_all, to_pose_2d
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 SECOND_US = 1_000_000
 WIDE = {"dataport.buffer.length": "64"}
@@ -45,7 +46,7 @@ class IisCart:
         self.loop.run_to(self.loop.now_us + round(seconds * SECOND_US))
         return self.loop.pose
 
-    def feed(self, name: str, value: iis.IisStruct) -> None:
+    def feed(self, name: str, value: Struct) -> None:
         out = OutPort("to", type(value))
         end = connect(out, self.loop.manager.port(name))
         out.write(value)

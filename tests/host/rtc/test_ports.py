@@ -11,7 +11,7 @@ from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.port import AnyPort, Listener
 from tickrig.host.rtc.ports.ring_buffer import BufferOptions, FullPolicy, ReadPolicy, RingBuffer
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rtc_types.basic import Time, TimedDouble, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedDouble, TimedLong
 
 OK = PortStatus.PORT_OK
 

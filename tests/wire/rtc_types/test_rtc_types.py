@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
+import copy
+import pickle
+import runpy
 import struct
 from dataclasses import FrozenInstanceError, replace
 from enum import IntEnum
@@ -15,8 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.wire.errors import FieldError
-from tickrig.wire.rtc_types import actuators, basic, extended_2d, extended_3d, iis
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.cdr import Endian, decode, encode
 from tickrig.wire.rtc_types.idl import (
     Char,
@@ -31,42 +32,36 @@ from tickrig.wire.rtc_types.idl import (
     ULong,
     ULongLong,
 )
+from tickrig.wire.rtc_types.rtc import Time
 
-GOLDEN = Path(__file__).parents[2] / "golden" / "cdr.txt"
+ROOT = Path(__file__).parents[3]
+GOLDEN = ROOT / "tests" / "golden" / "cdr.txt"
 TM = Time(1, 2)
 VALUES: list[Struct] = [
-    basic.TimedLong(TM, -3),
-    basic.TimedShort(TM, -3),
-    basic.TimedOctet(TM, 7),
-    basic.TimedBoolean(TM, True),
-    basic.TimedDouble(TM, 1.5),
-    basic.TimedFloat(TM, 1.5),
-    basic.TimedString(TM, "ab"),
-    basic.TimedLongSeq(TM, (1, 2)),
-    basic.TimedDoubleSeq(TM, (1.5,)),
-    basic.TimedDoubleSeq(TM, ()),
-    basic.TimedOctetSeq(TM, b"\1\2"),
-    extended_2d.TimedVelocity2D(TM, extended_2d.Velocity2D(1, 2, 3)),
-    extended_2d.TimedPose2D(TM, extended_2d.Pose2D(extended_2d.Point2D(1, 2), 3)),
-    basic.TimedStringSeq(TM, ("a", "bc")),
-    basic.TimedULong(TM, 5),
+    rtc.TimedLong(TM, -3),
+    rtc.TimedShort(TM, -3),
+    rtc.TimedOctet(TM, 7),
+    rtc.TimedBoolean(TM, True),
+    rtc.TimedDouble(TM, 1.5),
+    rtc.TimedFloat(TM, 1.5),
+    rtc.TimedString(TM, "ab"),
+    rtc.TimedLongSeq(TM, (1, 2)),
+    rtc.TimedDoubleSeq(TM, (1.5,)),
+    rtc.TimedDoubleSeq(TM, ()),
+    rtc.TimedOctetSeq(TM, b"\1\2"),
+    rtc.TimedVelocity2D(TM, rtc.Velocity2D(1, 2, 3)),
+    rtc.TimedPose2D(TM, rtc.Pose2D(rtc.Point2D(1, 2), 3)),
+    rtc.TimedStringSeq(TM, ("a", "bc")),
+    rtc.TimedULong(TM, 5),
 ]
 PADDING = {8: range(12, 16), 13: range(18, 20)}
 """Rows and offsets at which omniORB left what was in its buffer."""
 
-MODULES = (
-    *("basic", "extended_2d", "extended_3d", "actuators", "sensors", "navigation"),
-    *("iis", "iis_phase1", "iis_phase2", "rh2"),
-)
 TYPES = [
     kind
-    for module in MODULES
-    for kind in vars(importlib.import_module(f"tickrig.wire.rtc_types.{module}")).values()
-    if isinstance(kind, type)
-    and issubclass(kind, Struct)
-    and kind.__module__.endswith(f".{module}")
-    and hasattr(kind, "__match_args__")
-    and kind not in (basic.Stamped, basic.Timed, iis.IisStruct)
+    for module in (rtc, iis)
+    for kind in vars(module).values()
+    if isinstance(kind, type) and issubclass(kind, Struct) and kind.__module__ == module.__name__
 ]
 
 
@@ -135,7 +130,7 @@ def values_of(hint: Any) -> st.SearchStrategy[Any]:
 
 
 def test_there_are_types_of_all_idl_files() -> None:
-    assert len(TYPES) == 134
+    assert len(TYPES) == 138
     assert len({kind.idl_id() for kind in TYPES}) == len(TYPES)
 
 
@@ -143,6 +138,12 @@ def test_there_are_types_of_all_idl_files() -> None:
 def test_every_type_is_made_without_arguments_and_encoded(kind: type[Struct]) -> None:
     for endian in Endian:
         assert decode(kind, encode(kind(), endian), endian) == kind()
+
+
+def test_the_types_are_those_of_the_idl() -> None:
+    tool = runpy.run_path(str(ROOT / "tools" / "rtc-types"))
+    for path, text in tool["generated"]().items():
+        assert path.read_text("utf-8") == text, "new: tools/rtc-types"
 
 
 class Long64(Struct):
@@ -183,7 +184,7 @@ class Mixed(Struct):
     short: Short = 0
     doubles: tuple[Double, ...] = ()
     number: ULong = 0
-    points: tuple[extended_2d.Pose2D, ...] = ()
+    points: tuple[rtc.Pose2D, ...] = ()
     pixels: tuple[Pixel, ...] = ()
     rows: tuple[tuple[Short, ...], ...] = ()
     colours: tuple[Colour, ...] = ()
@@ -238,7 +239,7 @@ def test_each_field_is_padded_to_its_size(data: st.DataObject, endian: Endian) -
     assert decode(Mixed, expected, endian) == value
 
 
-TWO_POSES = encode(iis.TimedPath2DSeq(TM, (), (extended_2d.Pose2D(), extended_2d.Pose2D())))
+TWO_POSES = encode(iis.TimedPath2DSeq(TM, (), (rtc.Pose2D(), rtc.Pose2D())))
 POSES_AT = 16
 """Where their count ends, after the time and the count of `id`; they begin there, too."""
 
@@ -253,7 +254,7 @@ def test_a_truncated_sequence_names_the_number_that_is_not_whole(size: int) -> N
 @pytest.mark.parametrize(("size", "needed"), [(0, 4), (3, 4), (4, 8), (7, 8), (8, 12), (11, 12)])
 def test_a_truncated_run_names_its_first_number_that_is_not_whole(size: int, needed: int) -> None:
     with pytest.raises(FieldError, match=f"^{size} bytes, at least {needed} are needed$"):
-        decode(basic.TimedLong, encode(basic.TimedLong())[:size])
+        decode(rtc.TimedLong, encode(rtc.TimedLong())[:size])
 
 
 def test_of_two_faults_the_first_one_is_reported() -> None:
@@ -289,10 +290,10 @@ def test_a_truncated_value_is_a_field_error(data: st.DataObject, kind: type[Stru
 
 
 def test_a_number_that_an_enumeration_does_not_have_is_a_field_error() -> None:
-    whole = bytearray(encode(actuators.GripperState()))
+    whole = bytearray(encode(rtc.GripperState()))
     whole[8:12] = b"\xff\xff\xff\xff"  # behind the time
     with pytest.raises(FieldError):
-        decode(actuators.GripperState, bytes(whole))
+        decode(rtc.GripperState, bytes(whole))
 
 
 def test_a_struct_of_64_bit_numbers_is_aligned_to_eight() -> None:
@@ -301,24 +302,48 @@ def test_a_struct_of_64_bit_numbers_is_aligned_to_eight() -> None:
 
 
 def test_a_struct_is_frozen_and_has_slots() -> None:
-    value = basic.TimedLong(TM, 5)
+    value = rtc.TimedLong(TM, 5)
     with pytest.raises(FrozenInstanceError):
         value.data = 6  # type: ignore[misc]  # that is the point
     assert not hasattr(value, "__dict__")
-    assert value == basic.TimedLong(TM, 5)
-    other: Struct = basic.TimedShort(TM, 5)
+    assert value == rtc.TimedLong(TM, 5)
+    other: Struct = rtc.TimedShort(TM, 5)
     assert value != other
+    with pytest.raises(FrozenInstanceError):
+        del value.data
+
+
+@pytest.mark.parametrize("value", [*VALUES, rtc.ActArrayState(TM, (rtc.Actuator(1.0),))], ids=repr)
+def test_a_struct_has_equal_copies(value: Struct) -> None:
+    copies = copy.copy(value), copy.deepcopy(value), pickle.loads(pickle.dumps(value))
+    assert copies == (value,) * 3
+    assert {hash(each) for each in copies} == {hash(value)}
+    assert {repr(each) for each in copies} == {repr(value)}
+
+
+def test_a_struct_is_shown_as_the_call_that_makes_it() -> None:
+    assert repr(rtc.TimedLong(TM, 5)) == "TimedLong(tm=Time(sec=1, nsec=2), data=5)"
+
+
+class Later(rtc.TimedLong):
+    """A struct with the fields of another one."""
+
+    after: rtc.Time = rtc.Time()
+
+
+def test_a_struct_has_the_fields_of_its_base_first() -> None:
+    assert Later(TM, 5) == Later(TM, 5, rtc.Time())
+    assert Later.__match_args__ == ("tm", "data", "after")
+    assert decode(Later, encode(Later(TM, 5, TM))) == Later(TM, 5, TM)
 
 
 def test_iis_types_stand_in_their_own_module() -> None:
     assert iis.TimedPose2D.idl_id() == "IDL:IIS/TimedPose2D:1.0"
-    assert extended_2d.TimedPose2D.idl_id() == "IDL:RTC/TimedPose2D:1.0"
+    assert rtc.TimedPose2D.idl_id() == "IDL:RTC/TimedPose2D:1.0"
 
 
 def test_the_fields_of_an_iis_path_are_in_the_order_of_its_idl() -> None:
-    path = iis.TimedPath2DSeq(
-        TM, (7,), (extended_2d.Pose2D(),), (extended_2d.Velocity2D(1, 0, 0),), (0.5,)
-    )
+    path = iis.TimedPath2DSeq(TM, (7,), (rtc.Pose2D(),), (rtc.Velocity2D(1, 0, 0),), (0.5,))
     assert iis.TimedPath2DSeq.__match_args__ == ("tm", "id", "pose", "velocity", "error")
     assert encode(path).hex() == (
         "0100000002000000"  # tm
@@ -334,20 +359,20 @@ def test_the_fields_of_an_iis_path_are_in_the_order_of_its_idl() -> None:
 
 
 WRONG: list[Struct] = [
-    basic.TimedLong(TM, 2**31),
-    basic.TimedULong(TM, -1),
-    basic.TimedShort(Time(-1, 0), 0),
-    basic.TimedOctet(TM, 256),
-    basic.TimedFloat(TM, 1e39),
-    basic.TimedChar(TM, "ab"),
-    basic.TimedChar(TM, "あ"),
-    basic.TimedWChar(TM, "\U0001f600"),
-    basic.TimedString(TM, "a\0b"),
-    basic.TimedString(TM, "\ud800"),
-    replace(basic.TimedLong(), data="1"),  # type: ignore[arg-type]  # from untyped code
-    replace(basic.TimedDoubleSeq(), data=1.0),  # type: ignore[arg-type]  # from untyped code
-    replace(actuators.GripperState(), status=9),  # type: ignore[arg-type]  # from untyped code
-    replace(extended_3d.TimedPose3D(), data=None),  # type: ignore[arg-type]  # from untyped code
+    rtc.TimedLong(TM, 2**31),
+    rtc.TimedULong(TM, -1),
+    rtc.TimedShort(Time(-1, 0), 0),
+    rtc.TimedOctet(TM, 256),
+    rtc.TimedFloat(TM, 1e39),
+    rtc.TimedChar(TM, "ab"),
+    rtc.TimedChar(TM, "あ"),
+    rtc.TimedWChar(TM, "\U0001f600"),
+    rtc.TimedString(TM, "a\0b"),
+    rtc.TimedString(TM, "\ud800"),
+    replace(rtc.TimedLong(), data="1"),  # type: ignore[arg-type]  # from untyped code
+    replace(rtc.TimedDoubleSeq(), data=1.0),  # type: ignore[arg-type]  # from untyped code
+    replace(rtc.GripperState(), status=9),  # type: ignore[arg-type]  # from untyped code
+    replace(rtc.TimedPose3D(), data=None),  # type: ignore[arg-type]  # from untyped code
 ]
 
 
@@ -358,17 +383,17 @@ def test_a_value_that_does_not_fit_its_type_is_a_field_error(value: Struct) -> N
 
 
 UNREADABLE: list[tuple[type[Struct], str, str]] = [
-    (basic.TimedLong, "00000000 00000000 00000000 00", "1 too many"),
-    (basic.TimedLong, "00000000 00000000 0000", "12 are needed"),
-    (basic.TimedString, "00000000 00000000 00000000", "NUL"),
-    (basic.TimedString, "00000000 00000000 01000000 61", "NUL"),
-    (basic.TimedString, "00000000 00000000 03000000 610000", "NUL"),
-    (basic.TimedString, "00000000 00000000 02000000 ff00", "text of"),
-    (basic.TimedStringSeq, "00000000 00000000 ffffffff", "announced"),
-    (basic.TimedWChar, "00000000 00000000 00", "UTF-16"),
-    (basic.TimedWChar, "00000000 00000000 04 d83dde00", "UTF-16"),
-    (basic.TimedWString, "00000000 00000000 01000000 61", "text of"),
-    (actuators.GripperState, "00000000 00000000 09000000", "GripperStatus"),
+    (rtc.TimedLong, "00000000 00000000 00000000 00", "1 too many"),
+    (rtc.TimedLong, "00000000 00000000 0000", "12 are needed"),
+    (rtc.TimedString, "00000000 00000000 00000000", "NUL"),
+    (rtc.TimedString, "00000000 00000000 01000000 61", "NUL"),
+    (rtc.TimedString, "00000000 00000000 03000000 610000", "NUL"),
+    (rtc.TimedString, "00000000 00000000 02000000 ff00", "text of"),
+    (rtc.TimedStringSeq, "00000000 00000000 ffffffff", "announced"),
+    (rtc.TimedWChar, "00000000 00000000 00", "UTF-16"),
+    (rtc.TimedWChar, "00000000 00000000 04 d83dde00", "UTF-16"),
+    (rtc.TimedWString, "00000000 00000000 01000000 61", "text of"),
+    (rtc.GripperState, "00000000 00000000 09000000", "GripperStatus"),
 ]
 
 
@@ -382,7 +407,7 @@ def test_bytes_that_are_no_value_say_why(kind: type[Struct], text: str, said: st
 def test_a_wide_string_is_big_endian_unless_it_says_otherwise(text: str) -> None:
     data = bytes.fromhex(text)
     count = len(data).to_bytes(4, "little")
-    assert decode(basic.TimedWString, bytes(8) + count + data).data == "a"
+    assert decode(rtc.TimedWString, bytes(8) + count + data).data == "a"
 
 
 def test_a_field_that_is_no_idl_type_is_told() -> None:
@@ -403,9 +428,9 @@ def test_a_time_stamp_is_seconds_and_nanoseconds() -> None:
 
 
 def test_a_struct_is_made_by_place_by_name_or_of_zeros() -> None:
-    made = basic.TimedLong(Time(1), data=3)
-    assert made == basic.TimedLong(data=3, tm=Time(sec=1, nsec=0))
-    assert replace(made, data=4) == basic.TimedLong(Time(1), 4)
-    assert (basic.TimedLong(), Nothing()) == (basic.TimedLong(Time(), 0), Nothing())
+    made = rtc.TimedLong(Time(1), data=3)
+    assert made == rtc.TimedLong(data=3, tm=Time(sec=1, nsec=0))
+    assert replace(made, data=4) == rtc.TimedLong(Time(1), 4)
+    assert (rtc.TimedLong(), Nothing()) == (rtc.TimedLong(Time(), 0), Nothing())
     with pytest.raises(TypeError, match="unexpected keyword argument 'late'"):
-        basic.TimedLong(late=1)  # type: ignore[call-arg]
+        rtc.TimedLong(late=1)  # type: ignore[call-arg]

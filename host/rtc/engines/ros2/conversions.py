@@ -8,36 +8,35 @@ from typing import Any, Final
 from tickrig.host.rtc.engines.ros2 import robot_messages as robot
 from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
-from tickrig.wire.rtc_types import basic, extended_2d, iis
-from tickrig.wire.rtc_types.actuators import ActArrayState
+from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.sensors import RangeData
+from tickrig.wire.rtc_types.rtc import ActArrayState, RangeData
 
 _Conversion = Callable[[Any], Any]
 _Maker = Callable[[TopicEntry, Stamps], _Conversion]
 """Makes what converts the values, or the messages, of one port."""
 
 _STD: Final[Mapping[str, tuple[type[Struct], ...]]] = {
-    "Bool": (basic.TimedBoolean,),
-    "Float32": (basic.TimedFloat,),
-    "Float64": (basic.TimedDouble,),
-    "Int16": (basic.TimedShort, basic.TimedState),
-    "Int32": (basic.TimedLong,),
-    "String": (basic.TimedString,),
-    "UInt16": (basic.TimedUShort,),
-    "UInt32": (basic.TimedULong,),
-    "UInt8": (basic.TimedOctet,),
-    "Float32MultiArray": (basic.TimedFloatSeq,),
-    "Float64MultiArray": (basic.TimedDoubleSeq,),
-    "Int16MultiArray": (basic.TimedShortSeq,),
-    "Int32MultiArray": (basic.TimedLongSeq,),
-    "UInt16MultiArray": (basic.TimedUShortSeq,),
-    "UInt32MultiArray": (basic.TimedULongSeq,),
-    "UInt8MultiArray": (basic.TimedOctetSeq,),
+    "Bool": (rtc.TimedBoolean,),
+    "Float32": (rtc.TimedFloat,),
+    "Float64": (rtc.TimedDouble,),
+    "Int16": (rtc.TimedShort, rtc.TimedState),
+    "Int32": (rtc.TimedLong,),
+    "String": (rtc.TimedString,),
+    "UInt16": (rtc.TimedUShort,),
+    "UInt32": (rtc.TimedULong,),
+    "UInt8": (rtc.TimedOctet,),
+    "Float32MultiArray": (rtc.TimedFloatSeq,),
+    "Float64MultiArray": (rtc.TimedDoubleSeq,),
+    "Int16MultiArray": (rtc.TimedShortSeq,),
+    "Int32MultiArray": (rtc.TimedLongSeq,),
+    "UInt16MultiArray": (rtc.TimedUShortSeq,),
+    "UInt32MultiArray": (rtc.TimedULongSeq,),
+    "UInt8MultiArray": (rtc.TimedOctetSeq,),
 }
-_POSES: Final = (iis.TimedPose2D, extended_2d.TimedPose2D)
-_SPEEDS: Final = (iis.TimedVelocity2D, extended_2d.TimedVelocity2D)
-_ANGLES: Final = (basic.TimedDoubleSeq, basic.TimedFloatSeq, basic.TimedDouble, basic.TimedFloat)
+_POSES: Final = (iis.TimedPose2D, rtc.TimedPose2D)
+_SPEEDS: Final = (iis.TimedVelocity2D, rtc.TimedVelocity2D)
+_ANGLES: Final = (rtc.TimedDoubleSeq, rtc.TimedFloatSeq, rtc.TimedDouble, rtc.TimedFloat)
 
 
 def _data_out(name: str) -> _Maker:
@@ -68,7 +67,7 @@ def _data_in(data_type: type[Struct]) -> _Maker:
 
 def _array_in(data_type: type[Struct]) -> _Maker:
     make: Any = data_type
-    whole: Callable[[Any], Any] = bytes if data_type is basic.TimedOctetSeq else tuple
+    whole: Callable[[Any], Any] = bytes if data_type is rtc.TimedOctetSeq else tuple
     return lambda entry, stamps: lambda message: make(stamps.to_system(), whole(message.data))
 
 
@@ -86,7 +85,7 @@ _STD_OUT, _STD_IN = _std()
 
 OUT: Final[Mapping[tuple[str, type[Struct]], _Maker]] = {
     **{("nav_msgs/msg/Odometry", kind): robot.odometry_out for kind in _POSES},
-    ("nav_msgs/msg/Odometry", extended_2d.TimedPoseVel2D): robot.pose_vel_out,
+    ("nav_msgs/msg/Odometry", rtc.TimedPoseVel2D): robot.pose_vel_out,
     **{("tf2_msgs/msg/TFMessage", kind): robot.transform_out for kind in _POSES},
     **{("geometry_msgs/msg/PoseStamped", kind): robot.pose_out for kind in _POSES},
     **{("geometry_msgs/msg/Twist", kind): robot.twist_out for kind in _SPEEDS},

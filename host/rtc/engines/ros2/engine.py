@@ -30,7 +30,7 @@ from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.rtc import Time
 
 # Topics of a component that no table names: those of all its ports that a message fits.
 

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.rtc import Time
 
 # Times of values and of messages: one counts from the start of a system, the other from 1970.
 

@@ -12,9 +12,7 @@ from typing import Any, Final
 
 from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
 from tickrig.host.rtc.engines.ros2.topic_entry import TopicEntry
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
-from tickrig.wire.rtc_types.sensors import RangeData
+from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, RangeData, Time, Velocity2D
 
 _UNKNOWN: Final = [0.0] * 36
 """A covariance that nobody knows."""

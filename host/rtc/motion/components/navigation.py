@@ -7,10 +7,15 @@ from typing import ClassVar
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion.geometry import Pose, wrap
-from tickrig.host.rtc.motion.ports import read_newest, read_newest_pose, to_pose
+from tickrig.host.rtc.motion.ports import (
+    NavigationState,
+    RunMode,
+    read_newest,
+    read_newest_pose,
+    to_pose,
+)
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedState
-from tickrig.wire.rtc_types.rh2 import NavigationState, Path, RunMode
+from tickrig.wire.rtc_types.rtc import Path, Time, TimedState
 
 _State = NavigationState
 

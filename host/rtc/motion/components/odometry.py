@@ -11,7 +11,7 @@ from tickrig.host.rtc.motion.geometry import Pose, Wheels, moved, wrap
 from tickrig.host.rtc.motion.ports import plausible, read_all, to_pose_2d
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import TimedDoubleSeq
+from tickrig.wire.rtc_types.rtc import TimedDoubleSeq
 
 _CONF_LINE: Final = re.compile(r"conf\.([^.\s:=]+)\.([^\s:=]+)\s*[:=]\s*(.*)")
 

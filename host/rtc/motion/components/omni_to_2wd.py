@@ -12,11 +12,16 @@ from tickrig.host.rtc.motion.components.position_input import (
     START_POINT,
 )
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.ports import read_all, read_newest, to_pose, to_pose_2d
+from tickrig.host.rtc.motion.ports import (
+    NavigationState,
+    read_all,
+    read_newest,
+    to_pose,
+    to_pose_2d,
+)
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedState
-from tickrig.wire.rtc_types.rh2 import NavigationState
+from tickrig.wire.rtc_types.rtc import Time, TimedState
 
 _LEAST_WAY_M: Final = 1e-6
 """Metres that are no way: the heading of such a step would mean nothing."""

@@ -15,9 +15,9 @@ from tickrig.host.rtc.motion.control_laws import (
     steps,
 )
 from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, twist_of
-from tickrig.host.rtc.motion.ports import plausible, read_newest_pose, write_velocity
+from tickrig.host.rtc.motion.ports import RunMode, plausible, read_newest_pose, write_velocity
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.rh2 import Path, RunMode
+from tickrig.wire.rtc_types.rtc import Path
 
 _Mode = Callable[[Path, Pose, Pose], Twist]
 

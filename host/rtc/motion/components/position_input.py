@@ -10,10 +10,15 @@ from typing import ClassVar, Final
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.path_file import describe_pose, parse_points, read_path
-from tickrig.host.rtc.motion.ports import plausible, read_newest, to_pose, to_pose_2d
+from tickrig.host.rtc.motion.ports import (
+    NavigationState,
+    plausible,
+    read_newest,
+    to_pose,
+    to_pose_2d,
+)
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedState
-from tickrig.wire.rtc_types.rh2 import NavigationState
+from tickrig.wire.rtc_types.rtc import Time, TimedState
 
 START_POINT: Final = 100
 INTERMEDIATE_POINT: Final = 101

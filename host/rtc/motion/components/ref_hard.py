@@ -41,7 +41,7 @@ from tickrig.wire.modbus import (
     wide,
 )
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
+from tickrig.wire.rtc_types.rtc import Time, TimedDoubleSeq
 
 _MAX_MISSES: Final = 5
 """Requests in a row, unanswered or refused, that are an error.

@@ -11,9 +11,9 @@ from typing import ClassVar, Generic, TypeVar, get_args
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion.geometry import Pose, positive
 from tickrig.host.rtc.motion.ports import plausible, read_all, to_pose, to_pose_2d
-from tickrig.wire.rtc_types import iis, iis_phase1, iis_phase2
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 S = TypeVar("S", bound=Struct)
 T = TypeVar("T", bound=Struct)
@@ -43,54 +43,54 @@ class Adapter(RtComponent, Generic[S, T]):
         return ReturnCode.RTC_OK
 
 
-class Velocity1To2(Adapter[iis_phase1.TimedVelocity, iis_phase2.TimedVelocity]):
+class Velocity1To2(Adapter[rtc.TimedVelocity, iis.TimedVelocity]):
     """A moving command of phase 1 for a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity1To2", "IIS velocity, phase 1 to 2")
 
-    def convert(self, value: iis_phase1.TimedVelocity) -> iis_phase2.TimedVelocity:
+    def convert(self, value: rtc.TimedVelocity) -> iis.TimedVelocity:
         """Return a velocity straight ahead."""
-        return iis_phase2.TimedVelocity(value.tm, vx=value.v, w=value.w)
+        return iis.TimedVelocity(value.tm, vx=value.v, w=value.w)
 
 
-class Velocity2To1(Adapter[iis_phase2.TimedVelocity, iis_phase1.TimedVelocity]):
+class Velocity2To1(Adapter[iis.TimedVelocity, rtc.TimedVelocity]):
     """A moving command of phase 2 for a robot of phase 1; it does not go sideways."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To1", "IIS velocity, phase 2 to 1")
 
-    def convert(self, value: iis_phase2.TimedVelocity) -> iis_phase1.TimedVelocity:
+    def convert(self, value: iis.TimedVelocity) -> rtc.TimedVelocity:
         """Return a velocity without what goes sideways."""
-        return iis_phase1.TimedVelocity(value.tm, value.vx, value.w)
+        return rtc.TimedVelocity(value.tm, value.vx, value.w)
 
 
-class Velocity2To3(Adapter[iis_phase2.TimedVelocity, iis.TimedVelocity2D]):
+class Velocity2To3(Adapter[iis.TimedVelocity, iis.TimedVelocity2D]):
     """A moving command of phase 2 for a robot of phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity2To3", "IIS velocity, phase 2 to 3")
 
-    def convert(self, value: iis_phase2.TimedVelocity) -> iis.TimedVelocity2D:
+    def convert(self, value: iis.TimedVelocity) -> iis.TimedVelocity2D:
         """Return the same velocity."""
         data = Velocity2D(value.vx, value.vy, value.w)
         return iis.TimedVelocity2D(value.tm, value.id, data, value.error)
 
 
-class Velocity3To2(Adapter[iis.TimedVelocity2D, iis_phase2.TimedVelocity]):
+class Velocity3To2(Adapter[iis.TimedVelocity2D, iis.TimedVelocity]):
     """A moving command of phase 3 for a robot of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Velocity3To2", "IIS velocity, phase 3 to 2")
 
-    def convert(self, value: iis.TimedVelocity2D) -> iis_phase2.TimedVelocity:
+    def convert(self, value: iis.TimedVelocity2D) -> iis.TimedVelocity:
         """Return the same velocity."""
         data = value.data
-        return iis_phase2.TimedVelocity(value.tm, value.id, data.vx, data.vy, data.va, value.error)
+        return iis.TimedVelocity(value.tm, value.id, data.vx, data.vy, data.va, value.error)
 
 
-class Position2To3(Adapter[iis_phase2.TimedPosition, iis.TimedPose2D]):
+class Position2To3(Adapter[iis.TimedPosition, iis.TimedPose2D]):
     """A self-position of phase 2 for those of phase 3."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position2To3", "IIS self-position, phase 2 to 3")
 
-    def convert(self, value: iis_phase2.TimedPosition) -> iis.TimedPose2D | None:
+    def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
         """Return the same pose, heading in 0..2 pi; None if a number is none."""
         if not plausible(value.x, value.y, value.theta):
             return None
@@ -98,17 +98,17 @@ class Position2To3(Adapter[iis_phase2.TimedPosition, iis.TimedPose2D]):
         return iis.TimedPose2D(value.tm, value.id, to_pose_2d(pose), value.error)
 
 
-class Position3To2(Adapter[iis.TimedPose2D, iis_phase2.TimedPosition]):
+class Position3To2(Adapter[iis.TimedPose2D, iis.TimedPosition]):
     """A self-position of phase 3, or of RH3, for those of phase 2."""
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("Position3To2", "IIS self-position, phase 3 to 2")
 
-    def convert(self, value: iis.TimedPose2D) -> iis_phase2.TimedPosition | None:
+    def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
         """Return the same pose, heading in 0..2 pi; None if a number is none."""
         if (pose := to_pose(value.data)) is None:
             return None
         numbers = (pose.x, pose.y, positive(pose.heading))
-        return iis_phase2.TimedPosition(value.tm, value.id, *numbers, value.error)
+        return iis.TimedPosition(value.tm, value.id, *numbers, value.error)
 
 
 class PositiveHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):

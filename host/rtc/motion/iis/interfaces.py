@@ -11,8 +11,7 @@ from tickrig.host.rtc.motion.iis.adapters import with_wrapped_heading
 from tickrig.host.rtc.motion.ports import read_all, read_newest, to_pose
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Time, Velocity2D
 
 _PERIOD_US: Final = 10_000
 """What IIS recommends at most."""

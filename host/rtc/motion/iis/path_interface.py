@@ -9,6 +9,7 @@ from typing import ClassVar, Final, NamedTuple
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
 from tickrig.host.rtc.motion.geometry import Pose, positive, wrap
 from tickrig.host.rtc.motion.ports import (
+    RunMode,
     plausible,
     read_newest,
     read_newest_pose,
@@ -16,8 +17,7 @@ from tickrig.host.rtc.motion.ports import (
     to_pose_2d,
 )
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.rh2 import Path, RunMode
+from tickrig.wire.rtc_types.rtc import Path, Time
 
 PASSED: Final = 0
 STOPPED: Final = 1

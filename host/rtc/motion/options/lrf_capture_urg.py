@@ -11,8 +11,7 @@ from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, 
 from tickrig.host.rtc.motion.components.ref_hard import Opener
 from tickrig.host.text.log import log_of
 from tickrig.host.urg import UrgClient, UrgScan
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
+from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 
 _LOG: Final = log_of(__name__)
 

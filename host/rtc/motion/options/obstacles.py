@@ -26,9 +26,7 @@ from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.motion.ports import MOST, plausible, read_newest, write_velocity
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import TimedDouble
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
-from tickrig.wire.rtc_types.sensors import RangeData
+from tickrig.wire.rtc_types.rtc import Point2D, Pose2D, RangeData, TimedDouble
 
 _ANY: Final = 1e9
 """A limit that limits nothing."""

@@ -8,7 +8,7 @@ from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, Retu
 from tickrig.host.rtc.motion.ports import plausible, read_newest, write_velocity
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 _LOG: Final = log_of(__name__)
 

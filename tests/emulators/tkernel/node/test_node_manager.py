@@ -17,8 +17,8 @@ from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
 from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.system.call_queue import CallQueue
-from tickrig.wire.rtc_types.basic import TimedLong, TimedOctetSeq, TimedString
 from tickrig.wire.rtc_types.cdr import encode
+from tickrig.wire.rtc_types.rtc import TimedLong, TimedOctetSeq, TimedString
 
 
 def node(**limits: int) -> NodeManager:

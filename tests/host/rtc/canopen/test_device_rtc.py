@@ -13,7 +13,7 @@ from tickrig.emulators.canopen.models import MODELS
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 ECHO = "nodes: [{id: 48, name: Echo0, eds: echo.eds, ports: {rpdo1: in, tpdo1: out}}]\n"

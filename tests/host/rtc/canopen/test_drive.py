@@ -8,7 +8,7 @@ from tests.host.rtc.canopen.bench import SYSTEMS, Bench
 from tests.host.rtc.canopen.components import add_knob, add_logger
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 BEEGO = (

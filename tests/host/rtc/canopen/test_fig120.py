@@ -7,7 +7,7 @@ import pytest
 from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR, SYSTEMS, Bench
 from tickrig.host.rtc import ReturnCode
 from tickrig.host.rtc.canopen.events import ServerEventType
-from tickrig.wire.rtc_types.basic import Time, TimedShort
+from tickrig.wire.rtc_types.rtc import Time, TimedShort
 
 BY_LINK = (SYSTEMS / "fig120.yaml").read_text("utf-8")
 BY_PORTS = BY_LINK.replace("pdo_links: [{", "#").replace("# Through the PC instead: ", "")

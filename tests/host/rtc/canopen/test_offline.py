@@ -15,7 +15,7 @@ from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.offline import boot_offline, check_offline
 from tickrig.host.rtc.canopen.serve import open_server, read_files
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
-from tickrig.wire.rtc_types.basic import TimedOctet
+from tickrig.wire.rtc_types.rtc import TimedOctet
 
 KNOWN = "known: tpdo1, tpdo2, tpdo3, rpdo1"
 

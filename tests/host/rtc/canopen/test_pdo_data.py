@@ -11,7 +11,7 @@ from tests.host.rtc.canopen.components import add_knob, add_logger
 from tickrig.host.rtc import ReturnCode
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.ports.port import ConnectorProfile
-from tickrig.wire.rtc_types.basic import Time, TimedOctet, TimedShortSeq
+from tickrig.wire.rtc_types.rtc import Time, TimedOctet, TimedShortSeq
 
 
 def running(more: str = "") -> Bench:

@@ -7,7 +7,7 @@ from tests.host.rtc.canopen.components import add_logger
 from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
-from tickrig.wire.rtc_types.basic import TimedOctet
+from tickrig.wire.rtc_types.rtc import TimedOctet
 
 ACTIVE, ERROR, INACTIVE = LifeCycleState.ACTIVE, LifeCycleState.ERROR, LifeCycleState.INACTIVE
 CONNECTED = PALETTE_AND_MOTOR + "rt_connections: [{from: Palette0.tpdo1, to: Logger0.in}]\n"

@@ -33,7 +33,7 @@ from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.pdo import MappedObject
 from tickrig.wire.rtc_canopen import object_table
-from tickrig.wire.rtc_types.basic import (
+from tickrig.wire.rtc_types.rtc import (
     Time,
     TimedBooleanSeq,
     TimedDoubleSeq,

@@ -14,7 +14,7 @@ from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import NOT_HEARD, PdoView, PortView, ServerView
 from tickrig.wire.can import CanFrame
-from tickrig.wire.rtc_types.basic import TimedShortSeq
+from tickrig.wire.rtc_types.rtc import TimedShortSeq
 
 SAME_LENGTH = PdoName(16, "tpdo2"), PdoName(32, "rpdo2")
 

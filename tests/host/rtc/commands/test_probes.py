@@ -10,7 +10,7 @@ from tests.host.rtc.chain import PERIOD_US, Chain
 from tickrig.host.rtc import RtcRefused
 from tickrig.host.rtc.commands.system_control import HELD, LEASE_US, Probes
 from tickrig.host.rtc.system.system import describe
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 
 class Bench(Chain):

@@ -45,7 +45,7 @@ ports = ["ConsoleIn0.out", "ConsoleOut0.in"]
 
 TWICE = """
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
-from tickrig.wire.rtc_types.basic import TimedLong
+from tickrig.wire.rtc_types.rtc import TimedLong
 
 class Twice(RtComponent):
     spec = ModuleSpec("Twice")

@@ -13,7 +13,7 @@ from tickrig.host.rtc import ExecutionContext, OutPort, ReturnCode, connect
 from tickrig.host.rtc.lite import RtcLiteProxy
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteLinkFault
 from tickrig.wire.rtc_lite.frame import LiteFrame, fault_frame
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 OK, ERROR = ReturnCode.RTC_OK, ReturnCode.RTC_ERROR
 BAD, UNSUPPORTED = ReturnCode.BAD_PARAMETER, ReturnCode.UNSUPPORTED

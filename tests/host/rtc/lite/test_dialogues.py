@@ -15,7 +15,7 @@ from tests.host.rtc.lite.bench import PERIOD_US, Bench
 from tests.wire.rtc_lite.vectors import VECTORS, raw
 from tickrig.host.rtc import OutPort, connect
 from tickrig.wire.rtc_lite.codes import LiteCommand
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 DIALOGUES = {row["id"]: row for row in VECTORS["dialogues"]}
 

@@ -22,7 +22,7 @@ from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc.lite import ProxySettings, RtcLiteProxy
 from tickrig.wire.rtc_lite.codes import LiteContextType
 from tickrig.wire.rtc_lite.frame import Framing
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 NOISY_US = 3_000_000
 QUIET_US = 6_000_000

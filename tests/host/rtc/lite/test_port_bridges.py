@@ -11,7 +11,7 @@ from tickrig.host.links.link import DeviceRefused
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc.lite.proxy import PortBridges
 from tickrig.wire.rtc_lite.messages import LitePortData, LitePortProfile
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.rtc import Time
 
 
 def both_ways(code: str) -> tuple[PortBridges, OutPort[Any], InPort[Any]]:

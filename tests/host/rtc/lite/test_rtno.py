@@ -11,7 +11,7 @@ from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc.lite import ProxySettings
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
 from tickrig.wire.rtc_lite.frame import Checksum, Framing
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 RTNO = ProxySettings(framing=Framing.RTNO, rediscover=True)
 

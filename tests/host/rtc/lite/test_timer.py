@@ -8,7 +8,7 @@ from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.host.rtc import InPort, OutPort, ReturnCode, connect
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
 from tickrig.wire.rtc_lite.codes import LiteContextType
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 CONFIG = LiteConfig(context=LiteContextType.TIMER, rate_hz=100)
 

@@ -16,7 +16,7 @@ from tickrig.emulators.serial.serial_line import BYTE_FAULTS
 from tickrig.host.links.link import Link
 from tickrig.host.rtc.motion.components.ref_hard import RefHardRh3
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 COUNTS_PER_TURN = 149_820
 """Gear 74.91, 2000 counts (RH3 functional specification)."""

@@ -14,10 +14,8 @@ from tickrig.host.rtc.motion.components.odometry import Odometry
 from tickrig.host.rtc.motion.components.omni_to_2wd import OmniTo2WD
 from tickrig.host.rtc.motion.components.path_follower import PathFollower
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import TimedDoubleSeq, TimedState
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D
 from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.rh2 import Path
+from tickrig.wire.rtc_types.rtc import Path, Point2D, Pose2D, TimedDoubleSeq, TimedState
 
 numbers = st.floats() | st.sampled_from([0.0, -0.0, 1e-308, 1e308, -1e9, 1e9]) | st.floats(-5, 5)
 shorts = st.integers(-(2**15), 2**15 - 1) | st.integers(0, 8)

@@ -9,8 +9,9 @@ import pytest
 from tests.host.rtc.motion.port_bench import PortBench, at, way
 from tickrig.host.rtc.motion.components.navigation import Navigation
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.wire.rtc_types.rh2 import NavigationState as State
-from tickrig.wire.rtc_types.rh2 import Path, RunMode
+from tickrig.host.rtc.motion.ports import NavigationState as State
+from tickrig.host.rtc.motion.ports import RunMode
+from tickrig.wire.rtc_types.rtc import Path
 
 HERE, STEP, GOAL = Pose(), Pose(2.0, 0.0, 0.0), Pose(2.0, 0.0, 1.0)
 

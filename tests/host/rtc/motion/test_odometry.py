@@ -11,7 +11,7 @@ from tests.host.rtc.motion.port_bench import PortBench, at
 from tickrig.host.rtc import RtcRefused
 from tickrig.host.rtc.motion.components.odometry import Odometry, read_conf
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq
+from tickrig.wire.rtc_types.rtc import Time, TimedDoubleSeq
 
 RADIUS, AXLE = 0.0995, 0.464
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from tests.host.rtc.motion.port_bench import PortBench, at, poses_of
 from tickrig.host.rtc.motion.components.omni_to_2wd import OmniTo2WD, plan
 from tickrig.host.rtc.motion.geometry import Pose, wrap
-from tickrig.wire.rtc_types.basic import TimedState
-from tickrig.wire.rtc_types.rh2 import NavigationState
+from tickrig.host.rtc.motion.ports import NavigationState
+from tickrig.wire.rtc_types.rtc import TimedState
 
 FINISH = TimedState(data=NavigationState.FINISH)
 RUNS = TimedState(data=NavigationState.ANGLE_CHECK)

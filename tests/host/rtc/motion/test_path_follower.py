@@ -9,7 +9,8 @@ import pytest
 from tests.host.rtc.motion.port_bench import PortBench, at
 from tickrig.host.rtc.motion.components.path_follower import PathFollower
 from tickrig.host.rtc.motion.geometry import Twist
-from tickrig.wire.rtc_types.rh2 import Path, RunMode
+from tickrig.host.rtc.motion.ports import RunMode
+from tickrig.wire.rtc_types.rtc import Path
 
 
 def bench(set_id: str = "default", **settings: str) -> PortBench[PathFollower]:

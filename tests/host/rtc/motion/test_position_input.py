@@ -9,8 +9,8 @@ import pytest
 from tests.host.rtc.motion.port_bench import PortBench, at
 from tickrig.host.rtc.motion.components.position_input import USAGE, PositionInput
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.wire.rtc_types.basic import TimedState
-from tickrig.wire.rtc_types.rh2 import NavigationState
+from tickrig.host.rtc.motion.ports import NavigationState
+from tickrig.wire.rtc_types.rtc import TimedState
 
 FINISH = TimedState(data=NavigationState.FINISH)
 GOAL = Pose(1.0, 2.0, 0.5)

@@ -12,7 +12,11 @@ from hypothesis import strategies as st
 
 from tickrig.host.rtc import RtcRefused
 from tickrig.host.rtc.ports.literal import literal, read_literal
-from tickrig.wire.rtc_types.basic import (
+from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import (
+    GPSData,
+    GPSFixType,
+    Point2D,
     Time,
     TimedBoolean,
     TimedChar,
@@ -20,12 +24,10 @@ from tickrig.wire.rtc_types.basic import (
     TimedDoubleSeq,
     TimedLong,
     TimedOctetSeq,
+    TimedPoint2D,
     TimedString,
     TimedStringSeq,
 )
-from tickrig.wire.rtc_types.extended_2d import Point2D, TimedPoint2D
-from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.sensors import GPSData, GPSFixType
 
 NOW_US = 2_000_003
 NOW = Time(2, 3_000)

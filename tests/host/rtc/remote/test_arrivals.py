@@ -9,7 +9,7 @@ from tickrig.host.rtc.engines.in_port import InPortPushConnector
 from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
 from tickrig.host.rtc.system.call_queue import Arrivals, CallQueue
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rtc_types.basic import Time, TimedLong
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 
 def test_a_value_is_there_when_components_run_and_not_before() -> None:

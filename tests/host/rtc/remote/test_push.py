@@ -16,8 +16,8 @@ from tickrig.host.rtc.commands.verbs import component_lines
 from tickrig.host.rtc.engines.out_port import OutPortPushConnector
 from tickrig.host.rtc.engines.peer_end import PeerEnd, PeerState, cdr
 from tickrig.host.rtc.system.system import describe
-from tickrig.wire.rtc_types.basic import Time, TimedLong
 from tickrig.wire.rtc_types.cdr import Endian
+from tickrig.wire.rtc_types.rtc import Time, TimedLong
 
 OK, LOST = PortStatus.PORT_OK, PortStatus.CONNECTION_LOST
 

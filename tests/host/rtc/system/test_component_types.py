@@ -17,7 +17,7 @@ from tickrig.host.rtc.system.system_file import parse_toml, write_toml
 
 MODULE = """\
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
-from tickrig.wire.rtc_types.basic import TimedLong
+from tickrig.wire.rtc_types.rtc import TimedLong
 
 
 class Doubler(RtComponent):

@@ -16,7 +16,7 @@ from tickrig.host.rtc import (
 )
 from tickrig.host.rtc.components import ConsoleIn, SeqIn, SeqOut
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedLongSeq
+from tickrig.wire.rtc_types.rtc import Time, TimedLong, TimedLongSeq
 
 
 def test_numbers_pass_through_a_chain_unchanged_and_stamped() -> None:

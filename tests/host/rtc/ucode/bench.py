@@ -15,8 +15,7 @@ from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ucode.contents_interpretation import ContentsInterpretation
 from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
 from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
-from tickrig.wire.rtc_types.basic import TimedLongSeq, TimedStringSeq
-from tickrig.wire.rtc_types.extended_2d import TimedPoint2D
+from tickrig.wire.rtc_types.rtc import TimedLongSeq, TimedPoint2D, TimedStringSeq
 from tickrig.wire.ucode import BAUD
 
 BASE = "http://127.0.0.1:8640"

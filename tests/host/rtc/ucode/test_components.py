@@ -12,8 +12,7 @@ from tickrig.host.links.link import LinkClosed
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.ucode.infrared_rays_reader import InfraredRaysReader
 from tickrig.host.rtc.ucode.ucode_settlement import UcodeSettlement
-from tickrig.wire.rtc_types.basic import TimedStringSeq
-from tickrig.wire.rtc_types.extended_2d import Point2D
+from tickrig.wire.rtc_types.rtc import Point2D, TimedStringSeq
 
 
 @pytest.fixture

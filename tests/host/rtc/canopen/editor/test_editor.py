@@ -18,7 +18,7 @@ from tickrig.host.rtc.canopen.editor.app import SystemEditor
 from tickrig.host.rtc.canopen.editor.widgets import QuestionScreen
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.tui import FramedApp
-from tickrig.wire.rtc_types.basic import TimedShortSeq
+from tickrig.wire.rtc_types.rtc import TimedShortSeq
 
 TWO = f"""
 nodes:

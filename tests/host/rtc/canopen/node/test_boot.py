@@ -13,7 +13,7 @@ from tickrig.host.rtc import LifeCycleState
 from tickrig.host.rtc.canopen.definition import DefinitionError, read_device_file
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.served_node import NodePhase
-from tickrig.wire.rtc_types.basic import TimedOctet
+from tickrig.wire.rtc_types.rtc import TimedOctet
 
 PALETTE = "nodes: [{id: 16, name: Palette0, eds: f-palette.eds, role: device}]\n"
 ONE = {16: "f-palette"}

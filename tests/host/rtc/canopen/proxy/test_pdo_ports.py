@@ -15,26 +15,25 @@ from tickrig.host.rtc.canopen.pdo_layout import PDO_FIELD_TYPES, lay_out, proxy_
 from tickrig.host.rtc.canopen.proxy import PdoSink, PdoSource
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MappedObject
-from tickrig.wire.rtc_types import basic
-from tickrig.wire.rtc_types.basic import Time, TimedShortSeq
-from tickrig.wire.rtc_types.long_long import TimedLongLong, TimedULongLong
+from tickrig.wire.rtc_types import rtc
+from tickrig.wire.rtc_types.rtc import Time, TimedLongLong, TimedShortSeq, TimedULongLong
 
 GOLDEN = Path(__file__).parents[4] / "golden" / "rtc_canopen.json"
 Row = tuple[int, type[Any], type[Any] | None, int, bytes, Any]
 TABLE_4: list[Row] = [
-    (DataType.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 8, b"\x01", True),
-    (DataType.BOOLEAN, basic.TimedBoolean, basic.TimedBooleanSeq, 1, b"\x01", True),
-    (DataType.VISIBLE_CHAR, basic.TimedChar, basic.TimedCharSeq, 8, b"A", "A"),
-    (DataType.UNICODE_STRING, basic.TimedWChar, basic.TimedWCharSeq, 16, b"\x2b\x73", "猫"),
-    (DataType.UNSIGNED8, basic.TimedOctet, basic.TimedOctetSeq, 8, b"\xfe", 254),
-    (DataType.DOMAIN, basic.TimedChar, basic.TimedCharSeq, 8, b"A", "A"),
-    (DataType.INTEGER8, basic.TimedShort, basic.TimedShortSeq, 8, b"\xfe", -2),
-    (DataType.INTEGER16, basic.TimedShort, basic.TimedShortSeq, 16, b"\xfe\xff", -2),
-    (DataType.UNSIGNED16, basic.TimedUShort, basic.TimedUShortSeq, 16, b"\xfe\xff", 65534),
-    (DataType.REAL32, basic.TimedFloat, basic.TimedFloatSeq, 32, b"\0\0\x20\xc0", -2.5),
-    (DataType.INTEGER32, basic.TimedLong, basic.TimedLongSeq, 32, b"\xfe\xff\xff\xff", -2),
-    (DataType.UNSIGNED32, basic.TimedULong, basic.TimedULongSeq, 32, b"\1\0\0\x80", 0x8000_0001),
-    (DataType.REAL64, basic.TimedDouble, None, 64, bytes(6) + b"\x04\xc0", -2.5),
+    (DataType.BOOLEAN, rtc.TimedBoolean, rtc.TimedBooleanSeq, 8, b"\x01", True),
+    (DataType.BOOLEAN, rtc.TimedBoolean, rtc.TimedBooleanSeq, 1, b"\x01", True),
+    (DataType.VISIBLE_CHAR, rtc.TimedChar, rtc.TimedCharSeq, 8, b"A", "A"),
+    (DataType.UNICODE_STRING, rtc.TimedWChar, rtc.TimedWCharSeq, 16, b"\x2b\x73", "猫"),
+    (DataType.UNSIGNED8, rtc.TimedOctet, rtc.TimedOctetSeq, 8, b"\xfe", 254),
+    (DataType.DOMAIN, rtc.TimedChar, rtc.TimedCharSeq, 8, b"A", "A"),
+    (DataType.INTEGER8, rtc.TimedShort, rtc.TimedShortSeq, 8, b"\xfe", -2),
+    (DataType.INTEGER16, rtc.TimedShort, rtc.TimedShortSeq, 16, b"\xfe\xff", -2),
+    (DataType.UNSIGNED16, rtc.TimedUShort, rtc.TimedUShortSeq, 16, b"\xfe\xff", 65534),
+    (DataType.REAL32, rtc.TimedFloat, rtc.TimedFloatSeq, 32, b"\0\0\x20\xc0", -2.5),
+    (DataType.INTEGER32, rtc.TimedLong, rtc.TimedLongSeq, 32, b"\xfe\xff\xff\xff", -2),
+    (DataType.UNSIGNED32, rtc.TimedULong, rtc.TimedULongSeq, 32, b"\1\0\0\x80", 0x8000_0001),
+    (DataType.REAL64, rtc.TimedDouble, None, 64, bytes(6) + b"\x04\xc0", -2.5),
     (DataType.UNSIGNED64, TimedULongLong, None, 64, b"\1" + bytes(6) + b"\x80", (1 << 63) + 1),
     (DataType.INTEGER64, TimedLongLong, None, 64, b"\xfe" + b"\xff" * 7, -2),
 ]
@@ -96,11 +95,11 @@ def test_objects_of_one_type_are_a_sequence_in_the_order_of_the_mapping() -> Non
 def test_octets_are_a_sequence_of_bytes() -> None:
     layout = lay_out(0x1400, 0x210, mapped(8, 8), types(5, 5))
     sink = PdoSink(layout, "do")
-    assert sink.encode("do", basic.TimedOctetSeq(Time(), b"\1\2")) == b"\1\2"
-    source, in_ = PdoSource(layout, "di"), InPort("in", basic.TimedOctetSeq)
+    assert sink.encode("do", rtc.TimedOctetSeq(Time(), b"\1\2")) == b"\1\2"
+    source, in_ = PdoSource(layout, "di"), InPort("in", rtc.TimedOctetSeq)
     connect(source.ports[0], in_)
     source.receive(1_000, b"\1\2")
-    assert in_.read() == basic.TimedOctetSeq(Time(0, 1_000_000), b"\1\2")
+    assert in_.read() == rtc.TimedOctetSeq(Time(0, 1_000_000), b"\1\2")
 
 
 def test_objects_of_several_types_have_ports_of_their_own() -> None:
@@ -108,8 +107,8 @@ def test_objects_of_several_types_have_ports_of_their_own() -> None:
     sink = PdoSink(layout, "rpdo1")
     assert [port.name for port in sink.ports] == ["rpdo1_2100_00", "rpdo1_2100_01"]
     sink.preset(0x2100, 0x0F)
-    assert sink.encode("rpdo1_2100_01", basic.TimedLong(Time(), -1)).hex() == "0f00ffffffff"
-    assert sink.encode("rpdo1_2100_00", basic.TimedUShort(Time(), 7)).hex() == "0700ffffffff"
+    assert sink.encode("rpdo1_2100_01", rtc.TimedLong(Time(), -1)).hex() == "0f00ffffffff"
+    assert sink.encode("rpdo1_2100_00", rtc.TimedUShort(Time(), 7)).hex() == "0700ffffffff"
 
 
 def test_bits_and_dummies_keep_their_places() -> None:

@@ -10,8 +10,14 @@ import pytest
 from tickrig.host.rtc import InPort, Manager, ModuleSpec, OutPort, RtComponent
 from tickrig.host.rtc.canopen.robots import WHEELS, Beego, FourX, Joystick, WheeledBase
 from tickrig.host.rtc.ports.data_port import DataPort
-from tickrig.wire.rtc_types.basic import Time, TimedLong, TimedShort
-from tickrig.wire.rtc_types.extended_2d import TimedPose2D, TimedVelocity2D, Velocity2D
+from tickrig.wire.rtc_types.rtc import (
+    Time,
+    TimedLong,
+    TimedPose2D,
+    TimedShort,
+    TimedVelocity2D,
+    Velocity2D,
+)
 
 PERIOD_US = 10_000
 

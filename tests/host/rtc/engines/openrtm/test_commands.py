@@ -17,7 +17,7 @@ from tests.host.rtc.engines.openrtm.ports.foreign import Peer, compile_foreign
 from tickrig.emulators.bench.child import running
 from tickrig.emulators.commands.cli import main
 from tickrig.host.control.client import ControlClient
-from tickrig.wire.rtc_types.rh2 import RunMode
+from tickrig.host.rtc.motion.ports import RunMode
 
 CHAIN = Path(__file__).parents[5] / "examples" / "rtc_chain.toml"
 EDS = Path(__file__).parents[5] / "examples" / "eds"

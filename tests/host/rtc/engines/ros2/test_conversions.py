@@ -14,12 +14,19 @@ from tests.host.rtc.engines.ros2.extra import CYCLONE
 from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
 from tickrig.host.rtc.engines.ros2.message_types import Stamps
 from tickrig.host.rtc.engines.ros2.topic_entry import usual_entry
-from tickrig.wire.rtc_types import basic, extended_2d, iis
-from tickrig.wire.rtc_types.actuators import ActArrayState, Actuator
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, PoseVel2D, Velocity2D
+from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
-from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
+from tickrig.wire.rtc_types.rtc import (
+    ActArrayState,
+    Actuator,
+    Point2D,
+    Pose2D,
+    PoseVel2D,
+    RangeData,
+    RangerConfig,
+    Time,
+    Velocity2D,
+)
 
 pytestmark = CYCLONE
 
@@ -97,22 +104,22 @@ def test_the_velocity_of_odometry_is_that_on_an_arc_between_two_poses() -> None:
 
 def test_a_pose_with_its_velocity_is_odometry_with_that() -> None:
     data = PoseVel2D(Pose2D(Point2D(1, 2), 0), Velocity2D(0.5, 0.25, -1))
-    twist = out("nav_msgs/msg/Odometry", extended_2d.TimedPoseVel2D(data=data)).twist.twist
+    twist = out("nav_msgs/msg/Odometry", rtc.TimedPoseVel2D(data=data)).twist.twist
     assert (twist.linear.x, twist.linear.y, twist.angular.z) == (0.5, 0.25, -1.0)
 
 
 @pytest.mark.parametrize("kind", ["geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"])
-@pytest.mark.parametrize("data_type", [iis.TimedVelocity2D, extended_2d.TimedVelocity2D])
+@pytest.mark.parametrize("data_type", [iis.TimedVelocity2D, rtc.TimedVelocity2D])
 def test_a_velocity_comes_back_as_it_was(kind: str, data_type: Any) -> None:
     value = data_type(Time(0, 250_000_000), data=Velocity2D(0.5, -0.25, 1))
     assert into(kind, data_type, out(kind, value)) == value
 
 
 def test_joints_have_the_names_of_the_table_or_numbers() -> None:
-    kind, value = "sensor_msgs/msg/JointState", basic.TimedDoubleSeq(data=(1.0, -2.0))
+    kind, value = "sensor_msgs/msg/JointState", rtc.TimedDoubleSeq(data=(1.0, -2.0))
     assert out(kind, value, joints=("left", "right")).name == ["left", "right"]
     assert out(kind, value).name == ["joint0", "joint1"]
-    assert out(kind, basic.TimedDouble(data=3.0), joints=("arm",)).position == [3.0]
+    assert out(kind, rtc.TimedDouble(data=3.0), joints=("arm",)).position == [3.0]
     with pytest.raises(ValueError, match=r"^2 joints, and 1 names: left$"):
         out(kind, value, joints=("left",))
 

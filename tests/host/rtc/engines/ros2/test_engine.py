@@ -13,9 +13,16 @@ from tests.host.rtc.engines.ros2.extra import CYCLONE
 from tests.host.rtc.engines.ros2.joined import Joined, Peer
 from tickrig.host.rtc import InPort, ModuleSpec, OutPort, PortStatus, RtComponent
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time, TimedDoubleSeq, TimedLong
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
-from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
+from tickrig.wire.rtc_types.rtc import (
+    Point2D,
+    Pose2D,
+    RangeData,
+    RangerConfig,
+    Time,
+    TimedDoubleSeq,
+    TimedLong,
+    Velocity2D,
+)
 
 pytestmark = [CYCLONE, pytest.mark.realtime]
 

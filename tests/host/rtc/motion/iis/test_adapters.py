@@ -20,10 +20,9 @@ from tickrig.host.rtc.motion.iis.adapters import (
     Velocity3To2,
     WrappedHeading,
 )
-from tickrig.wire.rtc_types import iis, iis_phase1, iis_phase2
-from tickrig.wire.rtc_types.basic import Time
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
+from tickrig.wire.rtc_types.rtc import Time, Velocity2D
 
 TM = Time(1, 2_000)
 numbers = st.floats(-1e6, 1e6)
@@ -34,26 +33,26 @@ numbers = st.floats(-1e6, 1e6)
     [
         (
             Velocity1To2,
-            iis_phase1.TimedVelocity(TM, 0.5, -0.1),
-            iis_phase2.TimedVelocity(TM, (), 0.5, 0.0, -0.1),
+            rtc.TimedVelocity(TM, 0.5, -0.1),
+            iis.TimedVelocity(TM, (), 0.5, 0.0, -0.1),
         ),
         (
             Velocity2To1,
-            iis_phase2.TimedVelocity(TM, (3,), 0.5, 0.2, -0.1),
-            iis_phase1.TimedVelocity(TM, 0.5, -0.1),
+            iis.TimedVelocity(TM, (3,), 0.5, 0.2, -0.1),
+            rtc.TimedVelocity(TM, 0.5, -0.1),
         ),
         (
             Velocity2To3,
-            iis_phase2.TimedVelocity(TM, (3,), 0.5, 0.2, -0.1, (9.0,)),
+            iis.TimedVelocity(TM, (3,), 0.5, 0.2, -0.1, (9.0,)),
             iis.TimedVelocity2D(TM, (3,), Velocity2D(0.5, 0.2, -0.1), (9.0,)),
         ),
         (
             Velocity3To2,
             iis.TimedVelocity2D(TM, (3,), Velocity2D(0.5, 0.2, -0.1), (9.0,)),
-            iis_phase2.TimedVelocity(TM, (3,), 0.5, 0.2, -0.1, (9.0,)),
+            iis.TimedVelocity(TM, (3,), 0.5, 0.2, -0.1, (9.0,)),
         ),
-        (Position2To3, iis_phase2.TimedPosition(x=1.0, y=2.0, theta=-pi / 2), at(1, 2, 1.5 * pi)),
-        (Position3To2, at(1, 2, -pi / 2), iis_phase2.TimedPosition(x=1.0, y=2.0, theta=1.5 * pi)),
+        (Position2To3, iis.TimedPosition(x=1.0, y=2.0, theta=-pi / 2), at(1, 2, 1.5 * pi)),
+        (Position3To2, at(1, 2, -pi / 2), iis.TimedPosition(x=1.0, y=2.0, theta=1.5 * pi)),
         (PositiveHeading, at(1, 2, -pi / 2, 7), at(1, 2, 1.5 * pi, 7)),
         (WrappedHeading, at(1, 2, 1.5 * pi, 7), at(1, 2, -pi / 2, 7)),
     ],
@@ -70,7 +69,7 @@ def test_a_value_passes_as_the_other_phase_says_it(
 def test_a_pose_with_a_number_that_is_none_is_left_out(
     kind: Callable[[str], RtComponent], number: float
 ) -> None:
-    spoilt = iis_phase2.TimedPosition(x=number) if kind is Position2To3 else at(1, 2, number)
+    spoilt = iis.TimedPosition(x=number) if kind is Position2To3 else at(1, 2, number)
     on = PortBench(kind("A0"))
     assert on.after("out", "in", spoilt) == []
     assert on.state == "ACTIVE"
@@ -78,7 +77,7 @@ def test_a_pose_with_a_number_that_is_none_is_left_out(
 
 @given(numbers, numbers, numbers)
 def test_velocities_survive_the_way_to_phase_3_and_back(vx: float, vy: float, w: float) -> None:
-    value = iis_phase2.TimedVelocity(TM, (1, 2), vx, vy, w, (0.5,))
+    value = iis.TimedVelocity(TM, (1, 2), vx, vy, w, (0.5,))
     assert Velocity3To2("B0").convert(Velocity2To3("A0").convert(value)) == value
 
 

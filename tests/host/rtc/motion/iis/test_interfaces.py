@@ -12,7 +12,7 @@ from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.iis.interfaces import GoalInterface, RunningInformation
 from tickrig.host.rtc.motion.ports import read_all, to_pose_2d
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import Time
+from tickrig.wire.rtc_types.rtc import Time
 
 WIDE = {"dataport.buffer.length": "64"}
 

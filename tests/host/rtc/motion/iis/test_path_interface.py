@@ -7,9 +7,9 @@ import pytest
 from tests.host.rtc.motion.port_bench import PortBench, at, way
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.iis.path_interface import PASSED, STOPPED, PathInterface
+from tickrig.host.rtc.motion.ports import RunMode
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
-from tickrig.wire.rtc_types.rh2 import Path, RunMode
+from tickrig.wire.rtc_types.rtc import Path, Velocity2D
 
 START, CORNER, END = Pose(), Pose(2), Pose(2, 1, -pi / 2)
 

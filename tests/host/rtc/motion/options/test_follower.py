@@ -7,7 +7,7 @@ import pytest
 from tests.host.rtc.motion.port_bench import PortBench, at
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.options.follower import Follower
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 ORIGIN = Pose()
 

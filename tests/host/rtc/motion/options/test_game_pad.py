@@ -20,7 +20,7 @@ from tickrig.host.rtc.motion.options.game_pad import (
     StickPosition,
     open_pad,
 )
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 
 class Held:

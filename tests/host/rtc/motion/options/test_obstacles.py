@@ -15,9 +15,14 @@ from tickrig.host.rtc.motion.options.obstacles import (
     UrgToObstacles,
 )
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.basic import TimedDouble
-from tickrig.wire.rtc_types.extended_2d import Point2D, Pose2D, Velocity2D
-from tickrig.wire.rtc_types.sensors import RangeData, RangerConfig
+from tickrig.wire.rtc_types.rtc import (
+    Point2D,
+    Pose2D,
+    RangeData,
+    RangerConfig,
+    TimedDouble,
+    Velocity2D,
+)
 
 
 def scan(*ranges: float) -> RangeData:

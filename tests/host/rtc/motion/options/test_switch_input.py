@@ -5,7 +5,7 @@ from math import nan
 from tests.host.rtc.motion.port_bench import PortBench
 from tickrig.host.rtc.motion.options.switch_input import SwitchInput
 from tickrig.wire.rtc_types import iis
-from tickrig.wire.rtc_types.extended_2d import Velocity2D
+from tickrig.wire.rtc_types.rtc import Velocity2D
 
 PLANNED, PUSHED = Velocity2D(vx=0.3), Velocity2D(vx=-0.1, va=0.2)
 

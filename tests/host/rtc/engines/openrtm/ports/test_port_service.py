@@ -13,7 +13,7 @@ from tickrig.host.rtc.engines.openrtm.connector_ends import texts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.data_port import InPort
-from tickrig.wire.rtc_types.basic import TimedLong
+from tickrig.wire.rtc_types.rtc import TimedLong
 
 OK = "RTC_OK"
 
