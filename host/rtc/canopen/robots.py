@@ -1,4 +1,4 @@
-"""FourX: four driven wheels, a motor core unit each (NEDO report, 3.4.43.3; ours: K20)."""
+"""Robots on nodes of RTC-CANopen: a joystick, beego on two EPOS, FourX on four motor core units."""
 
 from __future__ import annotations
 
@@ -45,6 +45,16 @@ class Joystick(RtComponent):
         """Hold the stick; -100..100 % each, what is beyond counts as full."""
         self._forward_pct = clip(forward_pct, _FULL_PCT)
         self._left_pct = clip(left_pct, _FULL_PCT)
+
+    def typed(self, line: str) -> None:
+        """Hold the stick as a person types it: forward, and to the left if given, in per cent."""
+        try:
+            percents = [float(word) for word in line.split()]
+        except ValueError:
+            percents = []
+        if len(percents) not in (1, 2) or not all(-_FULL_PCT <= n <= _FULL_PCT for n in percents):
+            raise ValueError(f"{line!r} is not FORWARD [LEFT], each -100..100 %")
+        self.tilt(*percents)
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Write where the stick is."""
@@ -211,6 +221,8 @@ class Beego(WheeledBase):
         counts = (position.data - before + _TURN // 2) % _TURN - _TURN // 2
         return counts / (self.counts.value * self.gear.value) * tau
 
+
+# FourX: four driven wheels, a motor core unit each (NEDO report, 3.4.43.3; ours: K20).
 
 WHEELS: Final = ("fl", "rl", "fr", "rr")
 """Front and rear left, front and rear right."""

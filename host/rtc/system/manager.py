@@ -73,7 +73,8 @@ COMPONENT_TYPES: Final = ExtensionGroup[type[RtComponent]](
         for name in ("ConsoleIn", "ConsoleOut", "SeqIn", "SeqOut", "ConfigSample")
     }
     | {name: f"tickrig.host.rtc.ucode.{module}:{name}" for module, name in _UCODE.items()}
-    | {name: f"tickrig.host.rtc.motion.{place}" for name, place in _MOTION.items()},
+    | {name: f"tickrig.host.rtc.motion.{place}" for name, place in _MOTION.items()}
+    | {name: f"tickrig.host.rtc.canopen.robots:{name}" for name in ("Joystick", "Beego", "FourX")},
     _is_component_type,
     "an RtComponent with a spec",
 )

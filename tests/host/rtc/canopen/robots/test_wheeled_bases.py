@@ -7,9 +7,19 @@ from typing import Any
 
 import pytest
 
-from tickrig.host.rtc import InPort, Manager, ModuleSpec, OutPort, RtComponent
+from tickrig.host.rtc import (
+    ExecutionContext,
+    InPort,
+    Manager,
+    ModuleSpec,
+    OutPort,
+    RtComponent,
+    connect,
+)
 from tickrig.host.rtc.canopen.robots import WHEELS, Beego, FourX, Joystick, WheeledBase
 from tickrig.host.rtc.ports.data_port import DataPort
+from tickrig.host.rtc.system.system import restore
+from tickrig.host.rtc.system.system_file import parse_toml
 from tickrig.wire.rtc_types.rtc import (
     Time,
     TimedLong,
@@ -27,7 +37,7 @@ class Drives(RtComponent):
 
     spec = ModuleSpec("Drives")
 
-    def __init__(self, base: WheeledBase) -> None:
+    def __init__(self, base: RtComponent) -> None:
         super().__init__("Drives0")
         for port in base.ports.values():
             assert isinstance(port, DataPort)
@@ -193,3 +203,64 @@ class Sink(RtComponent):
     def __init__(self, instance_name: str, port: InPort[TimedVelocity2D]) -> None:
         super().__init__(instance_name)
         self.add_port(port)
+
+
+def test_a_stick_is_held_as_it_is_typed() -> None:
+    stick = Joystick("Joystick0")
+    drives = Drives(stick)
+    connect(stick.velocity, drives.ports["velocity"])
+    for line, expected in (("50", (0.25, 0.0)), ("100 -50", (0.5, -0.5)), ("0", (0.0, 0.0))):
+        stick.typed(line)
+        stick.on_execute(ExecutionContext())
+        data = drives.latest("velocity").data
+        assert (data.vx, data.va) == expected
+
+
+@pytest.mark.parametrize("line", ["", "go", "1 2 3", "101", "0 -101", "nan", "0 inf"])
+def test_a_line_that_is_no_stick_is_refused_and_changes_nothing(line: str) -> None:
+    stick = Joystick("Joystick0")
+    stick.typed("100")
+    with pytest.raises(ValueError, match=r"is not FORWARD \[LEFT\], each -100\.\.100 %"):
+        stick.typed(line)
+    drives = Drives(stick)
+    connect(stick.velocity, drives.ports["velocity"])
+    stick.on_execute(ExecutionContext())
+    assert drives.latest("velocity").data == Velocity2D(0.5, 0.0, 0.0)
+
+
+SYSTEM = """
+[[component]]
+type = "Joystick"
+name = "Joystick0"
+rate_hz = 100.0
+active = true
+
+[[component]]
+type = "{base}"
+name = "Base0"
+rate_hz = 100.0
+active = true
+
+[[connection]]
+ports = ["Joystick0.velocity", "Base0.velocity"]
+"""
+
+
+def component(manager: Manager, name: str) -> RtComponent:
+    return next(each for each in manager.components if each.instance_name == name)
+
+
+@pytest.mark.parametrize("base", ["Beego", "FourX"])
+def test_robots_of_a_system_file_drive_as_a_stick_is_typed(base: str) -> None:
+    manager = Manager()
+    restore(manager, parse_toml(SYSTEM.format(base=base)))
+    robot = component(manager, "Base0")
+    assert isinstance(robot, WheeledBase)
+    drives = manager.add(Drives(robot), rate_hz=100.0)
+    out = next(name for name in robot.ports if name.startswith(("left_speed", "fl_reference")))
+    manager.connect(f"Base0.{out}", f"Drives0.{out}")
+    stick = component(manager, "Joystick0")
+    assert isinstance(stick, Joystick)
+    stick.typed("50")
+    manager.run_for(100_000)
+    assert drives.latest(out).data > 0
