@@ -1,6 +1,7 @@
 """Refuse to build what has no modules, keep the links in a source distribution, compile a wheel.
 
-With TICKRIG_COMPILE=1 in the environment a wheel has extension modules (docs/howto/compiled.md).
+With TICKRIG_COMPILE=1 in the environment a wheel has extension modules, with TICKRIG_COMPILE=kernel
+the kernel of the CAN bus alone (docs/howto/compiled.md).
 All else about the build stands in pyproject.toml.
 """
 
@@ -129,9 +130,15 @@ def compiled_modules() -> list[str]:
     return sorted(str(path) for path in found - left_out if path.stem != "__init__")
 
 
+KERNEL = Extension("tickrig.emulators.rig._kernel", [str(PACKAGE / "emulators/rig/_kernel.c")])
+"""The short ways of a CAN bus, in C."""
+
+
 def extensions() -> list[Extension]:
-    """Return the extension modules of a compiled wheel; of anything else, none."""
-    if "bdist_wheel" not in sys.argv:
+    """Return the extension modules of a compiled wheel; of anything else, none but the kernel."""
+    if COMPILE == "kernel":
+        return [KERNEL]
+    if COMPILE != "1" or "bdist_wheel" not in sys.argv:
         return []
     from mypyc.build import mypycify  # noqa: PLC0415 - only where something is compiled
 
@@ -145,15 +152,17 @@ def extensions() -> list[Extension]:
     mend([*Path("build").glob("__native_*.c")])
     for extension in made:  # a product is rounded before it is added, whatever the processor can
         extension.extra_compile_args += ["-ffp-contract=off", "-fvisibility=hidden"]
-    return made
+    return [*made, KERNEL]
 
 
 NEEDED = ["mypy[mypyc]>=2.4,<2.5", "crcmod-plus>=2.2"]
 """What compiles, and what compiled modules import of others."""
 
-COMPILE = os.environ.get("TICKRIG_COMPILE") == "1"
+COMPILE = os.environ.get("TICKRIG_COMPILE", "")
+if COMPILE not in {"", "0", "1", "kernel"}:
+    raise SystemExit(f"TICKRIG_COMPILE is {COMPILE!r}; write 1, kernel or 0")
 setup(
     cmdclass={"sdist": LinkingSdist, "build_ext": ParallelBuildExt},
-    setup_requires=NEEDED if COMPILE else [],
-    ext_modules=extensions() if COMPILE else [],
+    setup_requires=NEEDED if COMPILE == "1" else [],
+    ext_modules=extensions(),
 )

@@ -90,6 +90,10 @@ def test_an_installation_is_compiled_whole_or_not_at_all() -> None:
         assert str(spec.origin).endswith(tuple(EXTENSION_SUFFIXES)) is tickrig.compiled, name
 
 
+def test_a_compiled_installation_has_the_kernel_too() -> None:
+    assert tickrig.kernel or not tickrig.compiled
+
+
 def test_a_compiled_module_has_its_source_beside_it() -> None:
     package = Path(tickrig.__file__).parent
     for name in compiled_modules():
@@ -119,7 +123,7 @@ def test_both_builds_do_the_same() -> None:
 
 KEPT: Final = {
     *("CanopenSlave", "Dictionary", "EntryDescription", "InputSignal", "LineSplitter"),
-    *("OutputSignal", "Rh3Base", "Rig", "Station", "Urg"),
+    *("OutputSignal", "Rh3Base", "Rig", "Urg"),
 }
 """Public classes that nobody derives from where they are compiled (docs/howto/compiled.md)."""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from heapq import heapify, heappop, heappush
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.twin import Part
+from tickrig.emulators.rig.kernel import ArbiterFields, in_kernel
 from tickrig.wire.can import CanFrame
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def dominant(frames: Sequence[CanFrame]) -> CanFrame:
     return min(frames, key=lambda frame: (frame.dlc, frame.data))
 
 
-class CanArbiter(Part):
+class CanArbiter(ArbiterFields):
     """The first frames of all queues, sorted as the bits on the bus would sort them.
 
     All times are in the units of the segment.
@@ -60,7 +60,7 @@ class CanArbiter(Part):
         slow: some node has to wait longer than the bus is busy.
     """
 
-    __slots__ = ("_ends", "free", "heads", "slow")
+    __slots__ = ()
 
     def __init__(self) -> None:
         self.free, self.slow = 0, False
@@ -87,6 +87,7 @@ class CanArbiter(Part):
             if end.waiting:
                 self.push(end)
 
+    @in_kernel
     def push(self, end: CanEnd) -> None:
         """Let a node take part again, which has a frame to send."""
         head = priority(end.next) << _NUMBER_BITS | end.number - _FIRST_NUMBER

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from tickrig.device.core import Device
-from tickrig.device.twin import Copyable
+from tickrig.device.twin import state_of, twin
 from tickrig.emulators.can.bus_device import (
     Accepted,
     ErrorAware,
@@ -16,6 +16,7 @@ from tickrig.emulators.can.bus_device import (
     is_filtering,
 )
 from tickrig.emulators.can.fault_confinement import ErrorCounters
+from tickrig.emulators.rig.kernel import EndFields, in_kernel
 from tickrig.wire.can import CanFrame, ErrorState, Frames
 from tickrig.wire.instant import NEVER
 
@@ -37,7 +38,7 @@ _NEW_IN_TWINS: Final[Mapping[str, object]] = {
 """A rig attaches its devices anew."""
 
 
-class CanEnd(Copyable):
+class CanEnd(EndFields):
     """One node on a `CanWire`; a `WirePort[Frames]`.
 
     Frames leave in the order in which they were given. A frame is received by
@@ -58,14 +59,7 @@ class CanEnd(Copyable):
         auto_recovery: it leaves bus-off by itself, as most drivers let it.
     """
 
-    __slots__ = (
-        *("_accepts", "_behind", "_device", "_error_aware", "_first", "_more"),
-        *("_reconfigured_by", "arrived_us", "auto_recovery", "controller", "held", "lost"),
-        *("next", "number", "on_error_state", "room", "segment", "unfiltered", "waiting"),
-        *("wake", "wire"),
-    )
-
-    _new_in_twins = _NEW_IN_TWINS
+    __slots__ = ()
 
     def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
         self.wire, self.number, self._accepts = wire, number, accepts
@@ -84,6 +78,18 @@ class CanEnd(Copyable):
         self.auto_recovery = False
         self._device: Filtering | None = None
         self._error_aware: ErrorAware | None = None
+
+    def __getstate__(self) -> object:
+        """Return the state that a twin begins with."""
+        return state_of(self, _NEW_IN_TWINS)
+
+    def __copy__(self) -> NoReturn:
+        """Refuse: a shallow copy would share its parts with the original."""
+        raise TypeError("CanEnd cannot be copied by copy.copy: use copy.deepcopy")
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> CanEnd:
+        """Return a twin, which has in common with other twins what the originals have."""
+        return twin(self, memo)
 
     @property
     def accepts(self) -> Accepted:
@@ -115,6 +121,7 @@ class CanEnd(Copyable):
         if is_error_aware(device):
             self._error_aware = device
 
+    @in_kernel
     def poll(self, now_us: int, /) -> Frames:
         """Take the frames that had ended by `now_us`."""
         if self.segment.now_us < now_us:
@@ -137,11 +144,13 @@ class CanEnd(Copyable):
         stamps = self.arrived_us, *(at_us for at_us, _ in self._more or ())
         return tuple(zip(stamps, self.poll(now_us), strict=False))
 
+    @in_kernel
     def send(self, now_us: int, traffic: Frames, /) -> None:
         """Queue frames behind those that have not left."""
         if traffic:
             self.segment.send(self, now_us, traffic)
 
+    @in_kernel
     def enqueue(self, frames: Frames) -> None:
         """Let frames wait behind those that do."""
         behind = frames
@@ -168,6 +177,7 @@ class CanEnd(Copyable):
         """Leave bus-off: after 128 times 11 recessive bits the node is error-active again."""
         self.segment.recover(self, now_us)
 
+    @in_kernel
     def receive(self, at_us: int, frame: CanFrame, alone: Frames) -> None:
         """Take a frame from the bus; `alone` are it and no other, made once for all who take it."""
         if not self._first:  # one of all ends' objects is touched, not six: 5 % of eight buses

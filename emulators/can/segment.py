@@ -13,6 +13,7 @@ from tickrig.emulators.can.transmission_outcomes import (
     Observer,
     TransmissionOutcomes,
 )
+from tickrig.emulators.rig.kernel import in_kernel
 from tickrig.wire.can import INTERFRAME_BITS, CanFrame, ErrorState, Frames, frame_bits
 from tickrig.wire.instant import NEVER
 
@@ -42,7 +43,10 @@ class CanSegment(TransmissionOutcomes):
         now_us: how far the bus was moved on.
         shorted: nobody can send.
         received: a frame woke a station since `advance_until_received` was called.
+        whole: no end of its wire is on another segment.
     """
+
+    __slots__ = ()
 
     def __init__(
         self,
@@ -54,15 +58,17 @@ class CanSegment(TransmissionOutcomes):
     ) -> None:
         super().__init__(bit_rate, faults, observers, on_traffic)
         self.now_us, self.shorted = start_us, False
-        self.received: bool
+        self.received, self.whole = False, True
         self._lengths: Cache[int, tuple[bytes, int]] = Cache()  # of the latest data by CAN-ID
-        self._finish: Callable[[], None]  # of the plan
+        self._finish: Callable[[], None] | None = None  # of the plan; None for `_deliver`
 
     @property
     def due_us(self) -> int:
         """When the frame that is on the bus, or goes next, will have ended."""
         if self._stale:
             self._plan()
+        if self._due_us == NEVER:
+            self._announced = False
         return self._due_us
 
     @property
@@ -70,19 +76,21 @@ class CanSegment(TransmissionOutcomes):
         """From when to when the frame that is on the bus keeps it busy, in units."""
         return (self._start, self._free) if self._winners else (0, 0)
 
+    @in_kernel
     def advance(self, now_us: int) -> None:
         """Let everything end that ends by `now_us`."""
         while self.advance_until_received(now_us):
             pass
         self.now_us = max(self.now_us, now_us)
 
+    @in_kernel
     def advance_until_received(self, until_us: int) -> bool:
         """Let everything end up to the first frame that wakes a station; False if none did."""
         self.received = False
         if self._stale:
             self._plan()
         while self._due_us <= until_us:
-            self._finish()
+            (self._finish or self._deliver)()
             self._stale = True
             if self._news:
                 self._notify_changes()
@@ -92,6 +100,7 @@ class CanSegment(TransmissionOutcomes):
                 return True
         return False
 
+    @in_kernel
     def send(self, end: CanEnd, now_us: int, frames: Frames) -> None:
         """Queue the frames of one node."""
         if self.now_us < now_us:
@@ -164,6 +173,13 @@ class CanSegment(TransmissionOutcomes):
         self._winners, self._start = [], NEVER
         self._plan_anew()
 
+    def _is_sound(self) -> bool:
+        """Say whether frames are delivered, one after the other, and nothing else can happen."""
+        unsound = self._faults.active or self._confinement.marked or self._recovery.active
+        slow = self._arbiter.slow or self.shorted or self._repeating
+        return self._on_bus > 1 and not (unsound or slow)
+
+    @in_kernel
     def _plan(self) -> None:
         """Find out what ends next, and when."""
         self._stale = False
@@ -181,7 +197,7 @@ class CanSegment(TransmissionOutcomes):
             else:
                 bits = self._length(frame)
             if self._on_bus > 1 and not self._faults.active and len(winners) == 1:
-                self._settle(self._deliver, bits)
+                self._settle(None, bits)
             else:
                 self._judge(frame, bits)
         else:
@@ -237,7 +253,7 @@ class CanSegment(TransmissionOutcomes):
         else:
             self._settle(self._fail, first_difference(frames) + _ECHO_BITS + _ERROR_BITS)
 
-    def _settle(self, finish: Callable[[], None], bits: int) -> None:
+    def _settle(self, finish: Callable[[], None] | None, bits: int) -> None:
         """Enter what the plan ends in, and how long it keeps the bus busy."""
         self._finish = finish
         self._free = free = self._start + bits * self.bit

@@ -7,11 +7,13 @@ from collections.abc import Callable, Iterator
 from math import gcd
 from typing import TYPE_CHECKING, Final
 
-from tickrig.device.twin import Cache, Listeners, Part
+from tickrig.device.twin import Cache, Listeners
 from tickrig.emulators.can.arbitration import CanArbiter, dominant
 from tickrig.emulators.can.fault_confinement import ErrorCounters, FaultConfinement, Recovery
 from tickrig.emulators.can.faults import CanFaults
+from tickrig.emulators.rig.kernel import BusyFields, RoutesFields, SegmentFields, in_kernel
 from tickrig.wire.can import BIT_ERROR, INTERFRAME_BITS, NO_ACK, CanFrame, ErrorFrame, ErrorState
+from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
     from tickrig.emulators.can.end import CanEnd
@@ -22,13 +24,13 @@ if TYPE_CHECKING:
 KEPT_SPANS: Final = 32_768
 
 
-class BusyTime(Part):
+class BusyTime(BusyFields):
     """The latest spans of time in which a bus was busy; frames behind each other are one span.
 
     Times are whole numbers of any unit.
     """
 
-    __slots__ = ("_since", "_spans", "_until")
+    __slots__ = ()
 
     def __init__(self) -> None:
         self._since = self._until = 0
@@ -62,13 +64,15 @@ _EXTENDED: Final = 1 << 29
 _CACHED_ROUTES: Final = 4_096
 
 
-class CanRoutes(Part):
+class CanRoutes(RoutesFields):
     """The ends of a bus and their filters, looked up once for each CAN-ID.
 
     Attributes:
         ends: all ends, in the order in which they joined.
         unfiltered: those of them whose filter is out of use until they are polled.
     """
+
+    __slots__ = ()
 
     def __init__(self) -> None:
         self.ends: list[CanEnd] = []
@@ -106,7 +110,7 @@ RECESSIVE_BITS: Final = 8 + INTERFRAME_BITS  # from the ACK or error delimiter t
 _SUSPEND_BITS: Final = 8  # a passive node's wait after it has sent
 
 
-class TransmissionOutcomes(Part):
+class TransmissionOutcomes(SegmentFields):
     """What a transmission on the bus can end in, and what all nodes make of it.
 
     Times are in units of which a bit and a microsecond are whole multiples; only time
@@ -119,6 +123,8 @@ class TransmissionOutcomes(Part):
         routes: the ends and who of them receives what.
         busy: when the latest frames kept the bus busy, in units.
     """
+
+    __slots__ = ()
 
     def __init__(
         self,
@@ -135,15 +141,17 @@ class TransmissionOutcomes(Part):
         self._confinement = FaultConfinement(self.routes.ends, self._state_changed)
         self._recovery = Recovery(self.bit)
         self._arbiter = CanArbiter()
-        self._on_bus: int  # ends that acknowledge
+        self._on_bus = 0  # ends that acknowledge
         self._repeating = False  # a node is alone, and nothing changes any more
         self._news: list[tuple[int, CanEnd]] = []  # whose error state changed when
         self._stale = True  # the plan that follows is to be made
         self._winners: list[CanEnd] = []
-        self._start: int  # of the plan, as the next two
-        self._free: int
-        self._due_us: int
+        self._start = self._due_us = NEVER  # of the plan, as the next
+        self._free = 0
+        self._sound = False  # frames are delivered and nothing else; only the kernel asks
+        self._announced = False  # that something may end earlier, since it was asked when
 
+    @in_kernel
     def _deliver(self) -> None:
         """Hand a frame to all that accept it: from one sender, on a sound bus, without detours."""
         winners, confinement = self._winners, self._confinement
@@ -270,6 +278,7 @@ class TransmissionOutcomes(Part):
     def _recount(self, now_us: int) -> None:
         """Count who acknowledges; a node that was alone begins anew."""
         states = [end.controller.state for end in self.routes.ends]
+        self._sound = False
         self._on_bus = len(states) - states.count(ErrorState.BUS_OFF)
         self.routes.forget()
         if self._repeating:
@@ -280,5 +289,7 @@ class TransmissionOutcomes(Part):
     def _plan_anew(self) -> None:
         """Find out anew what ends next when somebody asks; tell that it may be earlier."""
         self._stale = True
-        for tell in self._on_traffic:
-            tell()
+        if not self._announced:
+            self._announced = True
+            for tell in self._on_traffic:
+                tell()

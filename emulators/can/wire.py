@@ -83,6 +83,11 @@ class CanWire(Copyable):
         return end
 
     @property
+    def _kernel_bus(self) -> CanSegment | None:
+        """The bus, for who moves it on without the wire; None from a class that derives from it."""
+        return self.bus if type(self) is CanWire else None
+
+    @property
     def due_us(self) -> int:
         """When the next frame will have ended."""
         if not self._apart:
@@ -141,6 +146,7 @@ class CanWire(Copyable):
             faults = CanFaults(0, _ignore)
             apart = CanSegment(self.bit_rate, now_us, faults, Listeners(), self.on_traffic)
             self._apart[end.number] = apart
+            self.bus.whole = False
             apart.join(end, now_us)
 
     def reconnect(self, end: CanEnd) -> None:
@@ -153,6 +159,7 @@ class CanWire(Copyable):
         if apart is not None:
             apart.leave(end, self.bus.now_us)
             self.bus.join(end, self.bus.now_us)
+            self.bus.whole = not self._apart
 
     def cut_power(self, end: CanEnd) -> None:
         """Take a node off the bus: what it had to send or had received is lost, all begins anew.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from heapq import heapify, heappop, heappush, heapreplace
+from heapq import heapify, heapreplace
 from itertools import compress
 from operator import not_
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar, overload
@@ -14,8 +14,9 @@ from tickrig.device.horizon import Horizon
 from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
+from tickrig.emulators.rig.kernel import kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
-from tickrig.emulators.rig.station import Station, next_tick_us
+from tickrig.emulators.rig.station import Station, Timetable, next_tick_us
 from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.wire.instant import NEVER
 
@@ -95,6 +96,11 @@ class Wires(Part):
             self._busy = tuple(sorted((*self._busy, place)))
 
     @property
+    def only_bus(self) -> Any:
+        """The bus of the only wire, for the kernel; None if there are several."""
+        return getattr(self._wires[0], "_kernel_bus", None) if len(self._wires) == 1 else None
+
+    @property
     def due_us(self) -> int:
         """When something ends on one of them, `NEVER` if nothing is on its way."""
         return min(self._dues())[0] if self._busy else NEVER
@@ -159,69 +165,6 @@ class Wires(Part):
             if received and any(host.arrived_us < NEVER for host in hosts):
                 return
             heapreplace(heap, (wire.due_us, place))
-
-
-# Which stations of a rig have work at which tick.
-
-
-class Timetable(Part):
-    """Ticks with work, soonest first, each with its stations.
-
-    A station stands at one tick, `station.at_us`. Where it stood before it was
-    entered for an earlier tick it is simply passed over.
-
-    Attributes:
-        first_us: the soonest tick with work, `NEVER` if there is none.
-        open_us: no tick is entered before this.
-    """
-
-    __slots__ = ("_stations", "_ticks", "first_us", "open_us")
-
-    def __init__(self) -> None:
-        self.first_us, self.open_us = NEVER, 1
-        self._ticks: list[int] = []  # a heap
-        self._stations: dict[int, list[Station[Any]]] = {}
-
-    def enter(self, station: Station[Any], at_us: int) -> None:
-        """Let a station have work at the first tick from `at_us` on, unless it has some before."""
-        if at_us >= station.at_us:
-            return
-        tick_us = station.tick_us
-        at_us = -(-max(at_us, self.open_us) // tick_us) * tick_us
-        if at_us >= station.at_us:
-            return
-        station.at_us = at_us
-        stations = self._stations.get(at_us)
-        if stations is not None:
-            stations.append(station)
-            return
-        self._stations[at_us] = [station]
-        heappush(self._ticks, at_us)
-        self.first_us = min(self.first_us, at_us)
-
-    def take(self, now_us: int) -> list[Station[Any]]:
-        """Take the stations that have work by `now_us`."""
-        if self.first_us > now_us:
-            return []
-        taken = []
-        while self._ticks and self._ticks[0] <= now_us:
-            at_us = heappop(self._ticks)
-            for station in self._stations.pop(at_us):
-                if station.at_us == at_us:
-                    station.at_us = NEVER
-                    taken.append(station)
-        self._pass_over()
-        return taken
-
-    def _pass_over(self) -> None:
-        """Drop ticks whose stations all have gone elsewhere."""
-        while self._ticks:
-            at_us = self._ticks[0]
-            if any(station.at_us == at_us for station in self._stations[at_us]):
-                self.first_us = at_us
-                return
-            del self._stations[heappop(self._ticks)]
-        self.first_us = NEVER
 
 
 _LATE_US: Final = 1_000
@@ -300,6 +243,14 @@ class Rig(Copyable):
         attached = [self._attach(station) and not dense for station in stations]
         self.stations, self._woken = stations, tuple(compress(stations, attached))
         self._looked_at = tuple(compress(stations, map(not_, attached)))
+        self._bus: Any = None  # the bus that the kernel runs from tick to tick, if it can
+        self._look_for_bus()
+
+    def _look_for_bus(self) -> None:
+        """Let the kernel run the rig if all stations are on one bus, in virtual time."""
+        others = self._bridges or self._couplings or self._looked_at
+        virtual = self._jumps and type(self._clock) is VirtualClock
+        self._bus = self._wires.only_bus if kernel and virtual and not others else None
 
     def _attach(self, station: Station[Any]) -> bool:
         """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
@@ -307,14 +258,14 @@ class Rig(Copyable):
         if not is_wire_port(port):
             return False
         station.stand_in(None if self._dense else self._timetable)
-        self.move_on(port.wire)
+        self._wires.join(port.wire)
         if hasattr(device, "horizon"):
             device.horizon = None if self._dense else self._horizon
         return True
 
     def __getstate__(self) -> object:
         """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
-        begun = {"_bridges": (), "_clock": VirtualClock(), "_jumps": not self._dense}
+        begun = {"_bridges": (), "_bus": None, "_clock": VirtualClock(), "_jumps": not self._dense}
         now = {"_in_real_time": False, "acting_us": None, "in_step": False}
         return state_of(self, {**begun, **now})
 
@@ -324,6 +275,7 @@ class Rig(Copyable):
         self._wires.hear_again()
         for station in self.stations:
             self._attach(station)
+        self._look_for_bus()
 
     @overload
     def fork(self) -> Rig: ...
@@ -401,6 +353,7 @@ class Rig(Copyable):
             wire: the wire.
         """
         self._wires.join(wire)
+        self._look_for_bus()
 
     @property
     def next_us(self) -> int:
@@ -430,12 +383,22 @@ class Rig(Copyable):
         """
         self._enter_due()
         self._foresee(t_us + unseen_us if host is None else 0)
-        while (next_us := self._go_on(t_us, host)) <= t_us:
+        while host is not None or not self._run_in_kernel(t_us):
+            if (next_us := self._go_on(t_us, host)) > t_us:
+                self._pass_to(t_us)
+                return
             self._happen(next_us)
             if host is not None and host.arrived_us <= next_us:
                 self._wires.advance(self.now_us)
                 return
-        self._pass_to(t_us)
+
+    def _run_in_kernel(self, t_us: int) -> bool:
+        """Go on in C; False if something is to be done here before that time."""
+        if self._bus is None:
+            return False
+        watchers, hosts = self.watchers, self.hosts
+        parts = (self, self._timetable, self._bus, self.event_queue, self._horizon)
+        return run(*parts, watchers, hosts, t_us)
 
     def run_for(self, duration_us: int) -> None:
         """Step through a time.
@@ -587,6 +550,13 @@ class Rig(Copyable):
             received = station.port.poll(now_us)
             if received or self._dense or station.device.due_us <= now_us:
                 sent.append((station.port, station.device.tick(now_us, received)))
+        if not (kernel and tick_stations(self._timetable, now_us)):
+            self._tick_woken(now_us)
+        for port, traffic in sent:
+            port.send(now_us, traffic)
+
+    def _tick_woken(self, now_us: int) -> None:
+        """Let those compute and send that stand in the timetable."""
         timetable = self._timetable
         woken, enter = timetable.take(now_us), timetable.enter
         timetable.open_us = now_us + 1
@@ -597,8 +567,6 @@ class Rig(Copyable):
                 port.send(now_us, out)
             if (due_us := device.due_us) < NEVER:
                 enter(station, due_us)
-        for port, traffic in sent:
-            port.send(now_us, traffic)
 
     def _couple(self, now_us: int) -> None:
         """Let couplings act, and devices whose inputs they set have work."""

@@ -1,27 +1,25 @@
-"""A device on a port, and when it has work."""
+"""A device on a port, when it has work, and which of several have work at which tick."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Generic
+from heapq import heappop, heappush
+from typing import Any, Generic
 
 from tickrig.device.core import Device, W
-from tickrig.device.twin import Part
+from tickrig.emulators.rig.kernel import StationFields, TimetableFields, in_kernel
 from tickrig.emulators.rig.port import Port
 from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.wire.instant import NEVER
 
-if TYPE_CHECKING:
-    from tickrig.emulators.rig.rig import Timetable
 
-
-class Station(Part, Generic[W]):
+class Station(StationFields, Generic[W]):
     """A device on a port.
 
     Attributes:
         at_us: the tick for which it stands in the timetable of its rig.
     """
 
-    __slots__ = ("_timetable", "at_us", "device", "port", "tick_us")
+    __slots__ = ()
 
     def __init__(self, device: Device[W], port: Port[W]) -> None:
         self.device, self.port, self.tick_us = device, port, device.tick_us
@@ -34,6 +32,7 @@ class Station(Part, Generic[W]):
         if is_wire_port(self.port):
             self.port.attach(self.device, self._wake)
 
+    @in_kernel
     def _wake(self, at_us: int) -> None:
         if at_us < self.at_us and self._timetable is not None:
             self._timetable.enter(self, at_us)
@@ -49,3 +48,68 @@ def next_tick_us(now_us: int, due_us: int, tick_us: int) -> int:
     if due_us <= first_us:
         return first_us
     return -(-due_us // tick_us) * tick_us
+
+
+# Which stations of a rig have work at which tick.
+
+
+class Timetable(TimetableFields):
+    """Ticks with work, soonest first, each with its stations.
+
+    A station stands at one tick, `station.at_us`. Where it stood before it was
+    entered for an earlier tick it is simply passed over.
+
+    Attributes:
+        first_us: the soonest tick with work, `NEVER` if there is none.
+        open_us: no tick is entered before this.
+    """
+
+    __slots__ = ()
+
+    def __init__(self) -> None:
+        self.first_us, self.open_us = NEVER, 1
+        self._ticks: list[int] = []  # a heap
+        self._stations: dict[int, list[Station[Any]]] = {}
+
+    @in_kernel
+    def enter(self, station: Station[Any], at_us: int) -> None:
+        """Let a station have work at the first tick from `at_us` on, unless it has some before."""
+        if at_us >= station.at_us:
+            return
+        tick_us = station.tick_us
+        at_us = -(-max(at_us, self.open_us) // tick_us) * tick_us
+        if at_us >= station.at_us:
+            return
+        station.at_us = at_us
+        stations = self._stations.get(at_us)
+        if stations is not None:
+            stations.append(station)
+            return
+        self._stations[at_us] = [station]
+        heappush(self._ticks, at_us)
+        self.first_us = min(self.first_us, at_us)
+
+    @in_kernel
+    def take(self, now_us: int) -> list[Station[Any]]:
+        """Take the stations that have work by `now_us`."""
+        if self.first_us > now_us:
+            return []
+        taken = []
+        while self._ticks and self._ticks[0] <= now_us:
+            at_us = heappop(self._ticks)
+            for station in self._stations.pop(at_us):
+                if station.at_us == at_us:
+                    station.at_us = NEVER
+                    taken.append(station)
+        self._pass_over()
+        return taken
+
+    def _pass_over(self) -> None:
+        """Drop ticks whose stations all have gone elsewhere."""
+        while self._ticks:
+            at_us = self._ticks[0]
+            if any(station.at_us == at_us for station in self._stations[at_us]):
+                self.first_us = at_us
+                return
+            del self._stations[heappop(self._ticks)]
+        self.first_us = NEVER

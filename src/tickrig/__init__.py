@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tickrig.emulators.commands.device_type import DeviceType as DeviceType
     from tickrig.emulators.fields import DeviceField as DeviceField
     from tickrig.emulators.rig.clock import VirtualClock as VirtualClock
+    from tickrig.emulators.rig.kernel import kernel as kernel
     from tickrig.emulators.rig.rig import Rig as Rig
     from tickrig.emulators.rig.sim_link import SimLink as SimLink
     from tickrig.emulators.rig.station import Station as Station
@@ -63,6 +64,7 @@ else:
             "tickrig.emulators.commands.device_type": ("DeviceType",),
             "tickrig.emulators.fields": ("DeviceField",),
             "tickrig.emulators.rig.clock": ("VirtualClock",),
+            "tickrig.emulators.rig.kernel": ("kernel",),
             "tickrig.emulators.rig.rig": ("Rig",),
             "tickrig.emulators.rig.station": ("Station",),
             "tickrig.emulators.rig.sim_link": ("SimLink",),

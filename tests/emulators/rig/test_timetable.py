@@ -4,8 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.emulators.echo import Echo
-from tickrig.emulators.rig.rig import Timetable
-from tickrig.emulators.rig.station import Station
+from tickrig.emulators.rig.station import Station, Timetable
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.wire.instant import NEVER
 
