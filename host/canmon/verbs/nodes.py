@@ -20,7 +20,7 @@ from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files,
 from tickrig.host.cli.can_options import BusOptions
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.column_traffic import ColumnNodes
+    from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes
     from tickrig.host.canmon.model.columns.columns import Columns
 
 _MANY: Final = 1_000
@@ -91,7 +91,7 @@ class NodesView:
     def take_block(self, columns: Columns) -> None:
         """Take a block of a log."""
         if self._columns is None:
-            from tickrig.host.canmon.model.columns.column_traffic import ColumnNodes  # noqa: PLC0415 - numpy
+            from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes  # noqa: PLC0415 - numpy
 
             self._columns = ColumnNodes(self.decoder, self._board)
         self._columns.take(columns)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -19,13 +18,9 @@ from tickrig.host.canmon.model.columns.columns import (
     by_channel,
     grown,
     records,
-    select,
     split_errors,
 )
-from tickrig.host.canmon.model.decode.bus_decoder import BusDecoder, Effect
-from tickrig.host.canmon.model.decode.decoder import Decoder
-from tickrig.host.canmon.model.decode.node_board import NodeBoard
-from tickrig.host.canmon.model.frames import ERROR, EXTENDED, REMOTE, Record
+from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.traffic import (
     PAYLOAD_BITS,
     BitRow,
@@ -35,7 +30,7 @@ from tickrig.host.canmon.model.traffic import (
     IdRow,
     TrafficSnapshot,
 )
-from tickrig.wire.can import STANDARD_MAX, CanFrame, ErrorFrame
+from tickrig.wire.can import CanFrame, ErrorFrame
 
 # How often each payload bit changes, block after block, as in `BitMemory`; needs numpy.
 
@@ -207,9 +202,9 @@ class ColumnBus:
     def _latest(self) -> Columns:
         """Return the latest frame of each identifier."""
         idents = self._idents
-        channel = np.zeros(len(idents), np.uint8)
+        channel, sent = np.zeros(len(idents), np.uint8), np.zeros(len(idents), np.bool_)
         ident, payload = idents.idents.astype(np.uint32), self._changes.payload
-        return Columns(idents.last_us, ident, self._dlc, payload, channel, (self._channel,))
+        return Columns(idents.last_us, ident, self._dlc, payload, sent, channel, (self._channel,))
 
 
 def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
@@ -227,72 +222,3 @@ def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
     known_us = gap_us if gaps.count else None
     times = (gaps.count + 1, first_us, latest.at_us)
     return IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)
-
-
-# The node board of a log in blocks: only frames that can change it are decoded; needs numpy.
-
-_PIECE: Final = 1 << 10
-"""Frames in Python at once."""
-
-
-class ColumnNodes:
-    """Feeds a node board with blocks; what it shows at their end is as frame by frame.
-
-    Of `NodeStatus.pdos`, which the verb does not show, only those that matter to it are there.
-
-    Args:
-        decoder: it must be `standard`.
-        board: fed by nobody else.
-    """
-
-    def __init__(self, decoder: Decoder, board: NodeBoard) -> None:
-        self._decoder, self._board, self._begun = decoder, board, False
-
-    def take(self, columns: Columns) -> None:
-        """Take a block of frames."""
-        if not len(columns):
-            return
-        if not self._begun:  # nodes with an EDS are on the bus of the very first frame
-            self._feed(columns, np.arange(1))
-            columns, self._begun = select(columns, np.arange(1, len(columns))), True
-        for channel, _, frames in by_channel(columns):
-            self._take_bus(self._decoder.bus(channel), frames)
-            self._board.now_us = max(self._board.now_us, int(frames.at_us.max()))
-
-    def _take_bus(self, bus: BusDecoder, frames: Columns) -> None:
-        before = bus.changes
-        for row, record in _rows(frames, _that_matter(bus, frames)):
-            self._board.take(record, self._decoder.take(record))
-            if bus.changes != before:
-                self._feed(frames, np.arange(row + 1, len(frames)))
-                return
-
-    def _feed(self, frames: Columns, rows: Ints) -> None:
-        """Take frames whatever they mean."""
-        for _, record in _rows(frames, rows):
-            self._board.take(record, self._decoder.take(record))
-
-
-def _rows(frames: Columns, rows: Ints) -> Iterator[tuple[int, Record]]:
-    for begin in range(0, len(rows), _PIECE):
-        piece = rows[begin : begin + _PIECE]
-        yield from zip(piece.tolist(), records(select(frames, piece)), strict=True)
-
-
-def _that_matter(bus: BusDecoder, frames: Columns) -> Ints:
-    """Return the rows of frames that can change what is known of nodes."""
-    can_ids = (frames.ident & STANDARD_MAX).astype(np.int64)
-    can_ids[frames.ident & (EXTENDED | ERROR) != 0] = STANDARD_MAX + 1
-    effects = np.zeros(STANDARD_MAX + 2, np.uint8)
-    for can_id in np.flatnonzero(np.bincount(can_ids)[: STANDARD_MAX + 1]).tolist():
-        effects[can_id] = bus.effect(can_id)
-    found = effects[can_ids]
-    each = np.flatnonzero(found >= Effect.ALONE)
-    latest = np.flatnonzero(found == Effect.LATEST)
-    if not len(latest):
-        return each
-    low = frames.payload[each] & np.uint64(0xFF)
-    between = np.searchsorted(each[(found[each] == Effect.EACH) | (low == 0)], latest)
-    kinds = can_ids[latest] << 5 | (frames.ident[latest] & REMOTE != 0) << 4 | frames.dlc[latest]
-    _, last = np.unique((between << 16 | kinds)[::-1], return_index=True)
-    return np.sort(np.concatenate((each, latest[::-1][last])))

@@ -14,6 +14,7 @@ The frames of a bus by identifier, block after block; needs numpy.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeVar
 
@@ -43,6 +44,7 @@ class Columns:
         ident: identifier; bit 31 extended, bit 30 remote, bit 29 error frame.
         dlc: data length code, 0 to 8.
         payload: data as a little-endian number, zeros behind it.
+        sent: the recorder sent it.
         channel: place of the bus in `channels`.
         channels: names of the buses, in the order in which they appeared.
     """
@@ -51,13 +53,14 @@ class Columns:
     ident: npt.NDArray[np.uint32]
     dlc: npt.NDArray[np.uint8]
     payload: npt.NDArray[np.uint64]
+    sent: npt.NDArray[np.bool_]
     channel: npt.NDArray[np.uint8]
     channels: tuple[str, ...] = ()
 
     @property
     def parts(self) -> tuple[npt.NDArray[Any], ...]:
         """The arrays of the frames' properties."""
-        return self.at_us, self.ident, self.dlc, self.payload, self.channel
+        return self.at_us, self.ident, self.dlc, self.payload, self.sent, self.channel
 
     def __len__(self) -> int:
         """Return how many frames there are."""
@@ -87,7 +90,7 @@ class Rows:
     """Columns of some frames, of which not all are known yet.
 
     Attributes:
-        at_us, ident, dlc, payload, channel: as in `Columns`; 0 where nothing is known.
+        at_us, ident, dlc, payload, sent, channel: as in `Columns`; 0 where nothing is known.
         known: which rows hold a frame.
     """
 
@@ -96,6 +99,7 @@ class Rows:
         self.ident = np.zeros(count, np.uint32)
         self.dlc = np.zeros(count, np.uint8)
         self.payload = np.zeros(count, np.uint64)
+        self.sent = np.zeros(count, np.bool_)
         self.channel = np.zeros(count, np.uint8)
         self.known = np.zeros(count, np.bool_)
 
@@ -107,6 +111,16 @@ class Rows:
             rows.put(row, record, channels.place(record.channel))
         return rows
 
+    @classmethod
+    def joined(cls, pieces: Sequence[Rows]) -> Rows:
+        """Return the rows of several pieces, one at least."""
+        if len(pieces) == 1:
+            return pieces[0]
+        rows = cls(sum(len(piece.known) for piece in pieces))
+        for name in ("at_us", "ident", "dlc", "payload", "sent", "channel", "known"):
+            np.concatenate([getattr(piece, name) for piece in pieces], out=getattr(rows, name))
+        return rows
+
     def put(self, row: int, record: Record, channel: int) -> None:
         """Write one row; NoColumnsError where a frame of CAN FD does not fit into it."""
         frame = record.frame
@@ -115,20 +129,20 @@ class Rows:
         self.at_us[row], self.ident[row] = record.at_us, flagged_id(record)
         self.dlc[row] = len(frame.data) if isinstance(frame, ErrorFrame) else frame.dlc
         self.payload[row] = int.from_bytes(frame.data, "little")
+        self.sent[row] = record.sent
         self.channel[row], self.known[row] = channel, True
 
     def columns(self, channels: ChannelNames) -> Columns:
         """Return the rows that are known as columns."""
-        columns = Columns(
-            self.at_us, self.ident, self.dlc, self.payload, self.channel, channels.names
-        )
+        parts = self.at_us, self.ident, self.dlc, self.payload, self.sent, self.channel
+        columns = Columns(*parts, channels.names)
         return columns if self.known.all() else select(columns, np.flatnonzero(self.known))
 
 
 def select(columns: Columns, rows: Ints) -> Columns:
     """Return some rows."""
-    at_us, ident, dlc, payload, channel = (part[rows] for part in columns.parts)
-    return Columns(at_us, ident, dlc, payload, channel, columns.channels)
+    at_us, ident, dlc, payload, sent, channel = (part[rows] for part in columns.parts)
+    return Columns(at_us, ident, dlc, payload, sent, channel, columns.channels)
 
 
 def by_channel(columns: Columns) -> list[tuple[str, Ints, Columns]]:
@@ -149,10 +163,13 @@ def split_errors(columns: Columns) -> tuple[Columns, Columns]:
 
 
 def records(columns: Columns) -> list[Record]:
-    """Return frames as they were heard; who sent them is not in them."""
+    """Return frames as a reader of single frames gives them."""
     names = columns.channels
     rows = zip(*(part.tolist() for part in columns.parts), strict=True)
-    return [Record(at_us, names[channel], _frame(*frame)) for at_us, *frame, channel in rows]
+    return [
+        Record(at_us, names[channel], _frame(ident, dlc, payload), sent)
+        for at_us, ident, dlc, payload, sent, channel in rows
+    ]
 
 
 def _frame(ident: int, dlc: int, payload: int) -> CanFrame | ErrorFrame:

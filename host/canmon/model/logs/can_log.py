@@ -14,10 +14,10 @@ import struct
 import time
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from pathlib import Path
-from typing import Any, BinaryIO, Final, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, TextIO, cast
 
 import can
 from can.io.blf import FILE_HEADER_SIZE, BLFParseError
@@ -47,41 +47,9 @@ from tickrig.host.links.can_link import to_error_frame, to_fd_frame, to_frame, t
 from tickrig.wire.can import STANDARD_MAX, ErrorClass, ErrorFrame
 from tickrig.wire.errors import WireError
 
-# Theory of operation
-# ===================
-#
-# A BLF file (Vector's binary log) as python-can 4 reads and writes it, and what is added
-# here.
-#
-# file     LOGG, header size (4), file size (16), objects (32), start and end as SYSTEMTIME (40)
-# object   LOBJ, header size (4), header version (6), object size (8), type (12), then by version
-#            1: flags (16), client, version, time (24), body from 32
-#            2: flags (16), ..., time (24), original time, body from 40
-# container  object of type 10: compression (16; 2 is zlib), size when unpacked (24), data from 32
-#
-# Objects are padded to four bytes, in the file and in a container; `_SEARCHED` is the
-# window in which the next one must begin. Contents of containers follow each other as one
-# stream, so an object may begin in one and end in the next; what is left of one is carried
-# over (`held` in `_missing_end`).
-#
-# What python-can does not say, and how it is found:
-#
-# - a log that was cut. It stops in silence. `_missing_end` walks over the file again and
-#   compares what is whole with what the header declares; only logs whose counts differ are
-#   walked twice.
-# - a log whose recorder was killed. Its header still has the size of an empty file
-#   (`_has_end`), and it is read as far as it goes, with an error at its end.
-# - error frames of types 2 and 104, and statistics and driver errors (4, 31). `BlfReader`
-#   takes the data apart before python-can does, hands it the parts between, and puts its
-#   own messages among them: so the order stays that of the file.
-#
-# Writing. Times are relative to a start that the header holds in milliseconds: BLF begins
-# at a second, ASC at a millisecond, TRC at a multiple of 2^-13 days, each the finest start
-# that its text or number holds exactly. Otherwise every time in the log would be off by a
-# rounding of the start. BLF cannot hold a frame from before the start: it gets the time of
-# the start, and is counted (`early`).
-#
-# Everything that a format cannot hold is counted in `messages`, never dropped in silence.
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.blf_block import BlfBlock
+    from tickrig.host.canmon.model.columns.columns import Rows
 
 # What python-can heard.
 
@@ -135,9 +103,16 @@ class CanLogReader:
 
     def __iter__(self) -> Iterator[Record]:
         """Read the file."""
+        return cast("Iterator[Record]", self.blocks(None))
+
+    def blocks(self, apart: TakeApart | None) -> Iterator[Record | Rows]:
+        """Read the file; what `apart` takes apart of a BLF log comes as rows."""
         self.tally = LogTally()
         names: dict[object, str] = {}
-        for message in self._messages():
+        for message in self._messages(apart):
+            if not isinstance(message, can.Message):
+                yield message
+                continue
             if message.channel not in names:
                 names[message.channel] = channel_name(message.channel)
             message.is_extended_id |= message.arbitration_id > STANDARD_MAX  # as ASC without its x
@@ -149,12 +124,12 @@ class CanLogReader:
         """Read the file; its marks are counted alone."""
         return iter(self)
 
-    def _messages(self) -> Iterator[can.Message]:
+    def _messages(self, apart: TakeApart | None) -> Iterator[can.Message | Rows]:
         logging.getLogger("can.io.blf").addHandler(_UNSAID)
         with open_log(self._path) as file:
             try:
                 if self._kind is LogFormat.BLF:
-                    yield from self._blf(BlfReader(file))
+                    yield from self._blf(BlfReader(file), apart)
                 else:
                     yield from self._mf4(file)
             except LogError:
@@ -174,9 +149,10 @@ class CanLogReader:
         except NotImplementedError as error:
             raise LogError(f"{self._path}: {NO_MF4}") from error
 
-    def _blf(self, reader: BlfReader) -> Iterator[can.Message]:
-        count, reader.tally = 0, self.tally
-        for count, message in enumerate(reader, 1):  # noqa: B007 - counted
+    def _blf(self, reader: BlfReader, apart: TakeApart | None) -> Iterator[can.Message | Rows]:
+        count, reader.tally, reader.apart = 0, self.tally, apart
+        for message in cast("Iterator[can.Message | Rows]", reader):
+            count += 1 if isinstance(message, can.Message) else len(message.known)
             yield message
         with open_log(self._path) as file:
             ended = _has_end(file)
@@ -196,9 +172,13 @@ def channel_name(channel: object) -> str:
     return (f"can{name}" if name.isdecimal() else name)[:LONGEST_NAME]
 
 
+TakeApart = Callable[[bytes, float], "BlfBlock | None"]
+"""Takes the contents of a container apart, whose log begins at a time in s."""
+
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
 _OBJECT: Final = struct.Struct("<4sHHLL")  # signature, header, version, size, type
 _CONTAINER: Final = struct.Struct("<H6xL4x")  # compression, size of what is in it
+OBJECT_BYTES: Final = _OBJECT.size
 _SIGNATURE: Final = b"LOBJ"
 _SEARCHED: Final = 8
 """Bytes in which an object begins: behind the padding of the one before."""
@@ -208,6 +188,9 @@ _DEFLATED: Final = 2
 
 ERROR, STATISTIC, DRIVER_ERROR, FD_ERROR = 2, 4, 31, 104
 """Types of objects that tell of errors and that python-can passes over."""
+BLF_FRAMES: Final = (ERROR, 73, 100, 101, FD_ERROR)
+"""Types of frames that are no data or remote frames of CAN."""
+BLF_NOTES: Final = (STATISTIC, DRIVER_ERROR)
 _STAMP: Final = struct.Struct("<L4xQ")  # flags, time
 _IN_10_US: Final = 1
 """The flag of a time that is not in nanoseconds."""
@@ -222,20 +205,26 @@ class BlfReader(can.BLFReader):
 
     Attributes:
         tally: takes what objects say of errors that are no frames.
+        apart: takes containers apart that hold usual frames alone.
     """
 
     tally: LogTally
+    apart: TakeApart | None = None
 
-    def _parse_data(self, data: bytes) -> Iterator[can.Message]:
-        # `begin` is behind the last object that was taken out; python-can gets what lies
-        # between.
+    def _parse_data(self, data: bytes) -> Iterator[Any]:
+        if self.apart is not None and (block := self.apart(data, self.start_timestamp)):
+            for at, size, kind in block.notes:
+                self._note(data[at : at + size], kind)
+            self._pos = block.end
+            yield block.rows
+            return
         begin = at = 0
         for at, size, kind in _objects(data):
             if kind in (ERROR, FD_ERROR):
                 yield from self._part(data, begin, at)
                 yield self._error_frame(data[at : at + size], kind)
                 begin = at + size
-            elif kind in (STATISTIC, DRIVER_ERROR):
+            elif kind in BLF_NOTES:
                 self._note(data[at : at + size], kind)
         yield from self._part(data, begin, len(data))
 

@@ -81,7 +81,8 @@ def rows_of_records(records: Iterable[Record]) -> list[tuple[object, ...]]:
     for record in records:
         length = getattr(record.frame, "dlc", len(record.frame.data))
         payload = int.from_bytes(record.frame.data, "little")
-        rows.append((record.at_us, flagged_id(record), length, payload, record.channel))
+        row = record.at_us, flagged_id(record), length, payload, record.sent, record.channel
+        rows.append(row)
     return rows
 
 
@@ -169,7 +170,7 @@ def test_more_buses_than_a_byte_numbers_are_refused(tmp_path: Path) -> None:
 def test_other_formats_are_read_frame_by_frame(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_text('{"v":1,"t":1.5,"ch":"can0","id":1,"x":1,"dir":"rx","data":"0A"}\n')
-    assert rows_of(read_columns(path)) == [(1_500_000, 0x8000_0001, 1, 10, "can0")]
+    assert rows_of(read_columns(path)) == [(1_500_000, 0x8000_0001, 1, 10, False, "can0")]
 
 
 @pytest.mark.parametrize(
