@@ -282,7 +282,8 @@ def count_text(count: int | None) -> str:
     return "-" if count is None else str(count)
 
 
-_DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
+DATA_WIDTH: Final = len("[8]  00 11 22 33 44 55 66 77")
+"""Of the longest data, which what a frame means stands behind."""
 
 
 class Stamp(StrEnum):
@@ -303,42 +304,48 @@ class DumpLines:
     Args:
         stamp: what stands before a frame.
         extra: show whether the frame was received or sent, with B and E for BRS and ESI.
+
+    Attributes:
+        form: what stands before a frame.
+        first_us: when the first frame came; None before it.
+        last_us: when the last one came.
+        width: how many digits identifiers have.
     """
 
     def __init__(self, stamp: Stamp = Stamp.NONE, extra: bool = False) -> None:
-        self._stamp, self._extra = stamp, extra
-        self._first_us: int | None = None
-        self._last_us, self._width = 0, 3
+        self.form, self.extra = stamp, extra
+        self.first_us: int | None = None
+        self.last_us, self.width = 0, 3
 
     def line(self, record: Record, text: str = "") -> str:
         """Return the line, with what the frame means behind it."""
         ident = _ident(record.frame)
-        self._width = max(self._width, len(ident))
+        self.width = max(self.width, len(ident))
         direction = ""
-        if self._extra:
+        if self.extra:
             direction = f"  {'TX' if record.sent else 'RX'} {_flags(record.frame)}"
         stamp = self.stamp(record.at_us)
-        data = f"{_data(record.frame):<{_DATA_WIDTH + 1}}   {text}" if text else _data(record.frame)
-        return f"{stamp}  {record.channel}{direction}  {ident:>{self._width}}  {data}"
+        data = f"{_data(record.frame):<{DATA_WIDTH + 1}}   {text}" if text else _data(record.frame)
+        return f"{stamp}  {record.channel}{direction}  {ident:>{self.width}}  {data}"
 
     def stamp(self, at_us: int) -> str:
         """Return what stands before what was heard at this time."""
-        if self._stamp is Stamp.NONE:
+        if self.form is Stamp.NONE:
             return ""
-        if self._first_us is None:
-            self._first_us = self._last_us = at_us
-        last_us, self._last_us = self._last_us, at_us
-        match self._stamp:
+        if self.first_us is None:
+            self.first_us = self.last_us = at_us
+        last_us, self.last_us = self.last_us, at_us
+        match self.form:
             case Stamp.ABSOLUTE:
                 return f" ({seconds_text(at_us, 10)})"
             case Stamp.DATE:
                 return f" ({date_text(at_us)})"
             case Stamp.ZERO:
-                return f" ({seconds_text(at_us - self._first_us, 3)})"
+                return f" ({seconds_text(at_us - self.first_us, 3)})"
             case Stamp.DELTA:
                 return f" ({seconds_text(at_us - last_us, 3)})"
             case _:
-                assert_never(self._stamp)
+                assert_never(self.form)
 
 
 def _flags(frame: AnyFrame) -> str:
@@ -385,7 +392,7 @@ def date_text(at_us: int) -> str:
 def line_text(line: LineRecord, text: str) -> str:
     """Write the line, with what it means behind it."""
     data = bytes_text(line.data)
-    shown = f"{data:<{_DATA_WIDTH}}   {text}" if text else data
+    shown = f"{data:<{DATA_WIDTH}}   {text}" if text else data
     return f"{line.channel}  {ARROWS[line.sent]}  {shown}"
 
 

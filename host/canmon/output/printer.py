@@ -8,7 +8,7 @@ from enum import StrEnum
 from math import isfinite
 from typing import TYPE_CHECKING, Final, assert_never
 
-from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
+from tickrig.host.canmon.model.frames import DumpLines, Record, decoded_text
 from tickrig.host.canmon.model.logs.log_writer import comment, log_line
 from tickrig.host.canmon.model.logs.mark import Mark, dropped
 from tickrig.host.canmon.model.logs.notation import DUMP_HEADER, drop_line, json_line, line_json
@@ -17,6 +17,7 @@ from tickrig.host.text.page_text import json_text, one_line
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.decode.decoder import Decoder
     from tickrig.host.canmon.model.decode.filter import Filter
@@ -81,19 +82,16 @@ class DumpFormat(StrEnum):
     CSV = "csv"
 
 
-def printer_of(
-    output: DumpFormat, stamp: Stamp, extra: bool, raw: bool, errors: bool = False
-) -> _Printer:
+def printer_of(output: DumpFormat, lines: DumpLines, raw: bool, errors: bool = False) -> _Printer:
     """Return what prints a frame.
 
     Args:
         output: as what.
-        stamp: time in front of lines of text.
-        extra: direction in lines of text.
+        lines: writes lines of text.
         raw: leave out what frames mean,
         errors: but not of error frames.
     """
-    write = _writer(output, stamp, extra)
+    write = _writer(output, lines)
     if not raw:
         return write
     if errors:
@@ -101,10 +99,10 @@ def printer_of(
     return lambda record, _: write(record, None)
 
 
-def _writer(output: DumpFormat, stamp: Stamp, extra: bool) -> _Printer:
+def _writer(output: DumpFormat, lines: DumpLines) -> _Printer:
     match output:
         case DumpFormat.TEXT:
-            return _text_printer(DumpLines(stamp, extra))
+            return _text_printer(lines)
         case DumpFormat.LOG:
             return _log_printer
         case DumpFormat.JSONL:
@@ -194,6 +192,33 @@ def _cell(text: str) -> str:
     return f'"{quoted}"' if set(text) & set(',"\r\n') else text
 
 
+class BlockPrinter:
+    """Writes the lines of many frames at once, the same as `printer_of` one by one.
+
+    Args:
+        output: text, or a log.
+        lines: writes single lines of text; it goes on where this ends, and the other way round.
+    """
+
+    def __init__(self, output: DumpFormat, lines: DumpLines) -> None:
+        from tickrig.host.canmon.model.columns.column_text import (  # noqa: PLC0415 - numpy
+            ScreenText,
+            fits,
+            log_lines,
+        )
+        from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
+
+        self._fits, self._records, self._print = fits, records, printer_of(output, lines, raw=False)
+        self._write = log_lines if output is DumpFormat.LOG else ScreenText(lines).text
+
+    def text(self, columns: Columns, meaning: FilteredDecoder) -> str:
+        """Write frames; the last line is without its end."""
+        if not self._fits(columns):
+            found = meaning.take(self._records(columns))
+            return "\n".join(self._print(*one) for one in found)
+        return self._write(columns)[:-1] if len(columns) else ""
+
+
 _DROPS: Final = {
     DumpFormat.LOG: lambda lost: comment(dropped(0, lost)),
     DumpFormat.JSONL: drop_line,
@@ -221,8 +246,14 @@ class StdoutWriter:
         self, decoded_frames: Sequence[DecodedFrame], lost: int, marks: Sequence[Mark] = ()
     ) -> bool:
         """Print frames, at once; it always takes more."""
+        return self.take_text(
+            "\n".join([self._printer(*one) for one in decoded_frames]), lost, marks
+        )
+
+    def take_text(self, text: str, lost: int, marks: Sequence[Mark] = ()) -> bool:
+        """Print lines of frames, the last without its end."""
         lines = [DUMP_HEADER] if self._header else []
-        lines += [self._printer(*one) for one in decoded_frames]
+        lines += [text] if text else []
         if lost != self._lost and (said := _DROPS.get(self._output)):
             lines.append(said(lost - self._lost))
         if marks and (write := _MARKS.get(self._output)):

@@ -28,6 +28,7 @@ from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode.filter import Filter
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
@@ -88,6 +89,14 @@ class LogFile:
         if self.recorder.failed:
             raise SourceFailed(self.recorder.failed)
         return bool(self.recorder.ended)
+
+    def take_block(self, block: Columns) -> bool:
+        """Add many frames at once, one at least; False where `take` is to add them."""
+        self._watch.latest_us = int(block.at_us[-1])
+        taken = self.recorder.take_block(block, self._now_us)
+        if self.recorder.failed:
+            raise SourceFailed(self.recorder.failed)
+        return taken
 
     def trigger(self, why: str) -> None:
         """Record what was kept and what comes, where it waits for that."""

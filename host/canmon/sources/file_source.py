@@ -205,6 +205,52 @@ class BlockLog(AnySource["Columns"]):
         return []
 
 
+class PieceLog(LoggedSource):
+    """A log file in pieces: columns where it has them, else frames up to the next marks.
+
+    Raises:
+        SourceFailed: the file cannot be read.
+    """
+
+    live = False
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        from tickrig.host.canmon.model.columns.column_reader import read_columns  # noqa: PLC0415 - numpy
+
+        _check_readable(path)
+        self._path, self._reader = path, read_columns(path)
+        self._stream = self._reader.pieces()
+
+    def tallies(self) -> Iterable[tuple[str, LogTally]]:
+        """Return the tally of the file."""
+        return [(str(self._path), self._reader.tally)]
+
+    def pieces(self) -> Iterator[Columns | Sequence[Record]]:
+        """Read the file; `lost` and `marks` are of what is behind each piece."""
+        ahead: Columns | Sequence[Item] | None = ()
+        while not self._ended:
+            if not self._items:
+                # marks that follow each other are one event, wherever a piece ends
+                items = list[Item]()
+                while isinstance(ahead, Sequence) and len(items) < _BATCH:
+                    items += ahead
+                    ahead = self._next()
+                self._items, self._no_more = items, ahead is None
+                if not items and ahead is not None and not isinstance(ahead, Sequence):
+                    self.marks, block, ahead = (), ahead, ()
+                    yield block
+                    continue
+            yield self.poll(0)
+
+    def _next(self) -> Columns | Sequence[Item] | None:
+        try:
+            return next(self._stream, None)
+        except (OSError, LogError) as error:
+            self.failed = str(error)
+        return None
+
+
 def block_log(words: Sequence[str]) -> BlockLog | None:
     """Open the log that SOURCE words name; None if it is better read frame by frame.
 
@@ -212,12 +258,24 @@ def block_log(words: Sequence[str]) -> BlockLog | None:
         Refused: words that name nothing.
         SourceFailed: a file that cannot be read.
     """
+    path = _large_log(words)
+    return None if path is None else BlockLog(path)
+
+
+def piece_log(words: Sequence[str]) -> PieceLog | None:
+    """Open the log that SOURCE words name in pieces; None and errors as `block_log`."""
+    path = _large_log(words)
+    return None if path is None else PieceLog(path)
+
+
+def _large_log(words: Sequence[str]) -> Path | None:
+    """Return the path of a log that is to be read in blocks."""
     if len(words) != 1 or find_spec("numpy") is None:
         return None
     word = parse_source(words[0])
     if not isinstance(word, FileSpec) or word.chosen is not None:
         return None
     try:
-        return BlockLog(word.path) if word.path.stat().st_size >= SMALL_BYTES else None
+        return word.path if word.path.stat().st_size >= SMALL_BYTES else None
     except OSError:
         return None  # who reads it frame by frame says so

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from tickrig.host.canmon.model.recorder.plan import RecordingPlan
 from tickrig.host.canmon.output.listening import report, until_interrupted
-from tickrig.host.canmon.output.printer import FilteredDecoder
+from tickrig.host.canmon.output.printer import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.recording import LogFile, whole_log
+from tickrig.host.canmon.sources.file_source import PieceLog, piece_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.verbs.decode_options import (
     decode_options,
@@ -24,6 +26,10 @@ from tickrig.host.canmon.verbs.decode_options import (
 from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import INTERRUPTED
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.logs.mark import Mark
 
 
 @click.command()
@@ -56,16 +62,39 @@ def command(  # noqa: PLR0913 - options
     """  # noqa: D301 - click wants the backspace
     chosen = read_filter(wanted)
     decoder = None if chosen is None else make_decoder(eds, dbc)
-    meaning, frames = FilteredDecoder(decoder, chosen), open_source(source)
+    meaning, pieces = (
+        FilteredDecoder(decoder, chosen),
+        piece_log(source) if chosen is None else None,
+    )
+    frames = pieces or open_source(source)
     with closing(frames), whole_log(log, source) as place:
         with (
             closing(LogFile(RecordingPlan(path=place), source, kept=place == log)) as out,
             until_interrupted() as signals,
         ):
-            pass_on(frames, meaning, signals.behind(out.take))
+            if pieces is None:
+                pass_on(frames, meaning, signals.behind(out.take))
+            else:
+                _pass_pieces(pieces, signals.behind(out.take), signals.behind(out.take_block))
         if signals.came and place != log:
             raise click.exceptions.Exit(INTERRUPTED)
     report(frames, strict, meaning.messages())
+
+
+def _pass_pieces(
+    log: PieceLog,
+    take: Callable[[list[DecodedFrame], int, Sequence[Mark]], bool],
+    take_block: Callable[[Columns], bool],
+) -> None:
+    """Pass a large log on, of which all frames are wanted."""
+    from tickrig.host.canmon.model.columns.column_text import fits  # noqa: PLC0415 - numpy
+    from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
+
+    for piece in log.pieces():
+        if isinstance(piece, Sequence):
+            take([(record, None) for record in piece], log.lost, log.marks)
+        elif len(piece) and not (fits(piece) and take_block(piece)):
+            take([(record, None) for record in records(piece)], log.lost, log.marks)
 
 
 explained(command)

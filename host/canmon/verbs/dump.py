@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.frames import Stamp
+from tickrig.host.canmon.model.frames import DumpLines, Stamp
 from tickrig.host.canmon.output.listening import bit_rate_of, report, say_marks, until_interrupted
 from tickrig.host.canmon.output.printer import (
+    BlockPrinter,
     DecodedFrame,
     DumpFormat,
     FilteredDecoder,
@@ -31,6 +32,7 @@ from tickrig.host.canmon.output.recording import (
     filter_trigger,
     recording_options,
 )
+from tickrig.host.canmon.sources.file_source import PieceLog, piece_log
 from tickrig.host.canmon.sources.opening import open_any
 from tickrig.host.canmon.sources.source import AnySource, LineSpec, parse_source
 from tickrig.host.canmon.verbs.decode_options import (
@@ -198,9 +200,14 @@ def command(  # noqa: PLR0913 - options
     if recording is not None and recording.triggers and chosen is not None:
         kept, chosen = filter_trigger(wanted or "", chosen), None  # triggers see all frames
     meaning = FilteredDecoder(decoder, chosen)
-    take: _Take = StdoutWriter(
-        printer_of(form, Stamp(stamp or ""), extra, plain, errors), form
-    ).take
+    lines = DumpLines(Stamp(stamp or ""), extra)
+    writer = StdoutWriter(printer_of(form, lines, plain, errors), form)
+    take: _Take = writer.take
+    alike = form in (DumpFormat.TEXT, DumpFormat.LOG) and file is None and not errors and plain
+    if alike and chosen is None and count is None and (pieces := piece_log(source)):
+        _pass_pieces(pieces, meaning, writer, BlockPrinter(form, lines))
+        report(pieces, strict)
+        return
     with ExitStack() as held:
         frames = held.enter_context(closing(open_any(source, bus)))
         if reopen or (recording is not None and recording.plan.numbered):
@@ -217,6 +224,18 @@ def command(  # noqa: PLR0913 - options
             whole = take if recording is None else signals.behind(take)
             pass_on(frames, meaning, whole, count, quiet_ms)
     report(frames, strict, meaning.messages())
+
+
+def _pass_pieces(
+    log: PieceLog, meaning: FilteredDecoder, writer: StdoutWriter, blocks: BlockPrinter
+) -> None:
+    """Print a large log, of which all frames are wanted."""
+    with closing(log), until_interrupted(), until_unread():
+        for piece in log.pieces():
+            if isinstance(piece, Sequence):
+                writer.take(list(meaning.take(piece)), log.lost, log.marks)
+            else:
+                writer.take_text(blocks.text(piece, meaning), log.lost)
 
 
 def _with_keys(log: LogFile, keys: TriggerKeys) -> _Take:

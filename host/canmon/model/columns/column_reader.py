@@ -8,7 +8,8 @@ that the result is the same, frame for frame. So are the containers of a BLF log
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Final
 
@@ -25,8 +26,16 @@ from tickrig.host.canmon.model.logs.log_file import (
     read_blocks,
 )
 from tickrig.host.canmon.model.logs.log_reader import (
+    BLOCK_BYTES as PIECE,
+)
+from tickrig.host.canmon.model.logs.log_reader import (
+    Item,
+    LogLines,
     LogReader,
     WholeLines,
+    among,
+    holds_frame,
+    is_usual,
     parse_log_line,
     read_log,
 )
@@ -214,6 +223,9 @@ BLOCK_BYTES: Final = 1 << 20
 _BATCH: Final = 1 << 14
 """Frames of a block of other formats; of half as many statistics take a third longer."""
 
+_ITEMS: Final = 1 << 10
+"""Frames of a piece that is no columns."""
+
 
 def read_columns(path: Path) -> ColumnReader:
     """Return a reader of a log file; nothing is opened yet.
@@ -247,6 +259,90 @@ class ColumnReader:
         candump = self._kind is LogFormat.CANDUMP
         for rows in self._of_lines() if candump else self._of_frames():
             yield rows.columns(self._channels)
+
+    def pieces(self) -> Iterator[Columns | Sequence[Item]]:
+        """Read the file, with the marks among its frames: these pieces come as frames.
+
+        So do those with frames of CAN FD, and formats that have no columns.
+        """
+        if self._kind is LogFormat.CANDUMP:
+            yield from self._pieces_of_lines()
+        elif self._kind is LogFormat.BLF:
+            yield from self._pieces_of_blocks()
+        else:
+            reader = read_log(self._path)
+            items = reader.items()
+            while batch := list(islice(items, _ITEMS)):
+                self.tally = reader.tally
+                yield batch
+            self.tally = reader.tally
+
+    def _pieces_of_lines(self) -> Iterator[Columns | Sequence[Item]]:
+        lines, whole = LogLines(), WholeLines()
+        lines.tally = self.tally
+        with open_log(self._path) as file:
+            for data in read_blocks(file, self._path, BLOCK_BYTES):
+                if text := whole.push(data):
+                    yield from self._piece(text, lines, len(text) - data.rfind(b"\n") - 1)
+        if rest := whole.finish():
+            yield from self._piece(rest + b"\n", lines, len(rest))
+
+    def _piece(self, text: bytes, lines: LogLines, held: int) -> Iterator[Columns | Sequence[Item]]:
+        """Give the frames of some lines: as columns, where no line holds anything else.
+
+        Args:
+            text: the lines, each with its LF.
+            lines: reads them, or counts them.
+            held: so many bytes of the text were read with what is before it.
+        """
+        block = CandumpBlock(text)
+        rows = Rows(len(block.starts))
+        block.take(rows, self._channels)
+        strange = (~rows.known).nonzero()[0].tolist()
+        if len(strange) > len(rows.known) // 8 or not all(
+            map(holds_frame, map(block.line, strange))
+        ):
+            for begin, end in pairwise((0, *range(held + PIECE, len(text), PIECE), len(text))):
+                records = lines.push(text[begin:end])
+                yield among(records, lines.marks)
+            return
+        for row in strange:
+            record = parse_log_line(block.line(row), lines.number + row + 1, self.tally)
+            if record is not None:
+                rows.put(row, record, self._channels.place(record.channel))
+        columns = rows.columns(self._channels)
+        unusual = any(not is_usual(block.line(row)) for row in strange)
+        lines.skip(len(rows.known), int(columns.at_us[-1]) if len(columns) else None, unusual)
+        yield columns
+
+    def _pieces_of_blocks(self) -> Iterator[Columns | Sequence[Item]]:
+        reader = read_log(self._path)
+        singles = list[Item]()
+        failed = None
+        frames = self._frames(reader)
+        while failed is None:
+            try:
+                found = next(frames)
+            except StopIteration:
+                break
+            except (LogError, OSError) as error:  # all that was read before it counts
+                failed = error
+                break
+            self.tally = reader.tally
+            if isinstance(found, Record):
+                singles.append(found)
+                if len(singles) < _ITEMS:
+                    continue
+            if singles:
+                yield singles
+                singles = []
+            if not isinstance(found, Record):
+                yield found.columns(self._channels)
+        self.tally = reader.tally
+        if singles:
+            yield singles
+        if failed is not None:
+            raise failed
 
     def _of_frames(self) -> Iterator[Rows]:
         """Read frames, or many of them together where the format has columns, in pieces."""

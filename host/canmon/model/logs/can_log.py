@@ -44,12 +44,12 @@ from tickrig.host.canmon.model.logs.mark import (
 )
 from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
 from tickrig.host.links.can_link import to_error_frame, to_fd_frame, to_frame, to_message
-from tickrig.wire.can import STANDARD_MAX, ErrorClass, ErrorFrame
+from tickrig.wire.can import ERROR_FLAG, STANDARD_MAX, ErrorClass, ErrorFrame
 from tickrig.wire.errors import WireError
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.columns.blf_block import BlfBlock
-    from tickrig.host.canmon.model.columns.columns import Rows
+    from tickrig.host.canmon.model.columns.columns import Columns, Rows
 
 # What python-can heard.
 
@@ -351,6 +351,10 @@ _DATE: Final = "%a %b %d %H:%M:%S.{:03d} %Y"
 _END: Final = "End TriggerBlock\n"
 
 
+_EXACT_US: Final = 1 << 51
+"""Below it a time in seconds is exact to the microsecond as a floating-point number."""
+
+
 class AscWriter:
     """Begins at a millisecond of local time; a frame from before begins another block.
 
@@ -373,6 +377,26 @@ class AscWriter:
         assert self._begin_us is not None, "it has begun"
         seconds, micros = divmod(at_us - self._begin_us, 1_000_000)
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
+
+    def write_block(self, block: Columns, number: Callable[[str], int]) -> bool:
+        """Write many frames at once, 0.4 us each where one by one takes 6; False if it cannot.
+
+        It leaves error frames, a frame that begins another block, and times that are not exact as
+        floating-point numbers to who writes them one by one.
+        """
+        from tickrig.host.canmon.model.columns.column_text import asc_lines  # noqa: PLC0415 - numpy
+
+        first_us, earliest_us = int(block.at_us[0]), int(block.at_us.min())
+        begin_us = self._begin_us
+        if earliest_us < (first_us if begin_us is None else begin_us):
+            return False
+        if (block.ident & ERROR_FLAG).any() or int(block.at_us.max()) >= _EXACT_US:
+            return False
+        if begin_us is None:
+            self._begin(first_us)
+        assert self._begin_us is not None, "it has begun"
+        self._file.write(asc_lines(block, self._begin_us, number))
+        return True
 
     def mark(self, mark: Mark) -> None:
         """Write a comment."""
@@ -567,6 +591,11 @@ class CanLogWriter:
             if self._kind is LogFormat.TRC or record.at_us >= _END_US:
                 return
         self._writer.on_message_received(to_can(record, self._numbers.number(record.channel)))
+
+    def write_block(self, block: Columns, /) -> bool:
+        """Add many frames at once; False where they are to be added one by one."""
+        writer = self._writer
+        return isinstance(writer, AscWriter) and writer.write_block(block, self._numbers.number)
 
     def mark(self, mark: Mark, /) -> None:
         """Add a comment or marker, or count it."""

@@ -92,6 +92,7 @@ _COMMENTS: Final = ("#", ";", "//")
 _LINE: Final = re.compile(
     r"\(([0-9]{1,12})\.([0-9]{1,9})\)\s+(\S{1,32})\s+(\S+)(?:\s+([RT]))?", re.ASCII
 )
+"""A line as `candump -L` writes it, with any frame."""
 _XL: Final = re.compile(r"[0-9A-Fa-f]{5}#[0-9A-Fa-f:]{14}#(?:[0-9A-Fa-f]{2})+")
 
 
@@ -153,6 +154,16 @@ _USUAL: Final = re.compile(
 """A line with a data frame, as candump writes it: nearly all are so."""
 
 
+def is_usual(line: str) -> bool:
+    """Say whether a line holds a data frame as candump writes it."""
+    return _USUAL.match(line) is not None
+
+
+def holds_frame(line: str) -> bool:
+    """Say whether a line is one of `candump -L` that has no frame of CAN FD, nor is a mark."""
+    return "##" not in line and _LINE.fullmatch(line.strip()) is not None
+
+
 class LogLines:
     """A decoder of a log in text: `push` what has come in, `finish` at its end.
 
@@ -162,11 +173,12 @@ class LogLines:
         tally: what was no frame.
         marks: marks among the frames that were returned last, with how many of these are in
             front of each.
+        number: how many lines there were.
     """
 
     def __init__(self) -> None:
         self.tally, self.marks = LogTally(), list[tuple[int, Mark]]()
-        self._whole, self._number, self._latest_us = WholeLines(), 0, 0
+        self._whole, self.number, self._latest_us = WholeLines(), 0, 0
         self._clock: ScreenClock | None = None
 
     @property
@@ -179,14 +191,27 @@ class LogLines:
         lines, self.marks = self._whole.push(data), []
         return self._frames(lines[:-1].decode("latin-1")) if lines else []
 
+    def skip(self, lines: int, latest_us: int | None, unusual: bool) -> None:
+        """Pass over lines that hold frames, as `holds_frame` has it, and were read as columns.
+
+        Args:
+            lines: how many.
+            latest_us: when the last frame among them came; None if there was none.
+            unusual: one was not as `is_usual` has it.
+        """
+        self.number += lines
+        if unusual:
+            self._clock = self._clock or ScreenClock()
+        self._latest_us = self._latest_us if latest_us is None else latest_us
+
     def finish(self) -> list[Record]:
         """Return the frame of a last line without LF."""
         rest, self.marks = self._whole.finish(), []
         return self._frames(rest.decode("latin-1")) if rest else []
 
     def _frames(self, text: str) -> list[Record]:
-        count, begin = text.count("\n") + 1, self._number
-        self._number += count
+        count, begin = text.count("\n") + 1, self.number
+        self.number += count
         usual = _USUAL.findall(text)
         # All lines or none: if one is unusual the block is read line by line, so that the
         # order, the numbers of bad lines and the marks are right.

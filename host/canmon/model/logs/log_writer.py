@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from importlib import import_module
 from pathlib import Path
-from typing import Final, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, cast, runtime_checkable
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
@@ -19,6 +19,9 @@ from tickrig.host.canmon.model.logs.notation import (
     json_line,
 )
 from tickrig.wire.can import CanFrame, ErrorFrame
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
 
 _BLOCK_LINES: Final = 256
 
@@ -70,6 +73,15 @@ class LogWriter(Protocol):
 
     def messages(self) -> list[str]:
         """Say what the format could not hold, one line each."""
+        ...
+
+
+@runtime_checkable
+class BlockWriter(Protocol):
+    """A log that takes many frames at once."""
+
+    def write_block(self, block: Columns, /) -> bool:
+        """Add frames, one at least; False where they are to be added one by one."""
         ...
 
 
@@ -125,6 +137,16 @@ class TextLogWriter:
         self._lines.append(self._row(record))
         if len(self._lines) >= _BLOCK_LINES:
             self._give()
+
+    def write_block(self, block: Columns, /) -> bool:
+        """Add many frames at once; False where they are to be added one by one."""
+        if self._kind is not LogFormat.CANDUMP:
+            return False
+        from tickrig.host.canmon.model.columns.column_text import log_lines  # noqa: PLC0415 - numpy
+
+        self._give()
+        self._file.write(log_lines(block).encode())
+        return True
 
     def mark(self, mark: Mark, /) -> None:
         """Add a comment, or an event."""

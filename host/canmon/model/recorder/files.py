@@ -11,14 +11,17 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.logs.log_writer import in_blocks, write_log
+from tickrig.host.canmon.model.logs.log_writer import BlockWriter, in_blocks, write_log
 from tickrig.host.canmon.model.logs.mark import BACK, TRIGGER, VERSION, Mark
 from tickrig.host.canmon.model.recorder.plan import RESERVE_BYTES, AtLimit, RecordingPlan
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
 
 # One file of a recording.
 
@@ -74,6 +77,15 @@ class RecordingPart:
         self.frames += len(records)
         self.first_us = records[0].at_us if self.first_us is None else self.first_us
         self.last_us, self._pending = records[-1].at_us, True
+
+    def write_block(self, block: Columns) -> bool:
+        """Add many frames at once; False where its format wants them one by one."""
+        if not isinstance(self._writer, BlockWriter) or not self._writer.write_block(block):
+            return False
+        self.frames += len(block)
+        self.first_us = int(block.at_us[0]) if self.first_us is None else self.first_us
+        self.last_us, self._pending = int(block.at_us[-1]), True
+        return True
 
     def mark(self, mark: Mark) -> None:
         """Add a mark."""
@@ -296,6 +308,16 @@ class Files:
             part.flush(self._latest_us)
             begin = end
             self._keep_limit()
+
+    def store_block(self, block: Columns) -> bool:
+        """Add many frames at once; False where they are to be stored one by one."""
+        part = self._part
+        if self._index is not None or part is None or not part.write_block(block):
+            return False
+        self.frames += len(block)
+        self._latest_us = int(block.at_us[-1])
+        part.flush(self._latest_us)
+        return True
 
     def mark(self, mark: Mark) -> None:
         """Add a mark to the file that is under way, and to the index."""

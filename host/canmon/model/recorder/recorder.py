@@ -21,6 +21,7 @@ from tickrig.host.canmon.model.recorder.plan import (
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
+    from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
@@ -243,6 +244,25 @@ class Recorder:
             self._files.flush(now_us)
         except (OSError, LogError) as error:
             self._fail(error)
+
+    def take_block(self, block: Columns, now_us: int) -> bool:
+        """Take many frames, one at least; False where they are to be taken one by one.
+
+        Args:
+            block: frames, behind which nothing happened.
+            now_us: the time.
+        """
+        whole = self._before is None and self._wanted is None
+        if not whole or self.state is not RecorderState.RECORDING:
+            return False
+        try:
+            stored = self._files.store_block(block)
+            if stored:
+                self._files.flush(now_us)
+        except (OSError, LogError) as error:
+            self._fail(error)
+            return True
+        return stored
 
     def trigger(self, why: str, now_us: int) -> None:
         """Record what is kept, and what comes: somebody has pressed a key."""

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canmon.model.frames import LineRecord, Stamp
+from tickrig.host.canmon.model.frames import DumpLines, LineRecord, Stamp
 from tickrig.host.canmon.model.logs.log_reader import LogLines
 from tickrig.host.canmon.output.printer import DumpFormat, printer_of
 from tickrig.host.canmon.sources.line_source import RrcLines
@@ -31,16 +31,16 @@ def line(data: bytes) -> LineRecord:
 )
 def test_a_line_of_a_serial_port_is_printed_like_this(output: DumpFormat, text: str) -> None:
     found = line(b"output1eff\n")
-    assert printer_of(output, Stamp.ZERO, False, False)(found, found.decoded) == text
+    assert printer_of(output, DumpLines(Stamp.ZERO), False)(found, found.decoded) == text
 
 
 def test_bytes_that_are_no_text_are_hex() -> None:
-    printed = printer_of(DumpFormat.TEXT, Stamp.NONE, False, True)
+    printed = printer_of(DumpFormat.TEXT, DumpLines(Stamp.NONE), True)
     assert printed(line(b"\x01\xff\n"), None) == "  tty  >  01 FF"
 
 
 def test_a_log_reader_counts_lines_of_a_serial_port() -> None:
     found, lines = line(b"device\n"), LogLines()
-    text = printer_of(DumpFormat.JSONL, Stamp.NONE, False, False)(found, found.decoded)
+    text = printer_of(DumpFormat.JSONL, DumpLines(Stamp.NONE), False)(found, found.decoded)
     assert lines.push(text.encode() + b"\n") == []
     assert lines.tally.messages("pipe") == ["pipe: 1 lines of a serial port passed over"]

@@ -157,7 +157,7 @@ def show(records: list[Record]) -> None:
     """Do with frames what verbs do."""
     traffic, trace, decoder = Traffic(BitRates(500_000, 2_000_000)), FrameTrace(), Decoder()
     checker = Checker(Rules(no_emcy=True, no_sdo_abort=True, max_load=50.0), 500_000)
-    printers = [printer_of(output, Stamp.DATE, True, raw=False) for output in DumpFormat]
+    printers = [printer_of(output, DumpLines(Stamp.DATE, True), raw=False) for output in DumpFormat]
     for record in records:
         decoded = decoder.take(record)
         traffic.take(record)
