@@ -6,8 +6,6 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from tickrig.host.text.user_file import SUFFIX
-
 MODELS: Final = ("f-palette", "f-palette-boot", "motor-core-unit", "epos", "rtc-echo")
 """Names of `models.MODELS`."""
 
@@ -38,64 +36,3 @@ def is_bus_node(text: str) -> bool:
     (True, False)
     """
     return _BUS_NODE.fullmatch(text) is not None
-
-
-# Which nodes there shall be, as command lines say it.
-
-LSS: Final = "lss"
-"""Instead of a node-ID: the node waits for LSS to give it one."""
-
-_IDS: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?")
-
-
-@dataclass(frozen=True, slots=True)
-class NodeSpec:
-    """One node.
-
-    Attributes:
-        device: its EDS or DCF, the name of a model, or `FILE.py:Class` of a DeviceRTC.
-        node_id: 1..127, `UNCONFIGURED`, or None for that of the DCF or model.
-        profile: of `choices.PROFILES`, None for what holds for all nodes.
-    """
-
-    device: Path | str
-    node_id: int | None
-    profile: str | None = None
-
-
-def parse_node(text: str) -> Iterator[NodeSpec]:
-    """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
-
-    ValueError if it is none of them. A name is that of a model, unless there is such a file.
-
-    >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
-    [5, 6, 7]
-    """
-    ids, equals, name = text.partition("=")
-    if not equals:
-        yield NodeSpec(_device(text), None)
-        return
-    if not name:
-        raise ValueError(f"--node {text}: give ID=FILE or ID=MODEL, as 5=a.eds")
-    for node_id in parse_ids(f"--node {text}", ids):
-        yield NodeSpec(_device(name), node_id)
-
-
-def parse_ids(what: str, text: str) -> Iterable[int]:
-    """Read a node-ID, a range of them, or `lss`."""
-    if text == LSS:
-        return (UNCONFIGURED,)
-    match = _IDS.fullmatch(text)
-    first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
-    if not 1 <= first <= last <= 127:
-        raise ValueError(
-            f"{what}: a node-ID is 1..127, a range as 1-20, or {LSS} for a node that waits for LSS"
-        )
-    return range(first, last + 1)
-
-
-def _device(name: str) -> Path | str:
-    if f"{SUFFIX}:" in name:
-        return name
-    file = Path(name)
-    return name if name in MODELS and not file.exists() else file

@@ -10,7 +10,6 @@ from typing import Final
 
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.canopen.choices import MODELS
-from tickrig.host.cli.messages import Refused
 from tickrig.host.text.user_file import SUFFIX
 
 LSS: Final = "lss"
@@ -37,7 +36,7 @@ class NodeSpec:
 def parse_node(text: str) -> Iterator[NodeSpec]:
     """Read `5=a.eds`, `1-20=a.eds`, `5=epos`, `5=a.py:Class`, `lss=a.eds` or `a.dcf`.
 
-    Refused if it is none of them. A name is that of a model, unless there is such a file.
+    ValueError if it is none of them. A name is that of a model, unless there is such a file.
 
     >>> [spec.node_id for spec in parse_node("5-7=a.eds")]
     [5, 6, 7]
@@ -47,7 +46,7 @@ def parse_node(text: str) -> Iterator[NodeSpec]:
         yield NodeSpec(_device(text), None)
         return
     if not name:
-        raise Refused(f"--node {text}: give ID=FILE or ID=MODEL, as 5=a.eds")
+        raise ValueError(f"--node {text}: give ID=FILE or ID=MODEL, as 5=a.eds")
     for node_id in parse_ids(f"--node {text}", ids):
         yield NodeSpec(_device(name), node_id)
 
@@ -59,7 +58,7 @@ def parse_ids(what: str, text: str) -> Iterable[int]:
     match = _IDS.fullmatch(text)
     first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
     if not 1 <= first <= last <= 127:
-        raise Refused(
+        raise ValueError(
             f"{what}: a node-ID is 1..127, a range as 1-20, or {LSS} for a node that waits for LSS"
         )
     return range(first, last + 1)

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 import click
 
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bus_port import open_bus
@@ -26,14 +27,9 @@ from tickrig.emulators.canopen.build import (
     read_bus_file,
     store_keeper,
 )
-from tickrig.emulators.canopen.choices import (
-    AUTO,
-    UNCONFIGURED,
-    NodeSpec,
-    parse_ids,
-    parse_node,
-)
+from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, profile_name
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import CandumpFile
@@ -41,7 +37,7 @@ from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioS
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, RigPlan
 from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
-from tickrig.emulators.testing.rig_file.section import RigFileError
+from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.cli.can_options import BusOptions

@@ -6,8 +6,8 @@ import json
 import re
 from typing import Final
 
-from tickrig.emulators.testing.rig_file.section import (
-    RigFileTable,
+from tickrig.host.text.section import (
+    Section,
 )
 from tickrig.host.text.toml_reader import BROKEN
 from tickrig.host.text.trace import BEGIN
@@ -51,7 +51,7 @@ def no_rig_file(text: str) -> str:
     return SCENARIO if _SCENARIO.match(text) else ""
 
 
-def refuse_old_tables(top: RigFileTable) -> RigFileTable:
+def refuse_old_tables(top: Section) -> Section:
     """Return a rig file as it is; note what replaces the tables of files of before.
 
     Args:
@@ -69,7 +69,7 @@ def refuse_old_tables(top: RigFileTable) -> RigFileTable:
         top.wrong(_DUT, "dut")
     if isinstance(given.get("component"), list):
         top.wrong(_SYSTEM, "component")
-    return RigFileTable(top.notes, (), {"device": {}}) if top.notes.all else top
+    return Section(top.notes, (), {"device": {}}) if top.notes.all else top
 
 
 def _device(node: object, number: int) -> str:

@@ -16,7 +16,7 @@ from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.canopen.body import BodyPlan
-from tickrig.emulators.canopen.choices import LSS
+from tickrig.emulators.canopen.node_spec import LSS
 from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text.values import Setting
 

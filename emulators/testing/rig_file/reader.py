@@ -229,7 +229,7 @@ def parse_rig_file(text: str, path: Path) -> RigPlan:
     if reason := no_rig_file(text):
         raise RigFileError(str(path), (Mistake(1, reason),))
     document = read_toml(text)
-    top = refuse_old_tables(RigFileTable(RigFileNotes(document), (), document.values))
+    top = refuse_old_tables(Section(Notes(document), (), document.values))
     return _plan(with_nodes(top, path.parent), path)
 
 

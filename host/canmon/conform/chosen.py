@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from tickrig.host.canopen.conform.check import Check, ConformancePlan, Level
+from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.suite import OBJECTS, chosen_checks, group_titles, suite_checks
 from tickrig.host.cli.messages import Refused
 from tickrig.host.text.names import closest

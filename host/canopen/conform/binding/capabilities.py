@@ -65,17 +65,21 @@ _LSS_NUMBERS: Final = frozenset(range(1, 5))
 """Its sub-indices that an LSS address needs (CiA 305)."""
 
 
+_DUMMIES: Final = {"dummy5": "dummy0005", "dummy6": "dummy0006"}
+"""Objects of the data types that checks map in place of an object, and what an EDS calls them."""
+
+
 class EdsClaims(NamedTuple):
     """What an EDS says about a node beside its objects.
 
     Attributes:
         lss: it has LSS.
-        dummies: dummy objects may be mapped.
+        dummies: features for the dummy objects that may be mapped, of `_DUMMIES`.
         identity: the first numbers of 1018h, by sub-index, as its head has them.
     """
 
     lss: bool
-    dummies: bool
+    dummies: frozenset[str]
     identity: Mapping[int, int]
 
     @classmethod
@@ -85,7 +89,9 @@ class EdsClaims(NamedTuple):
         numbers = {sub: _number(info.get(key.lower(), "")) for sub, key in _IDENTITY}
         return cls(
             bool(_number(info.get("lss_supported", ""))),
-            any(map(_number, dummies.values())),
+            frozenset(
+                word for word, key in _DUMMIES.items() if _number(dummies.get(key.lower(), ""))
+            ),
             {sub: number for sub, number in numbers.items() if number is not None},
         )
 
@@ -122,7 +128,7 @@ class NodeDescription(NamedTuple):
         said = (row if row.has_default is bool(row.default) else _as_said(row) for row in rows)
         address = {row.sub: row.default for row in rows if row.index == _LSS_ADDRESS}
         identity = {sub: int.from_bytes(address.get(sub, b""), "little") for sub, _ in _IDENTITY}
-        claims = EdsClaims(address.keys() >= _LSS_NUMBERS, True, identity)
+        claims = EdsClaims(address.keys() >= _LSS_NUMBERS, frozenset(_DUMMIES), identity)
         return cls(EdsDevice(DeviceInfo(), tuple(said), objects), claims)
 
 
@@ -167,8 +173,11 @@ def find_features(
         claims: what its EDS says, None without one.
     """
     reasons = dict(_missing(binding))
-    if claims is None or not claims.dummies:
-        reasons["dummy"] = _unsaid(claims, "DummyUsage", "dummy objects may be mapped")
+    for word, key in _DUMMIES.items():
+        if claims is None or word not in claims.dummies:
+            reasons[word] = _unsaid(claims, key.title(), "this dummy may be mapped")
+    if (client.number(_STORE, 1) or 0) & _AUTONOMOUSLY:
+        reasons["unsaved"] = f"{_STORE:04X}h:01 says that the node saves by itself (bit 1)"
     for word, index in _ON_COMMAND.items():
         said = client.number(index, 1)
         if said is not None and not said & 1:

@@ -17,6 +17,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body import BodyOnDrives, DrivenWheel
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
 from tickrig.emulators.canopen.cli import main
+from tickrig.emulators.canopen.node_spec import NodeSpec
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.testing.commands.canopen_run import read_rig

@@ -11,7 +11,7 @@ from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_bench, make_nodes
-from tickrig.emulators.canopen.choices import NodeSpec
+from tickrig.emulators.canopen.node_spec import NodeSpec
 from tickrig.emulators.record.recorder import CandumpFile, TraceFile
 from tickrig.emulators.rrc.device_type import RRC
 from tickrig.emulators.scenario import Clear, ScenarioParser, ScenarioPlayer, ScenarioStep

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
-from tickrig.emulators.testing.rig_file.section import RigFileError
+from tickrig.emulators.testing.rig_file.schema import RigFileError
 
 NODE = "[[node]] is a device now, one for each node-ID:"
 
