@@ -23,6 +23,37 @@ from tickrig.wire.instant import NEVER
 
 # Where a serial line is served: `rfc2217://[HOST:]PORT` or `socket://[HOST:]PORT`.
 
+# Theory of operation
+# ===================
+#
+# A port has one host at most (`_host`), one that waits (`_next`) and a few that are shown
+# out (`_dismissed`). All sockets are non-blocking. They are looked at in `poll`, once a
+# tick, or in `attend` while the line has no room: no host can hold up the rig, whatever it
+# does.
+#
+# The second host. Whether the first is still there is known only behind all that it sent,
+# because the end of a connection comes after its data. So the second is accepted and
+# listened to (one of RFC 2217 gives up if nobody negotiates with it), and a little of what
+# it sends is held. Then `_let_in` decides, in a later tick if need be: the first has ended
+# or is stuck, and the second gets the line, what was held first; or nothing of the first
+# was waiting at the latest look, so that it is at work, and the second is refused.
+#
+# Ends. A host that has closed its sending side, as `nc` at the end of its input, is still
+# given what comes for a second. One that is refused reads a line that says why: its
+# connection is closed for sending and read until it is empty, because closing it with
+# unread data resets it, and then the line may be lost (`DismissedHost`).
+#
+# Bounds. Nothing that a host does makes this process grow: whole sends are dropped beyond
+# `buffer_bytes` and counted in `lost`, as on a pty; about two reads are held of a waiting
+# host; a suboption has 256 bytes at most; and a host that negotiates without reading the
+# answers is not read from 8 KiB of them on, because each read may bring forth more
+# (`_may_read`). The buffers of the kernel are small for the same reason: what is in them is
+# beyond the time of the rig.
+#
+# The settings of RFC 2217 are answered and remembered, and change nothing: the rate of the
+# line is that of the device. A host that sets another is told to people (`HostSetting`),
+# because at a real port it would read noise.
+
 _SCHEMES: Final = ("rfc2217", "socket")
 _LOOPBACK: Final = "127.0.0.1"
 

@@ -85,6 +85,8 @@ if sys.platform != "win32":
         poll = select.poll()
         for number, events in wanted.items():
             poll.register(number, events)
+        # Rounded down, and the rest slept: rounded up, each wait of a paced host would
+        # be up to a millisecond late.
         whole_ms = None if wait_s is None else math.floor(max(0.0, wait_s) * 1e3)
         came = dict(poll.poll(whole_ms))
         if not came and wait_s is not None and (rest_s := wait_s - (whole_ms or 0) / 1e3) > 0:
@@ -92,6 +94,8 @@ if sys.platform != "win32":
             came = dict(poll.poll(0))
         if any(events & select.POLLNVAL for events in came.values()):
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
+        # `select` calls what is broken ready for both, and whoever reads or writes then
+        # finds the error; `poll` has events of its own for it.
         broken = select.POLLERR | select.POLLHUP
         return (
             [one for one in readers if came.get(_number(one), 0) & (select.POLLIN | broken)],

@@ -105,6 +105,8 @@ class RrcClient(Closing):
         Raises:
             LinkTimeout: no RRC answers.
         """
+        # The LF ends what an earlier program has left half sent; what comes of that, and of
+        # the dummy command, is dropped below.
         self._link.send(b"\n" + cmd.DeviceName().encode())
         settled_us = self._link.now_us + _SETTLE_US
         while self._link.now_us < settled_us:
@@ -116,6 +118,8 @@ class RrcClient(Closing):
         except RrcRefused as error:
             if error.code != COMMAND_CHECKSUM:
                 raise
+            # It was sent without CHECK and is refused for that: stablemode is still on. In
+            # both modes `device` is answered (R12).
             self._settings.stable = True
             self.command(cmd.DeviceName())
 

@@ -11,6 +11,31 @@ from tickrig.host.rrc.inbox import NAMELESS, Answer, Exchange
 from tickrig.wire.rrc.commands import Command, Limit, Output, SpeedMode, StableMode, Watchdog
 from tickrig.wire.rrc.replies import Ok, Refusal, Text
 
+# Theory of operation
+# ===================
+#
+# Replies have no numbers. What is known: the RRC works on lines in order, OK names its
+# command, ER names it unless the name could not be read (`NAMELESS`), and with stablemode
+# there is no OK.
+#
+# Where that leaves a choice, the safe one is made, and the choices belong together:
+#
+# - An ER without a name goes to a motion command that nobody waits for, if there is one:
+#   refusals of `output` or `limit` in a row stop the client, so one too many is counted
+#   rather than one too few.
+# - With stablemode the awaited command takes an ER first. It is better to report a setting
+#   as refused that was not than the other way round.
+# - An OK takes the oldest command of its name, but the newest of that name is believed to
+#   hold: it was carried out or will be.
+# - Who drives is believed only when it is certain. A first `output` after `limit` that was
+#   only sent makes it None, so that the next `drive_by_host` sends speed mode 1 first
+#   (client.py, `_slow_down_before`).
+# - After EV:Initialized nothing is believed, but commands that waited in the receive buffer
+#   may still be carried out: they stay in doubt for 100 ms, and an OK meanwhile counts for
+#   the setting too.
+#
+# Refusals are counted for each command by itself. Who stops, and how, is in channel.py.
+
 _SETTLED_US: Final = 100_000
 """An ER would have come by then: 10 periods of the RRC."""
 

@@ -264,6 +264,10 @@ _RESPONSES: Final[dict[int, Callable[[bytes], Response]]] = {
     ServerCommand.DOWNLOAD: DownloadInitiateResponse.parse,
     ServerCommand.ABORT: Abort.parse,
 }
+# Bits 0 and 1 of a block command. In the direction of the data (client of a download,
+# server of an upload) bit 0 is the subcommand, 0 initiate and 1 end, and bit 1 of an
+# initiate says whether a size follows: C0h, C2h, C1h; hence `* 2`. Against it both bits are
+# the subcommand: A0h initiate, A1h end, A2h acknowledge, and of a client A3h start.
 _BLOCK_REQUESTS: Final[dict[int, tuple[Callable[[bytes], Request], ...]]] = {
     ClientCommand.BLOCK_UPLOAD: (
         BlockUploadInitiateRequest.parse,

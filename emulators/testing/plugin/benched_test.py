@@ -46,6 +46,36 @@ if TYPE_CHECKING:
     )
 
 
+# Theory of operation
+# ===================
+#
+# A test comes by here in each phase of pytest, in this order:
+#
+# setup: `open`. What its markers and its mode rule out is skipped before anything is
+# opened. Then the bench, with its warm-up; what it lacks of `needs` (known only of an open
+# bench); what outputs have to be at the end; and last `Health` begins to listen: faults
+# that a warm-up has left on count as ordered.
+#
+# call: `judged`, around the body. If the body has passed, and only then, the bench is
+# looked at: tasks, what went wrong in threads and coroutines, health, outputs. A test that
+# breaks off leaves its bench as it may, and its own failure is what people want to read.
+#
+# report of each phase: `judge`. Whatever fails is asked whether the bench is to blame;
+# artifacts are kept at the first failure, once, while the bench is still open. An exception
+# here would end the whole run of pytest, so it becomes a section of the report.
+#
+# teardown: `close`. Evidence and artifacts of passed tests come before the bench is closed.
+# What went wrong beside the body since it has passed fails the test here.
+#
+# Listening to threads and coroutines goes from before the bench is open until after it is
+# closed: a host may begin a thread while it is opened.
+#
+# The bench to blame: a test that did not come to a verdict about the device is an error and
+# no failure. pytest and JUnit call it an error if it happened in setup, so `make_error`
+# (verdict.py) says that it did. A mistake of the test, as a misspelt name, is never blamed
+# on a bench that was too slow (`is_mistake`).
+
+
 class BenchedTest:
     """A test, and its bench.
 

@@ -88,6 +88,8 @@ def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
     """
     depth = sys.get_coroutine_origin_tracking_depth()
     with warnings.catch_warnings():
+        # By default only the first of a line is told; with "error" it is raised in a
+        # finalizer, where Python only prints it.
         warnings.filterwarnings("always", _WARNING, RuntimeWarning)
         show = warnings.showwarning
 
@@ -98,6 +100,7 @@ def never_awaited(note: Callable[[str], None]) -> Iterator[None]:
             show(message, *where, **more)
 
         warnings.showwarning = showwarning
+        # Without it the warning does not say where the coroutine was made.
         sys.set_coroutine_origin_tracking_depth(max(1, depth))
         try:
             yield

@@ -94,6 +94,8 @@ def end_at_caller(error: BaseException) -> None:
     Args:
         error: what a test raised.
     """
+    # From the outermost frame inwards: the last one that is not ours becomes the end of the
+    # traceback.
     entry, last = error.__traceback__, None
     while entry is not None:
         if _package_of(entry) not in ("tickrig", "contextlib"):

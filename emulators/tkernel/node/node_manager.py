@@ -58,6 +58,24 @@ class NodeLimits:
                 raise ValueError(f"{name} {getattr(self, name)} is not in {low}..{high}")
 
 
+# Theory of operation
+# ===================
+#
+# The limits hold at four doors, so that it does not matter whether the command line, a
+# control socket or a peer comes: `add` (period of a component), `allows_period` of its
+# contexts (a rate that is set later), `admit` (each new connector) and `passes` (each value
+# that a component writes or that comes from a peer). The last two are called by the ports,
+# which get the manager as their `guard` before their component is known to anybody.
+#
+# - A connector between two components of the node is at two ports and counts once. Those of
+#   observers count nowhere: they are on no board.
+# - A refusal is counted under one of `REFUSED`, and the board has an output `refused_NAME`
+#   for each, which goes on over boots. A new reason needs its name there.
+# - Refusals raise for whoever asked. A value that is too long raises for nobody: whoever
+#   writes it is told PORT_ERROR, a peer INVALID_ARGS.
+# - `passes` may be called in the threads of peers, so it has the lock; all else is in the
+#   thread of the manager.
+
 HOST: Final = "tkernel"
 """Its naming context."""
 
