@@ -100,6 +100,6 @@ def _folded(table: re.Match[str]) -> str:
     heads = re.findall(r"<th\b[^>]*>(?:<p>)?(.*?)(?:</p>)?</th>", table[0], re.DOTALL)
     if not heads or not PROOF.fullmatch(heads[-1]):
         return table[0]
-    cell = r"<td>((?:(?!<td>).)*\S(?:(?!<td>).)*)</td>(\s*</tr>)"
+    cell = r"<td>(?!\s*</td>)((?:(?!<td>).)*?)</td>(\s*</tr>)"
     fold = r"<td><details><summary>show</summary>\1</details></td>\2"
     return re.sub(cell, fold, table[0], flags=re.DOTALL)
