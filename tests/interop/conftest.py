@@ -65,3 +65,9 @@ def master(network: canopen.Network, slave: Slave) -> Any:
     node.nmt.send_command(0x81)
     assert booted.wait(patience(10))  # wait_for_bootup would miss one that comes before it waits
     return node
+
+
+@pytest.fixture
+def nodes(bus: Bus) -> Iterator[Slave]:
+    with running(bus, "--node", "16=f-palette", "--node", "32=motor-core-unit") as child:
+        yield child

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tests.interop.buses import Bus
-from tests.interop.slave import Slave, running
+from tests.interop.slave import Slave
 
 pytestmark = pytest.mark.realtime
 
@@ -20,12 +19,6 @@ nodes:
 - {{id: 16, name: Palette0, eds: {EDS}/f-palette.eds, role: device, heartbeat_ms: 1000}}
 - {{id: 32, name: Motor0, eds: {EDS}/motor-core-unit.eds, role: device, heartbeat_ms: 1000}}
 """
-
-
-@pytest.fixture
-def nodes(bus: Bus) -> Iterator[Slave]:
-    with running(bus, "--node", "16=f-palette", "--node", "32=motor-core-unit") as child:
-        yield child
 
 
 def test_nodes_are_activated_linked_read_and_left(bus: Bus, nodes: Slave, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 from tests.interop.buses import Bus
-from tests.interop.slave import Slave, running
+from tests.interop.slave import Slave
 from tickrig.emulators.commands.ctl_cli import ctl
 
 pytestmark = pytest.mark.realtime
@@ -80,12 +80,6 @@ class Server:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             self._lines.put(line)
-
-
-@pytest.fixture
-def nodes(bus: Bus) -> Iterator[Slave]:
-    with running(bus, "--node", "16=f-palette", "--node", "32=motor-core-unit") as child:
-        yield child
 
 
 @pytest.fixture

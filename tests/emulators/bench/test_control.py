@@ -13,11 +13,6 @@ from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.control.requests import RequestDispatcher
 
 
-@pytest.fixture
-def emulator() -> Emulator:
-    return Emulator("lamp", Lamp())
-
-
 def ask(emulator: Emulator, do: object, **fields: object) -> Any:
     line = json.dumps({"v": 1, "do": do, **fields}).encode()
     answer = json.loads(EmulatorControl(emulator).answer_line(line))

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import pytest
 
-from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.serial.emulator import Emulator
 
@@ -11,11 +10,6 @@ def run_to(emulator: Emulator, t_us: int) -> None:
     emulator.event_queue.put("pause", t_us, lambda now_us: None)
     while emulator.rig.now_us < t_us - 1:
         emulator.step()
-
-
-@pytest.fixture
-def emulator() -> Emulator:
-    return Emulator("lamp", Lamp())
 
 
 def said(emulator: Emulator) -> list[bytes]:

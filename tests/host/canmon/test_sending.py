@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tests.host.canmon.terminal import PROGRAM
-from tests.host.canmon.wire import Wire, new_wire
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.cli import main
 
 EDS = str(Path(__file__).parents[3] / "examples/eds/epos.eds")
@@ -25,12 +25,6 @@ LOG = """\
 (1600000000.003000) can0 20000020#0000000000000000
 (1600000000.004000) can0 182#R
 """
-
-
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as made:
-        yield made
 
 
 @pytest.fixture

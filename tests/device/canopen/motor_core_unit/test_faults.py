@@ -28,11 +28,6 @@ CONTINUOUS, PEAK = 5_461, 10_922
 """References for 15 Nm and 30 Nm in current mode: 1.67 A and 3.33 A of 10 A."""
 
 
-@pytest.fixture
-def bench() -> UnitBench:
-    return UnitBench()
-
-
 def cause_short_circuit(bench: UnitBench) -> None:
     bench.begin(VELOCITY, 8_192)
     bench.pass_ms(200)

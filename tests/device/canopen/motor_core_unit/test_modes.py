@@ -28,11 +28,6 @@ ENCODER_DEG = 360 / 409_600
 """A count of the motor encoder, at the shaft."""
 
 
-@pytest.fixture
-def bench() -> UnitBench:
-    return UnitBench()
-
-
 @pytest.mark.unmeasured
 @pytest.mark.parametrize(
     ("reference", "angle_deg"), [(row["ai16"], row["angle_deg"]) for row in POTENTIOMETER]

@@ -11,11 +11,6 @@ RANGE = AbortCode.VALUE_RANGE
 
 
 @pytest.fixture
-def bench() -> PdoBench:
-    return PdoBench()
-
-
-@pytest.fixture
 def off(bench: PdoBench) -> PdoBench:
     bench.must_write((0x1400, 1, OFF | 0x205), (0x1800, 1, OFF | 0x185))
     return bench

@@ -13,11 +13,6 @@ from tickrig.wire.instant import NEVER
 
 
 @pytest.fixture
-def bench() -> PdoBench:
-    return PdoBench()
-
-
-@pytest.fixture
 def running(bench: PdoBench) -> PdoBench:
     bench.operational()
     return bench

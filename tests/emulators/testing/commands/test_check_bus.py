@@ -14,12 +14,6 @@ from tickrig.emulators.commands.cli import main
 from tickrig.emulators.testing.commands.check_cli import check
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def run(*words: str) -> tuple[int, list[str], str]:
     result = CliRunner().invoke(check, words)
     return result.exit_code, result.stdout.splitlines(), result.stderr

@@ -5,19 +5,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
 from click.testing import CliRunner
 
 from tickrig.emulators.testing.commands.check_cli import check
 
 GOOD = '[device.rrc]\ntype = "rrc"\n[wire.can0]\ntype = "can"\nbitrate = 500000\n'
 GOOD += '[device.left]\ntype = "epos"\nnode_id = "lss"\n[device.base]\ntype = "rh3-base"\n'
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def run(*words: str) -> tuple[int, str, str]:

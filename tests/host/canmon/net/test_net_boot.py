@@ -19,13 +19,6 @@ node_id = 5
 BUS = ROOT / "examples" / "bus" / "bus.yml"
 
 
-@pytest.fixture
-def rig(tmp_path: Path) -> str:
-    path = tmp_path / "bench.toml"
-    path.write_text(RIG)
-    return str(path)
-
-
 def steps(text: str) -> list[str]:
     """Return the steps without their times, which do not go back."""
     found = [re.fullmatch(r"(\d+\.\d{6}) (.*)", line) for line in text.splitlines()]

@@ -30,13 +30,6 @@ node_id = 16
 MODULE, DRIVE = "00000000:00000001:00010000:00000001", "00000000:00006210:00010000:00000001"
 
 
-@pytest.fixture
-def rig(tmp_path: Path) -> str:
-    path = tmp_path / "bench.toml"
-    path.write_text(RIG)
-    return str(path)
-
-
 def test_nodes_without_a_node_id_are_listed(rig: str) -> None:
     result = net(rig, "lss")
     assert (result.exit_code, result.stderr) == (0, "")

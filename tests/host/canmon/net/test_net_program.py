@@ -30,13 +30,6 @@ def file(tmp_path: Path) -> str:
     return str(path)
 
 
-@pytest.fixture
-def rig(tmp_path: Path) -> str:
-    path = tmp_path / "bench.toml"
-    path.write_text(RIG)
-    return str(path)
-
-
 def test_firmware_is_downloaded_and_runs(rig: str, file: str) -> None:
     result = net(rig, "program", "17", file, "--expect", ID)
     assert result.exit_code == 0, result.output

@@ -30,13 +30,6 @@ node_id = 16
 """
 
 
-@pytest.fixture
-def rig(tmp_path: Path) -> str:
-    path = tmp_path / "bench.toml"
-    path.write_text(RIG)
-    return str(path)
-
-
 def net(*words: str) -> Result:
     return CliRunner().invoke(main, ["net", *words], catch_exceptions=False)
 

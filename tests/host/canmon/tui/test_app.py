@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from tests.host.canmon.tui.pilot import (
     until,
     wire_session,
 )
-from tests.host.canmon.wire import Wire, new_wire
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.tui.app import MonitorApp, StatusLine
 from tickrig.host.canmon.tui.panels.panel import TABS
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
@@ -31,12 +31,6 @@ from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.instant import NEVER
 
 PANELS = tuple(map(TABS.load, TABS.built_in))
-
-
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as wire:
-        yield wire
 
 
 def status(monitor: MonitorApp) -> str:

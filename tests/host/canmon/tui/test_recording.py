@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.host.canmon.tui.pilot import drive_session, on_monitor, wire_session
-from tests.host.canmon.wire import Wire, new_wire
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.model.frames import AnyRecord
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.mark import Mark, gone
@@ -21,12 +21,6 @@ from tickrig.host.tui import line_text
 from tickrig.wire.can import CanFrame
 
 TRIES = 200
-
-
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as wire:
-        yield wire
 
 
 def status(monitor: MonitorApp) -> str:

@@ -28,13 +28,6 @@ not a line
 """
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> str:
-    path = tmp_path / "run.log"
-    path.write_text(LOG, "ascii")
-    return str(path)
-
-
 def canmon(*words: str) -> Result:
     return CliRunner().invoke(main, words)
 

@@ -3,23 +3,16 @@ from __future__ import annotations
 import re
 import struct
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
 from tests.host.canmon.terminal import Terminal
-from tests.host.canmon.wire import Wire, new_wire
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.cli import main
 
 EDS = str(Path(__file__).parents[4] / "examples/eds/epos.eds")
-
-
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as made:
-        yield made
 
 
 @pytest.fixture

@@ -15,13 +15,6 @@ def top(*words: str, text: str | None = None) -> Result:
     return CliRunner().invoke(main, ["top", *words], input=text)
 
 
-@pytest.fixture
-def log(tmp_path: Path) -> str:
-    path = tmp_path / "run.log"
-    path.write_text(LOG, "ascii")
-    return str(path)
-
-
 def test_a_log_file_ends_with_the_table(log: str) -> None:
     result = top(log)
     assert result.exit_code == 0, result.output

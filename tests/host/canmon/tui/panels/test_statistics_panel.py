@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, wire_session
-from tests.host.canmon.wire import Wire, new_wire
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
@@ -19,12 +18,6 @@ def shown(monitor: MonitorApp) -> list[str]:
     monitor.refresh_view()
     views = monitor.shown.query(LineView)
     return [line_text(line).rstrip() for view in views for line in view.lines]
-
-
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as wire:
-        yield wire
 
 
 def test_it_is_the_table_of_top_and_its_keys() -> None:

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,19 +15,13 @@ from tests.host.canmon.tui.pilot import (
     until,
     wire_session,
 )
-from tests.host.canmon.wire import Wire, new_wire
+from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
 from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.tui import LineView
-
-
-@pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as wire:
-        yield wire
 
 
 def panel_of(monitor: MonitorApp) -> TracePanel:

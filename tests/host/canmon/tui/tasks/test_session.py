@@ -37,12 +37,6 @@ def check_for_ever(session: Session) -> None:
 
 
 @pytest.fixture
-def wire() -> Iterator[Wire]:
-    with new_wire() as wire:
-        yield wire
-
-
-@pytest.fixture
 def session(wire: Wire) -> Iterator[Session]:
     session = wire_session(wire)
     yield session
