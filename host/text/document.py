@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 Key = str | int | float | bool | None
 Scalar = Key
@@ -70,6 +70,11 @@ class Item:
         return self.value if isinstance(self.value, tuple) else ()
 
     @property
+    def plain(self) -> Any:
+        """Its values alone, in lists and dictionaries."""
+        return _plain(self, {})
+
+    @property
     def is_list(self) -> bool:
         """Whether it is a list."""
         return isinstance(self.value, tuple)
@@ -84,3 +89,16 @@ class Item:
         if self.is_list:
             return "a list"
         return "a mapping" if self.is_mapping else repr(self.text) if self.text else "nothing"
+
+
+def _plain(item: Item, done: dict[int, Any]) -> Any:
+    """Return the values of an item; what an anchor names is made once, so that no file can grow."""
+    if isinstance(item.value, str | int | float | None):
+        return item.value
+    if (found := done.get(id(item))) is None:
+        if isinstance(item.value, tuple):
+            found = [_plain(each, done) for each in item.value]
+        else:
+            found = {key: _plain(each, done) for key, each in item.value.items()}
+        done[id(item)] = found
+    return found

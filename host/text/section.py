@@ -134,14 +134,16 @@ def whole(low: int, high: int) -> Taker:
     return take
 
 
-def number(low: float, high: float) -> Taker:
-    """Return what takes a number of a range."""
+def number(low: float, high: float, *, above: bool = False) -> Taker:
+    """Return what takes a number of a range; `above` leaves its lower end out."""
+    allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
     def take(value: object) -> float:
         fits = isinstance(value, int | float) and not isinstance(value, bool)
-        if fits and low <= value <= high and isfinite(value):  # type: ignore[operator,arg-type]
+        fits = fits and low <= value <= high and isfinite(value)  # type: ignore[operator,arg-type]
+        if fits and not (above and value == low):
             return value  # type: ignore[return-value]
-        raise ValueError(f"it takes a number {low:g}..{high:g}, not {shown(value)}")
+        raise ValueError(f"it takes a number {allowed}, not {shown(value)}")
 
     return take
 

@@ -1,23 +1,24 @@
 """`tickrig:` in a node of a bus.yml: its motor, gear and switches, its modes and inputs.
 
 >>> from tickrig.host.text.document import FileMistake, FilePlace, Item
+from tickrig.host.text.section import Field, flag, number, one_of, shown, whole
 >>> value = Item(100, FilePlace("bus.yml", 7), "100")
->>> KEYS["gear_ratio"].take(value)
-100.0
+>>> KEYS["gear_ratio"].field(value.plain)
+100
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from math import isfinite
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from tickrig.device.servo.parameters import PRESETS
 from tickrig.emulators.canopen.bus_file.joint_drive import NUMBERS
 from tickrig.emulators.canopen.choices import PROFILES
 from tickrig.host.text.document import FileMistake, FilePlace, Item
-from tickrig.host.text.names import closest, near
+from tickrig.host.text.names import near
+from tickrig.host.text.section import Field, flag, number, one_of, shown, whole
 from tickrig.host.text.values import Setting
 
 # What is wrong with a bus.yml and the files that it goes with, a line each.
@@ -42,22 +43,6 @@ URDF: Final = "urdf"
 _MOST: Final = 1e6
 
 
-class NodeKey(NamedTuple):
-    """A key of the mapping.
-
-    Attributes:
-        take: makes something of a value; ValueError with what was allowed.
-        values: what it takes, for people.
-        default: what holds without it, for people.
-        text: what it says, for people.
-    """
-
-    take: Callable[[Item], Any]
-    values: str
-    default: str
-    text: str
-
-
 @dataclass(frozen=True, slots=True)
 class NodeKeys:
     """What `tickrig:` says of a node.
@@ -79,173 +64,135 @@ class NodeKeys:
     places: Mapping[str, FilePlace] = field(default_factory=dict)
 
 
-def _number(low: float, high: float, *, above: bool = False) -> Callable[[Item], float]:
-    """Return what takes a number of a range; `above` leaves its lower end out."""
-
-    def take(item: Item) -> float:
-        value = item.value
-        fits = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-        if fits and low <= value <= high and not (above and value == low):  # type: ignore[operator]
-            return float(value)  # type: ignore[arg-type]
-        kind = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
-        raise ValueError(f"{item} is no number {kind}")
-
-    return take
+def _pair(value: object) -> tuple[float, float]:
+    if isinstance(value, list) and len(value) == 2:
+        low, high = map(number(-_MOST, _MOST), value)
+        if low <= high:
+            return low, high
+    raise ValueError(f"it takes a pair [FROM, TO] with FROM up to TO, not {shown(value)}")
 
 
-def _whole(low: int, high: int) -> Callable[[Item], int]:
-    def take(item: Item) -> int:
-        value = item.value
-        if isinstance(value, int) and not isinstance(value, bool) and low <= value <= high:
-            return value
-        raise ValueError(f"{item} is no whole number {low}..{high}")
-
-    return take
-
-
-def _one_of(*names: str) -> Callable[[Item], str]:
-    def take(item: Item) -> str:
-        text = item.text if not (item.is_list or item.is_mapping) else ""
-        if text in names:
-            return text
-        raise ValueError(f"{item} is none of {', '.join(names)}{_hint(text, names)}")
-
-    return take
-
-
-def _flag(item: Item) -> bool:
-    if isinstance(item.value, bool):
-        return item.value
-    raise ValueError(f"{item} is neither true nor false")
-
-
-def _hint(text: str, names: tuple[str, ...]) -> str:
-    close = closest(text, names) if text else []
-    return f"; did you mean {close[0]!r}?" if close else ""
-
-
-def _pair(item: Item) -> tuple[float, float]:
-    take = _number(-_MOST, _MOST)
-    values = [take(each) for each in item.items]
-    if len(values) != 2 or values[0] > values[1]:
-        raise ValueError(f"{item} is no pair [FROM, TO] with FROM up to TO")
-    return values[0], values[1]
-
-
-def _modes(item: Item) -> frozenset[int]:
-    if item.text == _ALL:
+def _modes(value: object) -> frozenset[int]:
+    if value == _ALL:
         return frozenset(NUMBERS.values())
-    take = _one_of(*NUMBERS)
-    if not item.items:
-        raise ValueError(f"{item} is neither {_ALL} nor a list of {', '.join(NUMBERS)}")
-    return frozenset(NUMBERS[take(each)] for each in item.items)
+    if not isinstance(value, list) or not value:
+        raise ValueError(f"it takes {_ALL} or a list of {', '.join(NUMBERS)}, not {shown(value)}")
+    return frozenset(NUMBERS[one_of(*NUMBERS)(each)] for each in value)
 
 
-def _settings(item: Item) -> dict[str, Setting]:
-    if not item.is_mapping:
-        raise ValueError(f"{item} is no mapping of inputs")
-    found: dict[str, Setting] = {}
-    for key, each in item.fields.items():
-        value = each.value
+def _settings(value: object) -> dict[str, Setting]:
+    if not isinstance(value, dict):
+        raise ValueError(f"it takes a mapping of inputs, not {shown(value)}")
+    for key, each in value.items():
         if not isinstance(key, str):
             raise ValueError(f"{key!r} is no name of an input")
-        if not isinstance(value, int | float | str):
-            raise ValueError(f"{key}: {each} is no number and no text")
-        found[key] = value
-    return found
+        if not isinstance(each, int | float | str):
+            raise ValueError(f"{key}: it takes a number or a text, not {shown(each)}")
+    return value
 
 
 _POSITION: Final = "rad, or m with `travel_m`"
 
-JOINT_KEYS: Final[Mapping[str, NodeKey]] = {
-    "motor": NodeKey(
-        _one_of(*PRESETS),
+JOINT_KEYS: Final[Mapping[str, Field]] = {
+    "motor": Field(
+        one_of(*PRESETS),
         ", ".join(f"`{name}`" for name in PRESETS),
-        "`epos-wheel`",
         "motor, power stage, encoder and gear to begin with: "
         "[presets](../reference/devices/servo.md#parameters)",
+        "`epos-wheel`",
     ),
-    "supply_v": NodeKey(_number(1, 100), "1..100", "of the motor", "supply of the power stage"),
-    "encoder_counts": NodeKey(
-        _whole(4, 1 << 24), f"4..{1 << 24}", "of the motor", "counts in a turn of the motor"
-    ),
-    "gear_ratio": NodeKey(
-        _number(0.01, _MOST),
-        "0.01..1e6",
-        "what `velocity` needs, else of the motor",
-        "turns of the motor in a turn of the shaft",
-    ),
-    "gear_efficiency": NodeKey(
-        _number(0, 1, above=True),
-        "above 0, up to 1",
+    "supply_v": Field(
+        number(1, 100),
+        "1..100",
+        "supply of the power stage",
         "of the motor",
+    ),
+    "encoder_counts": Field(
+        whole(4, 1 << 24), f"4..{1 << 24}", "counts in a turn of the motor", "of the motor"
+    ),
+    "gear_ratio": Field(
+        number(0.01, _MOST),
+        "0.01..1e6",
+        "turns of the motor in a turn of the shaft",
+        "what `velocity` needs, else of the motor",
+    ),
+    "gear_efficiency": Field(
+        number(0, 1, above=True),
+        "above 0, up to 1",
         "part of the power of a load that gets through",
+        "of the motor",
     ),
-    "friction_nm": NodeKey(
-        _number(0, _MOST), "0..1e6", "of the motor", "dry friction at the shaft"
+    "friction_nm": Field(
+        number(0, _MOST),
+        "0..1e6",
+        "dry friction at the shaft",
+        "of the motor",
     ),
-    "inertia_kg_m2": NodeKey(
-        _number(0, _MOST), "0..1e6", "of the motor", "what always hangs on the shaft"
+    "inertia_kg_m2": Field(
+        number(0, _MOST), "0..1e6", "what always hangs on the shaft", "of the motor"
     ),
-    "effort": NodeKey(
-        _number(0, _MOST, above=True),
+    "effort": Field(
+        number(0, _MOST, above=True),
         "above 0",
-        "that of the motor",
         "largest torque of the shaft in Nm, or force in N; the motor is made as large",
-    ),
-    "velocity": NodeKey(
-        _number(0, _MOST, above=True),
-        "above 0",
         "that of the motor",
+    ),
+    "velocity": Field(
+        number(0, _MOST, above=True),
+        "above 0",
         "largest speed in rad/s, or m/s; limits the drive as 6080h does",
+        "that of the motor",
     ),
-    "lower": NodeKey(
-        _number(-_MOST, _MOST), _POSITION, "no switch", "where it presses the negative limit switch"
+    "lower": Field(
+        number(-_MOST, _MOST), _POSITION, "where it presses the negative limit switch", "no switch"
     ),
-    "upper": NodeKey(
-        _number(-_MOST, _MOST), _POSITION, "no switch", "where it presses the positive limit switch"
+    "upper": Field(
+        number(-_MOST, _MOST), _POSITION, "where it presses the positive limit switch", "no switch"
     ),
-    "home_switch": NodeKey(
-        _pair, "`[FROM, TO]`, as above", "no switch", "between which it presses the home switch"
+    "home_switch": Field(
+        _pair, "`[FROM, TO]`, as above", "between which it presses the home switch", "no switch"
     ),
-    "travel_m": NodeKey(
-        _number(0, _MOST, above=True),
+    "travel_m": Field(
+        number(0, _MOST, above=True),
         "above 0",
-        "the joint turns",
         "it is a carriage, and a turn of the shaft moves it so far",
+        "the joint turns",
     ),
-    "units": NodeKey(
-        _number(0, 1e9, above=True),
+    "units": Field(
+        number(0, 1e9, above=True),
         "above 0",
-        "`scale_pos_to_dev`, or 1000",
         "position units in a radian, or in a metre",
+        "`scale_pos_to_dev`, or 1000",
     ),
 }
 """What makes a `JointDrive`."""
 
-KEYS: Final[Mapping[str, NodeKey]] = {
+KEYS: Final[Mapping[str, Field]] = {
     **JOINT_KEYS,
-    "modes": NodeKey(
+    "modes": Field(
         _modes,
         f"`{_ALL}`, a list of {', '.join(f'`{name}`' for name in NUMBERS)}",
-        "those of 6502h, and one that `sdo` writes to 6060h",
         "modes of operation; objects that they need and the EDS lacks are added",
+        "those of 6502h, and one that `sdo` writes to 6060h",
     ),
-    "profile": NodeKey(
-        _one_of(*PROFILES),
+    "profile": Field(
+        one_of(*PROFILES),
         ", ".join(f"`{name}`" for name in PROFILES),
-        "`auto`",
         "what the node does with its objects: "
         "[profiles](../reference/devices/canopen-slave-emu.md#profiles)",
+        "`auto`",
     ),
-    "configured": NodeKey(
-        _flag,
+    "configured": Field(
+        flag,
         "`true`, `false`",
-        "`false`",
         "it begins with all that the master would write to it at boot-up",
+        "`false`",
     ),
-    "start": NodeKey(
-        _settings, "a mapping", "as usual", "physical inputs and objects at the start"
+    "start": Field(
+        _settings,
+        "a mapping",
+        "physical inputs and objects at the start",
+        "as usual",
     ),
 }
 """All of a node."""
@@ -280,7 +227,7 @@ def read_keys(
                 mistakes.append(FileMistake(item.place, f"{where}.tickrig: {text}"))
                 continue
             try:
-                found[name] = KEYS[name].take(item)
+                found[name] = KEYS[name].field(item.plain)
             except ValueError as error:
                 mistakes.append(FileMistake(item.place, f"{where}.tickrig.{name}: {error}"))
             if name == "start":

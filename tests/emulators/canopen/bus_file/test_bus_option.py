@@ -136,10 +136,11 @@ def test_all_mistakes_are_told_at_once_with_their_lines(tmp_path: Path) -> None:
         f"Error: {path}:4: options.tickrig.urdf: {tmp_path / 'none.urdf'}: "
         "No such file or directory",
         f"{path}:9: joint_1.tickrig: no key 'gear_raito'; did you mean 'gear_ratio'?",
-        f"{path}:10: joint_1.tickrig.motor: 'epos-whele' is none of epos-wheel, motor-core-unit; "
-        "did you mean 'epos-wheel'?",
-        f"{path}:11: joint_1.tickrig.home_switch: a list is no pair [FROM, TO] with FROM up to TO",
-        f"{path}:12: joint_1.tickrig.modes: 'xy' is none of pp, pv, tq, hm, ip, csp, csv, cst",
+        f"{path}:10: joint_1.tickrig.motor: it takes epos-wheel, motor-core-unit, "
+        "not 'epos-whele'; did you mean 'epos-wheel'?",
+        f"{path}:11: joint_1.tickrig.home_switch: it takes a pair [FROM, TO] with FROM up to "
+        "TO, not a list",
+        f"{path}:12: joint_1.tickrig.modes: it takes pp, pv, tq, hm, ip, csp, csv, cst, not 'xy'",
         f"{path}:13: joint_1.tickrig.start.ambient_c: ambient_c 900 is not in -40..85 degC",
         f"{path}:13: joint_1.tickrig.start.load: no input 'load'; did you mean 'load_nm'?",
         f"{path}:14: joint_2: a drive of several axes (CiA 402-1) is not emulated; "
@@ -163,7 +164,9 @@ def test_a_drive_of_several_axes_can_be_plain_objects(tmp_path: Path) -> None:
 def test_the_check_tells_what_is_wrong_with_our_keys(tmp_path: Path) -> None:
     path = write_system(tmp_path, f"{ONE_JOINT}  tickrig: {{gear_ratio: -1}}\n")
     done = CliRunner().invoke(check, [str(path)])
-    text = "error: [tickrig] joint_1.tickrig.gear_ratio: '-1' is no number 0.01..1e+06; fix: "
+    text = (
+        "error: [tickrig] joint_1.tickrig.gear_ratio: it takes a number 0.01..1e+06, not -1; fix: "
+    )
     assert done.exit_code == 1
     assert done.stdout.splitlines()[-1].startswith(f"{path}:7: {text}")
 
@@ -233,3 +236,12 @@ def test_a_further_axis_that_nobody_uses_is_told(tmp_path: Path) -> None:
     assert (
         f"{path}:4: joint_1: of its axes (CiA 402-1) the first one is emulated\n" in result.stderr
     )
+
+
+def test_anchors_that_double_sixty_times_are_read_at_once(tmp_path: Path) -> None:
+    lines = ["a0: &a0 [x]", *(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]" for n in range(1, 60))]
+    keys = "".join(f"    {line}\n" for line in [*lines, "modes: *a59", "start: *a59"])
+    path = write_system(tmp_path, f"{ONE_JOINT}  tickrig:\n{keys}")
+    said = play("--bus", path).stderr
+    assert "joint_1.tickrig.modes: it takes pp, pv, tq, hm, ip, csp, csv, cst, not a list" in said
+    assert "joint_1.tickrig.start: it takes a mapping of inputs, not a list" in said
