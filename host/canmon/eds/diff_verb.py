@@ -9,6 +9,7 @@ import click
 
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canopen.data_sheet.show import diff
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 
@@ -29,8 +30,6 @@ def command(old: Path, new: Path, as_json: bool) -> None:
     canmon eds diff old.eds new.eds
     canmon eds diff drive.eds drive.xdd --json
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.canopen.data_sheet.show import diff  # noqa: PLC0415 - slow
-
     changes = diff(read_device_document(old), read_device_document(new))
     with until_unread():
         for change in changes:

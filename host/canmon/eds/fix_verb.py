@@ -12,6 +12,7 @@ import click
 
 from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canopen.data_sheet.fix import fix
 from tickrig.host.canopen.data_sheet.rule import EditPlace, RuleFinding
 from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.cli.options import PATH
@@ -56,8 +57,6 @@ def command(
     canmon eds fix drive.eds --dry-run
     canmon eds fix drive.eds -o mended.eds --from-encoding cp850
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.canopen.data_sheet.fix import fix  # noqa: PLC0415 - slow
-
     if (output is None) is not dry_run:
         raise Refused("give -o OUT, or --dry-run")
     document = _mendable(file, _known(from_encoding))

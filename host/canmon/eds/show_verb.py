@@ -11,6 +11,7 @@ import click
 
 from tickrig.host.canmon.eds_document import read_device_document
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canopen.data_sheet.show import entries, head, pdos, table
 from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
@@ -60,8 +61,6 @@ def _describe(
     document: Document, index: int | None, sub: int | None, node_id: int
 ) -> dict[str, Any]:
     """Return what is shown; without the head and the PDOs where one object is wanted."""
-    from tickrig.host.canopen.data_sheet.show import entries, head, pdos  # noqa: PLC0415 - slow
-
     said: dict[str, Any] = {"v": 1, "file": document.name}
     if index is None:
         said["device"] = head(document)
@@ -72,8 +71,6 @@ def _describe(
 
 
 def _lines(said: dict[str, Any], node_id: int) -> Iterator[str]:
-    from tickrig.host.canopen.data_sheet.show import table  # noqa: PLC0415 - slow
-
     for what, value in said.get("device", {}).items():
         if value != "":
             yield f"{what:<14}{value}"

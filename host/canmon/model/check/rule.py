@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from tickrig.host.canmon.model.frames import ERROR, REMOTE, Record
+from tickrig.host.canmon.model.frames import ERROR, REMOTE, DumpLines, Record, Stamp, decoded_text
 from tickrig.wire.can import STANDARD_MAX
 
 if TYPE_CHECKING:
@@ -49,12 +49,6 @@ class TrafficFinding(NamedTuple):
         head = self.line if lines is None else self._line(lines.stamp(self.at_us).strip())
         if not self.around:
             return head
-        from tickrig.host.canmon.model.frames import (  # noqa: PLC0415 - seldom wanted
-            DumpLines,
-            Stamp,
-            decoded_text,
-        )
-
         lines = lines or DumpLines(Stamp.ABSOLUTE)
         shown = [
             ("  >" if record is self.record else "   ") + lines.line(record, decoded_text(decoded))
