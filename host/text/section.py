@@ -6,6 +6,35 @@ A taker takes a value as the file gives it, or raises ValueError that says what 
 (5, 500000)
 """
 
+# How a user's file is read
+# -------------------------
+# A reader of a file reports all its mistakes at once, each with the line of the value or key that
+# is wrong. Three steps make that possible, and each of them goes on after a mistake:
+#
+#   text  -> tree     `toml_reader.read_toml` and `yaml_reader.read_yaml` parse the whole text. A
+#                     broken value becomes BROKEN in TOML, and the statement after it is read. Both
+#                     know the line of each value: TOML by path, YAML in the items of its tree.
+#   tree  -> values   `Section.read(schema)` takes the values of one table. A `Field` says what its
+#                     value is: the taker raises ValueError with what it takes instead, and the
+#                     section notes that at the path of the value. A wrong value is left out, so
+#                     readers ask `"key" in values`, and use the default if it is missing.
+#   values -> objects The reader of the file makes its own objects, and notes what is wrong
+#                     between them by `Section.wrong`. It looks at `Notes.all` last, and raises.
+#
+# What follows from a mistake is no second mistake:
+#   - BROKEN is noted by the parser; `is_broken` lets a reader skip it without a word.
+#   - A needed key is not missing if an unknown key is near to it: it is misspelt (`Section.read`).
+#   - A header that cannot be read may have been a table that others name: then `document.whole` is
+#     false, and `Section.unknown` does not report names that are not there.
+#   - `Notes.all` sorts by line and drops equal mistakes, for two readers may look at one value.
+#
+# Messages: `Notes.place` writes the path as TOML does (`device.left.start[1]`, indices from 1), the
+# taker the rest ("it takes a number 0..1, not 'x'"). `Field.values` and `Field.text` are what a
+# missing key reports and what the tables of the pages show, so both cannot differ from the code.
+#
+# A bus.yml is read by `host.canopen.bus_file.notes.BusFileSection` instead: dcfgen, cogen and the
+# container of ros2_canopen define what a value means there, and each mistake breaks a rule of them.
+
 from __future__ import annotations
 
 import shlex

@@ -1,5 +1,25 @@
 """Read a bus.yml: its slaves and its master, and all that is wrong with it."""
 
+# How a bus.yml becomes a bus
+# ---------------------------
+# The reference is what dcfgen (Lely) makes of the file, to the byte; tests compare with it. The
+# order of the steps below is that of dcfgen, and most steps depend on it.
+#
+#   1. `read_yaml`: the tree. Of a key that is there twice the last one counts, as for dcfgen.
+#   2. `read_layout`: dcfgen has its nodes at the top, cogen under `nodes`. cogen merges `defaults`
+#      into each node, and they win over what the node says; then it sorts all keys. A file with
+#      `nodes` or `defaults` is one for cogen, and the sections below are those that cogen writes.
+#   3. `Sheets.find`: the EDS or DCF of a node, beside the file first. Without one there is no node.
+#   4. `SlaveReader`: the keys of a node become writes to its objects. Their order is that of
+#      dcfgen, and so are the defaults that dcfgen takes if a key is wrong: later steps still see
+#      the bus that dcfgen would make. `CobIds` is one for all nodes: `auto` counts over the bus.
+#   5. `_watch_master` needs the master and all writes of the slave: it puts 1016h before them.
+#   6. `pdos_after`: the PDOs as they are after the writes, for the checks of COB-IDs and load.
+#   7. `bus_checks`: what is wrong between nodes, and what the container of ros2_canopen refuses.
+#
+# Findings are noted where they are found, in any order; `BusFileNotes.all` sorts them by line, and
+# leaves out those that follow from a misspelt key in the same line.
+
 from __future__ import annotations
 
 import re
