@@ -23,8 +23,8 @@ from tickrig.host.control.client import ControlClient
 from tickrig.host.control.clock import RealClock
 from tickrig.host.links.link import Link, LinkError
 from tickrig.host.links.serial_link import SerialLink
+from tickrig.host.rtc.component import ExecutionContext
 from tickrig.host.rtc.components import ConsoleIn, ConsoleOut
-from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.lite import ProxyEvent, ProxyEventType, ProxySettings, attach
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import Manager

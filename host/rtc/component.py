@@ -1,18 +1,155 @@
-"""An RT component: callbacks, ports and configuration under a name (OMG RTC 1.0, RTObject)."""
+"""RT components and the execution contexts that run them (OMG RTC 1.0)."""
+
+# Theory of operation
+#
+# A component (`RtComponent`) is alive between `initialize` and `finalize`. Alive, it takes part in
+# execution contexts, and in each it is Inactive, Active or in Error. A context has a rate; its
+# periods begin at the multiples of `period_us`, in the time that `tick(now_us)` is given: no clock
+# is read and nothing waits.
+#
+# Who asks for a move (`activate_component`, `reset_component`, ...) learns at once whether it is
+# allowed in the present state. The move itself is made at the beginning of the next period. So a
+# component changes its state between two of its own `on_execute`, never in the middle of one, and
+# the order in which requests came cannot be seen by components.
+#
+# A period has three passes over all components, in the order in which they were added:
+#
+#   pre   configuration sets that were changed take effect, then the moves that were asked for
+#   do    on_execute in Active, on_error in Error
+#   post  on_state_update in Active, of those that override it
+#
+# `do` of all comes before `post` of any: what a component writes in `do` is on the ports of the
+# others when they are asked in `post`. RefHardRh3 depends on that: it sends the speeds of this
+# period in `post`, and takes the answer to them in the next `do`.
+#
+# Moves and their callbacks, in order:
+#
+#   from      to        callbacks
+#   Inactive  Active    on_activated
+#   Active    Inactive  on_deactivated; if it fails, on_aborting, and the state is Error
+#   Active    Error     on_deactivated, on_aborting
+#   Inactive  Error     on_aborting
+#   Error     Inactive  on_reset; if it fails, the state stays Error
+#
+# A callback that returns another code than RTC_OK, or raises, brings its component to Error in the
+# next pre-pass: `wanted` is then Error, and a request that comes later does not take its place. No
+# exception leaves a component: what one does must not end the others.
+#
+# `ExecutionContexts` is what a schedule ticks. It keeps the earliest `due_us` of its contexts, so
+# that a tick before that costs one comparison. A context whose due time changes (start, stop,
+# another rate) calls `replan`. Contexts that were not due do not note the time; `now_us` is then
+# the `quiet_us` of all.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from typing import ClassVar, TypeVar
+from typing import ClassVar, Final, ParamSpec, TypeVar
 
-from tickrig.host.rtc.component_action import ComponentAction, guarded
 from tickrig.host.rtc.configuration import Configuration
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.ports.port import AnyPort, PortProfile
-from tickrig.host.rtc.states import ReturnCode, RtcRefused
+from tickrig.host.rtc.states import (
+    MAX_RATE_HZ,
+    MIN_RATE_HZ,
+    ExecutionKind,
+    LifeCycleState,
+    ReturnCode,
+    RtcRefused,
+)
+from tickrig.host.text.log import log_of
+from tickrig.wire.instant import NEVER
 
+_OK: Final = ReturnCode.RTC_OK
+_CREATED: Final = LifeCycleState.CREATED
+_INACTIVE: Final = LifeCycleState.INACTIVE
+_ACTIVE: Final = LifeCycleState.ACTIVE
+_ERROR: Final = LifeCycleState.ERROR
+
+_SECOND_US: Final = 1_000_000
+
+_LOG: Final = log_of(__name__)
+
+A = ParamSpec("A")
 P = TypeVar("P", bound=AnyPort)
+
+
+def guarded(
+    who: str, callback: Callable[A, ReturnCode], *args: A.args, **kwargs: A.kwargs
+) -> ReturnCode:
+    """Run a callback; what it raises is logged and counts as RTC_ERROR.
+
+    Any exception is caught, here and from listeners of ports: what one
+    component does must not end the others.
+    """
+    try:
+        return callback(*args, **kwargs)
+    except Exception:
+        return failed(who, callback)
+
+
+def failed(who: str, callback: Callable[..., ReturnCode]) -> ReturnCode:
+    """Log the exception that a callback has raised; it counts as RTC_ERROR."""
+    _LOG.exception("%s: %s raised", who, callback.__name__)
+    return ReturnCode.RTC_ERROR
+
+
+class ComponentAction:
+    """What a component does, one method a callback; each does nothing until overridden.
+
+    A callback returns RTC_OK or what went wrong: then Error comes next, but where its
+    docstring says otherwise. An exception is logged and counts as RTC_ERROR. No callback
+    waits: time passes between them. Its argument `ec` is the execution context that runs it;
+    the time is `ec.now_us`.
+    """
+
+    def on_initialize(self) -> ReturnCode:
+        """Begin; it stays Created if this returns another code than RTC_OK."""
+        return _OK
+
+    def on_finalize(self) -> ReturnCode:
+        """End, whatever this returns."""
+        return _OK
+
+    def on_startup(self, ec: ExecutionContext) -> ReturnCode:
+        """Take the start of the execution context `ec`."""
+        return _OK
+
+    def on_shutdown(self, ec: ExecutionContext) -> ReturnCode:
+        """Take the stop of the execution context `ec`."""
+        return _OK
+
+    def on_rate_changed(self, ec: ExecutionContext) -> ReturnCode:
+        """Take another rate of the execution context `ec`."""
+        return _OK
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Become Active in `ec`."""
+        return _OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Leave Active in `ec`, for Inactive or for Error."""
+        return _OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Work, once a period of `ec` in Active: the first pass."""
+        return _OK
+
+    def on_state_update(self, ec: ExecutionContext) -> ReturnCode:
+        """Work, once a period in Active, after on_execute of every component of `ec`."""
+        return _OK
+
+    def on_aborting(self, ec: ExecutionContext) -> ReturnCode:
+        """Enter Error in `ec`; what this returns is ignored."""
+        return _OK
+
+    def on_error(self, ec: ExecutionContext) -> ReturnCode:
+        """Work, once a period of `ec` in Error; what this returns is ignored."""
+        return _OK
+
+    def on_reset(self, ec: ExecutionContext) -> ReturnCode:
+        """Leave Error in `ec`, if this returns RTC_OK: for Inactive."""
+        return _OK
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,3 +309,463 @@ class RtComponent(ComponentAction):
     def _begin(self) -> ReturnCode:
         self.configuration.update()
         return self.on_initialize()
+
+
+# One component in one execution context.
+
+_Callback = Callable[["ExecutionContext"], ReturnCode]
+
+
+class Participant:
+    """A component as its execution context sees it.
+
+    Attributes:
+        state: the present state; Created after it was removed.
+        wanted: the state it is to be moved to in the next pre-pass, if any.
+    """
+
+    __slots__ = ("_context", "_updates", "component", "state", "wanted")
+
+    def __init__(self, component: RtComponent, context: ExecutionContext) -> None:
+        self.component, self._context = component, context
+        self.state: LifeCycleState = _INACTIVE
+        self.wanted: LifeCycleState | None = None
+        base = ComponentAction.on_state_update
+        self._updates = type(component).on_state_update is not base
+
+    def request(self, source: LifeCycleState, wanted: LifeCycleState) -> ReturnCode:
+        """Ask for a move; PRECONDITION_NOT_MET unless in `source` and not on the way to Error."""
+        if self.state is not source or self.wanted is _ERROR:
+            return ReturnCode.PRECONDITION_NOT_MET
+        self.wanted = wanted
+        return _OK
+
+    def abort(self) -> None:
+        """Move to Error in the next pre-pass; nothing if it is there."""
+        if self.state is not _ERROR:
+            self.wanted = _ERROR
+
+    def notify(self, callback: _Callback) -> ReturnCode:
+        """Run a callback and return its code; if it fails, Error comes next."""
+        code = self._call(callback)
+        if code is not _OK:
+            self.abort()
+        return code
+
+    def pre(self) -> None:
+        """First pass of a period: make the move that is wanted."""
+        if self.component.configuration.changed:
+            self.notify(self._update_configuration)
+        if (wanted := self.wanted) is not None:
+            self.wanted = None
+            code = _MOVES[self.state, wanted](self)
+            if self._context.on_move:
+                self._report(code)
+
+    def do(self) -> None:
+        """Second pass of a period: the work of the state."""
+        if self.state is _ACTIVE:
+            if self.wanted is not _ERROR and self._call(self.component.on_execute) is not _OK:
+                self.wanted = _ERROR
+        elif self.state is _ERROR:
+            self._call(self.component.on_error)
+
+    def post(self) -> None:
+        """Third pass of a period, after the second one of all participants."""
+        if self._updates and self.state is _ACTIVE and self.wanted is not _ERROR:
+            self.notify(self.component.on_state_update)
+
+    def leave(self) -> None:
+        """Leave Active at once, as a component that ends does; the state is Created."""
+        code = self._call(self.component.on_deactivated) if self.state is _ACTIVE else _OK
+        left, self.state, self.wanted = self.state is not _CREATED, _CREATED, None
+        if left and self._context.on_move:
+            self._report(code)
+
+    def _update_configuration(self, ec: ExecutionContext) -> ReturnCode:
+        self.component.configuration.update()
+        return _OK
+
+    def _report(self, code: ReturnCode) -> None:
+        component, listeners = self.component, self._context.on_move
+        call_listeners(component.instance_name, listeners, component, self.state, code)
+
+    def _activate(self) -> ReturnCode:
+        self.state = _ACTIVE
+        return self.notify(self.component.on_activated)
+
+    def _deactivate(self) -> ReturnCode:
+        code = self._call(self.component.on_deactivated)
+        if code is _OK:
+            self.state = _INACTIVE
+        else:
+            self._enter_error()
+        return code
+
+    def _abort_active(self) -> ReturnCode:
+        self._call(self.component.on_deactivated)
+        return self._enter_error()
+
+    def _enter_error(self) -> ReturnCode:
+        self.state = _ERROR
+        return self._call(self.component.on_aborting)
+
+    def _reset(self) -> ReturnCode:
+        code = self._call(self.component.on_reset)
+        if code is _OK:
+            self.state = _INACTIVE
+        return code
+
+    def _call(self, callback: _Callback) -> ReturnCode:
+        try:  # `guarded`, without a call for each callback
+            return callback(self._context)
+        except Exception:
+            return failed(self.component.instance_name, callback)
+
+
+_MOVES: Final[dict[tuple[LifeCycleState, LifeCycleState], Callable[[Participant], ReturnCode]]] = {
+    (_INACTIVE, _ACTIVE): Participant._activate,
+    (_INACTIVE, _ERROR): Participant._enter_error,
+    (_ACTIVE, _INACTIVE): Participant._deactivate,
+    (_ACTIVE, _ERROR): Participant._abort_active,
+    (_ERROR, _INACTIVE): Participant._reset,
+}
+
+
+# The execution contexts of a schedule: which is due next, and what time it is for all.
+
+
+class ExecutionContexts:
+    """Execution contexts that go on together, in the order in which they were added.
+
+    It keeps when the first of them is due, and a tick before that asks none: 11 us of each
+    tick with 127 of them.
+
+    Attributes:
+        quiet_us: the time of the latest tick in which none was due; they do not note it.
+    """
+
+    __slots__ = ("_contexts", "_due_us", "_known", "quiet_us")
+
+    def __init__(self) -> None:
+        self._contexts: list[ExecutionContext] = []
+        self._due_us, self._known, self.quiet_us = NEVER, True, 0
+
+    @property
+    def due_us(self) -> int:
+        """When the next period of one begins; `NEVER` while none runs."""
+        if not self._known:
+            self._known = True
+            self._due_us = min((context.due_us for context in self._contexts), default=NEVER)
+        return self._due_us
+
+    def tick(self, now_us: int) -> None:
+        """Run a period of each that is due.
+
+        Args:
+            now_us: the present; never less than before.
+        """
+        if now_us < self.due_us:
+            self.quiet_us = now_us
+            return
+        for context in self._contexts:
+            context.tick(now_us)
+
+    def replan(self) -> None:
+        """Take note that one of them is due at another time than before."""
+        self._known = False
+
+    def add(self, context: ExecutionContext, now_us: int) -> None:
+        """Tick a context from now on; one that is ticked already is no error."""
+        if context not in self._contexts:
+            context.tick(now_us)
+            self._contexts.append(context)
+            context.join(self)
+            self.replan()
+
+    def remove(self, context: ExecutionContext) -> None:
+        """Tick a context no more."""
+        self._contexts.remove(context)
+        context.join(ExecutionContexts())
+        self.replan()
+
+
+MoveListener = Callable[["RtComponent", LifeCycleState, ReturnCode], object]
+
+
+class ExecutionContext:
+    """Runs components period by period: three passes over all of them, in the order of adding.
+
+    - pre: moves that were asked for (activate, deactivate, reset, abort);
+    - do: on_execute in Active, on_error in Error;
+    - post: on_state_update in Active.
+
+    Requests are checked when they are made, and take effect in the next
+    period: nothing waits. Periods fall on the multiples of `period_us`.
+    It is PERIODIC; EVENT_DRIVEN and OTHER are not emulated.
+
+    Args:
+        rate_hz: periods a second, 1 uHz to 1 MHz; a period is a whole number of microseconds.
+
+    Attributes:
+        due_us: when the next period begins; `NEVER` while it is stopped.
+        rate_hz: periods a second.
+        period_us: one period.
+        running: between start and stop.
+        allows_period: asked for each new period in us, where not all are possible.
+        on_move: called with a component, its state and what the callback of the move returned,
+            after each move that it made or, after on_reset, could not make; Created if it left.
+
+    Raises:
+        ValueError: a rate that is not in the range.
+    """
+
+    kind: Final = ExecutionKind.PERIODIC
+
+    def __init__(self, rate_hz: float = 1_000.0) -> None:
+        if not _possible(rate_hz):
+            raise ValueError(f"rate {rate_hz} Hz is not in {MIN_RATE_HZ}..{MAX_RATE_HZ} Hz")
+        self._ticked_us, self.due_us, self.running = 0, NEVER, False
+        self._others = ExecutionContexts()
+        self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
+        self._participants: tuple[Participant, ...] = ()
+        self._by_id: dict[int, Participant] = {}
+        self.allows_period: Callable[[int], bool] | None = None
+        self.on_move: list[MoveListener] = []
+
+    @property
+    def now_us(self) -> int:
+        """The time of the latest tick; what callbacks take as the present."""
+        ticked_us, quiet_us = self._ticked_us, self._others.quiet_us
+        return ticked_us if ticked_us > quiet_us else quiet_us  # noqa: FURB136 - twice as fast
+
+    @property
+    def components(self) -> tuple[RtComponent, ...]:
+        """The participants, in the order in which they run."""
+        return tuple(participant.component for participant in self._participants)
+
+    def tick(self, now_us: int) -> None:
+        """Go on, and run a period if one is due.
+
+        Args:
+            now_us: the present.
+        """
+        self._ticked_us = now_us
+        if now_us < self.due_us:
+            return
+        self._plan()
+        participants = self._participants
+        for step in _PASSES:
+            for participant in participants:
+                if self.running:
+                    step(participant)
+
+    def start(self) -> ReturnCode:
+        """Start it, with on_startup of every participant.
+
+        Returns:
+            PRECONDITION_NOT_MET if it runs or a participant is not alive.
+        """
+        if self.running or not all(component.alive for component in self.components):
+            return ReturnCode.PRECONDITION_NOT_MET
+        self.running = True
+        self._plan()
+        self._notify(lambda component: component.on_startup)
+        return ReturnCode.RTC_OK
+
+    def stop(self) -> ReturnCode:
+        """Stop it, with on_shutdown of every participant; their states stay as they are.
+
+        Returns:
+            PRECONDITION_NOT_MET unless it runs.
+        """
+        if not self.running:
+            return ReturnCode.PRECONDITION_NOT_MET
+        self.running, self.due_us = False, NEVER
+        self._others.replan()
+        self._notify(lambda component: component.on_shutdown)
+        return ReturnCode.RTC_OK
+
+    def join(self, others: ExecutionContexts) -> None:
+        """Go on with others from now on; a `Manager` sees to it.
+
+        Args:
+            others: are told when it is due at another time.
+        """
+        self._ticked_us, self._others = self.now_us, others
+
+    def close(self) -> None:
+        """Deactivate all participants at once, stop, and let them go."""
+        for participant in self._participants:
+            participant.leave()
+        self.stop()
+        for participant in self._participants:
+            self._release(participant)
+
+    def set_rate(self, rate_hz: float) -> ReturnCode:
+        """Change the rate, with on_rate_changed of every participant.
+
+        Args:
+            rate_hz: periods a second.
+
+        Returns:
+            BAD_PARAMETER unless 1 uHz <= rate <= 1 MHz, and its period is allowed.
+        """
+        if not _possible(rate_hz):
+            return ReturnCode.BAD_PARAMETER
+        if self.allows_period is not None and not self.allows_period(_period_us(rate_hz)):
+            return ReturnCode.BAD_PARAMETER
+        self.rate_hz, self.period_us = rate_hz, _period_us(rate_hz)
+        if self.running:
+            self._plan()
+        self._notify(lambda component: component.on_rate_changed)
+        return ReturnCode.RTC_OK
+
+    def add_component(self, component: RtComponent) -> ReturnCode:
+        """Let a component take part, Inactive, after all that do.
+
+        Args:
+            component: which.
+
+        Returns:
+            PRECONDITION_NOT_MET if it takes part already.
+        """
+        if self._find(component) is not None:
+            return ReturnCode.PRECONDITION_NOT_MET
+        participant = self._by_id[id(component)] = Participant(component, self)
+        self._participants += (participant,)
+        component.contexts.append(self)
+        return ReturnCode.RTC_OK
+
+    def remove_component(self, component: RtComponent) -> ReturnCode:
+        """Let a component take part no more.
+
+        Args:
+            component: which.
+
+        Returns:
+            BAD_PARAMETER if it does not take part, PRECONDITION_NOT_MET while it is Active.
+        """
+        participant = self._find(component)
+        if participant is None:
+            return ReturnCode.BAD_PARAMETER
+        if participant.state is LifeCycleState.ACTIVE:
+            return ReturnCode.PRECONDITION_NOT_MET
+        self._release(participant)
+        return ReturnCode.RTC_OK
+
+    def release_component(self, component: RtComponent) -> ReturnCode:
+        """Let a component take part no more, with on_deactivated at once if it is Active.
+
+        Args:
+            component: which.
+
+        Returns:
+            BAD_PARAMETER if it does not take part.
+        """
+        participant = self._find(component)
+        if participant is None:
+            return ReturnCode.BAD_PARAMETER
+        self._release(participant)
+        return ReturnCode.RTC_OK
+
+    def activate_component(self, component: RtComponent) -> ReturnCode:
+        """Ask for Inactive to Active.
+
+        Args:
+            component: which.
+
+        Returns:
+            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
+            unless it is Inactive.
+        """
+        return self._request(component, LifeCycleState.INACTIVE, LifeCycleState.ACTIVE)
+
+    def deactivate_component(self, component: RtComponent) -> ReturnCode:
+        """Ask for Active to Inactive.
+
+        Args:
+            component: which.
+
+        Returns:
+            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
+            unless it is Active and not on its way to Error.
+        """
+        return self._request(component, LifeCycleState.ACTIVE, LifeCycleState.INACTIVE)
+
+    def reset_component(self, component: RtComponent) -> ReturnCode:
+        """Ask for Error to Inactive.
+
+        Args:
+            component: which.
+
+        Returns:
+            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
+            unless it is in Error.
+        """
+        return self._request(component, LifeCycleState.ERROR, LifeCycleState.INACTIVE)
+
+    def abort_component(self, component: RtComponent) -> ReturnCode:
+        """Ask for Error, from Inactive or Active; for a proxy whose device went there.
+
+        Not in OMG RTC, where only a callback that fails leads to Error.
+
+        Args:
+            component: which.
+
+        Returns:
+            BAD_PARAMETER if it does not take part or is not alive, PRECONDITION_NOT_MET
+            if it is in Error.
+        """
+        participant = self._find(component)
+        if participant is None or not component.alive:
+            return ReturnCode.BAD_PARAMETER
+        if participant.state is LifeCycleState.ERROR:
+            return ReturnCode.PRECONDITION_NOT_MET
+        participant.abort()
+        return ReturnCode.RTC_OK
+
+    def state_of(self, component: RtComponent) -> LifeCycleState:
+        """Return the state of a component here; Created if it is not alive or takes no part."""
+        participant = self._find(component)
+        if participant is None or not component.alive:
+            return LifeCycleState.CREATED
+        return participant.state
+
+    def _request(
+        self, component: RtComponent, source: LifeCycleState, wanted: LifeCycleState
+    ) -> ReturnCode:
+        participant = self._find(component)
+        if participant is None or not component.alive:
+            return ReturnCode.BAD_PARAMETER
+        return participant.request(source, wanted)
+
+    def _release(self, participant: Participant) -> None:
+        participant.leave()
+        self._participants = tuple(p for p in self._participants if p is not participant)
+        del self._by_id[id(participant.component)]
+        participant.component.contexts.remove(self)
+
+    def _find(self, component: RtComponent) -> Participant | None:
+        return self._by_id.get(id(component))
+
+    def _plan(self) -> None:
+        """Plan the next period."""
+        now_us = self.now_us
+        self.due_us = now_us - now_us % self.period_us + self.period_us
+        self._others.replan()
+
+    def _notify(self, callback: Callable[[RtComponent], _Callback]) -> None:
+        for participant in self._participants:
+            participant.notify(callback(participant.component))
+
+
+_PASSES: Final = (Participant.pre, Participant.do, Participant.post)
+
+
+def _possible(rate_hz: float) -> bool:
+    return MIN_RATE_HZ <= rate_hz <= MAX_RATE_HZ
+
+
+def _period_us(rate_hz: float) -> int:
+    return round(_SECOND_US / rate_hz)

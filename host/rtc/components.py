@@ -6,8 +6,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Final
 
-from tickrig.host.rtc.component import ModuleSpec, RtComponent
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.wire.rtc_types import rtc

@@ -1,8 +1,7 @@
 """The names of the component model, in one place."""
 
-from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
+from tickrig.host.rtc.component import ComponentProfile, ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.configuration import Parameter
-from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.ports.service_port import Consumer, Provider, ServicePort

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Final
+
+MAX_RATE_HZ: Final = 1_000_000
+MIN_RATE_HZ: Final = 1e-6
+"""Of execution contexts and of periodic connectors; the latter is one period in eleven days."""
 
 
 class ReturnCode(IntEnum):

@@ -4,9 +4,9 @@ from tickrig._lazy import lazy
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from tickrig.host.rtc.component import ExecutionContext as ExecutionContext
     from tickrig.host.rtc.component import ModuleSpec as ModuleSpec
     from tickrig.host.rtc.component import RtComponent as RtComponent
-    from tickrig.host.rtc.execution import ExecutionContext as ExecutionContext
     from tickrig.host.rtc.ports.data_port import InPort as InPort
     from tickrig.host.rtc.ports.data_port import OutPort as OutPort
     from tickrig.host.rtc.states import ReturnCode as ReturnCode
@@ -29,8 +29,7 @@ else:
     __all__, __getattr__, __dir__ = lazy(
         __name__,
         {
-            "tickrig.host.rtc.component": ("ModuleSpec", "RtComponent"),
-            "tickrig.host.rtc.execution": ("ExecutionContext",),
+            "tickrig.host.rtc.component": ("ExecutionContext", "ModuleSpec", "RtComponent"),
             "tickrig.host.rtc.ports.data_port": ("InPort", "OutPort"),
             "tickrig.host.rtc.states": ("ReturnCode",),
             "tickrig.host.rtc.system.manager": ("Manager",),

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final, NoReturn, Protocol
 
 from tickrig.host.links.link import Link
-from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext, RtComponent
 from tickrig.host.rtc.motion.options.lrf_capture_urg import LrfCaptureUrg
 from tickrig.host.rtc.ports.connect import Properties
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile

@@ -140,8 +140,9 @@ class NodeRun:
     def _start(self, manager: NodeManager, stack: ExitStack) -> None:
         """Make the system of a board that has booted, and open its doors."""
         options = self._options
-        for kind in (*EXAMPLES, LrfCaptureUrg):
+        for kind in EXAMPLES:
             manager.register(kind)
+        manager.register(LrfCaptureUrg)
         restore(manager, self._system)
         if options.urg is not None:
             add_range_finder(manager, self._lines, options.urg)

@@ -13,7 +13,7 @@ from tickrig.host.rtc.canopen.definition import DeviceFile, NodeEntry, SystemDef
 from tickrig.host.rtc.canopen.events import EventLog, ServerEventType
 from tickrig.host.rtc.canopen.proxy import ProxyRtc, lay_out_sdo_ports
 from tickrig.host.rtc.canopen.served_node import NodePhase, NodeServer, ServedNode
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.can import CanFrame, ErrorState, Frames

@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.links.link import Link, LinkClosed, ReopeningLink
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext
 from tickrig.host.rtc.lite.events import ProxyEvent, ProxyEventType, ProxyListener, notify
 from tickrig.host.rtc.lite.proxy import RtcLiteProxy
 from tickrig.host.rtc.lite.request_channel import POLL_US, ProxySettings, RequestChannel

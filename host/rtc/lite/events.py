@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
-from tickrig.host.rtc.component_action import guarded
+from tickrig.host.rtc.component import guarded
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER

@@ -8,8 +8,7 @@ from itertools import chain
 from typing import Any, ClassVar, Final
 
 from tickrig.host.links.link import DeviceRefused, Link, LinkError, LinkTimeout
-from tickrig.host.rtc.component import ComponentProfile, ModuleSpec, RtComponent
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ComponentProfile, ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.lite.events import (
     PingStatistics,
     ProxyEvent,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Generic, TypeVar
 
-from tickrig.host.rtc.execution import MAX_RATE_HZ, MIN_RATE_HZ
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
 from tickrig.host.rtc.ports.ring_buffer import (
     DEFAULT_LENGTH,
@@ -17,7 +16,7 @@ from tickrig.host.rtc.ports.ring_buffer import (
     ReadPolicy,
     RingBuffer,
 )
-from tickrig.host.rtc.states import PortStatus, RtcRefused
+from tickrig.host.rtc.states import MAX_RATE_HZ, MIN_RATE_HZ, PortStatus, RtcRefused
 from tickrig.wire.errors import FieldError
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.cdr import Endian, decode, encode

@@ -9,8 +9,7 @@ from itertools import count
 from typing import Final, TypeVar
 
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
-from tickrig.host.rtc.component import ModuleSpec, RtComponent
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.listeners import call_listeners
 from tickrig.host.rtc.ports.connect import Properties, connect
 from tickrig.host.rtc.ports.connector import Connector

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
-from tickrig.host.rtc.execution import ExecutionContext, ExecutionContexts
+from tickrig.host.rtc.component import ExecutionContext, ExecutionContexts
 from tickrig.host.rtc.ports.connector import Connector
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.component import ExecutionContext, RtComponent
 from tickrig.host.rtc.configuration import DEFAULT
-from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.ports.port import ConnectorProfile, automatic_id
 from tickrig.host.rtc.states import LifeCycleState, RtcRefused
 from tickrig.host.rtc.system.manager import (

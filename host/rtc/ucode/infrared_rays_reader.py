@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import ClassVar, Final
 
-from tickrig.host.links.link import Link, LinkError
+from tickrig.host.links.link import Link
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rtc.component import ModuleSpec, RtComponent
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext, ModuleSpec
+from tickrig.host.rtc.device_component import DeviceComponent
 from tickrig.host.rtc.ports.data_port import OutPort
-from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.text.log import log_of
 from tickrig.wire.errors import WireError
 from tickrig.wire.lines import LineSplitter
@@ -126,7 +125,7 @@ _OpenReader = Callable[[str], Link[bytes]]
 OPEN_SERIAL: Final[_OpenReader] = partial(SerialLink, baud=BAUD)
 
 
-class InfraredRaysReader(RtComponent):
+class InfraredRaysReader(DeviceComponent[UcodeReaderClient]):
     """Lets a reader listen while it is Active, and writes what it receives in each round.
 
     Ports: `ucodes` (32 hex digits each, the nearest marker first, none where none was received)
@@ -137,9 +136,6 @@ class InfraredRaysReader(RtComponent):
     Args:
         instance_name: of the component.
         open_link: opens the line; by pyserial unless given.
-
-    Attributes:
-        client: the host of the reader while it is Active.
     """
 
     spec: ClassVar[ModuleSpec] = ModuleSpec("InfraredRaysReader", "Ucodes of infra-red markers")
@@ -150,36 +146,20 @@ class InfraredRaysReader(RtComponent):
         self.ucodes = self.add_port(OutPort("ucodes", TimedStringSeq))
         self.levels = self.add_port(OutPort("levels", TimedLongSeq))
         self._open_link = open_link
-        self.client: UcodeReaderClient | None = None
         self._was_silent = self._was_blinded = False
 
-    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the line, and let the reader listen; also after Error."""
+    def open_client(self) -> UcodeReaderClient:
+        """Open the line, and let the reader listen."""
         self._was_silent = self._was_blinded = False
-        try:
-            self.client = UcodeReaderClient(self._open_link(self.device.value))
-        except LinkError as error:
-            return self._failed(error)
-        return ReturnCode.RTC_OK
+        return UcodeReaderClient(self._open_link(self.device.value))
 
-    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Let it listen no more, and give the line back."""
-        self._close()
-        return ReturnCode.RTC_OK
-
-    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+    def exchange(self, ec: ExecutionContext, client: UcodeReaderClient) -> None:
         """Write the rounds that have come."""
-        if self.client is None:
-            return ReturnCode.RTC_ERROR
-        restarts = self.client.restarts
-        try:
-            rounds = self.client.poll()
-        except LinkError as error:
-            return self._failed(error)
+        restarts = client.restarts
+        rounds = client.poll()
         for received in rounds:
             self._write(Time.from_us(ec.now_us), received)
-        self._watch(rounds, self.client.restarts > restarts)
-        return ReturnCode.RTC_OK
+        self._watch(rounds, client.restarts > restarts)
 
     def _write(self, now: Time, received: Round) -> None:
         self.ucodes.write(TimedStringSeq(now, tuple(ucode for ucode, _ in received.ucodes)))
@@ -198,16 +178,3 @@ class InfraredRaysReader(RtComponent):
         elif rounds and self._was_silent:
             _LOG.warning("%s: the reader is back", self.instance_name)
         self._was_silent = not rounds and (silent or self._was_silent)
-
-    def _failed(self, error: Exception) -> ReturnCode:
-        _LOG.error("%s: %s", self.instance_name, error)
-        self._close()
-        return ReturnCode.RTC_ERROR
-
-    def _close(self) -> None:
-        client, self.client = self.client, None
-        try:
-            if client is not None:
-                client.close()
-        except LinkError as error:
-            _LOG.warning("%s: %s", self.instance_name, error)

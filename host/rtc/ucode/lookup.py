@@ -6,8 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable
 from typing import Final, Generic, NamedTuple, TypeVar
 
-from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.execution import ExecutionContext
+from tickrig.host.rtc.component import ExecutionContext, RtComponent
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import ReturnCode
 from tickrig.host.rtc.ucode.cache import CacheLimits, LookupCache, OpenSource, Source

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, ReturnCode, RtComponent
-from tickrig.host.rtc.component_action import ComponentAction
+from tickrig.host.rtc.component import ComponentAction
 
 OK, ERROR = ReturnCode.RTC_OK, ReturnCode.RTC_ERROR
 CALLBACKS = tuple(name for name in vars(ComponentAction) if name.startswith("on_"))

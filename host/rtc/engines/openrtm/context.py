@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.component_action import guarded
+from tickrig.host.rtc.component import ExecutionContext, RtComponent, guarded
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference
 from tickrig.host.rtc.engines.openrtm.stubs import Stubs
-from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.call_queue import CALL_TIMEOUT_US, CallQueue
 from tickrig.host.rtc.system.manager import Manager

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from tickrig.host.cli.engine_options import OpenRtmOptions, format_name
-from tickrig.host.rtc.component import ModuleSpec, RtComponent
+from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.engines.openrtm import configuration, context, manager, rt_object
 from tickrig.host.rtc.engines.openrtm.context import AttachedContexts, ServantReferences
 from tickrig.host.rtc.engines.openrtm.names import NameServer
@@ -17,7 +17,6 @@ from tickrig.host.rtc.engines.openrtm.orb import Orb
 from tickrig.host.rtc.engines.openrtm.peers import Peers, refuse_wrong_paths
 from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.execution import ExecutionContext
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager
 

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from math import tau
-from typing import ClassVar, Final
+from typing import ClassVar
 
-from tickrig.host.links.link import DeviceRefused, LinkError
 from tickrig.host.links.serial_link import SerialLink
-from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort
+from tickrig.host.rtc.device_component import DeviceComponent
 from tickrig.host.rtc.motion.components.ref_hard import Opener
-from tickrig.host.text.log import log_of
 from tickrig.host.urg import UrgClient, UrgScan
 from tickrig.wire.rtc_types.rtc import RangeData, RangerConfig, Time
 
-_LOG: Final = log_of(__name__)
 
-
-class LrfCaptureUrg(RtComponent):
+class LrfCaptureUrg(DeviceComponent[UrgClient]):
     """Lets a sensor measure while it is Active, and writes each scan.
 
     A range of 0 means that there was no distance. The specification only names it
@@ -36,46 +33,15 @@ class LrfCaptureUrg(RtComponent):
         self.cluster = bind("cluster", 4, "1<=x<=99")
         self.ranges = self.add_port(OutPort("ranges", RangeData))
         self._open_link = open_link
-        self._client: UrgClient | None = None
 
-    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
-        """Open the line, and let the sensor measure; also after Error."""
-        try:
-            link = self._open_link(self.device.value)
-            self._client = UrgClient(link, self.cluster.value)
-        except LinkError as error:
-            return self._failed(error)
-        return ReturnCode.RTC_OK
+    def open_client(self) -> UrgClient:
+        """Open the line, and let the sensor measure."""
+        return UrgClient(self._open_link(self.device.value), self.cluster.value)
 
-    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
-        """Switch the laser off, and give the line back."""
-        self._close()
-        return ReturnCode.RTC_OK
-
-    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+    def exchange(self, ec: ExecutionContext, client: UrgClient) -> None:
         """Write the scans that have come."""
-        if self._client is None:
-            return ReturnCode.RTC_ERROR
-        try:
-            scans = self._client.poll()
-        except (LinkError, DeviceRefused) as error:
-            return self._failed(error)
-        for scan in scans:
+        for scan in client.poll():
             self.ranges.write(_range_data(Time.from_us(ec.now_us), scan))
-        return ReturnCode.RTC_OK
-
-    def _failed(self, error: Exception) -> ReturnCode:
-        _LOG.error("%s: %s", self.instance_name, error)
-        self._close()
-        return ReturnCode.RTC_ERROR
-
-    def _close(self) -> None:
-        client, self._client = self._client, None
-        try:
-            if client is not None:
-                client.close()
-        except LinkError as error:
-            _LOG.warning("%s: %s", self.instance_name, error)
 
 
 def _range_data(now: Time, scan: UrgScan) -> RangeData:

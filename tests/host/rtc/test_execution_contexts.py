@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.rtc import ExecutionContext
-from tickrig.host.rtc.execution import ExecutionContexts
+from tickrig.host.rtc.component import ExecutionContexts
 from tickrig.wire.instant import NEVER
 
 RATES_HZ = (1.0, 30.0, 300.0, 999.0, 1_000.0)

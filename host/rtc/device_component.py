@@ -1,0 +1,86 @@
+"""Base of components that talk with a device while they are Active."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Final, Generic, Protocol, TypeVar
+
+from tickrig.host.links.link import DeviceRefused, LinkError
+from tickrig.host.rtc.component import ExecutionContext, RtComponent
+from tickrig.host.rtc.states import ReturnCode
+from tickrig.host.text.log import log_of
+
+_LOG: Final = log_of(__name__)
+
+
+class DeviceClient(Protocol):
+    """What talks with a device."""
+
+    def close(self) -> None:
+        """Give the line back."""
+
+
+C = TypeVar("C", bound=DeviceClient)
+
+
+class DeviceComponent(RtComponent, ABC, Generic[C]):
+    """Opens a client when it is activated, and closes it when it is deactivated.
+
+    If the line fails or the device refuses, it logs why, closes the client and goes into Error; the
+    next activation opens a new one.
+
+    Attributes:
+        client: talks with the device while the component is Active.
+    """
+
+    def __init__(self, instance_name: str) -> None:
+        super().__init__(instance_name)
+        self.client: C | None = None
+
+    @abstractmethod
+    def open_client(self) -> C:
+        """Return a new client; LinkError if the device cannot be reached."""
+
+    @abstractmethod
+    def exchange(self, ec: ExecutionContext, client: C) -> None:
+        """Talk with the device in a period; LinkError or DeviceRefused if that fails."""
+
+    def release(self, ec: ExecutionContext) -> None:
+        """Do what is left to do before the client is closed; nothing unless overridden."""
+
+    def on_activated(self, ec: ExecutionContext) -> ReturnCode:
+        """Open the client, also after Error."""
+        try:
+            self.client = self.open_client()
+        except LinkError as error:
+            return self._failed(ec, error)
+        return ReturnCode.RTC_OK
+
+    def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
+        """Close the client."""
+        self._close(ec)
+        return ReturnCode.RTC_OK
+
+    def on_execute(self, ec: ExecutionContext) -> ReturnCode:
+        """Talk with the device."""
+        if self.client is None:
+            return ReturnCode.RTC_ERROR
+        try:
+            self.exchange(ec, self.client)
+        except (LinkError, DeviceRefused) as error:
+            return self._failed(ec, error)
+        return ReturnCode.RTC_OK
+
+    def _failed(self, ec: ExecutionContext, error: Exception) -> ReturnCode:
+        _LOG.error("%s: %s", self.instance_name, error)
+        self._close(ec)
+        return ReturnCode.RTC_ERROR
+
+    def _close(self, ec: ExecutionContext) -> None:
+        self.release(ec)
+        client, self.client = self.client, None
+        try:
+            if client is not None:
+                client.close()
+        except LinkError as error:
+            _LOG.warning("%s: %s", self.instance_name, error)
