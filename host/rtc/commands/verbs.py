@@ -424,18 +424,9 @@ def check(at: Path, file: Path) -> None:
     beside it does not matter.
     """
     with loading():
-        from tickrig.host.rtc.system.rts_profile import parse_rts_profile  # noqa: PLC0415
-        from tickrig.host.rtc.system.system import differences  # noqa: PLC0415
-        from tickrig.host.rtc.system.system_file import (  # noqa: PLC0415
-            file_format,
-            parse_toml,
-            read_system,
-        )
+        from tickrig.host.rtc.system.system_file import file_format, lacking  # noqa: PLC0415
 
-    parse = parse_rts_profile if file_format(file) == "xml" else parse_toml
-    wanted = read_system(file)
-    found = parse(request_system(at, "save", format=file_format(file))["text"])
-    lines = tuple(differences(wanted, found))
+    lines = lacking(file, request_system(at, "save", format=file_format(file))["text"])
     for line in lines:
         click.echo(line)
     if lines:
@@ -450,27 +441,9 @@ def dot(at: Path) -> None:
     \b
     tickrig rtc dot | dot -Tsvg -o system.svg
     """  # noqa: D301 - click wants the backspace
-    from tickrig.host.rtc.system.dot import Edge, write_dot  # noqa: PLC0415
+    from tickrig.host.rtc.system.dot import system_graph  # noqa: PLC0415
 
-    described = components(at)
-    ends = dict.fromkeys(
-        tuple(connector["ports"])
-        for component in described
-        for port in component["ports"]
-        for connector in port["connectors"]
-    )
-    click.echo(write_dot(map(_box, described), (Edge(*pair) for pair in ends)))
-
-
-def _box(component: Any) -> Any:
-    from tickrig.host.rtc.system.dot import Box  # noqa: PLC0415
-
-    ins, outs = list[str](), list[str]()
-    for port in component["ports"]:
-        side = ins if port["kind"] == "DataInPort" else outs
-        side.append(port["name"].rpartition(".")[2])
-    state = component["state"].capitalize()
-    return Box(component["name"], f"{component['type']} {state}", tuple(ins), tuple(outs))
+    click.echo(system_graph(components(at)))
 
 
 SYSTEM_VERBS: Final = (save, status, stop, check, dot)

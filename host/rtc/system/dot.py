@@ -16,7 +16,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 _SPECIAL: Final = re.compile(r'([\\{}|<>" ])')
 
@@ -59,6 +59,27 @@ def write_dot(boxes: Iterable[Box], edges: Iterable[Edge]) -> str:
         for edge in edges
     )
     return "\n".join((*lines, "}"))
+
+
+def system_graph(components: Iterable[Any]) -> str:
+    """Return the graph of a system whose components are described as the control socket does."""
+    described = tuple(components)
+    ends = dict.fromkeys(
+        tuple(connector["ports"])
+        for component in described
+        for port in component["ports"]
+        for connector in port["connectors"]
+    )
+    return write_dot(map(_box, described), (Edge(*pair) for pair in ends))
+
+
+def _box(component: Any) -> Box:
+    ins, outs = list[str](), list[str]()
+    for port in component["ports"]:
+        side = ins if port["kind"] == "DataInPort" else outs
+        side.append(port["name"].rpartition(".")[2])
+    state = component["state"].capitalize()
+    return Box(component["name"], f"{component['type']} {state}", tuple(ins), tuple(outs))
 
 
 def _label(box: Box) -> str:

@@ -36,22 +36,8 @@ from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import RemoteEntry
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
-from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System
-from tickrig.host.text.section import (
-    Field,
-    Schema,
-    Section,
-    anything,
-    flag,
-    in_a_line,
-    lines,
-    number,
-    read_section,
-    shown,
-    string,
-    table,
-    text,
-)
+from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System, differences
+from tickrig.host.text.toml_reader import load_toml
 from tickrig.host.text.whole_file import check_file, write_whole
 
 
@@ -177,15 +163,31 @@ XML: Final = ".xml"
 
 def read_system(path: Path) -> System:
     """Read a system file; Refused if that cannot be done."""
-    parse = parse_rts_profile if file_format(path) == "xml" else parse_toml
     try:
-        return parse(path.read_text("utf-8"))
+        return _parse(path, path.read_text("utf-8"))
     except UnicodeDecodeError as error:
         raise Refused(f"system {path}: byte {error.start} is not UTF-8") from None
     except OSError as error:
         refuse_path("system", error)
     except RtcRefused as error:
         raise Refused(f"system {path}: {error}") from None
+
+
+def lacking(path: Path, text: str) -> tuple[str, ...]:
+    """Return a line for all that a system lacks of a file.
+
+    Args:
+        path: the file, TOML or XML.
+        text: the system in the same format.
+
+    Raises:
+        Refused: the file cannot be read.
+    """
+    return tuple(differences(read_system(path), _parse(path, text)))
+
+
+def _parse(path: Path, text: str) -> System:
+    return parse_rts_profile(text) if file_format(path) == "xml" else parse_toml(text)
 
 
 def write_system(text: str, path: Path) -> None:

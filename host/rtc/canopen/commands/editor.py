@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import click
 
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
-from tickrig.host.cli.messages import BusFailed, Refused
+from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, version_option
 from tickrig.host.cli.start import loading
-from tickrig.host.links.link import LinkClosed
-from tickrig.host.rtc.canopen.commands.opening import (
-    STANDARD_OUTPUT,
-    add_components,
-    bus_of,
-    component_option,
-    log_listener,
-    open_link,
-    read_server,
-)
-from tickrig.wire.can import ErrorState
+from tickrig.host.rtc.canopen.commands.server import component_option
 
 
 @click.command(cls=BusCommand)
@@ -50,30 +38,7 @@ def main(
     """  # noqa: D301 - click wants the backspace
     try:
         with loading():
-            from tickrig.host.rtc.canopen.editor.app import SystemEditor  # noqa: PLC0415 - an extra
+            from tickrig.host.rtc.canopen.editor.app import run_editor  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
-    from tickrig.host.rtc.canopen.editor.session import EditorSession  # noqa: PLC0415
-
-    if log == STANDARD_OUTPUT:
-        raise Refused("--log -: the screen is on standard output; name a file")
-    server = read_server(file, components)
-    if not sys.stdout.isatty():
-        raise Refused("the editor needs a terminal; rtc-canopen-server does without one")
-    with ExitStack() as stack:
-        listeners = tuple(log_listener(log, stack))
-        bus = bus_of(BusOptions(**options), server.definition.bus)
-
-        def bus_state(state: ErrorState) -> None:
-            session.bus_state(state)
-
-        link, name = open_link(bus, bus_state, stack)
-        session = EditorSession(
-            server, file, link, lambda other: add_components(other, components), listeners
-        )
-        if start:
-            server.start()
-        try:
-            SystemEditor(session, name).run_session()
-        except LinkClosed as error:
-            raise BusFailed(str(error)) from None
+    run_editor(file, log, components, start, BusOptions(**options))

@@ -1,40 +1,36 @@
-"""What the command lines of a server have in common: its files, and its bus."""
+"""What the command lines of a server do: read its files, open its bus, run it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TextIO
+from typing import Any, Final, TextIO
 
 import click
 
 from tickrig.host.cli.can_options import BusOptions, open_raw
-from tickrig.host.cli.messages import NEEDS_YAML, Refused, refuse_path, show_findings
-from tickrig.host.cli.options import Decorator
-from tickrig.host.cli.start import loading
-from tickrig.host.links.link import StampedLink
+from tickrig.host.cli.control import serving_control, stopped_by_signals
+from tickrig.host.cli.engine_options import EngineOptions
+from tickrig.host.cli.messages import BusFailed, Refused, refuse_path, show_findings, warnings_shown
+from tickrig.host.links.can_link import CanLink
+from tickrig.host.links.echo import free_of_echo
+from tickrig.host.links.link import LinkClosed, StampedLink
+from tickrig.host.rtc.canopen.commands.server_control import ServerControl
+from tickrig.host.rtc.canopen.definition import BusEntry
+from tickrig.host.rtc.canopen.events import EventListener, ServerEvent
+from tickrig.host.rtc.canopen.offline import check_offline, draw_graph
+from tickrig.host.rtc.canopen.serve import ServerRunner, open_server
+from tickrig.host.rtc.canopen.server import RtcCanopenServer
 from tickrig.host.rtc.component import RtComponent
+from tickrig.host.rtc.engines.engines_joined import engines_joined
+from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.text.user_file import explain_error, find_class
-
-if TYPE_CHECKING:
-    from tickrig.host.links.can_link import CanLink
-    from tickrig.host.rtc.canopen.definition import BusEntry
-    from tickrig.host.rtc.canopen.events import EventListener, ServerEvent
-    from tickrig.host.rtc.canopen.server import RtcCanopenServer
-    from tickrig.wire.can import ErrorState
+from tickrig.wire.can import ErrorState
+from tickrig.wire.instant import NEVER
 
 STANDARD_OUTPUT: Final = Path("-")
-
-
-component_option: Final[Decorator] = click.option(
-    "--component",
-    "components",
-    multiple=True,
-    metavar="NAME=FILE.py:Class",
-    help="An RT component beside the proxies, Active at once; may be repeated.",
-)
 
 
 def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
@@ -42,11 +38,6 @@ def read_server(file: Path, components: Sequence[str]) -> RtcCanopenServer:
 
     What is wrong in its EDS files, and not used, is told on standard error.
     """
-    try:
-        with loading():
-            from tickrig.host.rtc.canopen.serve import open_server  # noqa: PLC0415 - slow
-    except ModuleNotFoundError:
-        raise Refused(NEEDS_YAML) from None
     try:
         server = open_server(file)
         add_components(server, components)
@@ -91,9 +82,6 @@ def open_link(
         bus_state: called with what its CAN controller reports.
         stack: closes it.
     """
-    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
-    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
-
     bus, interface, channel = open_raw(options)
     link = CanLink(bus, f"{interface}:{channel}", drops=True)
     stack.callback(_close, link)
@@ -136,3 +124,86 @@ def _close(link: CanLink) -> None:
     if link.reads.faults:
         click.echo(f"the driver could not read {link.reads.faults} frames", err=True)
     link.close()
+
+
+# What rtc-canopen-server does, once its options are read.
+
+_QUICK_US: Final = 2_000
+"""So long at most a call of an engine waits for the bus."""
+
+
+def run_server(file: Path, span_us: int, engines: EngineOptions, options: dict[str, Any]) -> None:
+    """Serve a System Definition; or check it, or draw it, if the options say so.
+
+    Args:
+        file: the definition.
+        span_us: how long; `NEVER` for no end.
+        engines: to join with.
+        options: the others of the command line.
+    """
+    server = read_server(file, options.pop("components"))
+    definition = server.definition
+    if options.pop("check"):
+        _check(file, server)
+        return
+    if options.pop("dot"):
+        click.echo(draw_graph(server))
+        return
+    names = "log", "quiet", "start", "control"
+    log, quiet, start, control = (options.pop(name) for name in names)
+    with warnings_shown(), ExitStack() as stack:
+        if not quiet:
+            server.log.listeners.append(lambda event: click.echo(str(event), err=True))
+        server.log.listeners += log_listener(log, stack)
+        bus = bus_of(BusOptions(**options), definition.bus)
+        link, name = open_link(bus, server.bus_state, stack)
+        if start:
+            server.start()
+        _run(server, link, span_us, _Doors(control, name, engines))
+
+
+def _check(file: Path, server: RtcCanopenServer) -> None:
+    if mistakes := check_offline(server):
+        raise Refused("\n".join(f"{file}: {mistake}" for mistake in mistakes))
+    click.echo(f"{file}: {len(server.nodes)} nodes, no mistake found")
+
+
+def _run(server: RtcCanopenServer, link: StampedLink, span_us: int, doors: _Doors) -> None:
+    until_us = NEVER if span_us == NEVER else link.now_us + span_us
+    runner = ServerRunner(server, link)
+    try:
+        with ExitStack() as stack:
+            stack.enter_context(stopped_by_signals(runner.stop))
+            click.echo(f"{len(server.nodes)} nodes on {doors.bus}. Ctrl-C ends.", err=True)
+            doors.open(stack, server, runner)
+            runner.run(until_us)
+        link.send(server.stop(link.now_us))
+    except LinkClosed as error:
+        raise BusFailed(str(error)) from None
+
+
+@dataclass(frozen=True, slots=True)
+class _Doors:
+    """By which others work with a server while it runs: a control socket, engines."""
+
+    control: Path | None
+    bus: str
+    engines: EngineOptions
+
+    def open(self, stack: ExitStack, server: RtcCanopenServer, runner: ServerRunner) -> None:
+        if self.control is not None:
+            requests = ServerControl(server, runner, self.bus)
+            door = stack.enter_context(serving_control(self.control, requests, runner))
+        if not self.engines:
+            return
+
+        def attach(calls: CallQueue) -> None:
+            runner.pause_us = _QUICK_US
+            if self.control is None:
+                runner.serve = calls.serve
+            else:
+                door.attach(calls, calls.make)
+
+        stack.enter_context(
+            engines_joined(self.engines, server.manager, attach, runner.stop, fixed=True)
+        )
