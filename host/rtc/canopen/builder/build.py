@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any, Final
 
+import click
+
+from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.rtc.canopen.builder.c_header import write_header
-from tickrig.host.rtc.canopen.builder.profile_file import Project, check_identifiers, snake_name
+from tickrig.host.rtc.canopen.builder.profile_file import (
+    Project,
+    check_identifiers,
+    parse_project,
+    snake_name,
+)
 from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX, write_skeleton
 from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry, SystemDefinition
 from tickrig.host.rtc.canopen.definition_writer import write_definition
+from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
@@ -116,3 +126,48 @@ def _pdo(port: PlacedPort) -> str:
     else:
         cob_id = f"{port.cob_id:03X}h{'+id' * port.relative}"
     return PDO.format(_pdo_name(port), cob_id, kind.bits or "-", f"{port.profile.name}: {what}")
+
+
+# What rtc-canopen-builder does, once its options are read.
+
+
+def run_builder(path: Path, out: Path | None, *, force: bool, every: bool) -> None:
+    """Check a profile, show it, and write its files.
+
+    Args:
+        path: of the profile.
+        out: folder for the files; nothing is written if left out.
+        force: overwrite a skeleton.
+        every: show every object, not only those of ports.
+    """
+    project, files = _read_and_build(path)
+    if out is not None:
+        _write_files(out, files, force=force)
+    for line in summary(project.profile, every=every):
+        click.echo(line)
+
+
+def _read_and_build(path: Path) -> tuple[Project, dict[str, str]]:
+    try:
+        project = parse_project(path.read_text("utf-8"))
+        return project, build(project)
+    except OSError as error:
+        refuse_path("profile", error)
+    except UnicodeDecodeError:
+        raise Refused(f"profile {path}: is no text in UTF-8") from None
+    except ValueError as error:
+        raise Refused(f"profile {path}: {error}") from None
+
+
+def _write_files(folder: Path, files: dict[str, str], *, force: bool) -> None:
+    """Write the files; a skeleton that is there may have been filled and is kept."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            path = folder / name
+            if path.suffix == SKELETON_SUFFIX and path.exists() and not force:
+                click.echo(f"{path} is kept; --force overwrites it", err=True)
+                continue
+            write_whole(path, text)
+    except OSError as error:
+        refuse_path("file", error)

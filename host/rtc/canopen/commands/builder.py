@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from tickrig.host.cli.messages import NEEDS_YAML, Refused, refuse_path
+from tickrig.host.cli.messages import NEEDS_YAML, Refused
 from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE, Project, parse_project
-from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX
+from tickrig.host.cli.start import loading
+from tickrig.host.rtc.canopen.builder.profile_file import EXAMPLE
 
 
 @click.command(cls=HarmlessCommand)
@@ -41,42 +41,9 @@ def main(
         return
     if profile is None:
         raise Refused("give a PROFILE, or --example for one to begin with")
-    project, files = _build(profile)
-    from tickrig.host.rtc.canopen.builder.build import summary  # noqa: PLC0415 - the extra [rtc]
-
-    if out is not None:
-        _write(out, files, force=force)
-    for line in summary(project.profile, every=every):
-        click.echo(line)
-
-
-def _build(path: Path) -> tuple[Project, dict[str, str]]:
     try:
-        from tickrig.host.rtc.canopen.builder.build import build  # noqa: PLC0415 - the extra [rtc]
+        with loading():
+            from tickrig.host.rtc.canopen.builder.build import run_builder  # noqa: PLC0415 - [rtc]
     except ModuleNotFoundError:
         raise Refused(NEEDS_YAML) from None
-    try:
-        project = parse_project(path.read_text("utf-8"))
-        return project, build(project)
-    except OSError as error:
-        refuse_path("profile", error)
-    except UnicodeDecodeError:
-        raise Refused(f"profile {path}: is no text in UTF-8") from None
-    except ValueError as error:
-        raise Refused(f"profile {path}: {error}") from None
-
-
-def _write(folder: Path, files: dict[str, str], *, force: bool) -> None:
-    """Write the files; a skeleton that is there may have been filled and is kept."""
-    from tickrig.host.text.whole_file import write_whole  # noqa: PLC0415 - a TAB needs none
-
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in files.items():
-            path = folder / name
-            if path.suffix == SKELETON_SUFFIX and path.exists() and not force:
-                click.echo(f"{path} is kept; --force overwrites it", err=True)
-                continue
-            write_whole(path, text)
-    except OSError as error:
-        refuse_path("file", error)
+    run_builder(profile, out, force=force, every=every)
