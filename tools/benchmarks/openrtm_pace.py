@@ -141,7 +141,7 @@ def reference(port: int) -> Any:
 
 def join(first: System, second: System, names: Sequence[str]) -> None:
     """Join OutPorts of a system with the InPorts of another one."""
-    from tickrig.host.rtc.engines.openrtm.connector_ends import nvlist  # noqa: PLC0415
+    from tickrig.host.rtc.engines.openrtm.orb import nvlist  # noqa: PLC0415
     from tickrig.host.rtc.engines.openrtm.stubs import stubs  # noqa: PLC0415
 
     values = {

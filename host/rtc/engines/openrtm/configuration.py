@@ -108,7 +108,7 @@ class ConfigurationServant:
         return {**self._configuration.sets, **shown}
 
     def _set(self, set_id: str, values: Mapping[str, str]) -> Any:
-        data = nvlist(dict(values), self._sdo.NameValue)
+        data = nvlist(values)
         return self._sdo.ConfigurationSet(id=set_id, description="", configuration_data=data)
 
     def _found(self, set_id: str) -> Any:

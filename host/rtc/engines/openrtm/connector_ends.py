@@ -9,10 +9,9 @@ from functools import partial
 from typing import Any, Final, Protocol
 
 from omniORB import CORBA
-from omniORB import any as omni_any
 
 from tickrig.host.rtc.engines.in_port import InPortPullConnector, InPortPushConnector
-from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.engines.out_port import OutPortPullConnector, OutPortPushConnector
 from tickrig.host.rtc.engines.peer_end import Codec, PeerEnd, PeerWatch, cdr
@@ -56,12 +55,6 @@ def changed(properties: _Properties, values: Mapping[str, str]) -> _Properties:
     """Return properties with some values; all others pass as they came."""
     kept = [item for item in properties if item.name not in values]
     return kept + nvlist(values)
-
-
-def nvlist(values: Mapping[str, str]) -> _Properties:
-    """Return properties that are texts."""
-    name_value = stubs().sdo.NameValue
-    return [name_value(name, omni_any.to_any(text)) for name, text in values.items()]
 
 
 def completed(properties: _Properties) -> _Properties:

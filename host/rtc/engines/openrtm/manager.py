@@ -90,20 +90,18 @@ class ManagerServant:
 
     def get_profile(self) -> Any:
         """Return how it is called."""
-        return self._rtm.ManagerProfile(self._nvlist(self._profile()))
+        return self._rtm.ManagerProfile(nvlist(self._profile()))
 
     def get_configuration(self) -> list[Any]:
         """Return its settings."""
-        return self._nvlist({f"manager.{key}": text for key, text in self._profile().items()})
+        return nvlist({f"manager.{key}": text for key, text in self._profile().items()})
 
     def get_factory_profiles(self) -> list[Any]:
         """Return the types of components that it can create."""
         names = self._calls.call(lambda: self._manager.types)
         facts = {"language": "Python", "lang_type": "SCRIPT"}
         return [
-            self._rtm.ModuleProfile(
-                self._nvlist({"implementation_id": name, "type_name": name, **facts})
-            )
+            self._rtm.ModuleProfile(nvlist({"implementation_id": name, "type_name": name, **facts}))
             for name in names
         ]
 
@@ -171,9 +169,6 @@ class ManagerServant:
             _LOG.warning("OpenRTM: create %s: %s", type_name, error)
             return None
         return self._references.of(component)
-
-    def _nvlist(self, values: dict[str, str]) -> list[Any]:
-        return nvlist(values, self._references.stubs.sdo.NameValue)
 
 
 def _option(word: str) -> tuple[str, str]:

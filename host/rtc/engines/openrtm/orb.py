@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, Final
 
@@ -14,6 +14,7 @@ from omniORB import CORBA, PortableServer
 from omniORB import any as omni_any
 
 from tickrig.host.cli.engine_options import Endpoint
+from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 from tickrig.host.rtc.system.peer_thread import calls_run
 from tickrig.host.text.log import log_of
@@ -160,25 +161,27 @@ def _serves() -> bool:
     return any(isinstance(thread, omniORB.WorkerThread) for thread in threading.enumerate())
 
 
-def nvlist(values: dict[str, str], name_value: Callable[[str, Any], Any]) -> list[Any]:
-    """Return an NVList of strings, made of the `NameValue` of the stubs.
+def nvlist(values: Mapping[str, str]) -> list[Any]:
+    """Return an NVList of strings.
 
     What a string of CORBA cannot carry becomes U+FFFD, with a line in the log: the ORB would
     refuse the whole answer behind the servant, where nothing can be logged.
     """
+    name_value = stubs().sdo.NameValue
     return [
-        name_value(_carried(name, name), omni_any.to_any(_carried(name, value)))
+        name_value(carried(name, name), omni_any.to_any(carried(name, value)))
         for name, value in values.items()
     ]
 
 
-def _carried(name: str, text: str) -> str:
-    carried = _NOT_CARRIED.sub("\N{REPLACEMENT CHARACTER}", text)
-    if carried != text:
+def carried(name: str, text: str) -> str:
+    """Return a text, for people called by a name, as a string of CORBA carries it."""
+    sent = _NOT_CARRIED.sub("\N{REPLACEMENT CHARACTER}", text)
+    if sent != text:
         _LOG.warning(
-            "OpenRTM: %r: a CORBA string cannot carry %r, it is sent as %r", name, text, carried
+            "OpenRTM: %r: a CORBA string cannot carry %r, it is sent as %r", name, text, sent
         )
-    return carried
+    return sent
 
 
 def explain(error: Exception) -> str:

@@ -13,10 +13,9 @@ from tickrig.host.rtc.engines.openrtm.connector_ends import (
     CORBA_CDR,
     DATA_TYPE,
     INTERFACE,
-    nvlist,
 )
 from tickrig.host.rtc.engines.openrtm.names import name_of
-from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, carried, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.port_service import SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.data_port import DataPort
@@ -122,7 +121,7 @@ class _Kept:
         ours, values = self._ports.calls.call(self._begin)
         rtc, wanted = stubs().rtc, self._wanted
         profile = rtc.ConnectorProfile(
-            wanted.name, wanted.connector_id, [ours, peer], nvlist(values)
+            carried("name", wanted.name), wanted.connector_id, [ours, peer], nvlist(values)
         )
         code, _ = ours.connect(profile)
         return bool(code == rtc.RTC_OK)

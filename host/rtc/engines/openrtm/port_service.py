@@ -21,11 +21,10 @@ from tickrig.host.rtc.engines.openrtm.connector_ends import (
     agreed_endian,
     changed,
     completed,
-    nvlist,
     offered,
     texts,
 )
-from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain
+from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, carried, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.connector import Connector
 from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
@@ -498,7 +497,7 @@ class SystemPorts:
         profile = connector.profile
         properties = nvlist(profile.properties)
         return stubs().rtc.ConnectorProfile(
-            profile.name, profile.connector_id, references, properties
+            carried("name", profile.name), profile.connector_id, references, properties
         )
 
     def close(self) -> None:

@@ -62,7 +62,7 @@ class RtObjectServant:
             category=spec.category,
             port_profiles=profiles,
             parent=None,
-            properties=nvlist(_properties_of(self._component), self._stubs.sdo.NameValue),
+            properties=nvlist(_properties_of(self._component)),
         )
 
     def get_ports(self) -> list[Reference]:

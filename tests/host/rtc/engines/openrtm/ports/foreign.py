@@ -15,8 +15,7 @@ from typing import Any, TypeVar
 
 from tests.host.rtc.chain import PERIOD_US, make_manager
 from tickrig.host.rtc import RtComponent
-from tickrig.host.rtc.engines.openrtm.connector_ends import nvlist
-from tickrig.host.rtc.engines.openrtm.orb import Orb
+from tickrig.host.rtc.engines.openrtm.orb import Orb, nvlist
 from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import DATA_TYPES, IDL, compile_idl, stubs
 from tickrig.host.rtc.system.call_queue import CallQueue

@@ -77,6 +77,15 @@ def test_a_connector_of_probes_is_not_shown(system: Served) -> None:
     assert ids(system, "ConsoleIn0.out") == []
 
 
+def test_what_a_string_cannot_carry_hides_no_connector(system: Served) -> None:
+    out, in_ = (system.manager.port(name) for name in ("ConsoleIn0.out", "ConsoleOut0.in"))
+    connect(out, in_, {"note": "a\0b", "half\ud800": "c"}, name="d\0e")
+    (found,) = profile_of(system, "ConsoleIn0.out").connector_profiles
+    assert found.name == "d\ufffde"
+    assert texts(found.properties)["note"] == "a\ufffdb"
+    assert texts(found.properties)["half\ufffd"] == "c"
+
+
 def test_properties_that_are_unknown_pass_unchanged(system: Served, peer: Peer) -> None:
     ports = system.service("ConsoleIn0.out"), system.reference(peer.iors["in"])
     profile = system.profile(*ports, connector_id="a", x__y="kept")
