@@ -1,5 +1,42 @@
 """The RTC-CANopen server: NMT master, heartbeat consumer, maker of proxies (Fig. 108)."""
 
+# Theory of operation
+#
+# A node of the System Definition is a `ServedNode`; a node that has booted has a proxy, which is an
+# ordinary RT component. Its life cycle and the NMT state of the device are kept equal (NEDO report,
+# table 3):
+#
+#   proxy     NMT state        the proxy asks with   from the bus it follows
+#   Inactive  Pre-operational  on_deactivated        a heartbeat that says so
+#   Active    Operational      on_activated          a heartbeat that says so
+#   Error     Stopped          on_aborting           a heartbeat that says so, and silence
+#
+# Both sides may move first. The callbacks of a proxy cannot wait for a bus: they note a request
+# (`ProxyRequest`), and `_carry_out` says it on the bus after the period, as a script of SDO and NMT
+# (operations.py). A state that a heartbeat reports moves the proxy, unless a script that moves the
+# device is under way or a request is not carried out yet: then the heartbeat is of the past. Error
+# ends when the device was reset and has booted again: on_reset refuses until then (`ready`).
+#
+# A PDO is a port, or one for each object if their types differ; an object may be a port by SDO.
+# What a frame of a TPDO carries is written to OutPorts as the frame comes. What comes to InPorts
+# leaves at the end of the tick, one frame for each value. `passing` opens the way from the device
+# with on_activated; `confirmed` opens the way to it when the script of the activation has ended.
+#
+# The order within `tick` is what the rest relies on:
+#
+#   1. frames in the order of the bus: PDOs to ports, all else to nodes;
+#   2. nodes that are due: time-outs of scripts and heartbeats;
+#   3. a period of the context begins: connections whose ports came are made, components run;
+#   4. what proxies asked for is said, the next node of the start order is activated;
+#   5. PDOs of InPorts, SDO transfers, SYNC and the server's own heartbeat.
+#
+# So components have the value of a TPDO in the tick in which it came, if a period begins in it, and
+# their answer is in what this tick returns. `due_us` is when something of it is due; `wake` makes
+# it earlier.
+#
+# A server that looks too late (`_be_late`) does not know what the nodes sent meanwhile: it must not
+# take that for silence of theirs.
+
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
