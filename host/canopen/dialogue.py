@@ -28,7 +28,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 from tickrig.host.canopen.errors import (
     SdoFailed,
@@ -84,7 +84,7 @@ FENCES: Final[tuple[Object, ...]] = (
 """Objects that may be read at any time; every server answers, and be it with an abort."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)  # not frozen: each transfer makes some, and that takes thrice as long
 class SdoRequest:
     """Send an SDO request; gives the response, raises SdoTimeout without one.
 
@@ -170,8 +170,7 @@ def _guard_nobody(can_id: int) -> None:
     """Send no remote frame: this host guards no node."""
 
 
-@dataclass(frozen=True, slots=True)
-class QueuedScript:
+class QueuedScript(NamedTuple):
     """A script, and who is told how it ended.
 
     Attributes:
@@ -295,7 +294,9 @@ class Dialogue:
 
     def clear(self) -> None:
         """Forget all jobs."""
-        dropped = [self.job, *self._jobs] if self.job is not None else []
+        if self.job is None:
+            return
+        dropped = [self.job, *self._jobs]
         self._jobs.clear()
         self.job, self._step, self._expected, self.due_us = None, None, None, NEVER
         for job in dropped:
@@ -330,7 +331,7 @@ class Dialogue:
                 self._pass_fence(step, answer)
             else:
                 self._keep_misnamed(now_us, named, data)
-        elif self._is_answer(step, answer, data):
+        elif self._is_answer(step, answer, named, data):
             self._unanswered.clear()
             took_us = max(LEAST_COPY_US, now_us - self._sent_us)
             self._answer, self._settled_us = data, now_us + min(took_us, _MOST_COPY_US)
@@ -362,13 +363,14 @@ class Dialogue:
         self._say(Abort(*at, AbortCode.GENERAL).encode())
         return SdoMisnamed(*at)
 
-    def _is_answer(self, step: SdoRequest, answer: Response, data: bytes) -> bool:
+    def _is_answer(
+        self, step: SdoRequest, answer: Response, named: Object | None, data: bytes
+    ) -> bool:
         """Say whether a response can be the answer to a step, and to nothing else.
 
         A segment and an abort of 0000h:00 name no object. While other questions are open they may
         be answers to those.
         """
-        named = _named(answer)
         if named is not None and named != _NONE_NAMED:
             mine = named == (step.index, step.sub)
         else:
@@ -483,17 +485,20 @@ class Dialogue:
         self._send(REQUEST_COB_ID + self._node_id, data)
 
 
+_NAMING: Final = (
+    UploadInitiateResponse,
+    DownloadInitiateResponse,
+    Abort,
+    BlockDownloadInitiateResponse,
+    BlockUploadInitiateResponse,
+)
+"""Responses that name an object, the most frequent one first."""
+
+
 def _named(answer: Response) -> Object | None:
     """Return the object that a response names, None if it names none."""
-    match answer:
-        case (
-            Abort()
-            | DownloadInitiateResponse()
-            | UploadInitiateResponse()
-            | BlockDownloadInitiateResponse()
-            | BlockUploadInitiateResponse()
-        ):
-            return answer.index, answer.sub
+    if isinstance(answer, _NAMING):
+        return answer.index, answer.sub
     return None
 
 

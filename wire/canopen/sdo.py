@@ -46,6 +46,8 @@ from tickrig.wire.canopen.sdo_frame import (
 )
 from tickrig.wire.errors import FieldError, FramingError
 
+_CODES: Final[dict[int, AbortCode]] = {int(code): code for code in AbortCode}
+
 
 @dataclass(frozen=True, slots=True)
 class Abort:
@@ -67,8 +69,7 @@ class Abort:
     def parse(cls, frame: bytes) -> Self:
         """Read the 8 bytes."""
         code = int.from_bytes(frame[4:], "little")
-        known = code in AbortCode.__members__.values()
-        return cls(*index_sub(frame), AbortCode(code) if known else code)
+        return cls(*index_sub(frame), _CODES.get(code, code))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from struct import Struct, error
 from typing import Final, Self
 
 import crcmod
@@ -172,17 +173,20 @@ BLOCK_SUBCOMMAND: Final = 0x03
 """Bits of the subcommand where block upload is meant, and of an acknowledgement."""
 
 
+_FRAME: Final = Struct("<BHB4s")
+
+
 def frame_at(command: int, index: int, sub: int, rest: bytes = b"") -> bytes:
     """Return a frame of command byte, multiplexer and up to 4 bytes."""
-    if not 0 <= index <= 0xFFFF or not 0 <= sub <= 0xFF:
-        raise FieldError(f"{index:X}h:{sub:X} is not in 0000h:00 to FFFFh:FF")
-    # 40 17 10 00 00 00 00 00 reads 1017h:00.
-    return bytes([command, index & 0xFF, index >> 8, sub]) + rest.ljust(4, b"\0")
+    try:
+        return _FRAME.pack(command, index, sub, rest)
+    except error:
+        raise FieldError(f"{index:X}h:{sub:X} is not in 0000h:00 to FFFFh:FF") from None
 
 
 def index_sub(frame: bytes) -> tuple[int, int]:
     """Return index and sub-index of a frame that has a multiplexer."""
-    return int.from_bytes(frame[1:3], "little"), frame[3]
+    return frame[1] | frame[2] << 8, frame[3]
 
 
 def number_field(number: int) -> bytes:

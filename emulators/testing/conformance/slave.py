@@ -12,7 +12,7 @@ from typing import Final, Protocol, TypeGuard
 from tickrig.host.canopen.conform.bus.exchange import Disturbed, NotAllowed, StepFailed
 from tickrig.host.canopen.conform.check import Stimulus
 from tickrig.host.canopen.conform.conform_run import Crash
-from tickrig.wire.can import CanFrame, Frames
+from tickrig.wire.can import STANDARD_MAX, CanFrame, Frames
 from tickrig.wire.errors import FieldError
 
 TICK_US: Final = 1_000
@@ -124,6 +124,8 @@ def checked_frames(sent: object) -> Frames:
     Raises:
         NoFrames: it cannot.
     """
+    if type(sent) is tuple and all(map(_is_plain, sent)):
+        return sent
     if isinstance(sent, CanFrame | str | bytes) or not isinstance(sent, Iterable):
         raise NoFrames(f"returned {_short(sent)}, not a list of CanFrame")
     frames = tuple(sent)
@@ -138,6 +140,14 @@ def checked_frames(sent: object) -> Frames:
         except FieldError as error:
             raise NoFrames(f"returned {_short(frame)}: {error}") from None
     return frames
+
+
+def _is_plain(frame: object) -> bool:
+    """Say whether it is a data frame with an 11-bit CAN-ID: most are, and need no closer look."""
+    if type(frame) is not CanFrame or frame.remote or frame.extended:
+        return False
+    sound = type(frame.can_id) is int and type(frame.data) is bytes and len(frame.data) <= 8
+    return sound and 0 <= frame.can_id <= STANDARD_MAX and not frame.remote_length
 
 
 def _takes(call: object, *given: object) -> bool:

@@ -95,8 +95,8 @@ class StrayHeartbeat:
     def hear(self) -> None:
         """Take what has come so far; answers to node guarding are no heartbeat."""
         heard = self._exchange.unread(self._can_id)
-        if not any(text.startswith(f"{self._can_id}#R") for _, text in heard):
-            self.stamps = [at_us for at_us, text in heard if matches(self._pattern, text)]
+        if not any(frame.remote for _, frame in heard):
+            self.stamps = [at_us for at_us, frame in heard if matches(self._pattern, str(frame))]
 
     def compare(self, period_ms: int | None) -> None:
         """Hold what was heard against 1017h, None if the node has none."""

@@ -102,7 +102,8 @@ class Judge:
         bound = self._bind(check, subject)
         if isinstance(bound, str):
             return Result(check, CheckOutcome(CheckVerdict.NOT_APPLICABLE, bound))
-        bound = replace(bound, steps=tuple(map(self._as_found, bound.steps)))
+        steps = tuple(map(self._as_found, bound.steps))
+        bound = bound if steps == bound.steps else replace(bound, steps=steps)
         if unread := self._unread(bound, subject):
             return Result(check, CheckOutcome(CheckVerdict.INCONCLUSIVE, unread))
         first = self._go(bound)
@@ -181,10 +182,10 @@ class Judge:
         return CheckOutcome(verdict, reason, lines, *times, self._wanted)
 
     def _play(self, bound: BoundCheck) -> tuple[CheckVerdict, str]:
-        where = ""
+        number = 0
         try:
-            for number, step in enumerate(bound.steps, 1):
-                where = ", ".join(filter(None, [f"step {number}", step_head(step)]))
+            for step in bound.steps:
+                number += 1
                 if not step.at_end:
                     self._player.play(step)
                 if self._exchange.crashes:
@@ -195,6 +196,7 @@ class Judge:
             return CheckVerdict.INCONCLUSIVE, str(error)
         except StepFailed as error:
             self._wanted = error.wanted
+            where = ", ".join(filter(None, [f"step {number}", step_head(step)]))
             if self._exchange.crashes:
                 return CheckVerdict.FAIL, f"{where}: {self._crash()}"
             if step.given or _is_constant(step.action, error):

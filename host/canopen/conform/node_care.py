@@ -165,9 +165,10 @@ class KnownState:
 
     def _read(self, at: Address) -> bytes | None:
         """Read an object; None if the node refuses, or gives no answer about this one."""
-        with suppress(SdoAborted):
+        try:
             return self._patiently(partial(self._client.upload, *at))
-        return None
+        except SdoAborted:
+            return None
 
     def _patiently(self, attempt: Callable[[], T]) -> T | None:
         """Ask the node; None if it gives no answer about this one, SdoTimeout if it is gone."""

@@ -57,7 +57,8 @@ class Permission:
         confirm: _Confirm,
         never: Collection[int] = (),
     ) -> None:
-        self._level, self._allow, self._node_id, self._never = level, allow, node_id, never
+        self._level, self._allow, self._never = level, allow, never
+        self._request = REQUEST_COB_ID + node_id
         self._confirm = confirm
         self._answers: dict[str, bool] = {}
         self.others: frozenset[int] = frozenset()
@@ -70,7 +71,7 @@ class Permission:
             NotAllowed: the level does not allow it.
             Disturbed: it would change other nodes as well.
         """
-        is_request = frame.can_id == REQUEST_COB_ID + self._node_id and not frame.extended
+        is_request = frame.can_id == self._request and not frame.extended
         if self._level is Level.READ_ONLY:
             if not is_request or frame.remote or not _is_upload(frame.data):
                 raise NotAllowed(f"{frame} is more than reading: --communication")

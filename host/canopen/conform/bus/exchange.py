@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict, deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable, Sequence
 from enum import Enum
 from typing import Final
@@ -10,7 +10,7 @@ from typing import Final
 from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches, unlike, wanted_text
 from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 from tickrig.host.links.link import StampedFrames, StampedLink
-from tickrig.wire.can import CanFrame, frame_bits
+from tickrig.wire.can import CanFrame, data_frame, frame_bits
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
 from tickrig.wire.canopen.sdo_frame import (
     BLOCK_ENDED,
@@ -60,29 +60,37 @@ LEFT_OUT: Final = "lines left out"
 """Ends the remark in place of the others."""
 
 
+_Line = tuple[int, Direction, CanFrame | str]
+
+
 class Evidence:
-    """The lines of one go at a check: the first and the last of many."""
+    """The lines of one go at a check: the first and the last of many.
+
+    Frames become text when the lines are asked for: nobody asks for what is said between checks,
+    which is nine tenths of a run.
+    """
 
     def __init__(self) -> None:
-        self._first: list[FrameLine] = []
-        self._last: deque[FrameLine] = deque(maxlen=LAST_LINES)
+        self._first: list[_Line] = []
+        self._last: deque[_Line] = deque(maxlen=LAST_LINES)
         self._left_out = 0
 
-    def add(self, at_us: int, direction: Direction, text: str) -> None:
-        """Add a line."""
-        line = FrameLine(at_us, direction, text)
+    def add(self, at_us: int, direction: Direction, what: CanFrame | str) -> None:
+        """Add a frame or a remark."""
         if len(self._first) < FIRST_LINES:
-            self._first.append(line)
+            self._first.append((at_us, direction, what))
             return
         self._left_out += len(self._last) == LAST_LINES
-        self._last.append(line)
+        self._last.append((at_us, direction, what))
 
     def lines(self) -> tuple[FrameLine, ...]:
         """Return them, with a remark where some were left out."""
-        if not self._left_out:
-            return (*self._first, *self._last)
-        remark = FrameLine(self._last[0].at_us, Direction.REMARK, f"{self._left_out} {LEFT_OUT}")
-        return (*self._first, remark, *self._last)
+        left_out: list[_Line] = []
+        if self._left_out:
+            remark = f"{self._left_out} {LEFT_OUT}"
+            left_out.append((self._last[0][0], Direction.REMARK, remark))
+        lines = (*self._first, *left_out, *self._last)
+        return tuple(FrameLine(at_us, way, str(what)) for at_us, way, what in lines)
 
 
 # Whether frames come as often as they should.
@@ -138,7 +146,7 @@ class Answers:
     """Counts uploads that begin, and answers to them, by object."""
 
     def __init__(self) -> None:
-        self._uploads, self._answered = Counter[bytes](), Counter[bytes]()
+        self._uploads, self._answered = defaultdict[bytes, int](int), defaultdict[bytes, int](int)
         self._silent = True
 
     def count_request(self, data: bytes) -> None:
@@ -157,7 +165,8 @@ class Answers:
         """How many nodes have answered: two, if most objects were told twice each time."""
         if self._silent:
             return Presence.NONE
-        twice = sum(self._answered[at] == 2 * times for at, times in self._uploads.items())
+        told = self._answered
+        twice = sum(told.get(at, 0) == 2 * times for at, times in self._uploads.items())
         many = len(self._uploads) >= _LEAST and 2 * twice > len(self._uploads)
         return Presence.TWO if many else Presence.ONE
 
@@ -308,17 +317,19 @@ class BusExchange:
     ) -> None:
         self._link, self._node_id, self.resolution_us = link, node_id, resolution_us
         self._allowance, self._foreign = Allowance(bit_rate, max_load), ForeignLoad(bit_rate)
-        self._permit, self._boot_up = permit, f"{ERROR_CONTROL_COB_ID + node_id:03X}#00"
+        self._permit = permit
+        self._boot_up = data_frame(ERROR_CONTROL_COB_ID + node_id, bytes(1))
         self.start_us = self._known_us = self._busy_us = link.now_us
         self._reserved = frozenset(("000", f"{REQUEST_COB_ID + node_id:03X}"))
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
         self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
+        self._origins: dict[tuple[int, bool], tuple[str, bool]] = {}
         self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
         self.unanswered: list[tuple[int, int]] = []
         self._answers, self._others_by = Answers(), _NODES
         self.played: int | None = None
         self._shared_host, self._late_us = shared_host, 0
-        self._unread: defaultdict[str, deque[tuple[int, str]]] = defaultdict(_queue)
+        self._unread: defaultdict[str, deque[tuple[int, CanFrame]]] = defaultdict(_queue)
         self._watched: frozenset[str] = frozenset()
         self.evidence, self.disturbances = Evidence(), dict[str, None]()
         self.crashes: dict[str, None] = {}
@@ -371,26 +382,30 @@ class BusExchange:
     def send(self, frame: CanFrame) -> None:
         """Send a frame, when the load allows it; NotAllowed if the level does not."""
         self._permit(frame)
-        now_us = self._link.now_us
+        link, is_request = self._link, frame.can_id == self._request
+        now_us = link.now_us
         if now_us > self._known_us:  # never in virtual time: half of all looks at the bus
             self._listen(now_us)
-        is_request = frame.can_id == self._request
-        if is_request:
+            now_us = link.now_us
+        if is_request and self._known_us < self._ready_us:
             self._listen_until(self._ready_us)
-        held_us = self._allowance.wait_us(self._link.now_us)
-        self._listen_until(self._link.now_us + held_us)
-        if held_us > _HELD_US and self._allowance.slowness > 1:
-            self.disturb(_TOO_LOW)
-        self.evidence.add(self.now_us - self.start_us, Direction.SENT, str(frame))
-        self._allowance.use(self.now_us, frame)
+            now_us = link.now_us
+        if held_us := self._allowance.wait_us(now_us):
+            self._listen_until(now_us + held_us)
+            now_us = link.now_us
+            if held_us > _HELD_US and self._allowance.slowness > 1:
+                self.disturb(_TOO_LOW)
+        self.evidence.add(now_us - self.start_us, Direction.SENT, frame)
+        self._allowance.use(now_us, frame)
         if is_request:
-            if frame.data[:1] and frame.data[0] in _UNANSWERED:
-                self._ready_us = self.now_us + _PAUSE_US
-            self._multiplexer = frame.data[_MULTIPLEXER]
-            self._answers.count_request(frame.data)
-            if len(frame.data) >= _MULTIPLEXER.stop and frame.data[0] & SPECIFIER in _BEGINNING:
-                self.unanswered.append(index_sub(frame.data))
-        self._link.send((frame,))
+            data = frame.data
+            if data[:1] and data[0] in _UNANSWERED:
+                self._ready_us = now_us + _PAUSE_US
+            self._multiplexer = data[_MULTIPLEXER]
+            self._answers.count_request(data)
+            if len(data) >= _MULTIPLEXER.stop and data[0] & SPECIFIER in _BEGINNING:
+                self.unanswered.append(index_sub(data))
+        link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
         """Wait for the next frame on a CAN-ID, which must match one of the patterns.
@@ -408,7 +423,8 @@ class BusExchange:
         if not queue:
             text = f"no {wanted_text(patterns)} within {within_ms} ms"
             raise StepFailed(text, wanted=patterns)
-        at_us, got = queue.popleft()
+        at_us, frame = queue.popleft()
+        got = str(frame)
         if at_us > until_us:
             late_ms = (at_us - until_us + self.resolution_us) / MS_US
             raise StepFailed(f"{got} came {late_ms:.1f} ms after the {within_ms} ms allowed")
@@ -456,7 +472,7 @@ class BusExchange:
         unread.clear()
         until_us = self.now_us + for_ms * MS_US
         self._listen_until(until_us)
-        times = [at_us for at_us, text in unread if at_us <= until_us and matches(pattern, text)]
+        times = [at for at, frame in unread if at <= until_us and matches(pattern, str(frame))]
         unread.clear()
         return times
 
@@ -478,14 +494,7 @@ class BusExchange:
         """Let time pass."""
         self._listen_until(self.now_us + for_ms * MS_US)
 
-    def next(self, can_id: str, until_us: int) -> str | None:
-        """Return the next frame on a CAN-ID, None if none has come by a time."""
-        queue = self._unread[can_id]
-        while not queue and self._known_us < until_us:
-            self._listen(until_us)
-        return queue.popleft()[1] if queue else None
-
-    def unread(self, can_id: str) -> deque[tuple[int, str]]:
+    def unread(self, can_id: str) -> deque[tuple[int, CanFrame]]:
         """Return the frames of a CAN-ID, with their times, that nobody has taken."""
         return self._unread[can_id]
 
@@ -495,6 +504,8 @@ class BusExchange:
 
     def listen(self, until_us: int) -> tuple[int, StampedFrames]:
         """Wait for a first frame; return a time, and all that had arrived by then."""
+        if until_us <= self._known_us == self._link.now_us:
+            return self._known_us, ()  # in virtual time; a look costs as much as a request
         received = self._listen(until_us)
         while not received and self._known_us < until_us:
             received = self._listen(until_us)
@@ -520,39 +531,48 @@ class BusExchange:
         return received
 
     def _take(self, at_us: int, frame: CanFrame) -> None:
-        text = str(frame)
-        can_id = can_id_of(text)
-        own = frame.can_id & _NODE_ID_MASK == self._node_id and not frame.extended
-        own = own and can_id not in self._reserved
+        can_id, own = self._origins.get((frame[0], frame[3])) or self._origin(frame)
         if own or can_id in self._watched:
-            self._unread[can_id].append((at_us, text))
-            self.evidence.add(at_us - self.start_us, Direction.RECEIVED, text)
+            self._unread[can_id].append((at_us, frame))
+            self.evidence.add(at_us - self.start_us, Direction.RECEIVED, frame)
         if own:
             if frame.can_id == self._response:
-                self._allowance.use(at_us, frame)
-                self._answers.count_response(frame.data)
-            self.boots += text == self._boot_up
-            answered = frame.can_id == self._response and len(frame.data) >= _MULTIPLEXER.stop
-            if answered and frame.data[_MULTIPLEXER] == self._multiplexer:
-                self.transfer = index_sub(frame.data)
-            if answered:
-                self._settle(frame.data)
+                self._take_response(at_us, frame)
+            elif frame == self._boot_up:
+                self.boots += 1
             return
         if not frame.extended and any(frame.can_id in ids for ids in self._others_by):
             self.others.update({frame.can_id & _NODE_ID_MASK} - {self.played})
         if can_id in self._reserved:
-            self.disturb(f"somebody else sent {text}")
+            self.disturb(f"somebody else sent {frame}")
         if self._foreign.add(at_us, frame):
             self.disturb("other nodes load the bus too much")
 
-    def _settle(self, data: bytes) -> None:
+    def _origin(self, frame: CanFrame) -> tuple[str, bool]:
+        """Return the CAN-ID of a frame in text, and whether it is of the node; once for each."""
+        can_id = can_id_of(str(frame))
+        own = frame.can_id & _NODE_ID_MASK == self._node_id and not frame.extended
+        origin = can_id, own and can_id not in self._reserved
+        self._origins[frame.can_id, frame.extended] = origin
+        return origin
+
+    def _take_response(self, at_us: int, frame: CanFrame) -> None:
+        data = frame.data
+        self._allowance.use(at_us, frame)
+        self._answers.count_response(data)
+        if len(data) >= _MULTIPLEXER.stop:
+            at = index_sub(data)
+            if data[_MULTIPLEXER] == self._multiplexer:
+                self.transfer = at
+            self._settle(at, data)
+
+    def _settle(self, at: tuple[int, int], data: bytes) -> None:
         """Drop the objects that the node has answered about, or will not answer about any more."""
-        at = index_sub(data)
         if at in self.unanswered:  # and those asked before it
             del self.unanswered[: self.unanswered.index(at) + 1]
         elif data[0] in NAMING:  # the node names another object
             del self.unanswered[:1]
 
 
-def _queue() -> deque[tuple[int, str]]:
+def _queue() -> deque[tuple[int, CanFrame]]:
     return deque(maxlen=_UNREAD_FRAMES)

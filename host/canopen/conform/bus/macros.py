@@ -332,7 +332,7 @@ def _scan(sdo: SdoFrames, number: int, bit: int, sub: int, following: int) -> bo
     sdo.exchange.send(CanFrame.parse(text))
     sdo.exchange.wait(_SCAN_MS)
     answers = sdo.exchange.unread(_FOUND[:3])
-    wrong = [text for _, text in answers if not matches(_FOUND, text)]
+    wrong = [frame for _, frame in answers if not matches(_FOUND, str(frame))]
     answered = bool(answers)
     answers.clear()
     if wrong:

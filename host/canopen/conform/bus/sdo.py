@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Final, TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import BusExchange, StepFailed
@@ -86,9 +85,10 @@ class SdoClient:
 
     def _twice(self, make: Callable[[], Script[T]]) -> T:
         """Run a script, and once more if the node did not answer: one frame may be lost."""
-        with suppress(SdoTimeout):
+        try:
             return self.run(make())
-        return self.run(make())
+        except SdoTimeout:
+            return self.run(make())
 
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""
