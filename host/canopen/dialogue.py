@@ -158,16 +158,12 @@ Failure = SdoFailed | StateTimeout | WrongIdentity
 Send = Callable[[int, bytes], None]
 
 
-def _nothing() -> None:
-    """Tell nobody."""
+def nothing(*_: object) -> None:
+    """Do nothing: this host guards no node, or no one asks what became of a script."""
 
 
 Misnamed = Callable[[Object, bytes], object]
 """Takes the object that was asked for, and the answer that names another one."""
-
-
-def _guard_nobody(can_id: int) -> None:
-    """Send no remote frame: this host guards no node."""
 
 
 class QueuedScript(NamedTuple):
@@ -185,7 +181,7 @@ class QueuedScript(NamedTuple):
     script: Script[Any]
     done: Callable[[Any], None]
     failed: Callable[[Failure], None]
-    dropped: Callable[[], None] = _nothing
+    dropped: Callable[[], None] = nothing
     moves: bool = True
 
 
@@ -258,7 +254,7 @@ class Dialogue:
         self,
         node_id: int,
         send: Send,
-        guard: Callable[[int], None] = _guard_nobody,
+        guard: Callable[[int], None] = nothing,
         sdo_timeout_us: int = SDO_TIMEOUT_US,
         on_misnamed: Misnamed | None = None,
     ) -> None:

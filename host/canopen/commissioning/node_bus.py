@@ -7,9 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Final, TypeVar
 
-from tickrig.host.canopen.dialogue import SDO_TIMEOUT_US, Dialogue, Script
+from tickrig.host.canopen.dialogue import SDO_TIMEOUT_US, Script
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.canopen.script_run import run_script, state_of
+from tickrig.host.canopen.network import NodeSession, state_of
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.links.link import LinkClosed, StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame, data_frame
@@ -40,7 +40,7 @@ class NodeBus:
 
     def __init__(self, link: StampedLink, timeout_us: int = SDO_TIMEOUT_US) -> None:
         self._link, self._timeout_us = link, timeout_us
-        self._talks: dict[int, Dialogue] = {}
+        self._sessions: dict[int, NodeSession] = {}
         self.states: dict[int, NmtState] = {}
 
     @property
@@ -98,15 +98,15 @@ class NodeBus:
         Raises:
             LinkClosed: the bus is gone.
         """
-        if node_id not in self._talks:
-            self._talks[node_id] = Dialogue(node_id, self.send, self._guard)
-        talk = self._talks[node_id]
-        talk.sdo_timeout_us = max(timeout_us, self._timeout_us)
+        if node_id not in self._sessions:
+            self._sessions[node_id] = NodeSession(node_id, self.send, self._guard)
+        session = self._sessions[node_id]
+        session.dialogue.sdo_timeout_us = max(timeout_us, self._timeout_us)
         try:
-            return run_script(talk, node_id, script, self.now_us, self.listen)
+            return session.run(script, self.now_us, self.listen)
         except BaseException:
             with suppress(LinkClosed):
-                talk.abort(AbortCode.GENERAL)
+                session.dialogue.abort(AbortCode.GENERAL)
             raise
 
     def read(self, node_id: int, index: int, sub: int, size: int = 0) -> bytes:

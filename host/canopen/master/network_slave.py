@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from tickrig.host.canopen.dialogue import Dialogue, QueuedScript, Send
+from tickrig.host.canopen.dialogue import QueuedScript, Send
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
 from tickrig.host.canopen.master.boot_slave import (
     BootOutcome,
@@ -14,14 +14,13 @@ from tickrig.host.canopen.master.boot_slave import (
     SlaveBoot,
     state_text,
 )
+from tickrig.host.canopen.network import ErrorControl, NodeSession
+from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
 from tickrig.wire.instant import NEVER
 
 _AGAIN_US: Final = 1_000_000
 """A slave that does not answer is booted again after so long."""
-
-_STATE_BITS: Final = 0x7F
-_TOGGLE: Final = 0x80
 
 
 class NetworkSlave:
@@ -36,8 +35,8 @@ class NetworkSlave:
 
     Attributes:
         assignment: as given.
-        dialogue: what is said with it by SDO.
-        state: what it reported last, or was commanded since; None while nobody knows.
+        session: what is said with it, and heard of it.
+        dialogue: of the session.
         outcome: how its latest boot-up ended, None before that and during one.
         steps: of its latest boot-up, each with its time.
         emergencies: error codes of its EMCYs, the first one first.
@@ -54,18 +53,26 @@ class NetworkSlave:
         plan: MasterPlan,
         booted: Callable[[NetworkSlave], None],
     ) -> None:
-        self.assignment, self._guard, self._booted = assignment, guard, booted
-        self.dialogue = Dialogue(assignment.node_id, send, guard, plan.sdo_timeout_us)
+        self.assignment, self._booted = assignment, booted
+        self.session = NodeSession(assignment.node_id, send, guard, plan.sdo_timeout_us)
+        self.dialogue = self.session.dialogue
+        self._control = ErrorControl(
+            *(assignment.heartbeat_us, assignment.guard_us, assignment.life_time_factor),
+            ask=lambda: guard(ERROR_CONTROL_COB_ID + assignment.node_id),
+        )
         self._boot_time_us = plan.boot_time_us
-        self.state: NmtState | None = None
         self.outcome: BootOutcome | None = None
         self.steps: list[tuple[int, BootStep]] = []
         self.emergencies: list[int] = []
         self.events: list[tuple[int, BootStep]] = []
         self.booting, self.lost = False, 0
         self._now_us = self.began_us = 0
-        self._again_us = self._silent_us = self._guard_us = NEVER
-        self._unanswered, self._toggle = 0, -1
+        self._again_us = NEVER
+
+    @property
+    def state(self) -> NmtState | None:
+        """What it reported last, or was commanded since; None while nobody knows."""
+        return self.session.state
 
     @property
     def good(self) -> bool:
@@ -75,13 +82,14 @@ class NetworkSlave:
     @property
     def due_us(self) -> int:
         """When `tick` has something to do."""
-        return min(self.dialogue.due_us, self._again_us, self._silent_us, self._guard_us)
+        return min(self.dialogue.due_us, self._again_us, self._control.due_us)
 
     def forget(self) -> None:
         """Know nothing of it, as after the master's own reset."""
         self.dialogue.clear()
-        self.state, self.outcome, self.booting = None, None, False
-        self._again_us = self._silent_us = self._guard_us = NEVER
+        self.session.state, self.outcome, self.booting = None, None, False
+        self._control.stop()
+        self._again_us = NEVER
 
     def boot(self, now_us: int) -> None:
         """Begin a boot-up, unless one is under way."""
@@ -92,43 +100,30 @@ class NetworkSlave:
     def _boot(self, now_us: int) -> None:
         state = self.state
         self.forget()
-        self._now_us, self.state, self.booting, self.steps = now_us, state, True, []
+        self._now_us, self.session.state, self.booting, self.steps = now_us, state, True, []
         script = SlaveBoot(self.assignment, self._note).script()
         self.dialogue.start(now_us, QueuedScript("boot-up", script, self._end, self._never))
 
     def expect(self, state: NmtState) -> None:
         """Take note of a state that was commanded."""
         if self.state is not None:
-            self.state = state
+            self.session.state = state
 
-    def report(self, now_us: int, number: int) -> None:
-        """Take a boot-up, a heartbeat or an answer to guarding.
-
-        Args:
-            now_us: the time.
-            number: its only byte.
-        """
-        self._now_us = now_us
-        try:
-            state = NmtState(number & _STATE_BITS)
-        except ValueError:
+    def receive(self, at_us: int, frame: CanFrame) -> None:
+        """Take a boot-up, a heartbeat, an answer to guarding, or an SDO response."""
+        if frame.can_id == ERROR_CONTROL_COB_ID + self.assignment.node_id:
+            self._now_us = at_us
+        returns = bool(self.events) and self.state is None and not self.booting
+        state = self.session.receive(at_us, frame)
+        if state is None:
             return
-        if self.events and self.state is None and not self.booting:
+        if returns:
             self._return(state)
-        self.state = state
-        self.dialogue.receive_state(now_us, state)
         if state is NmtState.INITIALISING:
-            self.state = NmtState.PRE_OPERATIONAL
-            self.boot(now_us)
+            self.session.state = NmtState.PRE_OPERATIONAL
+            self.boot(at_us)
         elif not self.booting:
-            self._watch(number & _TOGGLE)
-
-    def _watch(self, toggle: int) -> None:
-        """Go on with error control: by heartbeat of all that were heard, booted or not."""
-        if self.assignment.heartbeat_us:
-            self._silent_us = self._now_us + self.assignment.heartbeat_us
-        elif self.good and toggle != self._toggle:
-            self._toggle, self._unanswered = toggle, 0
+            self._control.hear(at_us, frame)
 
     def tick(self, now_us: int) -> bool:
         """Do what is due; return True if the slave was lost now."""
@@ -136,31 +131,15 @@ class NetworkSlave:
         self.dialogue.tick(now_us)
         if now_us >= self._again_us:
             self._boot(now_us)
-        if now_us >= self._silent_us:
-            self._silent_us = NEVER
-            return self._lose()
-        return now_us >= self._guard_us and self._guard_again()
-
-    def _guard_again(self) -> bool:
-        self._guard_us += self.assignment.guard_us
-        if self._unanswered < self.assignment.life_time_factor:
-            self._unanswered += 1
-            if self._unanswered == self.assignment.life_time_factor:
-                return self._lose()
-        self._guard(ERROR_CONTROL_COB_ID + self.assignment.node_id)
-        return False
-
-    def _lose(self) -> bool:
-        self.state, self.lost = None, self.lost + 1
+        if not self._control.tick(now_us):
+            return False
+        self.session.state, self.lost = None, self.lost + 1
         return True
 
     def note_loss(self, following: str) -> None:
         """Take note of its loss, and of what the master does about that."""
-        slave = self.assignment
-        what, silence_us = "heartbeat", slave.heartbeat_us
-        if not silence_us:
-            what, silence_us = "guarding", slave.guard_us * slave.life_time_factor
-        self._happened(what, f"none within {silence_us // 1_000} ms", f"lost; {following}")
+        within = f"none within {self._control.silence_us // 1_000} ms"
+        self._happened(self._control.what, within, f"lost; {following}")
 
     def _return(self, state: NmtState) -> None:
         """Tell that a lost slave is heard; only a boot-up has it booted anew."""
@@ -186,8 +165,8 @@ class NetworkSlave:
             return
         self.booting, self.outcome = False, outcome
         if outcome.status.good:
-            self.state = self.state or NmtState.PRE_OPERATIONAL
-            self._begin_guarding()
+            self.session.state = self.state or NmtState.PRE_OPERATIONAL
+            self._control.begin(self._now_us)  # of heartbeats the boot-up has awaited one
         self._booted(self)
 
     def _may_try_again(self) -> bool:
@@ -195,10 +174,3 @@ class NetworkSlave:
         if not self.assignment.mandatory or not self._boot_time_us:
             return True
         return self._now_us - self.began_us < self._boot_time_us
-
-    def _begin_guarding(self) -> None:
-        """Ask in periods; of heartbeats the boot-up has awaited one, and they are watched."""
-        slave = self.assignment
-        if slave.guard_us and slave.life_time_factor and not slave.heartbeat_us:
-            self._guard_us = self._now_us + slave.guard_us
-            self._unanswered = 0

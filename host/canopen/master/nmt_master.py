@@ -10,6 +10,7 @@ from tickrig.host.canopen.master.boot_slave import BootStatus
 from tickrig.host.canopen.master.cia402.drive_driver import DriveNode
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.process_image import ProcessImage
+from tickrig.host.canopen.network import state_of
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, data_frame
@@ -180,13 +181,11 @@ class NmtMaster:
             return
         function, node_id = frame.can_id & _FUNCTION, frame.can_id & ~_FUNCTION
         slave = self.slaves.get(node_id)
-        if function == ERROR_CONTROL_COB_ID and frame.data:
-            if slave is not None:
-                slave.report(at_us, frame.data[0])
-            elif node_id != self.plan.node_id and frame.data[0] == NmtState.INITIALISING:
+        if slave is not None and function in (ERROR_CONTROL_COB_ID, RESPONSE_COB_ID):
+            slave.receive(at_us, frame)
+        elif function == ERROR_CONTROL_COB_ID:
+            if node_id != self.plan.node_id and state_of(frame) is NmtState.INITIALISING:
                 self.strangers.append(node_id)
-        elif function == RESPONSE_COB_ID and slave is not None:
-            slave.dialogue.receive_sdo(at_us, frame.data)
         elif function == _EMCY_COB_ID and slave is not None:
             slave.emergencies.append(int.from_bytes(frame.data[:2], "little"))
         else:

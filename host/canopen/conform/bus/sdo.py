@@ -7,9 +7,9 @@ from typing import Final, TypeVar
 
 from tickrig.host.canopen.conform.bus.exchange import BusExchange, StepFailed
 from tickrig.host.canopen.conform.check import ANSWER_MS, Address
-from tickrig.host.canopen.dialogue import Dialogue, Script
+from tickrig.host.canopen.dialogue import Script
 from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
-from tickrig.host.canopen.script_run import run_script
+from tickrig.host.canopen.network import NodeSession
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.can import data_frame
 from tickrig.wire.canopen.sdo import Abort
@@ -57,7 +57,7 @@ class SdoClient:
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
         self._exchange, self._node_id = exchange, node_id
-        self._talk = Dialogue(node_id, self._send, on_misnamed=self._keep_misnamed)
+        self._session = NodeSession(node_id, self._send, on_misnamed=self._keep_misnamed)
         self.misnamed: dict[str, None] = {}
         self.size_of: SizeOf = lambda index, sub: 0
 
@@ -97,11 +97,11 @@ class SdoClient:
 
     def run(self, script: Script[T]) -> T:
         """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
-        exchange, talk = self._exchange, self._talk
+        exchange, talk = self._exchange, self._session.dialogue
         for at in exchange.unanswered:  # by the check, which talks for itself
             talk.remember(at)
         try:
-            return run_script(talk, self._node_id, script, exchange.now_us, exchange.listen)
+            return self._session.run(script, exchange.now_us, exchange.listen)
         finally:
             talk.clear()
             exchange.unanswered.clear()

@@ -355,7 +355,8 @@ def test_a_slave_of_which_nothing_is_known_is_taken_for_pre_operational() -> Non
 def test_what_is_no_state_is_passed_over() -> None:
     with network(GUARDED) as net:
         net.master.boot()
-        net.master.slave("left").report(net.master.now_us, 0x11)
+        for text in ("705#11", "705#", "705#0400"):
+            net.master.slave("left").receive(net.master.now_us, CanFrame.parse(text))
         assert net.master.slave("left").state is NmtState.OPERATIONAL
 
 

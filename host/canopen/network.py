@@ -1,0 +1,196 @@
+"""One node of a network as a host holds it: what is said to it, and what is heard of it.
+
+A node session. Whoever talks with a node for a while holds a `NodeSession`: the test master for
+each of its slaves, `canmon net` and the gateway for each node they ask, the conformance tester for
+the node under test. It has three parts, which go together because one frame can concern all three:
+
+- the `Dialogue`: the scripts that run, and which questions the server may still answer. It must
+  live as long as the session. A new dialogue would take a late answer to an old question for the
+  answer to its own.
+- the NMT state that the node reported last. A boot-up is the report INITIALISING; the node is
+  Pre-operational after it by itself (CiA 301, 7.3.2.1), so the holder decides what to store.
+- `ErrorControl`, if the holder supervises the node.
+
+One frame, one order. `receive` stores the state first and tells the dialogue second: a script that
+waits for a state may end with this frame, and its holder reads `state` in the callback.
+
+Time. The session has no clock. A frame comes with the time at which it was on the bus, `tick` with
+the time of now, and `due_us` says when `tick` has something to do. A holder with nothing else to do
+calls `run`, which waits by itself; one with many nodes calls `tick` for each that is due.
+
+Before a script begins, `run` takes what came before: an answer in the queue of a driver does not
+belong to this script.
+
+Error control (CiA 301, 7.2.8.2). A node has heartbeat or node guarding, never both; where the
+holder expects a heartbeat, guarding is off. A node that falls silent is lost once, not again in
+each period: the next loss needs a sign of life between. Guarding counts requests without an answer
+that has the other toggle bit: an answer that repeats the toggle bit is the copy of an old one.
+
+Boot-up. A boot procedure is a script, as any other, so that a session runs that of CiA 302-2
+(`master.boot_slave.SlaveBoot`, also behind `canmon net boot`) or another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Final, TypeVar
+
+from tickrig.host.canopen.dialogue import (
+    SDO_TIMEOUT_US,
+    Dialogue,
+    Misnamed,
+    QueuedScript,
+    Script,
+    Send,
+    nothing,
+)
+from tickrig.host.links.link import StampedFrames
+from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
+from tickrig.wire.canopen.sdo_frame import RESPONSE_COB_ID
+from tickrig.wire.instant import NEVER
+
+T = TypeVar("T")
+
+_STATE_BITS: Final = 0x7F
+_TOGGLE: Final = 0x80
+
+_Listen = Callable[[int], tuple[int, StampedFrames]]
+"""Waits for a first frame until a time; returns a time, and all that had arrived by then."""
+
+
+def state_of(frame: CanFrame) -> NmtState | None:
+    """Return the state that a frame of error control reports; None if it reports none."""
+    try:
+        return NmtState(frame.data[0] & _STATE_BITS) if len(frame.data) == 1 else None
+    except ValueError:
+        return None
+
+
+class ErrorControl:
+    """Finds out that a node is lost: by its heartbeat, or by node guarding.
+
+    Args:
+        heartbeat_us: consumer heartbeat time, 0 for none.
+        guard_us: guard time, 0 for none.
+        life_time_factor: so many requests without an answer are too many.
+        ask: sends a request of node guarding.
+
+    Attributes:
+        due_us: when `tick` has something to do.
+        what: `heartbeat` or `guarding`.
+        silence_us: a node that is silent for so long is lost.
+    """
+
+    def __init__(
+        self, heartbeat_us: int, guard_us: int, life_time_factor: int, ask: Callable[[], None]
+    ) -> None:
+        self._heartbeat_us, self._ask = heartbeat_us, ask
+        self._factor = 0 if heartbeat_us else life_time_factor
+        self._guard_us = guard_us if self._factor else 0
+        self.what = "heartbeat" if heartbeat_us else "guarding"
+        self.silence_us = heartbeat_us or guard_us * life_time_factor
+        self.due_us, self._unanswered, self._toggle = NEVER, 0, -1
+
+    def stop(self) -> None:
+        """Supervise no more until `begin`, or until the next heartbeat."""
+        self.due_us = NEVER
+
+    def begin(self, now_us: int) -> None:
+        """Begin to guard; a heartbeat is supervised from the first that is heard."""
+        if self._guard_us:
+            self.due_us, self._unanswered = now_us + self._guard_us, 0
+
+    def hear(self, at_us: int, frame: CanFrame) -> None:
+        """Take a heartbeat or an answer to guarding."""
+        toggle = frame.data[0] & _TOGGLE
+        if self._heartbeat_us:
+            self.due_us = at_us + self._heartbeat_us
+        elif self.due_us < NEVER and toggle != self._toggle:
+            self._toggle, self._unanswered = toggle, 0
+
+    def tick(self, now_us: int) -> bool:
+        """Do what is due; return True if the node is lost now."""
+        if now_us < self.due_us:
+            return False
+        if self._heartbeat_us:
+            self.due_us = NEVER
+            return True
+        self.due_us += self._guard_us
+        if self._unanswered < self._factor:
+            self._unanswered += 1
+            if self._unanswered == self._factor:
+                return True
+        self._ask()
+        return False
+
+
+class NodeSession:
+    """What a host says to one node, and hears of it.
+
+    Args:
+        node_id: the node, 1..127.
+        send: takes CAN-ID and data.
+        guard: takes the CAN-ID of a remote frame.
+        sdo_timeout_us: how long to wait for an SDO response.
+        on_misnamed: as a `Dialogue` takes it.
+
+    Attributes:
+        node_id: as given.
+        dialogue: the scripts that run.
+        state: what the node reported last, None while it has reported nothing.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        send: Send,
+        guard: Callable[[int], None] = nothing,
+        sdo_timeout_us: int = SDO_TIMEOUT_US,
+        on_misnamed: Misnamed | None = None,
+    ) -> None:
+        self.node_id = node_id
+        self.dialogue = Dialogue(node_id, send, guard, sdo_timeout_us, on_misnamed)
+        self.state: NmtState | None = None
+        self._response = RESPONSE_COB_ID + node_id
+        self._error_control = ERROR_CONTROL_COB_ID + node_id
+
+    def receive(self, now_us: int, frame: CanFrame) -> NmtState | None:
+        """Take a frame of the bus; return the state that it reports, None if it reports none."""
+        can_id, data, remote, extended, _ = frame
+        if remote or extended:
+            return None
+        if can_id == self._response:
+            self.dialogue.receive_sdo(now_us, data)
+        elif can_id == self._error_control and (state := state_of(frame)) is not None:
+            self.state = state
+            self.dialogue.receive_state(now_us, state)
+            return state
+        return None
+
+    def run(self, script: Script[T], now_us: int, listen: _Listen) -> T:
+        """Run a script to its end, and return or raise what it does.
+
+        Args:
+            script: what is said; nothing else is said meanwhile.
+            now_us: the time.
+            listen: waits.
+
+        Raises:
+            LinkClosed: the bus is gone.
+        """
+        ended: list[T | Exception] = []
+        now_us = self._take(listen(now_us))
+        self.dialogue.start(now_us, QueuedScript("", script, ended.append, ended.append))
+        while not ended:
+            self.dialogue.tick(self._take(listen(self.dialogue.due_us)))
+        if isinstance(ended[0], Exception):
+            raise ended[0]
+        return ended[0]
+
+    def _take(self, received: tuple[int, StampedFrames]) -> int:
+        """Take what was received; return the time of it."""
+        now_us, frames = received
+        for _, frame in frames:
+            self.receive(now_us, frame)
+        return now_us
