@@ -1,14 +1,12 @@
-"""The steps that only checks of objects have: what an object holds, and writing it back wrongly."""
+"""The checks of the objects that an EDS describes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
-from typing import Final, Protocol
+from typing import Final
 
-from tickrig.host.canopen.conform.bus.exchange import StepFailed
-from tickrig.host.canopen.conform.bus.frame_pattern import codes_text
 from tickrig.host.canopen.conform.check import (
     Action,
     Check,
@@ -19,12 +17,9 @@ from tickrig.host.canopen.conform.check import (
     RefuseWrite,
     Step,
 )
-from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
-from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.canopen.sdo_frame import describe_abort
 
 # The SDO abort codes that are accepted for each kind of refusal.
 #
@@ -335,71 +330,3 @@ def _may_have_none(entry: EntryDescription) -> bool:
     """Return whether an entry may hold nothing: no error yet, an empty domain or string."""
     reserved = entry.index in _PDO_PARAMETERS and entry.sub == _RESERVED_SUB
     return reserved or entry.index == _ERROR_FIELD or not entry.size
-
-
-class Client(Protocol):
-    """Reads and writes objects of the node under test."""
-
-    def upload(self, index: int, sub: int, /) -> bytes:
-        """Read an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
-        ...
-
-    def download(self, index: int, sub: int, data: bytes, /) -> None:
-        """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
-
-
-def play_of_object(client: Client, action: Hold | RefuseRewrite) -> None:
-    """Do what only checks of objects do.
-
-    Raises:
-        StepFailed: the node does not do as the step says.
-    """
-    try:
-        if isinstance(action, Hold):
-            _play_hold(client, action)
-        else:
-            _rewrite(client, *action.address, action.grow, action.codes)
-    except (SdoMisnamed, SdoTimeout) as error:
-        raise StepFailed(str(error)) from error
-
-
-def _play_hold(client: Client, step: Hold) -> None:
-    try:
-        data = client.upload(*step.address)
-    except SdoAborted as error:
-        if f"{error.code:08X}" in step.codes:
-            return
-        raise StepFailed(f"refused with {describe_abort(error.code)}, want its value") from error
-    kind = DataType[step.kind]
-    if kind.size and len(data) != kind.size:
-        raise StepFailed(f"{len(data)} bytes, want {kind.size} of {kind.name}: {data.hex()}")
-    if step.value is not None and data.hex().upper() != step.value:
-        raise StepFailed(f"holds {data.hex().upper()}, want {step.value}")
-    _check_limits(kind, data, step)
-
-
-def _check_limits(kind: DataType, data: bytes, step: Hold) -> None:
-    value = kind.decode(data)
-    if not isinstance(value, int | float):
-        return
-    if step.low is not None and value < step.low:
-        raise StepFailed(f"{value} is below its lower limit {step.low}")
-    if step.high is not None and value > step.high:
-        raise StepFailed(f"{value} is above its upper limit {step.high}")
-
-
-def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:
-    wanted = f"abort {codes_text(codes)}"
-    try:
-        data = client.upload(index, sub)
-    except SdoAborted:
-        return  # it holds nothing that could be written; what it should hold is another check
-    data = data[:grow] if grow < 0 else data + bytes(grow)
-    try:
-        client.download(index, sub, data)
-    except SdoAborted as error:
-        if f"{error.code:08X}" not in codes:
-            text = f"{len(data)} bytes refused with {describe_abort(error.code)}, want {wanted}"
-            raise StepFailed(text) from error
-    else:
-        raise StepFailed(f"{len(data)} bytes were taken, want {wanted}")

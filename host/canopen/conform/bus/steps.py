@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import Final
+from collections.abc import Callable, Sequence
+from typing import Final, Protocol
 
 from tickrig.host.canopen.conform.bus.exchange import (
     MS_US,
@@ -13,6 +13,7 @@ from tickrig.host.canopen.conform.bus.exchange import (
     NotAllowed,
     StepFailed,
 )
+from tickrig.host.canopen.conform.bus.frame_pattern import codes_text
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo import SdoFrames
 from tickrig.host.canopen.conform.check import (
@@ -35,8 +36,10 @@ from tickrig.host.canopen.conform.check import (
     Wait,
     Write,
 )
-from tickrig.host.canopen.conform.object_checks import Client, play_of_object
+from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.sdo_frame import describe_abort
 
 _Stimulus = Callable[..., str]
 
@@ -153,3 +156,74 @@ def _value(text: str) -> float | str:
         return float(text)
     except ValueError:
         return text
+
+
+# The steps that only checks of objects have: what an object holds, and writing it back wrongly.
+
+
+class Client(Protocol):
+    """Reads and writes objects of the node under test."""
+
+    def upload(self, index: int, sub: int, /) -> bytes:
+        """Read an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
+        ...
+
+    def download(self, index: int, sub: int, data: bytes, /) -> None:
+        """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
+
+
+def play_of_object(client: Client, action: Hold | RefuseRewrite) -> None:
+    """Do what only checks of objects do.
+
+    Raises:
+        StepFailed: the node does not do as the step says.
+    """
+    try:
+        if isinstance(action, Hold):
+            _play_hold(client, action)
+        else:
+            _rewrite(client, *action.address, action.grow, action.codes)
+    except (SdoMisnamed, SdoTimeout) as error:
+        raise StepFailed(str(error)) from error
+
+
+def _play_hold(client: Client, step: Hold) -> None:
+    try:
+        data = client.upload(*step.address)
+    except SdoAborted as error:
+        if f"{error.code:08X}" in step.codes:
+            return
+        raise StepFailed(f"refused with {describe_abort(error.code)}, want its value") from error
+    kind = DataType[step.kind]
+    if kind.size and len(data) != kind.size:
+        raise StepFailed(f"{len(data)} bytes, want {kind.size} of {kind.name}: {data.hex()}")
+    if step.value is not None and data.hex().upper() != step.value:
+        raise StepFailed(f"holds {data.hex().upper()}, want {step.value}")
+    _check_limits(kind, data, step)
+
+
+def _check_limits(kind: DataType, data: bytes, step: Hold) -> None:
+    value = kind.decode(data)
+    if not isinstance(value, int | float):
+        return
+    if step.low is not None and value < step.low:
+        raise StepFailed(f"{value} is below its lower limit {step.low}")
+    if step.high is not None and value > step.high:
+        raise StepFailed(f"{value} is above its upper limit {step.high}")
+
+
+def _rewrite(client: Client, index: int, sub: int, grow: int, codes: Sequence[str]) -> None:
+    wanted = f"abort {codes_text(codes)}"
+    try:
+        data = client.upload(index, sub)
+    except SdoAborted:
+        return  # it holds nothing that could be written; what it should hold is another check
+    data = data[:grow] if grow < 0 else data + bytes(grow)
+    try:
+        client.download(index, sub, data)
+    except SdoAborted as error:
+        if f"{error.code:08X}" not in codes:
+            text = f"{len(data)} bytes refused with {describe_abort(error.code)}, want {wanted}"
+            raise StepFailed(text) from error
+    else:
+        raise StepFailed(f"{len(data)} bytes were taken, want {wanted}")

@@ -10,6 +10,7 @@ from tests.host.canopen.data_sheet.corpus import GOOD, counted_only
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.emulators.canopen.eds import read_eds
 from tickrig.host.canopen.conform.bus.exchange import StepFailed
+from tickrig.host.canopen.conform.bus.steps import play_of_object
 from tickrig.host.canopen.conform.check import (
     Check,
     Hold,
@@ -19,7 +20,7 @@ from tickrig.host.canopen.conform.check import (
     RefuseWrite,
 )
 from tickrig.host.canopen.conform.notation import bind_check
-from tickrig.host.canopen.conform.object_checks import object_checks, play_of_object
+from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.eds import read_sound
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.wire.canopen.datatypes import DataType, Value
