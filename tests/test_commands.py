@@ -20,7 +20,7 @@ from packaging.requirements import Requirement
 from tickrig import __version__
 from tickrig.emulators.commands.cli import DEMOS
 from tickrig.emulators.commands.cli import main as tickrig
-from tickrig.emulators.rh3.motion_cli import main as rh3
+from tickrig.emulators.rh3.commands.motion_cli import main as rh3
 from tickrig.host.canmon.cli import main as canmon
 
 ROOT = Path(__file__).parents[1]

@@ -23,7 +23,7 @@ from tests.host.rtc.canopen.bench import PALETTE_AND_MOTOR
 from tickrig.emulators.canopen.cli import main as canopen_slave_emu
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.commands.cli import main as tickrig
-from tickrig.emulators.rh3.motion_cli import main as rh3
+from tickrig.emulators.rh3.commands.motion_cli import main as rh3
 from tickrig.emulators.testing.bench.bench import Bench
 from tickrig.emulators.testing.campaign.table import write_table
 from tickrig.emulators.testing.report.report_file import write_run

@@ -37,7 +37,7 @@ from tickrig.emulators.testing.report.report_file import from_json
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
 from tickrig.emulators.testing.signals.formula import parse_formula
 from tickrig.emulators.testing.signals.table import read_points
-from tickrig.emulators.tkernel.resolution.table import parse_table as parse_ucodes
+from tickrig.emulators.tkernel.ucode_table import parse_table as parse_ucodes
 from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.model.check.rule_parser import parse_rule
 from tickrig.host.canmon.model.check.rules import parse_rule_file
@@ -195,7 +195,7 @@ READERS: Final = {
         of_file(lambda path: read_points(path, None), "p.csv"), ("t,a\n0,", 't,"')
     ),
     "emulators.testing.signals.formula": Reader(parse_formula, ("1 + ", "- ")),
-    "emulators.tkernel.resolution.table": Reader(parse_ucodes, ("x = ", "a.")),
+    "emulators.tkernel.ucode_table": Reader(parse_ucodes, ("x = ", "a.")),
     "host.canmon.workspace": Reader(Workspace, ("x = ",)),
     "host.canopen.conform.report.baseline": Reader(of_file(Baseline.read, "b.txt")),
     "host.rtc.engines.ros2.table_reader": Reader(

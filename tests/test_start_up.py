@@ -47,7 +47,7 @@ MOST = {
     "tickrig rtc con TAB": 29,
     "rrc-emu TAB": 15,
     "rtc-lite-emu --framing TAB": 21,
-    "rh3 goto TAB": 16,
+    "rh3 goto TAB": 17,
     "rh3-emu TAB": 17,
     "urg-emu TAB": 15,
     "ucode-reader-emu TAB": 17,

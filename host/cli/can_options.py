@@ -5,7 +5,6 @@ python-can is imported when a bus is opened: it takes a fifth of a second.
 
 from __future__ import annotations
 
-import errno
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,12 +24,6 @@ if TYPE_CHECKING:
 GREEDY: Final = ("--timing", "--bus-kwargs")
 """Options that take one or more values in python-can's tools."""
 
-_HINTS: Final = {
-    errno.EAFNOSUPPORT: "this kernel has no SocketCAN; udp_multicast needs none",
-    errno.ENODEV: "no such CAN interface; a virtual one is made by"
-    " 'ip link add dev NAME up type vcan'",
-}
-_NO_MSGPACK: Final = "msgpack not installed"
 """What python-can says where its interface udp_multicast lacks a package."""
 
 UNNAMED: Final = '"None"'
@@ -223,7 +216,7 @@ def open_raw(options: BusOptions, instead: str = "") -> tuple[can.BusABC, str, s
         import can  # noqa: PLC0415 - slow
         from can.util import load_config  # noqa: PLC0415
 
-    from tickrig.host.links.can_link import prepare_bus  # noqa: PLC0415
+    from tickrig.host.links.can_link import bus_reason, prepare_bus  # noqa: PLC0415
 
     _check_interface(options.interface)
     given = _given(options)
@@ -311,12 +304,3 @@ def _first_line(error: BaseException) -> str:
     from tickrig.host.links.link import first_line  # noqa: PLC0415 - a TAB needs none
 
     return first_line(error)
-
-
-def bus_reason(error: BaseException) -> str:
-    """Return in a line why a bus cannot be opened, and what to do where that is known."""
-    number = getattr(error, "errno", None) or getattr(error, "error_code", None)
-    hint = _HINTS.get(number) if isinstance(number, int) else None
-    if _NO_MSGPACK in str(error):
-        hint = "pip install 'python-can[multicast]'"
-    return f"{_first_line(error)} ({hint})" if hint else _first_line(error)

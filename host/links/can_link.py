@@ -37,39 +37,12 @@ from tickrig.wire.can import (
     Frames,
 )
 
-# Theory of operation
-# ===================
-#
-# python-can gives one interface to two dozen drivers, and they differ exactly where a bench
-# is sensitive. This file is the one place that knows it; everything behind sees frames,
-# times of the machine's monotonic clock, and LinkClosed.
-#
-# - Reading (`BusReceiver`). A driver may raise anything for a damaged line: it is counted,
-#   told at the 1st, 10th, 100th time, and reading goes on. The bus is given up for an error
-#   code that says the adapter is gone (`GONE`), or when 100 reads in a row have failed for
-#   a second. Messages that can be no frame (`_odd`: an identifier too large, fewer bytes
-#   than the DLC says) are such faults.
-# - Waiting. `BusABC.recv` measures by the wall clock; `_receive` goes round it and measures
-#   by the monotonic one. It uses `_recv_internal`, which is not public: a driver that
-#   overrides `recv` is called as it is.
-# - Times (`StampClock`). Stamps of a driver are on a clock of its own. The least difference
-#   to ours that was seen is taken, since a frame is never read before it has arrived, and
-#   it may grow by the drift of two clocks. A frame is never older than the last look that
-#   found nothing: so a bad stamp can only matter while this process was late.
-# - Lateness. `receive_stamped` returns a time from before its last look. Whoever judges
-#   silence takes that time for now; a process that was stopped behind the look thus finds
-#   itself late, not the bus.
-# - Queues. The kernel's queue is enlarged when a bus is prepared: 300 frames, its usual
-#   size, are 40 ms at 1 Mbit/s. Sending tries again while the driver's queue is full (ten
-#   frames in SocketCAN) for 1 s; a link that `drops` counts instead, for traffic that
-#   nobody may wait for.
-# - The multicast bus of python-can binds to a port without its group, and hears its own
-#   frames. The first is mended in `prepare_bus`, the second is for the link above
-#   (`echo.py`).
-#
-# What each driver does stands beside the line that it concerns. Before you change one: most
-# of these lines are covered by tests with the real driver only (tests/host/links,
-# tests/interop).
+_HINTS: Final = {
+    errno.EAFNOSUPPORT: "this kernel has no SocketCAN; udp_multicast needs none",
+    errno.ENODEV: "no such CAN interface; a virtual one is made by"
+    " 'ip link add dev NAME up type vcan'",
+}
+_NO_MSGPACK: Final = "msgpack not installed"
 
 
 def to_message(frame: CanFrame | FdFrame, at_us: int = 0) -> can.Message:
@@ -591,3 +564,12 @@ def _error_state(message: can.Message) -> ErrorState | None:
     if flags & _PASSIVE:
         return ErrorState.PASSIVE
     return ErrorState.ACTIVE if ControllerFlag.ACTIVE in flags else None
+
+
+def bus_reason(error: BaseException) -> str:
+    """Return in a line why a bus cannot be opened, and what to do where that is known."""
+    number = getattr(error, "errno", None) or getattr(error, "error_code", None)
+    hint = _HINTS.get(number) if isinstance(number, int) else None
+    if _NO_MSGPACK in str(error):
+        hint = "pip install 'python-can[multicast]'"
+    return f"{first_line(error)} ({hint})" if hint else first_line(error)

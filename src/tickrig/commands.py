@@ -43,7 +43,7 @@ def canmon() -> None:
 
 def rh3() -> None:
     """Call `rh3`."""
-    _start("rh3", "tickrig.emulators.rh3.motion_cli")
+    _start("rh3", "tickrig.emulators.rh3.commands.motion_cli")
 
 
 def rh3_emu() -> None:
@@ -63,12 +63,12 @@ def ucode_reader_emu() -> None:
 
 def ucode_resolver() -> None:
     """Call `ucode-resolver`."""
-    _start("ucode-resolver", "tickrig.emulators.tkernel.resolution.cli")
+    _start("ucode-resolver", "tickrig.emulators.tkernel.commands.resolver_cli")
 
 
 def tkernel_emu() -> None:
     """Call `tkernel-emu`."""
-    _start("tkernel-emu", "tickrig.emulators.tkernel.node.cli")
+    _start("tkernel-emu", "tickrig.emulators.tkernel.commands.node_cli")
 
 
 def canopen_slave_emu() -> None:

@@ -15,11 +15,11 @@ import tickrig
 from benchmarks.table import row
 from tickrig import Bench
 from tickrig.device import Rrc
-from tickrig.emulators.testing.campaign.campaign_run import Campaign
 from tickrig.emulators.testing.campaign.crew import Crew, LocalWorkers
 from tickrig.emulators.testing.campaign.journal import CampaignJournal
 from tickrig.emulators.testing.campaign.order import CampaignOrder
 from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds
+from tickrig.emulators.testing.commands.campaign_run import Campaign
 
 TEST = """
 import pytest

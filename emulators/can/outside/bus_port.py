@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from contextlib import ExitStack
-from typing import Final, NamedTuple
+from typing import Final
 
 import can
 
 from tickrig.device.twin import NonCopyable
 from tickrig.emulators.can.outside.bridge import CountingPort, WithoutEcho
-from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of, to_frame, to_message
 from tickrig.host.links.echo import ECHOING
 from tickrig.host.links.link import LinkClosed
@@ -112,34 +110,6 @@ class CanBusPort(NonCopyable):
         if failed and not self._failed:
             _logger.warning("%s: %s; what it does not take is kept", self._name, failed)
         self._failed = failed
-
-
-class BusPortOpener(NamedTuple):
-    """A bus outside.
-
-    Attributes:
-        port: the bus.
-        name: what people call it.
-        channel: what logs call it.
-    """
-
-    port: CountingPort
-    name: str
-    channel: str
-
-
-def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
-    """Open the bus that options, environment or configuration files of python-can name.
-
-    Raises:
-        Refused: none is named, or it cannot be opened.
-    """
-    instead = "give --scenario FILE, which runs in virtual time"
-    bus, interface, channel = open_raw(options, instead)
-    stack.callback(close_bus, bus)
-    name = interface if channel is None else f"{interface} {channel}"
-    label = "_".join(str(channel).split()) if channel not in (None, "") else interface
-    return BusPortOpener(port_on(bus, interface, f"CAN bus {name}"), name, label)
 
 
 def port_on(

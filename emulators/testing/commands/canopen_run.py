@@ -14,7 +14,8 @@ from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
-from tickrig.emulators.can.outside.bus_port import open_bus
+from tickrig.emulators.can.outside.bridge import CountingPort
+from tickrig.emulators.can.outside.bus_port import port_on
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.build import (
@@ -40,8 +41,9 @@ from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.canopen.bus_file.bus_file import is_bus_file
-from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.can_options import BusOptions, open_raw
 from tickrig.host.cli.messages import Refused, refuse_path, say, show_findings
+from tickrig.host.links.can_link import close_bus
 from tickrig.host.text.values import counted, parse_size, parse_time_us
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import CanFrame, LogLine
@@ -65,6 +67,34 @@ class BusYml(NamedTuple):
 
     file: Path | None = None
     urdf: Path | None = None
+
+
+class BusPortOpener(NamedTuple):
+    """A bus outside.
+
+    Attributes:
+        port: the bus.
+        name: what people call it.
+        channel: what logs call it.
+    """
+
+    port: CountingPort
+    name: str
+    channel: str
+
+
+def open_bus(options: BusOptions, stack: ExitStack) -> BusPortOpener:
+    """Open the bus that options, environment or configuration files of python-can name.
+
+    Raises:
+        Refused: none is named, or it cannot be opened.
+    """
+    instead = "give --scenario FILE, which runs in virtual time"
+    bus, interface, channel = open_raw(options, instead)
+    stack.callback(close_bus, bus)
+    name = interface if channel is None else f"{interface} {channel}"
+    label = "_".join(str(channel).split()) if channel not in (None, "") else interface
+    return BusPortOpener(port_on(bus, interface, f"CAN bus {name}"), name, label)
 
 
 class RigNodes(NamedTuple):

@@ -21,7 +21,6 @@ from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
-from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 from tickrig.host.text.values import Setting
@@ -122,7 +121,7 @@ def _reason(name: str, key: str, value: object) -> str:
     """Return why a device cannot have an option, empty if it can."""
     try:
         names = option_names(name)
-    except ExtensionError:
+    except ValueError:
         return ""  # the device is the mistake
     if key.replace("_", "-") not in names:
         return f"no option {key!r}; {near(key, list(names))}"

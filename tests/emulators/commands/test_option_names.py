@@ -9,7 +9,7 @@ from tickrig.host.cli.start import load
 
 MAINS = {
     "rrc-emu": "tickrig.emulators.rrc.cli:main",
-    "rh3": "tickrig.emulators.rh3.motion_cli:main",
+    "rh3": "tickrig.emulators.rh3.commands.motion_cli:main",
     "rh3-emu": "tickrig.emulators.rh3.cli:main",
     "urg-emu": "tickrig.emulators.urg.cli:main",
     "rtc-lite-emu": "tickrig.emulators.rtc_lite.cli:main",

@@ -9,7 +9,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from tickrig.emulators.can.outside.bus_port import open_bus
+from tickrig.emulators.testing.commands.canopen_run import open_bus
 from tickrig.host.cli.can_options import GREEDY, BusCommand, BusOptions, bus_options, open_raw
 from tickrig.host.cli.messages import Refused
 

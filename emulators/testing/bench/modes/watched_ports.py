@@ -14,8 +14,14 @@ import serial
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
-from tickrig.host.cli.can_options import bus_reason
-from tickrig.host.links.can_link import GONE, BusReceiver, prepare_bus, to_error_frame, to_frame
+from tickrig.host.links.can_link import (
+    GONE,
+    BusReceiver,
+    bus_reason,
+    prepare_bus,
+    to_error_frame,
+    to_frame,
+)
 from tickrig.host.links.link import first_line
 from tickrig.host.links.ready import let_wait
 from tickrig.host.links.serial_link import explain_open_error

@@ -8,7 +8,7 @@ import pytest
 
 from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.record_log import hear
-from tickrig.emulators.fig120 import BIT_RATE, LINK, MOTOR, PALETTE, VirtualStage, run_demo
+from tickrig.emulators.demos.fig120 import BIT_RATE, LINK, MOTOR, PALETTE, VirtualStage, run_demo
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.column_check import ColumnChecker
 from tickrig.host.canmon.model.check.rule import Rule, TrafficFinding

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from tests.host.rtc.engines.ros2.extra import CYCLONE
 from tests.host.rtc.engines.ros2.joined import DEADLINE_S, Peer, command, own_domain
-from tickrig.emulators.rh3.motion_cli import main
+from tickrig.emulators.rh3.commands.motion_cli import main
 from tickrig.host.control.client import ControlClient
 
 READ = {

@@ -1,0 +1,1 @@
+"""Demonstrations of `tickrig demo`: a device and a host at work."""

@@ -1,0 +1,26 @@
+"""The command `tickrig demo tkernel`."""
+
+from __future__ import annotations
+
+import click
+
+from tickrig.host.cli.start import loading
+
+
+@click.command()
+@click.option("--no-caches", is_flag=True, help="Entries of the caches do not outlive the outage.")
+def tkernel(no_caches: bool) -> None:
+    """Let a robot keep its position by ucodes while the service that resolves them is gone.
+
+    A cart of Reference Hardware 3 with worn wheels drives along a corridor
+    with infra-red markers; a node on T-Kernel reads their ucodes. On the way
+    back the resolution service is unreachable, and the caches of the node go
+    on. In virtual time: the same lines each time.
+    """
+    with loading():
+        from tickrig.emulators.demos.tkernel import (  # noqa: PLC0415
+            CorridorStage,
+            run_demo,
+        )
+
+    run_demo(CorridorStage(caches=not no_caches), click.echo)

@@ -1,0 +1,180 @@
+"""The command `rh3`: let a cart of Reference Hardware 3 drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import click
+
+from tickrig.emulators.commands.run_options import device_options
+from tickrig.emulators.rh3.fields import PARAMETERS
+from tickrig.host.cli.engine_options import openrtm_options, ros2_options
+from tickrig.host.cli.options import (
+    PATH,
+    Decorator,
+    LazyGroup,
+    NumberRange,
+    add_options,
+    version_option,
+)
+from tickrig.host.cli.start import loading
+
+_COORDINATES: Final = {"ignore_unknown_options": True}
+"""So that `-1` is a number and no option."""
+
+_SHARED: Final[Decorator] = add_options(
+    click.option(
+        "--set",
+        "set_id",
+        type=click.Choice(["default", "tuned"]),
+        default="default",
+        show_default=True,
+        help="Configuration set: the specification's, or the more precise one.",
+    ),
+    click.option("--device", metavar="URL", help="Serial port of a base; else one is emulated."),
+    click.option(
+        "--any-device",
+        is_flag=True,
+        help="Drive what --device names without asking whether it is an RH3 base.",
+    ),
+    click.option(
+        "--baud",
+        type=click.IntRange(1_200, 4_000_000),
+        default=115_200,
+        show_default=True,
+        help="Bit rate of the device, 8N1.",
+    ),
+    click.option(
+        "--pace",
+        type=NumberRange(0.01, 1_000),
+        metavar="X",
+        help="Speed of virtual time, 1 is real time; else as fast as it goes.",
+    ),
+    click.option("--odometry-conf", "conf", type=PATH, help="File with conf.default.NAME: VALUE."),
+    click.option("--map/--no-map", "show_map", default=None, help="Draw the track as it grows."),
+    device_options(PARAMETERS),
+    click.option("--seed", type=int, default=0, help="Of the noise.  [0]"),
+)
+
+
+_PLOT: Final[Decorator] = click.option(
+    "--plot", type=PATH, help="Draw the journey into FILE.png, .svg or .html."
+)
+
+
+@click.group(cls=LazyGroup, commands={})
+@version_option()
+def main() -> None:
+    """Let a cart of Reference Hardware 3 drive: six components over a base.
+
+    The base is emulated, in virtual time; with --device it is real hardware or
+    rh3-emu, in real time. Ctrl-C stops it.
+
+    \b
+    rh3 goto 1 0.5 1.57 --set tuned --plot track.svg
+    rh3 path corners.txt --pace 10
+    rh3 square --tread-m 0.459
+    rh3 goto 1 0 0 --device /dev/ttyUSB0
+    rh3 serve --openrtm localhost:2809
+    rh3 serve --ros2
+    """  # noqa: D301 - click wants the backspace
+
+
+@main.command(context_settings=_COORDINATES)
+@click.argument("x", type=float)
+@click.argument("y", type=float)
+@click.argument("theta", type=float)
+@_PLOT
+@_SHARED
+def goto(x: float, y: float, theta: float, **options: Any) -> None:
+    """Drive to X and Y in metres, and turn to THETA in radians.
+
+    \b
+    rh3 goto 1 0.5 1.57
+    rh3 goto -1 0 0 --set tuned
+    """  # noqa: D301
+    with loading():
+        from tickrig.emulators.rh3.commands.motion_verbs import go_to  # noqa: PLC0415 - slow
+
+    go_to(x, y, theta, options)
+
+
+@main.command("path")
+@click.argument("file", type=PATH)
+@_PLOT
+@_SHARED
+def along_path(file: Path, **options: Any) -> None:
+    """Drive along the points of FILE: lines with x, y in metres, and a heading in radians.
+
+    Only the heading of the last point counts.
+
+    \b
+    printf '2 0\\n2 2\\n0 2\\n0 0 0\\n' > corners.txt
+    rh3 path corners.txt
+    """  # noqa: D301
+    with loading():
+        from tickrig.emulators.rh3.commands.motion_verbs import go_along  # noqa: PLC0415 - slow
+
+    go_along(file, options)
+
+
+@main.command()
+@click.option("--runs", type=click.IntRange(1, 100), help="Each way.  [1, 5 where chance is]")
+@click.option(
+    "--side",
+    type=NumberRange(0.2, 100),
+    metavar="M",
+    help="Of the squares.  [4]",
+)
+@click.option("--save", type=PATH, help="Write the corrected Odometry.conf here.")
+@_SHARED
+def square(runs: int | None, side: float | None, save: Path | None, **options: Any) -> None:
+    """Drive squares both ways (UMBmark), and calibrate the odometry by them.
+
+    After each square the true place of the cart is measured: of an emulated base
+    it is known, with --device it is asked for.
+
+    \b
+    rh3 square --tread-m 0.459 --save Odometry.conf
+    rh3 square --tread-m 0.459 --odometry-conf Odometry.conf
+    """  # noqa: D301
+    with loading():
+        from tickrig.emulators.rh3.commands.motion_verbs import go_round  # noqa: PLC0415 - slow
+
+    go_round(runs, side, save, options)
+
+
+@main.command()
+@openrtm_options
+@ros2_options
+@click.option(
+    "--room",
+    "room_m",
+    nargs=2,
+    type=NumberRange(0.1, 1_000),
+    metavar="WIDTH DEPTH",
+    help="Walls around an emulated base in m, and a range finder that sees them.",
+)
+@click.option(
+    "--control",
+    type=PATH,
+    help="Control socket, for tickrig ctl PATH goal and tickrig rtc --at PATH.",
+)
+@_SHARED
+def serve(**options: Any) -> None:
+    """Run the six components in real time until Ctrl-C, for you and others to work with.
+
+    PositionInput takes what you type: goal X Y DEG, path FILE, path X Y, X Y DEG, path alone
+    for a square of 1 m, end. Metres and degrees; FILE has radians.
+
+    \b
+    printf 'goal 1 0 90\\npath 0 0, 1 1\\n' | rh3 serve
+    rh3 serve --control /tmp/cart
+    rh3 serve --openrtm localhost:2809 --device /dev/ttyUSB0
+    rh3 serve --ros2 --room 6 4
+    """  # noqa: D301
+    with loading():
+        from tickrig.emulators.rh3.commands.motion_verbs import serve as serve_until  # noqa: PLC0415
+
+    serve_until(options)

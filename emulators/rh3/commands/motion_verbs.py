@@ -1,0 +1,297 @@
+"""What `rh3` does: runs of the options of its command line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from math import nan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import click
+
+from tickrig.emulators.commands.picture import check_plot, new_figure, write_figure
+from tickrig.emulators.rh3.commands.cart_options import (
+    MotionOptions,
+    RunWatcher,
+    require_arrival,
+    watched,
+)
+from tickrig.emulators.rh3.commands.served_cart import serve_cart
+from tickrig.emulators.rh3.device_type import read_parameters
+from tickrig.emulators.rh3.fields import PARAMETERS
+from tickrig.host.cli.engine_options import take_engines
+from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.cli.options import NumberRange
+from tickrig.host.rtc.motion.drive import BaseConnection, drive, limits_of, stop, table
+from tickrig.host.rtc.motion.geometry import Pose, Wheels
+from tickrig.host.rtc.motion.motion_run import MotionRun
+from tickrig.host.rtc.motion.path_file import FARTHEST_M, read_path, within_reach
+from tickrig.host.rtc.motion.ports import plausible
+from tickrig.host.rtc.motion.umbmark import SIDE_M, Umbmark, run_umbmark, square
+from tickrig.host.text.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+# Topics of ROS 2 for a cart, where no table names others.
+
+_TOPICS: Final = """
+[[topic]]
+port = "RefHardRh30.InTargetVelocity"
+topic = "cmd_vel"
+type = "geometry_msgs/msg/Twist"
+
+[[topic]]
+port = "Odometry0.OdometryPosition"
+topic = "odom"
+type = "nav_msgs/msg/Odometry"
+
+[[topic]]
+port = "Odometry0.OdometryPosition"
+topic = "tf"
+type = "tf2_msgs/msg/TFMessage"
+
+[[topic]]
+port = "RefHardRh30.OutWheelAngle"
+topic = "joint_states"
+type = "sensor_msgs/msg/JointState"
+joints = ["left_wheel", "right_wheel"]
+"""
+
+_SCAN: Final = """
+[[topic]]
+port = "LRFCapture_URG0.ranges"
+topic = "scan"
+type = "sensor_msgs/msg/LaserScan"
+"""
+"""With a range finder."""
+
+
+# A run as a picture: path, cross-track error and velocities; needs the extra `plot`.
+
+
+def _write_track(run: MotionRun, points: Sequence[Pose], title: str, path: Path) -> None:
+    """Draw a run into a file, PNG, SVG or HTML by its name.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    write_figure(_draw(run, points, title), title, path)
+
+
+def _draw(run: MotionRun, points: Sequence[Pose], title: str) -> Figure:
+    figure = new_figure(9, 9)
+    figure.suptitle(title)
+    ground, beside, speed, turn = figure.subplots(4, 1, height_ratios=(4, 1, 1, 1))
+    samples, times = run.samples, [sample.time_s for sample in run.samples]
+    _draw_ground(ground, run, points)
+    beside.plot(times, [_beside_mm(s.line, s.pose) for s in samples], color="tab:red")
+    beside.set_ylabel("off line, mm")
+    speed.plot(times, [sample.twist.v for sample in samples], color="tab:blue")
+    speed.set_ylabel("forward, m/s")
+    turn.plot(times, [sample.twist.w for sample in samples], color="tab:orange")
+    turn.set_ylabel("turning, rad/s")
+    turn.set_xlabel("time, s")
+    beside.sharex(turn)
+    speed.sharex(turn)
+    for axes in (ground, beside, speed, turn):
+        axes.grid(visible=True, alpha=0.3)
+    return figure
+
+
+def _draw_ground(axes: Axes, run: MotionRun, points: Sequence[Pose]) -> None:
+    track = [sample.pose for sample in run.samples]
+    axes.plot([p.x for p in points], [p.y for p in points], "+", color="tab:gray", label="points")
+    axes.plot([p.x for p in track], [p.y for p in track], color="tab:blue", label="track")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x, m")
+    axes.set_ylabel("y, m")
+    axes.legend(loc="best")
+
+
+def _beside_mm(line: Pose | None, pose: Pose) -> float:
+    return nan if line is None else line.left(pose) * 1e3
+
+
+# `rh3 square`: UMBmark before and after a calibration.
+
+
+class SquarePlan(NamedTuple):
+    """How many squares each way, and how large."""
+
+    runs: int
+    side_m: float
+
+    @property
+    def corners(self) -> list[Pose]:
+        """All corners of both ways."""
+        there, back = (square(clockwise=way, side_m=self.side_m) for way in (True, False))
+        return [*there, *back]
+
+
+class Squares:
+    """Squares of one run of `rh3`, each with a cart at the origin.
+
+    Args:
+        options: the options.
+        size: how many, and how large.
+        watcher: receives each sample.
+
+    Attributes:
+        latest: the connection of the latest square.
+    """
+
+    def __init__(self, options: MotionOptions, size: SquarePlan, watcher: RunWatcher) -> None:
+        self._options, self._size, self._watcher = options, size, watcher
+        self.latest: BaseConnection | None = None
+
+    def run(self, wheels: Wheels | None = None) -> Umbmark:
+        """Drive squares; with other radii and axle if they are given."""
+        try:
+            return run_umbmark(
+                lambda number: self._begin(wheels),
+                self._true_pose,
+                self._size.runs,
+                self._size.side_m,
+                self._watcher.watch,
+            )
+        except TimeoutError as error:
+            error_reason = self.latest.chain.ref_hard.error_reason if self.latest else ""
+            raise click.ClickException(error_reason or str(error)) from None
+
+    def stop(self) -> None:
+        """Stop the cart."""
+        if self.latest is not None:
+            stop(self.latest)
+
+    def _begin(self, wheels: Wheels | None) -> BaseConnection:
+        self.stop()
+        if self._options.device is not None:
+            with self._watcher.asking():
+                click.pause("Put the cart at its start, and press a key.")
+        self.latest = self._options.begin(wheels)
+        return self.latest
+
+    def _true_pose(self, connection: BaseConnection) -> Pose:
+        if self._options.device is None:
+            return connection.pose
+        with self._watcher.asking():
+            x_mm, y_mm = (
+                click.prompt(f"Measured {axis} of the cart from its start, mm", type=NumberRange())
+                for axis in ("x", "y")
+            )
+        return Pose(x_mm / 1e3, y_mm / 1e3)
+
+
+def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> None:
+    """Drive squares, calibrate, drive them again, and print how both went."""
+    with watched(options, size.corners) as watcher:
+        squares = Squares(options, size, watcher)
+        try:
+            before = squares.run()
+            assert squares.latest is not None
+            corrected = before.corrected(squares.latest.chain.odometry.wheels, size.side_m)
+            after = squares.run(corrected)
+        finally:
+            squares.stop()
+    click.echo("              before   after")
+    _print_row("E_max,syst", before.most_m, after.most_m)
+    _print_row("return, most", max(before.returns_m), max(after.returns_m))
+    text = _conf(corrected)
+    click.echo(text, nl=False)
+    if save is not None:
+        try:
+            write_whole(save, text)
+        except OSError as error:
+            refuse_path("save", error)
+
+
+def _print_row(what: str, before_m: float, after_m: float) -> None:
+    click.echo(f"{what:<12} {before_m * 1e3:7.1f} {after_m * 1e3:7.1f} mm")
+
+
+def _conf(wheels: Wheels) -> str:
+    """Return an Odometry.conf."""
+    return (
+        f"conf.default.radiusOfLeftWheel: {wheels.left:.7f}\n"
+        f"conf.default.radiusOfRightWheel: {wheels.right:.7f}\n"
+        f"conf.default.lengthOfAxle: {wheels.axle:.7f}\n"
+    )
+
+
+def go_to(x: float, y: float, theta: float, options: dict[str, Any]) -> None:
+    """Drive to a pose, in metres and radians."""
+    if not plausible(x, y, theta):
+        raise Refused(f"{x:g} {y:g} {theta:g} is no pose: metres, metres, radians")
+    if not within_reach(goal := Pose(x, y, theta)):
+        raise Refused(f"{x:g} {y:g} {theta:g} is beyond {FARTHEST_M} m")
+    _drive(_checked(options), [goal], f"rh3 goto {x:g} {y:g} {theta:g}")
+
+
+def go_along(file: Path, options: dict[str, Any]) -> None:
+    """Drive along the points of a file."""
+    try:
+        points = read_path(file)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    _drive(_checked(options), points, f"rh3 path {file.name}")
+
+
+def go_round(
+    runs: int | None, side_m: float | None, save: Path | None, options: dict[str, Any]
+) -> None:
+    """Drive squares both ways, `runs` times or as often as is of use."""
+    checked = _checked(options)
+    by_chance = checked.device is not None or checked.base.noise
+    run_squares(checked, SquarePlan(runs or (5 if by_chance else 1), side_m or SIDE_M), save)
+
+
+def serve(options: dict[str, Any]) -> None:
+    """Run a cart in real time until Ctrl-C."""
+    room_m = options["room_m"]
+    if room_m and options["device"]:
+        raise Refused("--room is for the emulated base; a --device has what is around it")
+    engines = take_engines(options, _TOPICS + _SCAN if room_m else _TOPICS)
+    if engines.ros2 and options["pace"] not in {None, 1.0}:
+        raise Refused("--pace is not for --ros2: what others send has real time")
+    pace = options["pace"] or (None if options["device"] else 1.0)
+    control = options.pop("control")
+    serve_cart(_checked({**options, "pace": pace}), engines, control)
+
+
+def _checked(options: dict[str, Any]) -> MotionOptions:
+    given = {name: options.pop(name) for name in (*(field.name for field in PARAMETERS), "seed")}
+    if options["device"] is not None and options["pace"] is not None:
+        raise Refused("--pace is for the emulated base; a --device has real time")
+    if options["any_device"] and options["device"] is None:
+        raise Refused("--any-device is for a --device; the emulated base is known")
+    if options["show_map"] is None:
+        options["show_map"] = sys.stdout.isatty()
+    try:
+        checked = MotionOptions(**options, base=read_parameters(given))
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    if checked.plot is not None:
+        check_plot(checked.plot)  # before the run, not after it
+    return checked
+
+
+def _drive(options: MotionOptions, points: Sequence[Pose], title: str) -> None:
+    connection = options.begin()
+    began = connection.chain.odometry.pose
+    with watched(options, [began, *points]) as watcher:
+        try:
+            run = drive(connection, points, watcher.watch)
+            require_arrival(connection, run)
+        finally:
+            stop(connection)
+    for line in table(run, began, points, limits_of(connection.chain)):
+        click.echo(line)
+    if options.plot is not None:
+        try:
+            _write_track(run, points, title, options.plot)
+        except OSError as error:
+            refuse_path("plot", error)

@@ -1,0 +1,1 @@
+"""The commands `tkernel-emu` and `ucode-resolver`."""

@@ -1,0 +1,175 @@
+"""A resolution service over HTTP on loopback."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from contextlib import ExitStack
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import ClassVar, Final
+
+import click
+
+from tickrig.emulators.bench.fault_spec import parse_fault_spec
+from tickrig.emulators.tkernel.operated import Operated
+from tickrig.emulators.tkernel.resolution import ResolutionService
+from tickrig.emulators.tkernel.ucode_table import EXAMPLE, UcodeTable, parse_table
+from tickrig.host.cli.control import serving_control, stopped_by_signals
+from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, warnings_shown
+from tickrig.host.control.clock import ServingClock
+
+_LOOPBACK: Final = "127.0.0.1"
+_POLL_S: Final = 0.02
+_IDLE_S: Final = 5.0
+"""A client that says nothing for so long is hung up on."""
+
+_LOG: Final = logging.getLogger(__name__)
+
+
+class HttpService:
+    """Serves a service in threads of its own, as long as it is reachable.
+
+    Args:
+        service: answers; its `base` becomes the address of this server.
+        port: of loopback; 0 takes a free one.
+
+    Attributes:
+        url: where it is.
+
+    Raises:
+        OSError: the port is taken.
+    """
+
+    def __init__(self, service: ResolutionService, port: int = 0) -> None:
+        self._service, self._closing, self._lock = service, threading.Event(), threading.Lock()
+        self._server: ThreadingHTTPServer | None = None
+        self._port = port
+        self._listen()
+        service.base = self.url = f"http://{_LOOPBACK}:{self._port}"
+
+    def follow(self) -> None:
+        """Listen, or not, as the fault `unreachable` has it; to be called now and then.
+
+        A port that somebody else took meanwhile is told, and tried again.
+        """
+        if not self._service.reachable:
+            self._hang_up()
+        elif self._server is None:
+            try:
+                self._listen()
+            except OSError as error:
+                _LOG.warning("port %d cannot be had again: %s", self._port, error)
+
+    def close(self) -> None:
+        """End; answers that are late are not given."""
+        self._closing.set()
+        self._hang_up()
+
+    def _listen(self) -> None:
+        service, lock, closing = self._service, self._lock, self._closing
+
+        class Handler(_Handler):
+            pass
+
+        Handler.service, Handler.lock, Handler.closing = service, lock, closing
+        self._server = server = _Server((_LOOPBACK, self._port), Handler)
+        self._port = server.server_address[1]
+        threading.Thread(target=server.serve_forever, args=(_POLL_S,), daemon=True).start()
+
+    def _hang_up(self) -> None:
+        server, self._server = self._server, None
+        if server is not None:
+            server.shutdown()
+            server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    block_on_close = False
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Say nothing of clients that hang up or talk nonsense."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    service: ClassVar[ResolutionService]
+    lock: ClassVar[threading.Lock]
+    closing: ClassVar[threading.Event]
+    timeout = _IDLE_S
+
+    def do_GET(self) -> None:
+        """Answer, later if it is slow."""
+        with self.lock:
+            response = self.service.respond(self.path)
+        if self.closing.wait(response.delay_us / 1e6):
+            return
+        body = response.text.encode()
+        self.send_response(response.status)
+        self.send_header("Content-Type", "text/plain; charset=utf-8")
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - as http.server has it
+        """Log a request where somebody wants to see it."""
+        _LOG.debug(format, *args)
+
+
+# Run a resolution service as its command line asks.
+
+_LOOK_US = 20_000
+"""How often it looks at its faults."""
+
+
+def print_example() -> None:
+    """Print a table to begin with."""
+    click.echo(EXAMPLE, nl=False)
+
+
+def _read_table(path: Path) -> UcodeTable:
+    """Read the table of a file; Refused if it is none."""
+    try:
+        return parse_table(path.read_text("utf-8"))
+    except OSError as error:
+        refuse_path("table", error)
+    except ValueError as error:
+        raise Refused(f"table {path}: {error}") from None
+
+
+def run_service(
+    table: Path | None, *, port: int, control: Path | None, faults: tuple[str, ...]
+) -> None:
+    """Serve until somebody stops it.
+
+    Raises:
+        Refused: the command line asks for something that cannot be done.
+    """
+    if table is None:
+        raise Refused("give a TABLE, or --example for one to begin with")
+    service = ResolutionService(_read_table(table), "")
+    running = [True]
+    operated = Operated("ucode-resolver", service, running.clear)
+    with refused_at("--fault"):
+        operated.plan(map(parse_fault_spec, faults))
+    clock = ServingClock()
+    with warnings_shown(), ExitStack() as stack:
+        stack.enter_context(stopped_by_signals(running.clear))
+        http = _open(service, port)
+        stack.callback(http.close)
+        if control is not None:
+            stack.enter_context(serving_control(control, operated, clock))
+        click.echo(http.url)
+        say(f"{len(service.table.ucodes)} ucodes at {http.url}/ucodes/UCODE. Ctrl-C ends.")
+        while running:
+            clock.wait_until(clock.now_us + _LOOK_US)
+            operated.tick(clock.now_us)
+            http.follow()
+    say(f"requests: {service.read('requests')}; unknown: {service.read('unknown')}")
+
+
+def _open(service: ResolutionService, port: int) -> HttpService:
+    try:
+        return HttpService(service, port)
+    except OSError as error:
+        raise Refused(f"--port {port}: {error.strerror}") from None

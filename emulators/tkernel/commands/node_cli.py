@@ -1,0 +1,64 @@
+"""The command `tkernel-emu`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from tickrig.host.cli.engine_options import openrtm_options, take_engines
+from tickrig.host.cli.messages import Refused, time_us
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
+from tickrig.host.cli.start import loading
+
+
+@click.command(cls=HarmlessCommand)
+@click.argument("system", type=PATH, required=False)
+@click.option("--urg", metavar="URL", help="Line of a range finder: its component runs here.")
+@click.option("--ucode", metavar="URL", help="Line of a ucode reader: three components run here.")
+@click.option("--service", default="", metavar="URL", help="Of ucodes.  [http://127.0.0.1:8640]")
+@click.option("--control", type=PATH, help="Control socket of its system, for 'tickrig rtc --at'.")
+@click.option("--board", type=PATH, help="Control socket of the board, for 'tickrig ctl'.")
+@click.option("--connectors", type=int, default=8, help="The most that its ports have.  [8]")
+@click.option(
+    "--message-octets", type=int, default=4_096, help="The most of a value as CDR.  [4096]"
+)
+@click.option("--tick", default="10ms", help="Periods are multiples of this.  [10ms]")
+@click.option("--boot", default="3s", help="From power-up until it answers.  [3s]")
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="NAME[@FROM[-TO]]",
+    help="power_cut; may be repeated.",
+)
+@openrtm_options
+@version_option()
+def main(connectors: int, message_octets: int, tick: str, boot: str, **options: Any) -> None:
+    """Emulate a board with OpenRTM on T-Kernel, until Ctrl-C.
+
+    Its RT components are those of Figs. 122 and 123 of the NEDO report, or of
+    a SYSTEM file. It has a small board's limits: what is beyond them is
+    refused, and told. Until it has booted nobody answers; a power cut loses
+    all but the files.
+
+    \b
+    urg-emu --link /tmp/urg --room 4,3
+    tkernel-emu --urg /tmp/urg --control /tmp/node --board /tmp/board
+    tickrig rtc ls -l --at /tmp/node
+    tickrig ctl /tmp/board fault power_cut
+    tkernel-emu --ucode /tmp/ucode --openrtm localhost
+    """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.tkernel.commands.node_run import NodeOptions, NodeRun  # noqa: PLC0415
+        from tickrig.emulators.tkernel.node_manager import NodeLimits  # noqa: PLC0415 - slow
+
+    engines = take_engines(options)
+    tick_us, boot_us = time_us("--tick", tick), time_us("--boot", boot)
+    try:
+        limits = NodeLimits(
+            connectors=connectors, message_octets=message_octets, tick_us=tick_us, boot_us=boot_us
+        )
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    NodeRun(NodeOptions(limits=limits, engines=engines, **options)).run()

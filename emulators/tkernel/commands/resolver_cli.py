@@ -1,0 +1,52 @@
+"""The command `ucode-resolver`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
+from tickrig.host.cli.start import loading
+
+
+@click.command(cls=HarmlessCommand)
+@click.argument("table", type=PATH, required=False)
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65_535),
+    default=8_640,
+    help="Of loopback; 0 takes a free one.  [8640]",
+)
+@click.option("--control", type=PATH, help="Control socket to serve, for 'tickrig ctl'.")
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="NAME[@FROM[-TO]]",
+    help="unreachable, slow, unknown_ucode or broken; may be repeated.",
+)
+@click.option("--example", is_flag=True, help="Print a table to begin with, and end.")
+@version_option()
+def main(table: Path | None, *, example: bool, **options: Any) -> None:
+    """Serve a TABLE of ucodes over HTTP on loopback, until Ctrl-C.
+
+    GET /ucodes/UCODE answers with the address of its information, GET
+    /contents/NAME with that information, 404 where there is none. What goes
+    wrong with it has names.
+
+    \b
+    ucode-resolver --example > places.toml
+    ucode-resolver places.toml --control /tmp/resolver.ctl
+    tickrig ctl /tmp/resolver.ctl fault unreachable
+    tickrig ctl /tmp/resolver.ctl fault slow@0s-10s
+    tickrig ctl /tmp/resolver.ctl get requests found
+    """  # noqa: D301 - click wants the backspace
+    with loading():
+        from tickrig.emulators.tkernel.commands.http_service import print_example, run_service  # noqa: PLC0415 - slow
+
+    if example:
+        print_example()
+    else:
+        run_service(table, **options)

@@ -1,1 +1,0 @@
-"""A node of OpenRTM on T-Kernel: a board with RT components and narrow limits: `tkernel-emu`."""

@@ -1,0 +1,152 @@
+"""A resolution service: what it answers, and what goes wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
+from tickrig.emulators.tkernel.ucode_table import UcodeTable
+from tickrig.host.rtc.ucode.cache import Fetched, SourceStatus
+
+_INPUTS: Final = (
+    InputSignal("unreachable", "nobody can connect to it", SignalType.FAULT),
+    InputSignal("slow", "each answer comes delay_ms later", SignalType.FAULT),
+    InputSignal("unknown_ucode", "it knows no ucode and no contents any more", SignalType.FAULT),
+    InputSignal("broken", "its answers are no addresses and no contents", SignalType.FAULT),
+    InputSignal("delay_ms", "how much later, while slow", high=60_000, unit="ms", initial=3_000),
+)
+
+_OUTPUTS: Final = (
+    OutputSignal("requests", "requests that arrived"),
+    OutputSignal("found", "of these, answered with what was asked for"),
+    OutputSignal("unknown", "of these, for what it does not know"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """An answer of HTTP.
+
+    Attributes:
+        status: its code.
+        text: its body.
+        delay_us: how much later than usual it comes.
+    """
+
+    status: int
+    text: str
+    delay_us: int = 0
+
+
+class ResolutionService:
+    """Answers `/ucodes/UCODE` with an address, `/contents/NAME` with JSON; it does no I/O.
+
+    Args:
+        table: what it knows.
+        base: its own address, such as `http://127.0.0.1:8640`.
+
+    Attributes:
+        table: it may be changed.
+        inputs: its faults.
+    """
+
+    tick_us: Final = 1_000
+
+    def __init__(self, table: UcodeTable, base: str) -> None:
+        self.table, self.base = table, base
+        self.inputs = InputBank(_INPUTS)
+        self._counts = dict.fromkeys(("requests", "found", "unknown"), 0)
+
+    @property
+    def outputs(self) -> Mapping[str, OutputSignal]:
+        """What `read` knows."""
+        return {output.name: output for output in _OUTPUTS}
+
+    @property
+    def reachable(self) -> bool:
+        """Whether anybody can connect."""
+        return not self.inputs["unreachable"]
+
+    def read(self, name: str, /) -> int:
+        """Look at an output; KeyError if there is none of that name."""
+        return self._counts[name]
+
+    def respond(self, path: str) -> Response:
+        """Answer a GET."""
+        inputs = self.inputs
+        delay_us = inputs["delay_ms"] * 1_000 if inputs["slow"] else 0
+        text = None if inputs["unknown_ucode"] else self._find(path)
+        self._counts["requests"] += 1
+        self._counts["unknown" if text is None else "found"] += 1
+        if text is None:
+            return Response(404, "unknown\n", delay_us)
+        return Response(200, "out of order" if inputs["broken"] else text, delay_us)
+
+    def _find(self, path: str) -> str | None:
+        match path.split("/"):
+            case ["", "ucodes", ucode] if name := self.table.ucodes.get(ucode.upper()):
+                return name if name.startswith("http://") else f"{self.base}/contents/{name}"
+            case ["", "contents", name]:
+                return self.table.contents.get(name)
+            case _:
+                return None
+
+
+# A resolution service in virtual time: answers come later by a latency, never by the clock.
+
+_LATENCY_US: Final = 4_000
+"""Of an answer on the way there and back; a choice."""
+
+_TIMEOUT_US: Final = 1_000_000
+"""As long as `HttpSource` waits."""
+
+
+class SimSource:
+    """A `Source` at a service in the same process.
+
+    As HTTP does it asks one thing after the other; who cannot connect knows at once.
+
+    Args:
+        service: answers.
+    """
+
+    def __init__(self, service: ResolutionService) -> None:
+        self._service, self._free_us = service, 0
+        self._due: list[tuple[int, Fetched]] = []
+
+    def request(self, address: str, now_us: int) -> None:
+        """Ask for what is under an address."""
+        self._free_us = max(self._free_us, now_us)
+        at_us, fetched = self._fetch(address)
+        self._free_us += at_us
+        self._due.append((self._free_us, fetched))
+
+    def take(self, now_us: int) -> tuple[Fetched, ...]:
+        """Take the requests that have ended."""
+        ended = tuple(fetched for at_us, fetched in self._due if at_us <= now_us)
+        self._due = self._due[len(ended) :]
+        return ended
+
+    def close(self) -> None:
+        """End."""
+        self._due.clear()
+
+    def _fetch(self, address: str) -> tuple[int, Fetched]:
+        """Return how long it takes, and what comes."""
+        service = self._service
+        if not service.reachable or not address.startswith(f"{service.base}/"):
+            why = f"{address}: connection refused"
+            return _LATENCY_US, Fetched(address, SourceStatus.FAILED, why)
+        response = service.respond(address.removeprefix(service.base))
+        if (took_us := _LATENCY_US + response.delay_us) > _TIMEOUT_US:
+            return _TIMEOUT_US, Fetched(address, SourceStatus.FAILED, f"{address}: timed out")
+        if response.status == 200:
+            return took_us, Fetched(address, SourceStatus.FOUND, response.text)
+        return took_us, Fetched(address, SourceStatus.UNKNOWN)
+
+
+def opener(service: ResolutionService) -> Callable[[str, tuple[str, ...]], SimSource]:
+    """Return what opens sources at a service."""
+    return lambda name, hosts: SimSource(service)

@@ -1,1 +1,0 @@
-"""The resolution service of ucodes: a table, its faults, HTTP: `ucode-resolver`."""
