@@ -15,8 +15,8 @@ from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.body import BodyPlan
-from tickrig.emulators.canopen.choices import AUTO, is_bus_node
+from tickrig.emulators.canopen.body import BodyOnDrives
+from tickrig.emulators.canopen.choices import AUTO, LSS, NodeSpec, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm
@@ -199,15 +199,14 @@ _logger = log_of(__name__)
 def make_bench(  # noqa: PLR0913 - options, by keyword
     wire: CanWire,
     nodes: Sequence[Node],
-    body: BodyPlan | None = None,
+    bodies: Sequence[BodyOnDrives] = (),
     *,
     outside: CountingPort | None = None,
     link: str = "",
     trace: CandumpFile | None = None,
     clock: Clock | None = None,
 ) -> CanEmulator:
-    """Put nodes together with a body, the bus outside, if there are such, and a clock."""
-    bodies = [body.put_on(nodes)] if body else []
+    """Put nodes together with bodies, the bus outside, if there are such, and a clock."""
     stations = [Station(node, node.port) for node in nodes]
     return CanEmulator(
         NAME,

@@ -15,6 +15,7 @@ import click
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
+from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator, keeping_time
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.host.cli.control import serving_control, stopped_by_signals
@@ -67,10 +68,10 @@ class EmulatorRun(ABC):
             Refused: the command line asks for something that cannot be done.
             BusFailed: its CAN bus cannot be read any more.
         """
-        faults, scenario = self._checked()
         with ExitStack() as stack:
             if self._shows_warnings:
                 stack.enter_context(warnings_shown())
+            faults, scenario = self._checked()
             if self._in_real_time:
                 stack.enter_context(stopped_by_signals(self._stop))
             bench = self._running = self._open(stack)
@@ -103,12 +104,12 @@ class EmulatorRun(ABC):
         return True
 
     @abstractmethod
-    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
-        """Build what options and scenario are checked against; nothing is opened."""
+    def _make(self) -> tuple[Operator, ScenarioParser]:
+        """Make the devices, and what faults and scenario are checked against; open nothing."""
 
     @abstractmethod
     def _open(self, stack: ExitStack) -> RunningEmulator:
-        """Open the outside world; each thing is given back at the end."""
+        """Open the outside world for the devices; each thing is given back at the end."""
 
     @abstractmethod
     def _greet(self, bench: RunningEmulator) -> None:
@@ -122,9 +123,8 @@ class EmulatorRun(ABC):
 
     def _checked(self) -> tuple[list[FaultSpec], tuple[ScenarioStep, ...]]:
         """Read all that can be wrong before anything is opened."""
-        bench, parser = self._dry_run()
+        hands, parser = self._make()
         with refused_at("--fault"):
-            hands = bench.operator
             faults = [parse_fault_spec(text, hands.check_clear) for text in self._shared.faults]
             for spec in faults:
                 hands.check_fault(spec)

@@ -11,10 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import TraceFile
+from tickrig.emulators.rig.event_queue import EventQueue
+from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.emulator import Emulator, SerialHub
 from tickrig.emulators.serial.network import NetworkPort, ServeUrl, parse_serve_url
@@ -77,15 +80,14 @@ class SerialRun(EmulatorRun):
             self._urls = [parse_serve_url(url) for url in options.serve]
         self._places: list[str] = []
 
-    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
+    def _make(self) -> tuple[Operator, ScenarioParser]:
         if self._options.panel:
             self._check_panel()
-        device_type = self._type
-        bench = Emulator(device_type.name, self._device, line=device_type.line)
-        parser = ScenarioParser(
-            self._device, bench.operator, device_type.encoders, senders=device_type.senders
-        )
-        return bench, parser
+        device, line = self._device, self._type.line
+        port = FaultyPort(line.wire(line.baud).a, line.faults)
+        operator = Operator(device.inputs, device.tick_us, EventQueue(), port)
+        encoders, senders = self._type.encoders, self._type.senders
+        return operator, ScenarioParser(device, operator, encoders, senders=senders)
 
     def _check_panel(self) -> None:
         if self._options.scenario or self._options.verbose:

@@ -19,6 +19,7 @@ from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.faults import FaultyPort
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
@@ -253,9 +254,9 @@ class BenchOperator(Operator):
     _wires: tuple[str, ...]
 
     @classmethod
-    def at(cls, assembly: Assembly, rig: Rig, faults: AssemblyFaults) -> BenchOperator:
-        """Return the hands at the devices of a rig."""
-        hands = cls(assembly.inputs, assembly.tick_us, rig.event_queue, faults)
+    def at(cls, assembly: Assembly, queue: EventQueue, faults: AssemblyFaults) -> BenchOperator:
+        """Return the operator of several devices, whose later acts are entered in a queue."""
+        hands = cls(assembly.inputs, assembly.tick_us, queue, faults)
         hands._assembly, hands._wires = assembly, faults.wires
         return hands
 
@@ -301,6 +302,17 @@ class Parts:
     stores: Sequence[StoreFile] = ()
     seed: int = 0
 
+    @property
+    def assembly(self) -> Assembly:
+        """The physical side of all devices."""
+        devices = {name: part for mount in self.mounts for name, part in mount.parts.items()}
+        return Assembly({**devices, **{body.name: Nodes([], [body]) for body in self.bodies}})
+
+    @property
+    def faults(self) -> AssemblyFaults:
+        """The faults of all wires."""
+        return AssemblyFaults({mount.name: mount.faults for mount in self.mounts})
+
 
 class RigState(Copyable):
     """What a bench consists of in virtual and in real time, and what its twin has too.
@@ -328,12 +340,7 @@ class RigState(Copyable):
     ) -> None:
         mounts = parts.mounts
         self.mounts = {mount.name: mount for mount in mounts}
-        self.assembly = Assembly(
-            {
-                **{name: part for mount in mounts for name, part in mount.parts.items()},
-                **{body.name: Nodes([], [body]) for body in parts.bodies},
-            }
-        )
+        self.assembly, self.faults = parts.assembly, parts.faults
         self.recorder = (
             TraceRecorder(trace, _header_of(mounts, parts.seed)) if trace or keeps else None
         )
@@ -348,8 +355,7 @@ class RigState(Copyable):
         for mount in mounts:
             if isinstance(mount, BusMount):
                 self.rig.move_on(mount.wire)
-        self.faults = AssemblyFaults({mount.name: mount.faults for mount in mounts})
-        self.operator = BenchOperator.at(self.assembly, self.rig, self.faults)
+        self.operator = BenchOperator.at(self.assembly, self.rig.event_queue, self.faults)
 
     def _start(self, start: Mapping[str, Mapping[str, Setting]]) -> None:
         for device, values in start.items():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
-from zlib import crc32
 
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.twin import Copyable
@@ -175,8 +174,3 @@ class BusMount(Copyable):
 
 
 Mount = LineMount | BusMount
-
-
-def seed_of(seed: int, name: str, *, alone: bool) -> int:
-    """Return the seed of a wire: chance on one wire has nothing to do with that on another."""
-    return seed if alone else seed ^ crc32(name.encode())

@@ -20,7 +20,7 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.bench_rig import BenchRig, Parts, RigState
-from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount, seed_of
+from tickrig.emulators.testing.bench.mounts import BIT_RATE, BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.recorded_device import node_entry
 from tickrig.emulators.testing.rig_file.plan import (
     DeviceKind,
@@ -28,6 +28,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     RigPlan,
     WirePlan,
     WireType,
+    seed_of,
 )
 from tickrig.emulators.testing.rig_file.probe import eds_cache
 from tickrig.emulators.testing.signals.sources import SignalSpec
@@ -99,7 +100,10 @@ def _begin_faults(plan: RigPlan, rig: BenchRig) -> None:
 
 
 def _line(wire: WirePlan, devices: Sequence[DevicePlan], seed: int) -> LineMount:
-    made = [configure(device.type, device.config, seed) for device in devices]
+    made: list[ConfiguredDevice] = [
+        device.made.take(device.made_of(seed)) or configure(device.type, device.config, seed)
+        for device in devices
+    ]
     mount = LineMount(wire.name, *_settings(wire, made))
     for device, configured in zip(devices, made, strict=True):
         entry = DeviceEntry(wire.name, device.type, configured.config)
@@ -155,12 +159,14 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
     node_id = description.node_id if device.node_id is None else device.node_id
     if node_id is None:
         raise NoNodeIdError(f"{device.name}: {device.type} gives no node-ID: add node_id = 1..127")
-    dictionary, memory = description.make_dictionary(), None
-    if device.store:
-        if device.store not in stores:
-            stores[device.store] = StoreFile(device.store)
-        memory = stores[device.store].nonvolatile(device.name, dictionary)
-    slave = make_slave(dictionary, node_id, memory, description.application, device.sdo)
+    slave: CanopenSlave | None = device.made.take(device.made_of())
+    if slave is None:
+        dictionary, memory = description.make_dictionary(), None
+        if device.store:
+            if device.store not in stores:
+                stores[device.store] = StoreFile(device.store)
+            memory = stores[device.store].nonvolatile(device.name, dictionary)
+        slave = make_slave(dictionary, node_id, memory, description.application, device.sdo)
     profile, files = device.profile or AUTO, description.files
     return slave, node_entry(device.wire, slave, kind, profile, files)
 

@@ -9,13 +9,15 @@ from typing import Final
 
 import click
 
+from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import STATE, RunningEmulator
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import read_signal
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
 from tickrig.emulators.serial.pty_port import PtyPort
-from tickrig.emulators.testing.bench.bench_rig import BenchRig
+from tickrig.emulators.testing.bench.bench_rig import BenchOperator, BenchRig
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.journal import line_text
 from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
@@ -58,18 +60,24 @@ class BenchRun(EmulatorRun):
         self._mounts: list[Mount] = []
         self._is_over = False
 
-    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
-        bench = rig_of(parts_of(self._plan), self._plan, keeps=False)
-        return bench, ScenarioParser(bench.device, bench.operator)
+    def _make(self) -> tuple[Operator, ScenarioParser]:
+        try:
+            self._parts = parts_of(self._plan)
+        except ValueError as error:
+            raise Refused(str(error)) from None
+        device, faults = self._parts.assembly, self._parts.faults
+        operator = BenchOperator.at(device, EventQueue(), faults)
+        return operator, ScenarioParser(device, operator)
 
     def _open(self, stack: ExitStack) -> BenchRig:
-        parts = parts_of(self._plan)
-        self._mounts = list(parts.mounts)
+        self._mounts = list(self._parts.mounts)
         if not self._options.virtual:
             self._outside = self._open_outside(stack)
             self._clock = self._outside.clock
         try:
-            return rig_of(parts, self._plan, self._outside, trace=self._options.trace, keeps=False)
+            return rig_of(
+                self._parts, self._plan, self._outside, trace=self._options.trace, keeps=False
+            )
         except OSError as error:
             refuse_path("trace", error)
 

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import click
 
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
-from tickrig.device.canopen.slave import UNCONFIGURED
+from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
@@ -30,10 +30,11 @@ from tickrig.emulators.canopen.build import (
 )
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, profile_name
-from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
+from tickrig.emulators.canopen.node import Nodes
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import CandumpFile
+from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep, Send
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, RigPlan
 from tickrig.emulators.testing.rig_file.probe import eds_cache
@@ -146,7 +147,7 @@ class CanopenRun(EmulatorRun):
         self._described: list[Described] = []
         self._channel = _VIRTUAL_CHANNEL
 
-    def _dry_run(self) -> tuple[RunningEmulator, ScenarioParser]:
+    def _make(self) -> tuple[Operator, ScenarioParser]:
         try:
             self._described = self._describe()
         except ValueError as error:
@@ -154,10 +155,13 @@ class CanopenRun(EmulatorRun):
         if not self._described:
             raise Refused(_NO_NODE)
         show_findings(odd for item in self._described for odd in item.description.warnings)
-        wire = self._make_wire()
-        bench = make_bench(wire, make_nodes(self._described, wire), self._options.rig.body)
-        senders = {"send": parse_send}
-        return bench, ScenarioParser(bench.device, bench.operator, senders=senders)
+        self._wire, body = self._make_wire(), self._options.rig.body
+        self._store = self._open_store()
+        self._nodes = make_nodes(self._described, self._wire, self._store, self._options.sdo)
+        self._bodies = [body.put_on(self._nodes)] if body else []
+        device = Nodes(self._nodes, self._bodies)
+        operator = Operator(device.inputs, device.tick_us, EventQueue(), self._wire.faults)
+        return operator, ScenarioParser(device, operator, senders={"send": parse_send})
 
     def _describe(self) -> list[Described]:
         """Read the files of the nodes; ValueError with all that is wrong."""
@@ -190,21 +194,19 @@ class CanopenRun(EmulatorRun):
         outside, link = None, ""
         if self._options.in_real_time:
             outside, link, self._channel = open_bus(self._options.bus, stack)
-        wire = self._make_wire()
-        store = self._open_store()
-        nodes = make_nodes(self._described, wire, store, self._options.sdo)
+        wire = self._wire
         trace = self._open_trace(wire)
         bench = make_bench(
             wire,
-            nodes,
-            self._options.rig.body,
+            self._nodes,
+            self._bodies,
             outside=outside,
             link=link,
             trace=trace,
             clock=self._clock if outside else None,
         )
-        if store:
-            bench.after_step.append(store_keeper(store))
+        if self._store:
+            bench.after_step.append(store_keeper(self._store))
         if self._options.scenario or self._options.verbose > 1:
             wire.observers.append(lambda at, x: click.echo(str(LogLine(at, self._channel, x))))
         return bench

@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
+from zlib import crc32
 
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
 from tickrig.device.canopen.slave import UNCONFIGURED
@@ -79,6 +80,31 @@ class DeviceKind(Enum):
     DEVICE_RTC = "DeviceRTC"
 
 
+class MadeDevice:
+    """The device that a reader has made to check the file; the first bench takes it.
+
+    A copy, in this process or in another, holds none.
+
+    Args:
+        device: a device as `configure` makes it, or a slave.
+        of: what it was made of; it is taken only for the same.
+    """
+
+    def __init__(self, device: object = None, of: object = None) -> None:
+        self._device, self._of = device, of
+
+    def take(self, of: object) -> Any:
+        """Return the device once, if it was made of this; else None."""
+        if self._device is None or self._of != of:
+            return None
+        device, self._device = self._device, None
+        return device
+
+    def __reduce__(self) -> tuple[type[MadeDevice], tuple[()]]:
+        """Leave the device behind."""
+        return MadeDevice, ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DevicePlan:
     """One device.
@@ -96,6 +122,7 @@ class DevicePlan:
         sdo: what the SDO servers of a CANopen node put up with.
         start: inputs at the start by name, members of groups each for itself: a value, or the
             signal that drives it.
+        made: the device, if the reader has made it and no bench has taken it.
     """
 
     name: str
@@ -108,6 +135,17 @@ class DevicePlan:
     store: Path | None = None
     sdo: SdoLimits = USUAL
     start: Mapping[str, Setting | SignalSpec] = field(default_factory=dict)
+    made: MadeDevice = field(default_factory=MadeDevice, compare=False, repr=False)
+
+    def made_of(self, seed: int = 0) -> tuple[object, ...]:
+        """Return all that decides what the device is like when it is made.
+
+        Args:
+            seed: of all chance, for a device on a serial line.
+        """
+        if self.kind is DeviceKind.SERIAL:
+            return self.type, self.config, seed
+        return self.type, self.profile, self.node_id, self.sdo, self.store
 
 
 @dataclass(frozen=True, slots=True)
@@ -349,3 +387,8 @@ def _driven(device: DevicePlan) -> int:
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'s' if number > 1 else ''}" if number else ""
+
+
+def seed_of(seed: int, name: str, *, alone: bool) -> int:
+    """Return the seed of a wire: chance on one wire has nothing to do with that on another."""
+    return seed if alone else seed ^ crc32(name.encode())

@@ -20,7 +20,7 @@ from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals
-from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan
+from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, MadeDevice
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
 from tickrig.host.text.values import Setting
@@ -38,6 +38,7 @@ class Probe:
         node_id: of a node, that of its DCF or model.
         bit_rate: of a node, that of its DCF.
         start: inputs that are not as usual when it begins.
+        made: the device, for a bench.
     """
 
     physical: HasSignals
@@ -47,6 +48,7 @@ class Probe:
     node_id: int | None = None
     bit_rate: int | None = None
     start: Mapping[str, Setting] = field(default_factory=dict)
+    made: MadeDevice = field(default_factory=MadeDevice)
 
     @property
     def faults(self) -> dict[str, bool]:
@@ -73,17 +75,18 @@ class WrongDevice(NamedTuple):
     keys: tuple[str, ...]
 
 
-def probe(plan: DevicePlan) -> Probe | list[WrongDevice]:
+def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
     """Make a device.
 
     Args:
-        plan: what it is; its name, wire, node-ID and start make no difference.
+        plan: what it is.
+        seed: of all chance in it, for a device on a serial line.
 
     Returns:
         What it has, or all that is wrong.
     """
     if plan.kind is DeviceKind.SERIAL:
-        return _serial(plan.type, plan.config)
+        return _serial(plan, seed)
     device = Path(plan.type) if plan.kind is DeviceKind.EDS else plan.type
     try:
         found = describe(eds_cache(), device, plan.profile or AUTO)
@@ -91,7 +94,14 @@ def probe(plan: DevicePlan) -> Probe | list[WrongDevice]:
         return [WrongDevice(reason, ("type",)) for reason in str(error).splitlines()]
     except SystemExit as error:  # a user's file may do anything
         return [WrongDevice(f"{plan.type}: {explain_error(error)}", ("type",))]
-    slave = make_slave(found.make_dictionary(), ANY_ID, None, found.application)
+    node_id = found.node_id if plan.node_id is None else plan.node_id
+    slave = make_slave(
+        found.make_dictionary(),
+        ANY_ID if node_id is None else node_id,
+        None,
+        found.application,
+        plan.sdo,
+    )
     node = Nodes([Node(plan.name, slave, CanWire())])
     title = found.info.product_name or Path(plan.type).name
     if plan.kind is DeviceKind.MODEL:
@@ -103,15 +113,23 @@ def probe(plan: DevicePlan) -> Probe | list[WrongDevice]:
         node_id=found.node_id,
         bit_rate=found.bit_rate,
         start=found.start,
+        made=MadeDevice(None if plan.store or node_id is None else slave, plan.made_of()),
     )
 
 
-def _serial(name: str, config: Mapping[str, object]) -> Probe | list[WrongDevice]:
+def _serial(plan: DevicePlan, seed: int) -> Probe | list[WrongDevice]:
     """Make a device on a serial line."""
-    made = _configured(name, config)
+    name, config = plan.type, plan.config
+    made = _configured(name, config, seed)
     if isinstance(made, ConfiguredDevice):
         line = made.type.line
-        return Probe(made.device, line.faults, made.type.title, baud=line.baud)
+        return Probe(
+            made.device,
+            line.faults,
+            made.type.title,
+            baud=line.baud,
+            made=MadeDevice(made, plan.made_of(seed)),
+        )
     alone = [(key, _reason(name, key, value)) for key, value in config.items()]
     wrong = [WrongDevice(reason, ("config", key)) for key, reason in alone if reason]
     return wrong or [WrongDevice(made, ("config" if config else "type",))]
@@ -129,10 +147,10 @@ def _reason(name: str, key: str, value: object) -> str:
     return "" if isinstance(made, ConfiguredDevice) else made
 
 
-def _configured(name: str, config: Mapping[str, object]) -> ConfiguredDevice | str:
+def _configured(name: str, config: Mapping[str, object], seed: int = 0) -> ConfiguredDevice | str:
     """Return the device of these options, or why there can be none."""
     try:
-        return configure(name, config)
+        return configure(name, config, seed)
     except ValueError as error:
         return str(error)
     except (Exception, SystemExit) as error:  # a foreign type may raise anything

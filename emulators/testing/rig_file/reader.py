@@ -33,6 +33,7 @@ from tickrig.emulators.testing.rig_file.plan import (
     RigPlan,
     WirePlan,
     WireType,
+    seed_of,
 )
 from tickrig.emulators.testing.rig_file.probe import UNKNOWN, Probe, WrongDevice, probe
 from tickrig.emulators.testing.rig_file.schema import BODY, TOP, RigFileError
@@ -257,9 +258,10 @@ class _Reader:
         missing = "device" not in top.values or (not self._devices.plans and not top.notes.all)
         if missing and top.notes.document.whole:
             top.wrong("no device: a rig file has tables [device.NAME] with a type")
-        self._make_probes()
         self._devices.check_stores()
+        plans = dict(self._devices.plans)  # those without a wire are checked too
         self._devices.put_on_wires()
+        self._make_probes(plans, seed)
         check_wires(top, self._wires, self._devices.plans)
         node_ids = self._check_node_ids()
         starts = StartReader(self._folder)
@@ -283,14 +285,21 @@ class _Reader:
             path=self._path,
         )
 
-    def _make_probes(self) -> None:
-        """Make each device, of those that are the same one."""
+    def _make_probes(self, plans: Mapping[str, DevicePlan | None], seed: int) -> None:
+        """Make each device, of those that are the same one; a bench takes that one."""
         made: dict[str, Probe | list[WrongDevice]] = {}
-        for name, plan in self._devices.plans.items():
+        alone = len(self._wires) == 1
+        for name, plan in plans.items():
             found = None
             if plan is not None:
                 key = f"{plan.kind} {plan.type} {plan.profile} {plan.config}"
-                found = made[key] if key in made else made.setdefault(key, probe(plan))
+                if key not in made:
+                    wired = self._devices.plans[name]
+                    wire = wired.wire if wired else ""
+                    made[key] = probe(plan, seed_of(seed, wire, alone=alone))
+                    if isinstance(first := made[key], Probe) and wired:
+                        self._devices.plans[name] = replace(wired, made=first.made)
+                found = made[key]
             if isinstance(found, list):
                 for reason, keys in found:
                     self._devices.sections[name].wrong(reason, *keys)

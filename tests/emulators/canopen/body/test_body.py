@@ -41,8 +41,9 @@ class Robot:
 
     def __init__(self, rig: Path) -> None:
         file, wire = read_rig(rig), CanWire()
+        assert file.body is not None
         nodes = make_nodes(file.nodes, wire)
-        self.bench: CanEmulator = make_bench(wire, nodes, file.body)
+        self.bench: CanEmulator = make_bench(wire, nodes, [file.body.put_on(nodes)])
         self.nodes = [str(node.slave.configured_id) for node in nodes]
         self.run(5)
 
