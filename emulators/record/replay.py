@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from itertools import groupby, zip_longest
 from typing import Any, Generic
 
 from tickrig.device.core import Device, W
+from tickrig.device.horizon import Horizon
 from tickrig.emulators.rig.emulated import Emulated
-from tickrig.emulators.rig.rig import Rig
-from tickrig.emulators.rig.station import Station
+from tickrig.emulators.rig.station import next_tick_us
 from tickrig.host.text.bench_header import (
     PREFIX,
     BenchHeader,
@@ -35,7 +35,7 @@ from tickrig.host.text.trace import (
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
-# What a replay is made of: a port that plays, and the comparison of what was said.
+# What a replay is made of: the run of one device, and the comparison of what was said.
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,37 +55,58 @@ class ReplayDifference(Generic[W]):
     line: int
 
 
-class ReplayPort(Generic[W]):
-    """Gives a device what it received at the ticks it received it.
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """What is done to a device before a tick."""
+
+    at_us: int
+    act: Callable[[], None]
+
+
+def _play(
+    device: Device[W],
+    received: Iterable[tuple[int, W]],
+    changes: Iterable[_Change],
+    nothing: W,
+    until_us: int,
+) -> list[tuple[int, W]]:
+    """Give a device what it received and suffered; return what it says, with its ticks.
+
+    It does what a `Rig` with this one station would do, without asking anything but the device:
+    only ticks with work are made. Between two changes nobody looks at the device, so a drive may
+    work ahead (`Horizon`).
 
     Args:
-        received: the traffic with its times.
+        device: a fresh one.
+        received: the traffic with its times, sorted.
+        changes: what is done to it, sorted.
         nothing: empty traffic.
-
-    Attributes:
-        sent: what the device says, with its times.
+        until_us: the last tick.
     """
+    sent: list[tuple[int, W]] = []
+    horizon, tick_us, now_us = Horizon(), device.tick_us, 0
+    if hasattr(device, "horizon"):
+        device.horizon = horizon
+    traffic = iter(received)
+    next_us, arriving = next(traffic, (NEVER, nothing))
+    for change in (*changes, _Change(until_us + 1, _nothing)):
+        horizon.until_us = last_us = change.at_us - 1
+        while (at_us := next_tick_us(now_us, min(device.due_us, next_us), tick_us)) <= last_us:
+            rx = nothing
+            while next_us <= at_us:
+                rx += arriving  # type: ignore[operator]  # bytes or a tuple
+                next_us, arriving = next(traffic, (NEVER, nothing))
+            if (rx or device.due_us <= at_us) and (tx := device.tick(at_us, rx)):
+                sent.append((at_us, tx))
+            horizon.passed_us = now_us = at_us
+        horizon.passed_us = now_us = max(now_us, last_us)
+        horizon.until_us = 0
+        change.act()
+    return sent
 
-    def __init__(self, received: Iterable[tuple[int, W]], nothing: W) -> None:
-        self._received, self._nothing = deque(received), nothing
-        self.sent: list[tuple[int, W]] = []
 
-    @property
-    def due_us(self) -> int:
-        """When there is something next."""
-        return self._received[0][0] if self._received else NEVER
-
-    def poll(self, now_us: int, /) -> W:
-        """Take what was received by now."""
-        out = self._nothing
-        while self._received and self._received[0][0] <= now_us:
-            out += self._received.popleft()[1]  # type: ignore[operator]  # bytes or a tuple
-        return out
-
-    def send(self, now_us: int, traffic: W, /) -> None:
-        """Take what the device says."""
-        if traffic:
-            self.sent.append((now_us, traffic))
+def _nothing() -> None:
+    """Do nothing."""
 
 
 def _first_difference(
@@ -157,15 +178,14 @@ def replay(recording: RecordedRun, device: Emulated[bytes]) -> ReplayDifference[
     """
     records = recording.records
     received = ((r.at_us, r.data) for r in records if r.mark is Mark.TO_DEVICE)
-    port = ReplayPort(received, b"")
-    rig = Rig(Station(device, port))
-    for record in records:
-        if record.mark is Mark.PHYSICAL:
-            rig.run_to(record.at_us - 1)
-            _set_signal(device, record)
-    rig.run_to(recording.until_us)
+    changes = (
+        _Change(r.at_us, partial(_set_signal, device, r))
+        for r in records
+        if r.mark is Mark.PHYSICAL
+    )
+    sent = _play(device, received, changes, b"", recording.until_us)
     said = [(r.at_us, r.data, r.line) for r in records if r.mark is Mark.FROM_DEVICE]
-    return _first_difference(said, port.sent, b"")
+    return _first_difference(said, sent, b"")
 
 
 def _set_signal(device: Emulated[bytes], record: Record) -> None:
@@ -198,6 +218,14 @@ class BenchRecording:
     header: BenchHeader
     records: tuple[BenchRecord, ...]
     ended: bool
+    _by_name: dict[str, list[BenchRecord]] = field(
+        init=False, repr=False, compare=False, default_factory=dict
+    )
+
+    def __post_init__(self) -> None:
+        for record in self.records:
+            if record.mark is not Mark.WIRE:
+                self._by_name.setdefault(record.name, []).append(record)
 
     @property
     def until_us(self) -> int:
@@ -215,7 +243,7 @@ class BenchRecording:
 
     def of(self, name: str) -> tuple[BenchRecord, ...]:
         """Return the lines of a device."""
-        return tuple(x for x in self.records if x.name == name and x.mark is not Mark.WIRE)
+        return tuple(self._by_name.get(name, ()))
 
 
 def read_bench_recording(data: bytes) -> BenchRecording:
@@ -273,14 +301,12 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
     nothing: Traffic = () if recording.header.on_can(name) else b""
     records = recording.of(name)
     received = ((at, what) for at, what, _ in traffic_of(records, Mark.TO_DEVICE))
-    port = ReplayPort[Any](received, nothing)
-    rig = Rig(Station(device, port))
-    for record in records:
-        if record.mark is Mark.PHYSICAL:
-            rig.run_to(record.at_us - 1)
-            do(device, record)
-    rig.run_to(recording.until_us)
-    return port.sent
+    changes = (
+        _Change(record.at_us, partial(do, device, record))
+        for record in records
+        if record.mark is Mark.PHYSICAL
+    )
+    return _play(device, received, changes, nothing, recording.until_us)
 
 
 def traffic_of(records: Sequence[BenchRecord], mark: Mark) -> Iterator[tuple[int, Traffic, int]]:

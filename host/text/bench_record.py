@@ -31,9 +31,11 @@ from tickrig.host.text.values import Setting, format_time
 from tickrig.wire.can import CanFrame, ErrorState
 from tickrig.wire.errors import WireError
 
-_LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) (?:(\w[\w./:-]*) ([<>!~]) (.*)|\.)", re.ASCII)
+_LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ((\w[\w./:-]*) ([<>!~]) (.*)|\.)", re.ASCII)
 _CHANGE: Final = re.compile(r"([\w./:-]{1,200})=(.{1,9999})", re.ASCII)
 _FAULT: Final = re.compile(r"\w{1,99}(?:=[0-9.e+-]{1,30})?", re.ASCII)
+
+_KEPT_LINES: Final = 4_096
 
 BUS_STATE: Final = {
     f"bus_state {name}": state
@@ -99,6 +101,7 @@ class BenchParser:
     def __init__(self, header: BenchHeader) -> None:
         self._header = header
         self._on_can = {name: header.on_can(name) for name in header.devices}
+        self._known: dict[str, BenchRecord] = {}  # lines repeat but for their time: read once
 
     def parse(self, lines: Iterable[str]) -> Iterator[BenchRecord]:
         """Read line by line; time must not run backwards, and nothing follows the end.
@@ -123,20 +126,30 @@ class BenchParser:
         match = _LINE.fullmatch(line)
         if match is None:
             raise ValueError(f"not 'SECONDS NAME MARK TEXT': {line!r:.60}")
-        seconds, micros, name, mark, text = match.groups()
+        seconds, micros, rest, name, mark, text = match.groups()
+        known = self._known.get(rest)
+        if known is None:
+            if len(self._known) >= _KEPT_LINES:
+                self._known.clear()
+            known = self._known[rest] = self._read(name, mark, text)
+        _, its_name, its_mark, traffic, its_text, _ = known
         at_us = int(seconds) * 1_000_000 + int(micros)
+        return BenchRecord(at_us, its_name, its_mark, traffic, its_text, number)
+
+    def _read(self, name: str | None, mark: str, text: str) -> BenchRecord:
+        """Read what stands behind the time."""
         if name is None:
-            return BenchRecord(at_us, "", Mark.END, line=number)
+            return BenchRecord(0, "", Mark.END)
         if mark == Mark.WIRE:
             _check_fault(text, name in self._header.wires)
-            return BenchRecord(at_us, name, Mark.WIRE, text=text, line=number)
+            return BenchRecord(0, name, Mark.WIRE, text=text)
         if name not in self._on_can:
             raise ValueError(f"no device {name:.60} in the header")
         if mark == Mark.PHYSICAL:
             _check_change(text)
-            return BenchRecord(at_us, name, Mark.PHYSICAL, text=text, line=number)
+            return BenchRecord(0, name, Mark.PHYSICAL, text=text)
         traffic = CanFrame.parse(text) if self._on_can[name] else unescape(text)
-        return BenchRecord(at_us, name, Mark(mark), traffic, line=number)
+        return BenchRecord(0, name, Mark(mark), traffic)
 
 
 def _check_fault(text: str, known: bool) -> None:
