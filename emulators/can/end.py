@@ -27,6 +27,7 @@ _QUEUE_FRAMES: Final = 4_096
 """Frames that an end keeps, going out and as many coming in; more are lost and counted."""
 
 
+@in_kernel
 def _ignore(at_us: int) -> None:
     """Wake nobody: nobody ticks at this end."""
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, SupportsIndex, TypeVar
+from tempfile import TemporaryFile
+from typing import IO, Any, Final, Generic, NamedTuple, Protocol, SupportsIndex, TypeVar
 
 from tickrig.device.core import Device, W
 from tickrig.device.horizon import Horizon
@@ -229,6 +230,10 @@ class Tick(NamedTuple):
     sent: Any = b""
     mark: Mark = Mark.PHYSICAL
 
+    def lines(self) -> Iterator[str]:
+        """Give its lines as text, without LF."""
+        return (record.encode() for record in self.records())
+
     def records(self) -> Iterator[BenchRecord]:
         """Give the lines of it."""
         at_us, name = self.at_us, self.name
@@ -243,13 +248,14 @@ class Tick(NamedTuple):
 class TraceRecorder(Copyable):
     r"""Records the devices of a bench, in memory or in a file.
 
-    In memory it keeps all, for `save`; a copy of the bench has what was recorded so far and
-    goes on by itself. In a file each tick is written at once, so that a kill loses nothing but
-    the last tick; where writing fails the recording ends with one warning, and the run goes on.
-    Nobody records a copy then.
+    Without a file it keeps all, for `save`: the latest ticks in memory, those before them as text
+    in a temporary file, which is gone with the recorder. So memory does not grow with the run. A
+    copy of the bench has what was recorded so far and goes on by itself. In a file each tick is
+    written at once, so that a kill loses nothing but the last tick; where writing fails the
+    recording ends with one warning, and the run goes on. Nobody records a copy then.
 
     Args:
-        path: the file, which is replaced; None to keep the lines in memory.
+        path: the file, which is replaced; None to keep the lines for `save`.
         header: what is on the bench.
 
     Raises:
@@ -271,8 +277,9 @@ class TraceRecorder(Copyable):
         self.header = header
         self._file = None if path is None else LineFile(path, header.encode())
         self._forgetful = path is not None
-        self._shared: tuple[_Ticks, ...] = ()
+        self._shared: tuple[_Ticks | _Lines, ...] = ()  # ticks in memory come last
         self._ticks: list[Tick] = []
+        self._spool, self._in_memory = _Spool(), 0
         self._last_us = 0
 
     def device(self, name: str, device: Device[W]) -> TracedDevice[W]:
@@ -314,23 +321,33 @@ class TraceRecorder(Copyable):
         self._last_us = max(self._last_us, tick.at_us)
         if not self._forgetful:
             self._ticks.append(tick)
+            self._in_memory += 1
+            if self._in_memory >= TICKS_KEPT:
+                self._write_down()
         elif self._file is not None:
-            self._file.write([record.encode() for record in tick.records()])
+            self._file.write([*tick.lines()])
+
+    def _write_down(self) -> None:
+        """Keep as text what is in memory."""
+        parts = (*(part for part in self._shared if isinstance(part, _Ticks)), _Ticks(self._ticks))
+        text = "".join(f"{line}\n" for part in parts for line in part.lines())
+        written = tuple(part for part in self._shared if isinstance(part, _Lines))
+        self._shared = (*written, self._spool.keep(text))
+        self._ticks, self._in_memory = [], 0
 
     def lines(self, now_us: int) -> Iterator[str]:
-        """Give the lines of what is in memory, as a run that lasted until now.
+        """Give the lines of what was kept, as a run that lasted until now.
 
         Args:
             now_us: time of the rig.
         """
         yield self.header.encode()
-        for part in (*(part.ticks for part in self._shared), self._ticks):
-            for tick in part:
-                yield from (record.encode() for record in tick.records())
+        for part in (*self._shared, _Ticks(self._ticks)):
+            yield from part.lines()
         yield BenchRecord(max(now_us, self._last_us), "", Mark.END).encode()
 
     def save(self, path: Path, now_us: int) -> None:
-        """Write what is in memory into a file.
+        """Write what was kept into a file.
 
         Args:
             path: the file; one that exists is replaced.
@@ -353,14 +370,88 @@ class TraceRecorder(Copyable):
         """Return the state of a copy; what was recorded so far is shared."""
         if self._ticks:
             self._shared, self._ticks = (*self._shared, _Ticks(tuple(self._ticks))), []
-        return {**vars(self), "_file": None}
+        return {**vars(self), "_file": None, "_spool": _Spool()}
+
+
+TICKS_KEPT: Final = 4_096
+"""So many ticks are kept in memory at most, before they are written as text."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Ticks(Immutable):
     """Ticks that a recorder shares with its copies."""
 
-    ticks: tuple[Tick, ...]
+    ticks: Sequence[Tick]
+
+    def lines(self) -> Iterator[str]:
+        """Give their lines, without LF."""
+        for tick in self.ticks:
+            yield from tick.lines()
+
+
+class _Spool:
+    """A temporary file that only grows; where none can be written, what was to go there stays.
+
+    Copies within the process share what was written; each copy writes into a file of its own.
+    """
+
+    shared_by_twins = True
+
+    def __init__(self) -> None:
+        self._file: IO[bytes] | None = None
+        self._size, self._failed = 0, False
+
+    def keep(self, text: str) -> _Lines:
+        """Keep a text."""
+        data = text.encode()
+        if not self._failed:
+            try:
+                self._file = self._file or TemporaryFile()  # noqa: SIM115 - it stays open
+                self._file.seek(self._size)
+                self._file.write(data)
+                self._file.flush()
+            except OSError as error:
+                self._failed = True
+                _logger.warning("a trace stays in memory: no temporary file: %s", error.strerror)
+            else:
+                self._size += len(data)
+                return _Lines(b"", self, self._size - len(data), len(data))
+        return _Lines(data)
+
+    def __del__(self) -> None:
+        """Remove the file."""
+        if self._file is not None:
+            self._file.close()
+
+    def read(self, start: int, size: int) -> bytes:
+        """Return what was kept."""
+        if self._file is None:
+            return b""
+        self._file.seek(start)
+        return self._file.read(size)
+
+
+class _Lines(Immutable):
+    """Lines that a recorder shares with its copies; a pickle has them itself."""
+
+    def __init__(
+        self, data: bytes, spool: _Spool | None = None, start: int = 0, size: int = 0
+    ) -> None:
+        self._data, self._spool, self._start, self._size = data, spool, start, size
+
+    @property
+    def _text(self) -> bytes:
+        if self._spool is None:
+            return self._data
+        return self._spool.read(self._start, self._size)
+
+    def lines(self) -> Iterator[str]:
+        """Give them, without LF."""
+        return iter(self._text.decode().split("\n")[:-1])
+
+    def __reduce__(self) -> Any:
+        """Take the lines along into another process."""
+        return _Lines, (self._text,)
 
 
 class _Channel(NamedTuple):

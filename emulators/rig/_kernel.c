@@ -79,7 +79,24 @@ typedef struct {
 static PyTypeObject *StationType, *TimetableType, *EndType, *ArbiterType, *RoutesType, *BusyType,
     *SegmentType;
 
-#define IS(item, type) ((item) != NULL && PyObject_TypeCheck(item, type))
+/* The class in Python that was met last, of each type: most questions end there (3 % of a bus). */
+static PyTypeObject *usual_Station, *usual_Timetable, *usual_End, *usual_Arbiter, *usual_Routes,
+    *usual_Busy, *usual_Segment;
+
+static int
+is_of(PyObject *item, PyTypeObject *type, PyTypeObject **usual)
+{
+    if (item == NULL || !PyObject_TypeCheck(item, type))
+        return 0;
+    PyTypeObject *before = *usual;
+    *usual = (PyTypeObject *)Py_NewRef(Py_TYPE(item));
+    Py_XDECREF(before);
+    return 1;
+}
+
+#define IS(item, name)                                                                           \
+    (((item) != NULL && Py_TYPE(item) == usual_##name) ||                                         \
+     is_of((PyObject *)(item), name##Type, &usual_##name))
 #define OBJECT(name, type, field) {name, T_OBJECT_EX, offsetof(type, field), 0, NULL}
 #define NUMBER(name, type, field) {name, T_LONGLONG, offsetof(type, field), 0, NULL}
 
@@ -129,7 +146,7 @@ static PyMemberDef segment_fields[] = {
 
 enum { STATION_WAKE, TIMETABLE_ENTER, TIMETABLE_TAKE, END_POLL, END_SEND, END_RECEIVE,
        END_ENQUEUE, ARBITER_PUSH, SEGMENT_PLAN, SEGMENT_DELIVER, SEGMENT_ADVANCE,
-       SEGMENT_ADVANCE_UNTIL, SEGMENT_SEND, METHODS };
+       SEGMENT_ADVANCE_UNTIL, SEGMENT_SEND, IGNORE, METHODS };
 static PyObject *reference[METHODS];
 static int enabled = 1;
 static PyObject *empty_tuple;
@@ -439,7 +456,7 @@ timetable_enter(PyObject *self, PyObject *const *args, Py_ssize_t count)
     us at_us;
     if (wrong_number("enter", count, 2))
         return NULL;
-    if (!enabled || !IS(args[0], StationType))
+    if (!enabled || !IS(args[0], Station))
         return by_reference(TIMETABLE_ENTER, self, args, count);
     if (read_time(args[1], &at_us) < 0 || enter((Timetable *)self, (Station *)args[0], at_us) < 0)
         return NULL;
@@ -466,7 +483,7 @@ take(Timetable *table, us now_us) /* the stations with work; NULL: an exception 
         int standing = 0;
         for (Py_ssize_t i = 0; i < PyList_GET_SIZE(there); i++) {
             Station *station = (Station *)PyList_GET_ITEM(there, i);
-            if (!IS((PyObject *)station, StationType) || station->at_us != at_us)
+            if (!IS((PyObject *)station, Station) || station->at_us != at_us)
                 continue;
             standing = 1;
             if (at_us > now_us)
@@ -497,7 +514,7 @@ static int
 is_table(PyObject *item)
 {
     Timetable *table = (Timetable *)item;
-    return IS(item, TimetableType) && table->ticks && PyList_CheckExact(table->ticks) &&
+    return IS(item, Timetable) && table->ticks && PyList_CheckExact(table->ticks) &&
            table->stations && PyDict_CheckExact(table->stations);
 }
 
@@ -523,7 +540,7 @@ station_wake(PyObject *self, PyObject *const *args, Py_ssize_t count)
     us at_us;
     if (wrong_number("_wake", count, 1))
         return NULL;
-    if (!enabled || !IS(station->timetable, TimetableType))
+    if (!enabled || !IS(station->timetable, Timetable))
         return by_reference(STATION_WAKE, self, args, count);
     if (read_time(args[0], &at_us) < 0 || enter((Timetable *)station->timetable, station, at_us) < 0)
         return NULL;
@@ -536,9 +553,11 @@ wake(PyObject *callback, us at_us)
     if (callback != NULL && PyCFunction_CheckExact(callback) &&
         PyCFunction_GET_FUNCTION(callback) == (PyCFunction)(void (*)(void))station_wake) {
         Station *station = (Station *)PyCFunction_GET_SELF(callback);
-        if (IS(station->timetable, TimetableType))
+        if (IS(station->timetable, Timetable))
             return enter((Timetable *)station->timetable, station, at_us);
     }
+    if (callback != NULL && callback == reference[IGNORE])
+        return 0;
     PyObject *number = PyLong_FromLongLong(at_us);
     if (number == NULL || callback == NULL) {
         Py_XDECREF(number);
@@ -574,7 +593,7 @@ arbiter_push(PyObject *self, PyObject *const *args, Py_ssize_t count)
 {
     if (wrong_number("push", count, 1))
         return NULL;
-    if (!enabled || !IS(args[0], EndType))
+    if (!enabled || !IS(args[0], End))
         return by_reference(ARBITER_PUSH, self, args, count);
     if (push((Arbiter *)self, (End *)args[0]) < 0)
         return NULL;
@@ -587,8 +606,8 @@ static int
 is_whole(Segment *segment) /* its parts are what this file can work on */
 {
     Arbiter *arbiter = (Arbiter *)segment->arbiter;
-    return IS(segment->arbiter, ArbiterType) && IS(segment->routes, RoutesType) &&
-           IS(segment->busy, BusyType) && segment->winners && PyList_CheckExact(segment->winners) &&
+    return IS(segment->arbiter, Arbiter) && IS(segment->routes, Routes) &&
+           IS(segment->busy, Busy) && segment->winners && PyList_CheckExact(segment->winners) &&
            arbiter->heads && PyList_CheckExact(arbiter->heads) && arbiter->ends &&
            PyDict_Check(arbiter->ends) && segment->bit > 0 && segment->unit > 0 &&
            segment->observers && PyList_Check(segment->observers);
@@ -618,6 +637,28 @@ same_rank(PyObject *heads, Py_ssize_t place, us head)
 }
 
 static int
+set_winner(Segment *segment, PyObject *end) /* one, or none if `end` is NULL */
+{
+    PyObject *winners = segment->winners;
+    Py_ssize_t count = end == NULL ? 0 : 1;
+    if (winners == NULL || !PyList_CheckExact(winners) || Py_REFCNT(winners) > 1) {
+        PyObject *made = PyList_New(count);
+        if (made == NULL)
+            return -1;
+        if (count)
+            PyList_SET_ITEM(made, 0, Py_NewRef(end));
+        put(&segment->winners, made);
+        Py_DECREF(made);
+        return 0;
+    }
+    if (count && PyList_GET_SIZE(winners) == 1)
+        return PyList_SetItem(winners, 0, Py_NewRef(end));
+    if (PyList_GET_SIZE(winners) && PyList_SetSlice(winners, 0, PyList_GET_SIZE(winners), NULL) < 0)
+        return -1;
+    return count ? PyList_Append(winners, end) : 0; /* the list keeps its room */
+}
+
+static int
 plan(Segment *segment) /* CanSegment._plan */
 {
     int sound = is_sound(segment), over;
@@ -644,21 +685,16 @@ plan(Segment *segment) /* CanSegment._plan */
     Py_DECREF(number);
     if (end == NULL && PyErr_Occurred())
         return -1;
-    if (!IS(end, EndType) || !read_frame(((End *)end)->next, &frame))
+    if (!IS(end, End) || !read_frame(((End *)end)->next, &frame))
         return done(by_reference(SEGMENT_PLAN, (PyObject *)segment, NULL, 0));
-    PyObject *winners = PyList_New(1), *taken;
-    if (winners == NULL)
+    Py_INCREF(end);
+    PyObject *taken = heap_pop(heads);
+    int result = taken == NULL ? -1 : set_winner(segment, end);
+    Py_DECREF(end);
+    Py_XDECREF(taken);
+    if (result < 0)
         return -1;
-    PyList_SET_ITEM(winners, 0, Py_NewRef(end));
-    taken = heap_pop(heads);
-    if (taken == NULL) {
-        Py_DECREF(winners);
-        return -1;
-    }
-    Py_DECREF(taken);
     put(&segment->stale, Py_False);
-    put(&segment->winners, winners);
-    Py_DECREF(winners);
     put(&segment->finish, Py_None);
     segment->start = arbiter->free;
     segment->free = arbiter->free + frame_bits(&frame) * segment->bit;
@@ -681,11 +717,14 @@ static int
 note(Busy *busy, us since, us until) /* BusyTime.note */
 {
     if (since != busy->until) {
-        PyObject *span = Py_BuildValue("(LL)", busy->since, busy->until);
-        if (span == NULL || busy->spans == NULL)
-            return -1;
-        int result = done(PyObject_CallMethodOneArg(busy->spans, s_append, span));
-        Py_DECREF(span);
+        PyObject *first = PyLong_FromLongLong(busy->since);
+        PyObject *last = PyLong_FromLongLong(busy->until);
+        PyObject *span = first && last && busy->spans ? PyTuple_Pack(2, first, last) : NULL;
+        int result = span == NULL
+            ? -1 : done(PyObject_CallMethodOneArg(busy->spans, s_append, span));
+        Py_XDECREF(first);
+        Py_XDECREF(last);
+        Py_XDECREF(span);
         if (result < 0)
             return -1;
         busy->since = since;
@@ -712,22 +751,24 @@ take_next(End *end) /* CanEnd.take: a new reference */
 }
 
 static int
-receive(PyObject *item, PyObject *number, us at_us, PyObject *frame, PyObject *alone)
+receive(PyObject *item, us at_us, PyObject *frame, PyObject *alone)
 {
     End *end = (End *)item;
-    int usual = IS(item, EndType) && end->first && PyTuple_CheckExact(end->first) &&
-                !PyTuple_GET_SIZE(end->first) && IS(end->segment, SegmentType) &&
+    int usual = IS(item, End) && end->first && PyTuple_CheckExact(end->first) &&
+                !PyTuple_GET_SIZE(end->first) && IS(end->segment, Segment) &&
                 end->reconfigured_by && PyAnySet_Check(end->reconfigured_by);
     if (!usual) {
-        PyObject *args[] = {number, frame, alone};
-        return done(by_reference(END_RECEIVE, item, args, 3));
+        PyObject *number = PyLong_FromLongLong(at_us), *args[] = {number, frame, alone};
+        int result = number == NULL ? -1 : done(by_reference(END_RECEIVE, item, args, 3));
+        Py_XDECREF(number);
+        return result;
     }
     put(&end->first, alone);
     end->arrived_us = at_us;
     if (wake(end->wake, at_us) < 0)
         return -1;
     Segment *segment = (Segment *)end->segment;
-    if (!IS(end->segment, SegmentType))
+    if (!IS(end->segment, Segment))
         return 0;
     put(&segment->received, Py_True);
     if (end->unfiltered != Py_False || !PySet_GET_SIZE(end->reconfigured_by))
@@ -737,7 +778,7 @@ receive(PyObject *item, PyObject *number, us at_us, PyObject *frame, PyObject *a
         return reconfigured;
     Routes *routes = (Routes *)segment->routes;
     put(&end->unfiltered, Py_True);
-    if (IS(segment->routes, RoutesType) && routes->unfiltered && PyList_Check(routes->unfiltered))
+    if (IS(segment->routes, Routes) && routes->unfiltered && PyList_Check(routes->unfiltered))
         return PyList_Append(routes->unfiltered, item);
     PyErr_SetString(PyExc_TypeError, "a bus without routes");
     return -1;
@@ -766,11 +807,13 @@ deliver(Segment *segment) /* CanSegment._deliver of one winner on a sound bus */
         return done(by_reference(SEGMENT_DELIVER, (PyObject *)segment, NULL, 0));
     us at_us = segment->due_us;
     int result = -1;
-    PyObject *number = NULL, *frame = NULL, *found = NULL, *alone = NULL, *winners = NULL;
+    PyObject *number = NULL, *frame = NULL, *found = NULL, *alone = NULL;
     Arbiter *arbiter = (Arbiter *)Py_NewRef(segment->arbiter);
     PyObject *observers = Py_NewRef(segment->observers);
     Py_INCREF(sender);
-    if ((frame = take_next(sender)) == NULL || (number = PyLong_FromLongLong(at_us)) == NULL)
+    if ((frame = take_next(sender)) == NULL)
+        goto end;
+    if (PyList_GET_SIZE(observers) && (number = PyLong_FromLongLong(at_us)) == NULL)
         goto end;
     for (Py_ssize_t i = 0; i < PyList_GET_SIZE(observers); i++) {
         PyObject *args[] = {number, frame}, *observe = Py_NewRef(PyList_GET_ITEM(observers, i));
@@ -788,9 +831,8 @@ deliver(Segment *segment) /* CanSegment._deliver of one winner on a sound bus */
         goto end;
     if (sender->waiting && push(arbiter, sender) < 0)
         goto end;
-    if ((winners = PyList_New(0)) == NULL)
+    if (set_winner(segment, NULL) < 0)
         goto end;
-    put(&segment->winners, winners);
     found = receivers((Routes *)segment->routes, frame, read.extended);
     if (found == NULL || !PyTuple_Check(found))
         goto end;
@@ -799,7 +841,7 @@ deliver(Segment *segment) /* CanSegment._deliver of one winner on a sound bus */
             goto end;
         for (Py_ssize_t i = 0; i < PyTuple_GET_SIZE(found); i++) {
             PyObject *end = PyTuple_GET_ITEM(found, i);
-            if (end != (PyObject *)sender && receive(end, number, at_us, frame, alone) < 0)
+            if (end != (PyObject *)sender && receive(end, at_us, frame, alone) < 0)
                 goto end;
         }
     }
@@ -810,7 +852,6 @@ end:
     Py_DECREF(sender);
     Py_DECREF(arbiter);
     Py_DECREF(observers);
-    Py_XDECREF(winners);
     Py_XDECREF(number);
     Py_XDECREF(frame);
     Py_XDECREF(found);
@@ -823,7 +864,7 @@ finish(Segment *segment) /* end what was planned */
 {
     if (segment->finish == Py_None && segment->sound == Py_True && is_whole(segment) &&
         PyList_GET_SIZE(segment->winners) == 1 &&
-        IS(PyList_GET_ITEM(segment->winners, 0), EndType))
+        IS(PyList_GET_ITEM(segment->winners, 0), End))
         return deliver(segment);
     put(&segment->sound, Py_False); /* what follows may count errors */
     if (segment->finish == NULL || segment->finish == Py_None)
@@ -925,7 +966,7 @@ send_frames(Segment *segment, End *end, us now_us, PyObject *frames) /* CanSegme
     if (sound < 0)
         return -1;
     if (!sound || !count || end->waiting < 0 || end->waiting + count > end->room || now_us > FAR ||
-        now_us < 0 || !IS(segment->arbiter, ArbiterType)) {
+        now_us < 0 || !IS(segment->arbiter, Arbiter)) {
         if ((number = PyLong_FromLongLong(now_us)) == NULL)
             return -1;
         PyObject *args[] = {(PyObject *)end, number, frames};
@@ -939,14 +980,11 @@ send_frames(Segment *segment, End *end, us now_us, PyObject *frames) /* CanSegme
     if (segment->start >= now && segment->stale == Py_False) { /* CanSegment._withdraw */
         for (Py_ssize_t i = 0; i < PyList_GET_SIZE(segment->winners); i++) {
             PyObject *winner = PyList_GET_ITEM(segment->winners, i);
-            if (IS(winner, EndType) && ((End *)winner)->waiting && push(arbiter, (End *)winner) < 0)
+            if (IS(winner, End) && ((End *)winner)->waiting && push(arbiter, (End *)winner) < 0)
                 return -1;
         }
-        PyObject *winners = PyList_New(0);
-        if (winners == NULL)
+        if (set_winner(segment, NULL) < 0)
             return -1;
-        put(&segment->winners, winners);
-        Py_DECREF(winners);
         segment->start = NEVER;
         if (plan_anew(segment) < 0)
             return -1;
@@ -980,7 +1018,7 @@ segment_send(PyObject *self, PyObject *const *args, Py_ssize_t count)
     us now_us;
     if (wrong_number("send", count, 3))
         return NULL;
-    if (!enabled || !IS(args[0], EndType))
+    if (!enabled || !IS(args[0], End))
         return by_reference(SEGMENT_SEND, self, args, count);
     if (read_time(args[1], &now_us) < 0 ||
         send_frames((Segment *)self, (End *)args[0], now_us, args[2]) < 0)
@@ -994,7 +1032,7 @@ static PyObject *
 poll(End *end, us now_us, PyObject *number) /* CanEnd.poll; number: the same time, or NULL */
 {
     Segment *segment = (Segment *)end->segment;
-    if (!IS(end->segment, SegmentType) || !IS(segment->routes, RoutesType) || end->first == NULL ||
+    if (!IS(end->segment, Segment) || !IS(segment->routes, Routes) || end->first == NULL ||
         !PyTuple_CheckExact(end->first) ||
         (end->more != Py_None && PyTuple_GET_SIZE(end->first))) {
         PyObject *args[] = {number != NULL ? Py_NewRef(number) : PyLong_FromLongLong(now_us)};
@@ -1013,7 +1051,7 @@ poll(End *end, us now_us, PyObject *number) /* CanEnd.poll; number: the same tim
         if (result < 0)
             return NULL;
         segment = (Segment *)end->segment;
-        if (!IS(end->segment, SegmentType) || !IS(segment->routes, RoutesType) ||
+        if (!IS(end->segment, Segment) || !IS(segment->routes, Routes) ||
             end->first == NULL || !PyTuple_CheckExact(end->first) ||
             (end->more != Py_None && PyTuple_GET_SIZE(end->first)))
             return poll(end, now_us, number);
@@ -1056,7 +1094,7 @@ end_send(PyObject *self, PyObject *const *args, Py_ssize_t count)
     us now_us;
     if (wrong_number("send", count, 2))
         return NULL;
-    if (!enabled || !IS(end->segment, SegmentType) || !PyTuple_CheckExact(args[1]))
+    if (!enabled || !IS(end->segment, Segment) || !PyTuple_CheckExact(args[1]))
         return by_reference(END_SEND, self, args, count);
     if (!PyTuple_GET_SIZE(args[1]))
         Py_RETURN_NONE;
@@ -1077,7 +1115,7 @@ end_receive(PyObject *self, PyObject *const *args, Py_ssize_t count)
         return NULL;
     if (!enabled || !read_frame(args[1], &frame) || !PyTuple_CheckExact(args[2]))
         return by_reference(END_RECEIVE, self, args, count);
-    if (read_time(args[0], &at_us) < 0 || receive(self, args[0], at_us, args[1], args[2]) < 0)
+    if (read_time(args[0], &at_us) < 0 || receive(self, at_us, args[1], args[2]) < 0)
         return NULL;
     Py_RETURN_NONE;
 }
@@ -1154,7 +1192,7 @@ tick_station(Station *station, Timetable *table, us now_us, PyObject *number)
         PyErr_SetString(PyExc_AttributeError, "a station without device and port");
         goto end;
     }
-    int direct = IS(port, EndType);
+    int direct = IS(port, End);
     received = direct ? poll((End *)port, now_us, number)
                       : PyObject_CallMethodOneArg(port, s_poll, number);
     if (received == NULL)
@@ -1175,7 +1213,7 @@ tick_station(Station *station, Timetable *table, us now_us, PyObject *number)
             goto end;
         if (some) {
             int gone;
-            if (direct && PyTuple_CheckExact(sent) && IS(((End *)port)->segment, SegmentType)) {
+            if (direct && PyTuple_CheckExact(sent) && IS(((End *)port)->segment, Segment)) {
                 PyObject *segment = Py_NewRef(((End *)port)->segment);
                 gone = send_frames((Segment *)segment, (End *)port, now_us, sent);
                 Py_DECREF(segment);
@@ -1229,34 +1267,91 @@ tick_stations(PyObject *module, PyObject *const *args, Py_ssize_t count)
     Py_RETURN_TRUE;
 }
 
+static int
+enter_due(PyObject *stations, Timetable *table) /* Rig._enter_due */
+{
+    for (Py_ssize_t i = 0; i < PyTuple_GET_SIZE(stations); i++) {
+        Station *station = (Station *)PyTuple_GET_ITEM(stations, i);
+        us due_us;
+        if (!IS((PyObject *)station, Station) || station->device == NULL) {
+            PyErr_SetString(PyExc_TypeError, "a station is none");
+            return -1;
+        }
+        if (read_attribute(station->device, s_due_us, &due_us) < 0 ||
+            (due_us < station->at_us && enter(table, station, due_us) < 0))
+            return -1;
+    }
+    return 0;
+}
+
+static int
+make_tick(PyObject *rig, Timetable *table, Segment *segment, PyObject *horizon, us now_us)
+{
+    PyObject *number = PyLong_FromLongLong(now_us), *outer = PyObject_GetAttr(rig, s_in_step);
+    int result = number == NULL || outer == NULL ||
+                         PyObject_SetAttr(rig, s_in_step, Py_True) < 0 ||
+                         PyObject_SetAttr(rig, s_now_us, number) < 0 ? -1 : 0;
+    table->open_us = now_us;
+    if (result == 0)
+        result = advance(segment, now_us);
+    if (result == 0)
+        result = tick_all(table, now_us, number);
+    if (result == 0)
+        result = PyObject_SetAttr(horizon, s_passed_us, number);
+    if (outer != NULL) {
+        PyObject *type, *value, *trace;
+        PyErr_Fetch(&type, &value, &trace);
+        int restored = PyObject_SetAttr(rig, s_in_step, outer);
+        if (type != NULL)
+            PyErr_Restore(type, value, trace);
+        result = result < 0 || restored < 0 ? -1 : 0;
+        Py_DECREF(outer);
+    }
+    Py_XDECREF(number);
+    return result;
+}
+
+/* Rig.run_to: of a rig and its parts, a time, and the time up to which nobody looks. True if that
+   time has come; False if Python has something to do before, or all of it. */
 static PyObject *
 run(PyObject *module, PyObject *const *args, Py_ssize_t count)
 {
-    us until_us, now_us, due_us;
-    if (wrong_number("run", count, 8))
+    us until_us, unseen_us, now_us, due_us;
+    PyObject *part[7] = {NULL};
+    if (wrong_number("run", count, 4))
         return NULL;
-    PyObject *rig = args[0], *queue = args[3], *horizon = args[4];
-    Timetable *table = (Timetable *)args[1];
-    Segment *segment = (Segment *)args[2];
-    if (!is_table(args[1]) || !IS(args[2], SegmentType) || !PyList_Check(args[5]) ||
-        !PyList_Check(args[6])) {
-        PyErr_SetString(PyExc_TypeError, "run() takes the parts of a rig and a time");
+    int whole = PyTuple_CheckExact(args[1]) && PyTuple_GET_SIZE(args[1]) == 7;
+    for (int i = 0; whole && i < 7; i++)
+        part[i] = PyTuple_GET_ITEM(args[1], i); /* the tuple is held by the caller */
+    PyObject *rig = args[0], *queue = part[2], *horizon = part[3], *watchers = part[4],
+             *hosts = part[5];
+    if (!whole || !is_table(part[0]) || !IS(part[1], Segment) || !PyList_Check(watchers) ||
+        !PyList_Check(hosts) || !PyTuple_CheckExact(part[6])) {
+        PyErr_SetString(PyExc_TypeError, "run() takes a rig, its parts and two times");
         return NULL;
     }
-    if (read_time(args[7], &until_us) < 0 || read_attribute(rig, s_now_us, &now_us) < 0)
+    Timetable *table = (Timetable *)part[0];
+    Segment *segment = (Segment *)part[1];
+    if (read_time(args[2], &until_us) < 0 || read_time(args[3], &unseen_us) < 0)
         return NULL;
-    while (enabled && segment->whole == Py_True && !PyList_GET_SIZE(args[5]) &&
-           !PyList_GET_SIZE(args[6]) && until_us < FAR) {
-        if (read_attribute(queue, s_due_us, &due_us) < 0)
-            return NULL;
+    if (!enabled || segment->whole != Py_True || PyList_GET_SIZE(watchers) ||
+        PyList_GET_SIZE(hosts) || until_us > FAR)
+        Py_RETURN_FALSE;
+    if (read_attribute(rig, s_now_us, &now_us) < 0 || enter_due(part[6], table) < 0 ||
+        read_attribute(queue, s_due_us, &due_us) < 0)
+        return NULL;
+    if (unseen_us > due_us - 1)
+        unseen_us = due_us - 1;
+    if (write_attribute(horizon, s_until_us, unseen_us) < 0)
+        return NULL;
+    while (enabled && segment->whole == Py_True && !PyList_GET_SIZE(watchers) &&
+           !PyList_GET_SIZE(hosts)) {
         us tick_us = table->first_us > now_us ? table->first_us : now_us;
         us next_us = tick_us < due_us ? tick_us : due_us;
         int woken = advance_until(segment, next_us - 1 < until_us ? next_us - 1 : until_us);
         if (woken < 0)
             return NULL;
-        if (woken)
-            continue;
-        if (next_us > until_us) { /* Rig._pass_to */
+        if (!woken && next_us > until_us) { /* Rig._pass_to */
             if (advance(segment, until_us) < 0)
                 return NULL;
             if (until_us > now_us) {
@@ -1268,32 +1363,16 @@ run(PyObject *module, PyObject *const *args, Py_ssize_t count)
             table->open_us = now_us + 1;
             Py_RETURN_TRUE;
         }
-        if (due_us <= next_us)
-            break; /* an action of the event queue */
-        PyObject *number = PyLong_FromLongLong(next_us);
-        if (number == NULL)
-            return NULL;
-        PyObject *outer = PyObject_GetAttr(rig, s_in_step);
-        int result = outer == NULL || PyObject_SetAttr(rig, s_in_step, Py_True) < 0 ||
-                             PyObject_SetAttr(rig, s_now_us, number) < 0
-                         ? -1 : 0;
-        table->open_us = now_us = next_us;
-        if (result == 0)
-            result = advance(segment, now_us);
-        if (result == 0)
-            result = tick_all(table, now_us, number);
-        if (result == 0)
-            result = PyObject_SetAttr(horizon, s_passed_us, number);
-        if (outer != NULL) {
-            PyObject *type, *value, *trace;
-            PyErr_Fetch(&type, &value, &trace);
-            result |= PyObject_SetAttr(rig, s_in_step, outer);
-            if (type != NULL)
-                PyErr_Restore(type, value, trace);
-            Py_DECREF(outer);
+        if (!woken) {
+            if (due_us <= next_us)
+                break; /* an action of the event queue */
+            now_us = next_us;
+            if (make_tick(rig, table, segment, horizon, now_us) < 0)
+                return NULL;
+        } else if (!PyList_GET_SIZE(segment->observers)) {
+            continue; /* nobody could have entered an action */
         }
-        Py_DECREF(number);
-        if (result < 0)
+        if (read_attribute(queue, s_due_us, &due_us) < 0)
             return NULL;
     }
     Py_RETURN_FALSE;
@@ -1303,7 +1382,7 @@ static const char *const method_names[METHODS] = {
     "Station._wake", "Timetable.enter", "Timetable.take", "CanEnd.poll", "CanEnd.send",
     "CanEnd.receive", "CanEnd.enqueue", "CanArbiter.push", "CanSegment._plan",
     "TransmissionOutcomes._deliver", "CanSegment.advance", "CanSegment.advance_until_received",
-    "CanSegment.send"};
+    "CanSegment.send", "_ignore"};
 
 static PyObject *
 method(PyObject *module, PyObject *args) /* takes a Python method; returns what replaces it */

@@ -49,25 +49,6 @@ def bits(frame: object) -> int | None:
     return counted
 
 
-def run(*parts: Any) -> bool:
-    """Let a rig run up to a time, as `Rig.run_to`.
-
-    Args:
-        parts: the rig, its timetable, the bus, its event queue, horizon, watchers and hosts, and
-            the time.
-
-    Returns:
-        False if something else has to be done before that time: an action of the event queue, or
-        all of it where there is no kernel.
-    """
-    return bool(_KERNEL.run(*parts))
-
-
-def tick_stations(timetable: object, now_us: int) -> bool:
-    """Let the stations compute and send that have work, as `Rig._tick_woken`; False if disabled."""
-    return bool(_KERNEL.tick_stations(timetable, now_us))
-
-
 if TYPE_CHECKING or _KERNEL is None:
 
     class StationFields:
@@ -115,7 +96,23 @@ if TYPE_CHECKING or _KERNEL is None:
             *("received", "routes", "shorted", "unit", "whole"),
         )
 
+    def run(rig: object, parts: object, until_us: int, unseen_us: int, /) -> bool:
+        """Let a rig run up to a time in C, as `Rig.run_to`; False if there is more to be done.
+
+        Args:
+            rig: the rig.
+            parts: its timetable, bus, event queue, horizon, watchers, hosts and stations.
+            until_us: the time.
+            unseen_us: up to then nobody looks at a device.
+        """
+        return False
+
+    def tick_stations(timetable: object, now_us: int, /) -> bool:
+        """Let the stations compute and send that have work; False if Python has to."""
+        return False
+
 else:
+    run, tick_stations = _KERNEL.run, _KERNEL.tick_stations
     StationFields, TimetableFields = _KERNEL.StationFields, _KERNEL.TimetableFields
     EndFields, ArbiterFields = _KERNEL.EndFields, _KERNEL.ArbiterFields
     RoutesFields, BusyFields = _KERNEL.RoutesFields, _KERNEL.BusyFields

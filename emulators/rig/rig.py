@@ -243,14 +243,17 @@ class Rig(Copyable):
         attached = [self._attach(station) and not dense for station in stations]
         self.stations, self._woken = stations, tuple(compress(stations, attached))
         self._looked_at = tuple(compress(stations, map(not_, attached)))
-        self._bus: Any = None  # the bus that the kernel runs from tick to tick, if it can
+        self._short: tuple[object, ...] = ()  # what the kernel runs from tick to tick, if it can
         self._look_for_bus()
 
     def _look_for_bus(self) -> None:
         """Let the kernel run the rig if all stations are on one bus, in virtual time."""
         others = self._bridges or self._couplings or self._looked_at
         virtual = self._jumps and type(self._clock) is VirtualClock
-        self._bus = self._wires.only_bus if kernel and virtual and not others else None
+        bus = self._wires.only_bus if kernel and virtual and not others else None
+        lists = self.watchers, self.hosts, self._woken
+        parts = (self._timetable, bus, self.event_queue, self._horizon, *lists)
+        self._short = () if bus is None else parts
 
     def _attach(self, station: Station[Any]) -> bool:
         """Subscribe to the wake-ups of a station's port, if it has them (`WirePort`)."""
@@ -265,7 +268,7 @@ class Rig(Copyable):
 
     def __getstate__(self) -> object:
         """Return the state that a twin begins with: it has no hosts, and runs in virtual time."""
-        begun = {"_bridges": (), "_bus": None, "_clock": VirtualClock(), "_jumps": not self._dense}
+        begun = {"_bridges": (), "_short": (), "_clock": VirtualClock(), "_jumps": not self._dense}
         now = {"_in_real_time": False, "acting_us": None, "in_step": False}
         return state_of(self, {**begun, **now})
 
@@ -381,9 +384,13 @@ class Rig(Copyable):
             unseen_us: how long after that time it is likely that nobody looks at a device or
                 sets an input between ticks; it may happen, and costs more then.
         """
+        if host is None and self._short:
+            self._until_us = t_us + unseen_us
+            if run(self, self._short, t_us, self._until_us):
+                return
         self._enter_due()
         self._foresee(t_us + unseen_us if host is None else 0)
-        while host is not None or not self._run_in_kernel(t_us):
+        while True:
             if (next_us := self._go_on(t_us, host)) > t_us:
                 self._pass_to(t_us)
                 return
@@ -391,14 +398,8 @@ class Rig(Copyable):
             if host is not None and host.arrived_us <= next_us:
                 self._wires.advance(self.now_us)
                 return
-
-    def _run_in_kernel(self, t_us: int) -> bool:
-        """Go on in C; False if something is to be done here before that time."""
-        if self._bus is None:
-            return False
-        watchers, hosts = self.watchers, self.hosts
-        parts = (self, self._timetable, self._bus, self.event_queue, self._horizon)
-        return run(*parts, watchers, hosts, t_us)
+            if host is None and self._short and run(self, self._short, t_us, self._until_us):
+                return
 
     def run_for(self, duration_us: int) -> None:
         """Step through a time.

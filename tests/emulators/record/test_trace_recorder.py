@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import copy
 import logging
+import pickle
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from tickrig.device.twin import twin
 from tickrig.emulators.can.end import CanEnd
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.record.recorder import TraceRecorder
+from tickrig.emulators.record.recorder import TICKS_KEPT, Tick, TraceRecorder, _Ticks
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
@@ -176,3 +177,48 @@ def test_a_device_or_name_that_the_header_cannot_have_is_refused() -> None:
         BenchHeader({"a b": DeviceEntry("line")}, WIRES)
     with pytest.raises(ValueError, match="is on wire 'air', which is not there"):
         BenchHeader({"a": DeviceEntry("air")}, WIRES)
+
+
+def long_run(recorder: TraceRecorder, ticks: int, first: int = 0) -> None:
+    for number in range(first, first + ticks):
+        recorder.add(Tick(number * 1_000, "lamp", (), b"", b"%d\x85\n" % number))
+
+
+def test_a_long_run_keeps_few_ticks_in_memory_and_loses_none(tmp_path: Path) -> None:
+    recorder, in_file = TraceRecorder(None, HEADER), TraceRecorder(tmp_path / "a.trace", HEADER)
+    for each in (recorder, in_file):
+        long_run(each, 2 * TICKS_KEPT)
+    kept = copy.deepcopy(recorder)
+    for each in (recorder, in_file):
+        long_run(each, TICKS_KEPT // 2, 2 * TICKS_KEPT)
+    in_file.close(0)
+    recorder.save(tmp_path / "b.trace", 0)
+    assert (tmp_path / "b.trace").read_bytes() == (tmp_path / "a.trace").read_bytes()
+    here = [*recorder.lines(0)]
+    assert [*kept.lines(0)][:-1] == here[: 2 * TICKS_KEPT + 1]
+    assert [*pickle.loads(pickle.dumps(recorder)).lines(0)] == here
+
+
+def test_many_copies_of_a_long_run_keep_few_ticks_too() -> None:
+    recorder = TraceRecorder(None, HEADER)
+    for number in range(20):
+        long_run(recorder, TICKS_KEPT // 4, number * TICKS_KEPT // 4)
+        copy.deepcopy(recorder)
+    in_memory = sum(len(part.ticks) for part in recorder._shared if isinstance(part, _Ticks))
+    assert in_memory + len(recorder._ticks) < TICKS_KEPT
+    assert len([*recorder.lines(0)]) == 2 + 5 * TICKS_KEPT
+
+
+def test_a_long_run_stays_in_memory_where_no_file_can_be_written(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refused() -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tickrig.emulators.record.recorder.TemporaryFile", refused)
+    recorder = TraceRecorder(None, HEADER)
+    long_run(recorder, 3 * TICKS_KEPT)
+    assert len([*recorder.lines(0)]) == 2 + 3 * TICKS_KEPT
+    assert [record.message for record in caplog.records] == [
+        "a trace stays in memory: no temporary file: No space left on device"
+    ]
