@@ -1,5 +1,45 @@
 """A stretch of CAN bus on which all hear each other: what is sent next, and when."""
 
+# Theory of operation.
+#
+# Six modules are one machine: `wire` (what users have), `segment` (what is sent next, and when),
+# `transmission_outcomes` (what it ends in), `arbitration` (whose frame is next), `end` (a node's
+# queue, filter and inbox) and `fault_confinement` (error counters). `faults` says what is armed.
+#
+# Times on a segment are whole units of which a bit and a microsecond are both multiples; a time
+# stamp is rounded up to the next microsecond. So frames behind each other add up without error.
+#
+# A segment has one plan: which frame is on the bus, or goes next, when it starts and ends, and in
+# which method (`_finish`; None is `_deliver`). The plan holds as long as `_stale` is False.
+# `_due_us` is when its end of frame has passed. Whoever moves the bus on (`advance`) ends the plan,
+# tells whose error state has changed, and makes the next one.
+#   - A plan may be withdrawn until its first bit is out: who sends at that very time still takes
+#     part in the arbitration. From then on nothing changes it; a node that leaves breaks it off.
+#   - `CanArbiter.heads` is a heap of the first frames of all queues: priority, then node. Nodes
+#     that send the same identifier win together. `free` is when the bus is free; a node that has to
+#     wait longer (`held`: a delay, a passive node behind its frame) makes the arbiter `slow`.
+#   - `_plan` takes the short way where one frame wins on a bus without faults; `_judge` finds out
+#     what else can happen: nobody can send, a collision, nobody to acknowledge, an armed fault.
+#     Chance is drawn once for a frame, however often it is planned (`CanFaults.judge`, `spend`).
+#   - A node alone and error-passive repeats for ever: `_repeating` stops planning until something
+#     changes (`_recount`).
+#   - A return from bus-off is a plan, too: what ends next may be 128 sequences of recessive bits.
+# `_deliver` is the short way again: without counters, faults and recovery a frame goes straight to
+# the ends that `CanRoutes` knows for its identifier. They have one tuple in common.
+#
+# An end that receives its first frame wakes its station and sets `received`; then
+# `advance_until_received` returns, for the rig may have an earlier tick now. A frame that may
+# change what a device listens to (`reconfigured_by`) opens the filter of its end until the next
+# poll.
+#
+# A disconnected end is on a segment of its own (`CanWire._apart`): nobody acknowledges it there.
+#
+# The fields of segment, arbiter, routes and ends are those of the kernel, which
+# `emulators/rig/kernel.py` describes. Where it was built, `_plan`, `advance` and `send` run in C
+# while `_sound` is True and come back to the methods here for all else. What may end soundness sets
+# `_sound` to False: `_recount`, and each plan that does not end in `_deliver`. `_is_sound` is asked
+# before the next plan.
+
 from __future__ import annotations
 
 from collections.abc import Callable

@@ -1,5 +1,45 @@
 """A rig: devices on wires, stepped together by one clock."""
 
+# Theory of operation.
+#
+# Time is an int of microseconds that only the rig moves. Three kinds of things happen:
+#   - an action of the event queue, put there by a scenario, a signal, a host that waits;
+#   - an end on a wire: a frame or byte has arrived, and wakes the station that receives it;
+#   - a tick: at multiples of its period a device polls its port, computes, and sends.
+# Things of one time happen in this order. `run_to`, `run_until` and `step` all keep it, so how a
+# run is cut into calls makes no difference.
+#
+# A step of the rig has two phases. First all devices poll and compute, then all send: what is sent
+# in a tick is heard in a later one, and the order of the stations makes no difference. On a shared
+# wire each station may send at once, because a frame takes time to end. Couplings act after that;
+# what they set counts in the next tick. Watchers come last and see a finished step.
+#
+# Most ticks have no work, and a rig in virtual time jumps over them. Who has work, and when:
+#   - A station on a shared wire (`WirePort`) stands in the `Timetable` at its next tick with work.
+#     It is entered when its port wakes it, after its own tick for `due_us`, and by `_enter_due`
+#     for what changed between steps (an input set, an object written). It stands at one tick;
+#     entries for later ones are passed over.
+#   - All other stations are asked in each step (`_looked_at`), as serial lines say `due_us` alone.
+#   - Wires are asked when something ends next (`Wires`). An idle wire is not asked: it calls
+#     `on_traffic` when something may end earlier than it said.
+# `_planned_us` is the earliest of tick and action. `_go_on` lets wires run up to just before it,
+# but stops where a station was woken, for that may have entered an earlier tick.
+#
+# Several wires run by themselves up to the next tick at which anybody who hears of them could
+# act; only hosts that wait, or observers of two wires, need them in the order of time.
+#
+# A drive may work its next ticks out in one go while nobody looks (`Horizon`). `_foresee` says
+# until when: not with watchers or couplings, and not beyond the next action. `passed_us` tells how
+# far time has come when somebody asks the drive all the same.
+#
+# With the kernel (`kernel.py`), a rig whose stations are all on one bus, in virtual time, without
+# bridges, couplings, watchers and hosts, is run in C from tick to tick: `run` is the loop of
+# `_go_on`, `_happen` and `_tick` over the same fields. It returns False where an action is due,
+# a plug is pulled or somebody began to watch, and the loop here goes on.
+#
+# In real time (`_in_real_time`) the rig wakes at every tick, bridges take in before it and give out
+# after it, and lateness is counted; nothing is skipped.
+
 from __future__ import annotations
 
 from collections import deque

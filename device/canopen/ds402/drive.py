@@ -1,5 +1,39 @@
 """A drive (CiA 402-2): its objects, its modes of operation and its motor."""
 
+# Theory of operation.
+#
+# A drive is an `Application` of its slave: it works in ticks that somebody asks for. A tick
+# (`on_execute`) goes one way: the motor moves up to now (`step_to`), inputs and shaft are read,
+# `Supervision` says which faults there are, `Automaton` runs the state machine and in it one step
+# of the mode of operation, the motor is told its new demand, actual values are shown. What objects
+# change (controlword, mode, target, configuration) is noted by watchers, which ask for a tick
+# (`request`); a controlword acts at once, before the tick, with the configuration before it.
+#
+# At the end of a tick `_sleep` decides when the next one is due: never while nothing moves and the
+# mode has settled, each second while the winding cools, else in the next millisecond.
+#
+# Run-ahead. Between two SYNCs a drive in csp does the same each millisecond. `Stretch.plan`, asked
+# by `_sleep`, works such ticks out in one loop over floats, to the bit as single ticks do. For that
+#   - the rig must say that nobody looks (`Horizon.until_us`), and
+#   - the next ticks must be plain (`goes_on_plainly`): Operation enabled, no input or configuration
+#     has changed, no fault is waiting, no limit switch is in reach, nobody watches an actual value.
+# The loop ends before the first tick in which anything else would happen: heat is due, a demand is
+# cut, the following error is too large, the shaft stands or sticks. That tick is an `on_execute`.
+# How many ticks are worth it is what the latest quiet lasted, less one: a SYNC that comes a tick
+# early must not make the loop run twice.
+#
+# The result (`RunAhead`) is not the drive's state before time has come there. Who asks earlier gets
+# it: `axis`, `limited`, `read` and the objects call `Stretch.catch_up`, which takes the ticks up to
+# `Horizon.passed_us` and works out the rest anew. What changes the drive calls `_interrupt` first:
+# it catches up, drops what is ahead and writes down the actual values, so that they are those of
+# the tick before. A drive without `horizon` (no rig, dense, couplings, watchers) works tick by
+# tick.
+# Actual values are worked out when somebody reads them (`ActualValues`): `begin` shows what is
+# written while the drive works, `renew` lets them follow again and writes those that are watched.
+#
+# A second table of limits, homing or a mode belongs to `modes/`; what all modes obey (limits,
+# switches, stopping) is in `axis`; objects and their units are in `settings`.
+
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
