@@ -16,7 +16,7 @@ from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.body import BodyOnDrives
-from tickrig.emulators.canopen.choices import AUTO, LSS, NodeSpec, is_bus_node
+from tickrig.emulators.canopen.choices import AUTO, is_bus_node
 from tickrig.emulators.canopen.eds import DeviceDescription, EdsCache
 from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import NODE_INPUTS, Node, Nodes, SecondNodeAlarm

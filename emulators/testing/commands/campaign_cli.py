@@ -71,7 +71,7 @@ def campaign() -> None:
 )
 @click.option("--scheduler", default="", metavar="URL", help="Run on this Dask cluster.")
 @click.option("--fresh", is_flag=True, help="Begin anew, whatever is there.")
-@works_in("tickrig.emulators.testing.commands.campaign:run")
+@works_in("tickrig.emulators.testing.commands.campaign_run:run")
 def run(**options: Any) -> None:
     """Run TESTS (files, folders or node IDs) with each seed and each value, in virtual time.
 
@@ -81,25 +81,12 @@ def run(**options: Any) -> None:
     tickrig campaign tests/test_stop.py --seeds 0-9999 --param flip=0.0001,0.001
     tickrig campaign tests/test_stop.py --seeds 0-99 -o runs.csv -o runs.parquet
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.testing.campaign.order import CampaignRefusal  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.commands.campaign_run import (  # noqa: PLC0415
-            CampaignOptions,
-            CampaignRun,
-        )
-
-    try:
-        wanted = CampaignOptions(version=VERSION, **options)
-        table = CampaignRun(wanted).run()
-    except CampaignRefusal as refusal:
-        raise Refused(str(refusal)) from None
-    context.exit(_shown(table, wanted.output_paths[0]))
 
 
 @campaign.command()
 @click.argument("tables", metavar="TABLE...", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", "outputs", multiple=True, required=True, type=PATH, help=_OUTPUT)
-@works_in("tickrig.emulators.testing.commands.campaign:merge")
+@works_in("tickrig.emulators.testing.commands.campaign_run:merge")
 def merge(tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
     """Join the tables of shards, and say what they found.
 
@@ -107,40 +94,3 @@ def merge(tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> None:
     tickrig campaign merge part1.csv part2.csv -o all.csv
     tickrig campaign merge part*.parquet -o all.csv -o all.parquet
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.testing.campaign.order import CampaignRefusal  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
-            merge_tables,
-            missing_seeds,
-            read_table,
-        )
-        from tickrig.emulators.testing.commands.campaign_run import (  # noqa: PLC0415
-            check_arrow,
-            check_outputs,
-            write_outputs,
-        )
-
-    try:
-        check_outputs(outputs)
-        check_arrow(tables)
-        table = merge_tables([(path, read_table(path)) for path in tables])
-        write_outputs(table, outputs)
-    except CampaignRefusal as refusal:
-        raise Refused(str(refusal)) from None
-    except OSError as error:
-        raise Refused(f"{error.filename}: {error.strerror}") from None
-    for line in missing_seeds(table):
-        say(f"warning: {line}")
-    context.exit(_shown(table, outputs[0]))
-
-
-def _shown(table: CampaignTable, path: Path) -> int:
-    """Show what was found; return the exit status."""
-    from tickrig.emulators.testing.campaign.table import (  # noqa: PLC0415
-        WELL,
-        summary,
-    )
-
-    for line in summary(table, str(path)):
-        click.echo(line)
-    return 0 if all(row.outcome in WELL for row in table.rows) else _NOT_PASSED

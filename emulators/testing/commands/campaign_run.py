@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Final, NoReturn, Protocol
+from typing import Any, Final, NoReturn, Protocol
 
 import click
 from click._termui_impl import ProgressBar
@@ -26,10 +26,15 @@ from tickrig.emulators.testing.campaign.table import (
     PARQUET,
     WELL,
     CampaignTable,
+    merge_tables,
+    missing_seeds,
+    read_table,
+    summary,
     table_of,
     write_table,
 )
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.options import VERSION
 from tickrig.host.cli.start import INTERRUPTED, UNWRITTEN, as_is
 from tickrig.host.text.names import known
 from tickrig.host.text.values import counted
@@ -353,3 +358,40 @@ def write_outputs(table: CampaignTable, paths: Sequence[Path]) -> None:
     """Write a table in each form; OSError if it cannot be."""
     for path in paths:
         write_table(table, path)
+
+
+# The commands `tickrig campaign run` and `tickrig campaign merge`.
+
+_NOT_PASSED: Final = 1
+
+
+def run(**options: Any) -> int:
+    """Do the runs; return the exit status."""
+    try:
+        wanted = CampaignOptions(version=VERSION, **options)
+        table = CampaignRun(wanted).run()
+    except CampaignRefusal as refusal:
+        raise Refused(str(refusal)) from None
+    return _shown(table, wanted.output_paths[0])
+
+
+def merge(tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> int:
+    """Join the tables; return the exit status."""
+    try:
+        check_outputs(outputs)
+        check_arrow(tables)
+        table = merge_tables([(path, read_table(path)) for path in tables])
+        write_outputs(table, outputs)
+    except CampaignRefusal as refusal:
+        raise Refused(str(refusal)) from None
+    except OSError as error:
+        raise Refused(f"{error.filename}: {error.strerror}") from None
+    for line in missing_seeds(table):
+        say(f"warning: {line}")
+    return _shown(table, outputs[0])
+
+
+def _shown(table: CampaignTable, path: Path) -> int:
+    for line in summary(table, str(path)):
+        click.echo(line)
+    return 0 if all(row.outcome in WELL for row in table.rows) else _NOT_PASSED

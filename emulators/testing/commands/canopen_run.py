@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 import click
 
 from tickrig.device.canopen.sdo import USUAL, SdoLimits
+from tickrig.device.canopen.slave import UNCONFIGURED
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import FrameTranscript, RunningEmulator
 from tickrig.emulators.can.emulator import CanEmulator
@@ -31,6 +32,7 @@ from tickrig.emulators.canopen.build import (
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, profile_name
 from tickrig.emulators.canopen.node import Nodes
+from tickrig.emulators.canopen.node_spec import NodeSpec, parse_ids, parse_node
 from tickrig.emulators.canopen.store_file import StoreError, StoreFile
 from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.recorder import CandumpFile

@@ -37,7 +37,21 @@ from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.manager import RemoteEntry
 from tickrig.host.rtc.system.rts_profile import parse_rts_profile
 from tickrig.host.rtc.system.system import ComponentEntry, ConnectionEntry, System, differences
-from tickrig.host.text.toml_reader import load_toml
+from tickrig.host.text.section import (
+    Field,
+    Schema,
+    Section,
+    anything,
+    flag,
+    in_a_line,
+    lines,
+    number,
+    read_section,
+    shown,
+    string,
+    table,
+    text,
+)
 from tickrig.host.text.whole_file import check_file, write_whole
 
 

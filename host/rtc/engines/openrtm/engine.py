@@ -19,8 +19,8 @@
 # what the peer is to call; `keep` joins it with what the peer answered. If anything fails in
 # between, `drop` takes the first step back and the peer is told.
 #
-# Who is first in the list of ports asks the other one and tells it of the end. Two ports of ours are
-# found by their object keys and joined here, without CORBA between them.
+# Who is first in the list of ports asks the other one and tells it of the end. Two ports of ours
+# are found by their object keys and joined here, without CORBA between them.
 #
 # Data are bytes of CDR (`InPortCdr`, `OutPortCdr`): encoded in the manager's thread when a port is
 # written, decoded in the thread of the ORB in which they come. They do not wake the manager:
