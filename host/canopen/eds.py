@@ -22,9 +22,32 @@ def read_eds_bytes(path: Path) -> bytes:
     return data
 
 
+_OTHER_FILES: Final = {
+    ".yml": "YAML, not an EDS; for a bus.yml use: tickrig check",
+    ".yaml": "YAML, not an EDS; for a bus.yml use: tickrig check",
+    ".toml": "TOML, not an EDS; for a rig file use: tickrig check",
+    ".dbc": "a DBC file, not an EDS; use: canmon dump LOG --dbc",
+}
+"""What users give in place of an EDS, by the ending, and the command that takes it."""
+
+
+def _check_kind(path: Path, data: bytes) -> None:
+    """Raise EdsError if a file is of another kind by its name, and is no EDS by its sections."""
+    other = _OTHER_FILES.get(path.suffix.lower())
+    if other and b"[deviceinfo]" not in data.lower():
+        raise EdsError([Finding(str(path), "", f"{other} {path}")])
+
+
 def open_eds(path: Path) -> EdsFile:
-    """Return the sections of a file; OSError if it cannot be read, EdsError if it is too large."""
-    return EdsFile(str(path), decode_text(read_eds_bytes(path)))
+    """Return the sections of a file.
+
+    Raises:
+        OSError: it cannot be read.
+        EdsError: it is too large for an EDS, or a file of another kind.
+    """
+    data = read_eds_bytes(path)
+    _check_kind(path, data)
+    return EdsFile(str(path), decode_text(data))
 
 
 def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
@@ -34,9 +57,11 @@ def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
 
     Raises:
         OSError: the file cannot be read.
-        EdsError: it is too large for an EDS.
+        EdsError: it is too large for an EDS, or a file of another kind.
     """
-    return _sheet_of(str(path), read_eds_bytes(path))
+    data = read_eds_bytes(path)
+    _check_kind(path, data)
+    return _sheet_of(str(path), data)
 
 
 @lru_cache(maxsize=16)  # all nodes of a bus, and each test of a bench, have the same few files

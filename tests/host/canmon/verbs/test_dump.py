@@ -218,6 +218,24 @@ def test_a_log_is_left_alone_where_the_source_cannot_be_opened(tmp_path: Path) -
     assert kept.read_text("ascii") == LOG
 
 
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("bus.yml", "YAML, not an EDS; for a bus.yml use: tickrig check"),
+        ("rig.TOML", "TOML, not an EDS; for a rig file use: tickrig check"),
+        ("car.dbc", "a DBC file, not an EDS; use: canmon dump LOG --dbc"),
+    ],
+)
+def test_another_file_in_place_of_an_eds_is_named(
+    log: str, tmp_path: Path, name: str, kind: str
+) -> None:
+    file = tmp_path / name
+    file.write_text("anything: 1")
+    result = canmon("dump", log, "--eds", f"1={file}")
+    assert result.exit_code == 2
+    assert result.stderr == f"Error: --eds {file}: {kind} {file}\n"
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("name", ["full.log", "full.asc"])
 def test_a_full_disk_ends_it_with_status_3(log: str, tmp_path: Path, name: str) -> None:
