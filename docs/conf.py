@@ -57,7 +57,7 @@ LONG_WORD = re.compile(r'(?<=<span class="pre">)[^<]{20,}(?=</span>)')
 
 
 TABLE = re.compile(r"<table\b.*?</table>", re.DOTALL)
-PROOF = re.compile(r"(?:tests?|checks?|proven by|held by)")
+PROOF = re.compile(r"(?:(?:further )?tests?|checks?|proven by|held by)")
 """Head of a last column that names the tests of each row: most readers want the others."""
 
 
