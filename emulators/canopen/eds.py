@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -14,10 +15,10 @@ from tickrig.device.canopen.ds402 import Ds402, indices
 from tickrig.device.canopen.ds402.modes.modes import MODES, supported
 from tickrig.device.canopen.slave import Application, ServiceMaker
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.host.canopen.eds import open_eds
+from tickrig.host.canopen.eds import open_eds, read_eds_bytes, sheet_of
 from tickrig.host.text.values import Setting, counted
 from tickrig.wire.canopen.datatypes import Value
-from tickrig.wire.canopen.eds.eds_device import read_device
+from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, Finding
 from tickrig.wire.canopen.eds.eds_value import format_value
@@ -199,12 +200,16 @@ def describe(file: EdsFile, profile: str = AUTO) -> DeviceDescription:
         EdsError: something has no meaning: it would be another device. All that is
             wrong stands in it.
     """
-    return in_profile(_describe(file), profile)
+    return in_profile(_describe(file, read_device(file)), profile)
 
 
-def _describe(file: EdsFile) -> DeviceDescription:
+@lru_cache(maxsize=16)  # most benches of a test run have nodes of the same few files
+def _description_of(name: str, data: bytes) -> DeviceDescription:
+    return _describe(*sheet_of(name, data))
+
+
+def _describe(file: EdsFile, device: EdsDevice) -> DeviceDescription:
     """Describe what the file alone says of a device; its values may be open."""
-    device = read_device(file)
     if file.errors:
         raise EdsError(file.errors)
     return DeviceDescription(
@@ -354,7 +359,7 @@ class EdsCache:
         version = version_of(path)
         known = self._known.get((path, profile))
         if known is None or known[0] != version:
-            found = _describe(open_eds(path))
+            found = _description_of(str(path), read_eds_bytes(path))
             known = version, found if profile is None else in_profile(found, profile)
             self._known[path, profile] = known
         return known[1]

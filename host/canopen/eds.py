@@ -61,11 +61,12 @@ def read_sheet(path: Path) -> tuple[EdsFile, EdsDevice]:
     """
     data = read_eds_bytes(path)
     _check_kind(path, data)
-    return _sheet_of(str(path), data)
+    return sheet_of(str(path), data)
 
 
 @lru_cache(maxsize=16)  # all nodes of a bus, and each test of a bench, have the same few files
-def _sheet_of(name: str, data: bytes) -> tuple[EdsFile, EdsDevice]:
+def sheet_of(name: str, data: bytes) -> tuple[EdsFile, EdsDevice]:
+    """Return the sections of these bytes, and their device; see `read_sheet`."""
     file = EdsFile(name, decode_text(data))
     return file, read_device(file)
 

@@ -54,7 +54,6 @@ _MEANT: Final = {
 """What is meant by the words of PyYAML, by how they begin."""
 
 
-@lru_cache(maxsize=4)  # PyYAML takes ten times as long as all that is made of its nodes
 def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...]]:
     """Read a text.
 
@@ -66,7 +65,7 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
         The tree, None if there is none; and what is wrong.
     """
     try:
-        root = yaml.compose(text, yaml.SafeLoader)
+        root = _composed(text)
         if root is None:
             return None, (FileMistake(FilePlace(name, 1), "the file is empty", "yaml"),)
         tree = _Tree(name)
@@ -81,6 +80,11 @@ def read_yaml(text: str, name: str) -> tuple[Item | None, tuple[FileMistake, ...
     except RecursionError:
         line, reason = 1, "lists or mappings nest too deep"
     return None, (FileMistake(FilePlace(name, line), f"not YAML: {_in_a_line(reason)}", "yaml"),)
+
+
+@lru_cache(maxsize=4)  # PyYAML takes ten times as long as all that is made of its nodes
+def _composed(text: str) -> yaml.Node | None:
+    return yaml.compose(text, yaml.SafeLoader)
 
 
 def _said(problem: str) -> str:

@@ -15,6 +15,7 @@ from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.bus_file.joint_drive import (
     NAMES,
     UNITS,
+    UNITS_OF_POSITION,
     JointDrive,
     complete,
     missing,
@@ -244,7 +245,11 @@ class NodeMaker:
         self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
     ) -> Dictionary:
         """Return the objects of a drive with the units of its keys; those of others are told."""
-        written = {(each.index, each.sub_index): each.data for each in slave.writes}
+        written = {
+            (each.index, each.sub_index): each.data
+            for each in slave.writes
+            if each.index in UNITS_OF_POSITION
+        }
         given, place = joint.units_of(dictionary), slave.place
         said, result = f"scale_pos_to_dev {joint.units:g}", dictionary
         if "units" in keys.joint:

@@ -247,6 +247,9 @@ _ALWAYS: Final = (
     indices.SUPPORTED_MODES,
 )
 _FACTORS: Final = (indices.ENCODER_RESOLUTION, indices.GEAR_RATIO, indices.FEED_CONSTANT)
+UNITS_OF_POSITION: Final = (*_FACTORS, indices.SI_UNIT_POSITION)
+"""Objects that make the position units."""
+_MODES: Final = indices.SUPPORTED_MODES
 _TORQUE: Final = (indices.TARGET_TORQUE, indices.TORQUE_ACTUAL)
 _NEEDED: Final = {
     1: (indices.TARGET_POSITION, indices.PROFILE_VELOCITY, *_PROFILE),
@@ -301,23 +304,29 @@ def complete(
     """
     given, own = dictionary.description, epos.dictionary().description
     entries = [
-        *(_with_default(each, defaults) for each in given),
-        *(_with_default(each, defaults, anew=True) for each in _of(own, added)),
+        _with_default(each, defaults) if each.index in PROFILE_AREA else each for each in given
     ]
-    objects = {**given.objects, **{index: own.objects[index] for index in added}}
-    return Dictionary((_listing(each, modes) for each in entries), objects)
+    entries += [_with_default(each, defaults, anew=True) for each in _of(own, added)]
+    listed = [_listing(each, modes) if each.index == _MODES else each for each in entries]
+    if tuple(listed) == given.entries:
+        return dictionary
+    return Dictionary(listed, {**given.objects, **{index: own.objects[index] for index in added}})
 
 
 def with_values(dictionary: Dictionary, values: Mapping[tuple[int, int], Value]) -> Dictionary:
     """Return a dictionary with other power-on values, or their bytes, of entries that it has."""
-    if not any(at in dictionary for at in values):
+    rows: dict[int, EntryDescription] = {}
+    for at, value in values.items():
+        entry = dictionary.find(*at)
+        if entry is None:
+            continue
+        row = entry.description.with_default(value)
+        if row.default != entry.description.default or not entry.description.has_default:
+            rows[row.key] = row
+    if not rows:
         return dictionary
     given = dictionary.description
-    entries = (
-        each if (value := values.get((each.index, each.sub))) is None else each.with_default(value)
-        for each in given
-    )
-    return Dictionary(entries, given.objects)
+    return Dictionary([rows.get(each.key, each) for each in given], given.objects)
 
 
 def with_factors(dictionary: Dictionary, defaults: _Defaults) -> Dictionary:
@@ -357,9 +366,8 @@ def _with_default(
 
 
 def _listing(entry: EntryDescription, modes: Collection[int]) -> EntryDescription:
-    """Return an entry; 6502h lists the modes beside what else its bits say."""
-    if entry.index != indices.SUPPORTED_MODES:
-        return entry
+    """Return 6502h with the modes, beside what else its bits say."""
     known = sum(1 << number - 1 for number in NAMES)
     more = int.from_bytes(entry.default, "little") & ~known
-    return entry.with_default(more | sum(1 << number - 1 for number in modes))
+    listed = entry.with_default(more | sum(1 << number - 1 for number in modes))
+    return entry if entry.has_default and listed.default == entry.default else listed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from typing import Final
 
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave, DriveChannel
@@ -199,15 +200,21 @@ def _check_name(section: BusFileSection) -> None:
             section.notes.note("node-name", section.place, section.name, text)
 
 
+@lru_cache(maxsize=16)  # an EDS that has not changed has the findings of the last check
+def _findings_of(name: str, data: bytes) -> tuple[tuple[RuleFinding, ...], bool]:
+    """Return what is wrong with an EDS, and whether it is in UTF-8."""
+    document = Document(name, data)
+    return tuple(check(document)), document.is_unicode
+
+
 def check_sheets(slaves: Mapping[str, BusSlave]) -> tuple[RuleFinding, ...]:
     """Return how much `canmon eds check` finds in each EDS, and what of it stops dcfgen."""
     notes = BusFileNotes()
     for sheet in dict.fromkeys(slave.sheet for slave in slaves.values()):
-        document = Document(str(sheet), read_eds_bytes(sheet))
-        found = check(document)
+        found, is_unicode = _findings_of(str(sheet), read_eds_bytes(sheet))
         stops = [one for one in found if one.rule.name in STOPS]
         names = [one.rule.name for one in stops]
-        if not document.is_unicode:
+        if not is_unicode:
             names.insert(0, "its encoding, which is not UTF-8")
         counted = [*stops, *failing(found)]
         if names or counted:

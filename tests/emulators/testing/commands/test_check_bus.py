@@ -31,6 +31,24 @@ def test_a_good_file_is_summed_up(folder: Path) -> None:
     )
 
 
+def test_a_file_that_has_not_changed_is_checked_with_few_calls(folder: Path) -> None:
+    write_bus(folder, PLAIN.replace("sync_period", "sync_peroid"))
+    first = run("bus.yml")
+    calls = 0
+
+    def count(_frame: object, event: str, _arg: object) -> None:
+        nonlocal calls
+        calls += event == "call"
+
+    sys.setprofile(count)
+    try:
+        second = run("bus.yml")
+    finally:
+        sys.setprofile(None)
+    assert second == first
+    assert calls < 12_000
+
+
 def test_a_mistake_is_told_with_both_places(folder: Path) -> None:
     write_bus(
         folder, NODE + "  sdo:\n    - {index: 0x6041, value: 1}\n    - {index: 0x9999, value: 1}\n"

@@ -123,7 +123,7 @@ def test_the_bit_rate_of_the_master_is_that_of_the_bus(tmp_path: Path) -> None:
 
 def test_mistakes_have_the_lines_of_the_bus_yml(tmp_path: Path) -> None:
     path = write_system(tmp_path, f"{ONE_JOINT}  tickrig: {{gear_ratio: -1}}\n")
-    reason = "joint_1.tickrig.gear_ratio: '-1' is no number 0.01..1e+06"
+    reason = "joint_1.tickrig.gear_ratio: it takes a number 0.01..1e+06, not -1"
     with pytest.raises(RigFileError) as told:
         open_bench(path)
     assert str(told.value) == f"{path}:7: {reason}"
