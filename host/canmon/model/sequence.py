@@ -11,7 +11,6 @@ A sequence as it is carried out, and what it waits for: frames by a pattern or a
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -22,8 +21,9 @@ from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.filter import parse_filter
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.sequence_variables import fill_in
+from tickrig.host.text.names import near
 from tickrig.host.text.steps import FOREVER, Condition, Place, Step, StepError, content_lines
-from tickrig.host.text.toml_reader import load_toml, read_toml
+from tickrig.host.text.toml_reader import read_toml
 from tickrig.host.text.values import format_time, parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import WireError
@@ -353,7 +353,6 @@ _WITHIN: Final = "1s"
 """How long an expectation waits that does not say."""
 
 _TOP: Final = ("name", "vars", "step")
-_LINE: Final = re.compile(r"line ([0-9]+)")  # else it is the end of the document
 
 
 class _Wrong(Exception):  # noqa: N818 - never leaves this file
@@ -382,7 +381,7 @@ class TomlSequence:
         resolve: Callable[[str], CanFrame] = CanFrame.parse,
         condition: Callable[[str], FrameCondition] | None = None,
     ) -> None:
-        self._text, self._file = text, file
+        self._document, self._file = read_toml(text), file
         self._given = dict(variables or {})
         self._resolve = resolve
         self._condition = condition or parse_pattern
@@ -394,10 +393,9 @@ class TomlSequence:
         Raises:
             StepError: `FILE:LINE: what came, what is allowed`.
         """
-        try:
-            top = load_toml(self._text)
-        except tomllib.TOMLDecodeError as error:
-            raise StepError(self._syntax(str(error))) from None
+        top = self._document.values
+        for line, reason in self._document.mistakes:
+            raise StepError(f"{self._file}:{line}: {reason}")
         try:
             self._variables = {**self._vars(top.get("vars", {})), **self._given}
             _check_keys(top, _TOP, ())
@@ -409,13 +407,7 @@ class TomlSequence:
         return Sequence(steps, self._locate)
 
     def _locate(self, place: Place) -> str:
-        return f"{self._file}:{read_toml(self._text).line_of(place)}"
-
-    def _syntax(self, text: str) -> str:
-        reason, _, place = text.rpartition(" (at ")
-        found = _LINE.search(place)
-        number = found[1] if found else max(1, len(self._text.splitlines()))
-        return f"{self._file}:{number}: {reason or place}"
+        return f"{self._file}:{self._document.line_of(place)}"
 
     def _vars(self, table: Any) -> dict[str, int]:
         if not isinstance(table, dict):
@@ -504,7 +496,7 @@ _READERS: Final[Mapping[str, _Reader]] = {
 def _check_keys(table: Mapping[str, Any], known: tuple[str, ...], path: Place) -> None:
     for key in table:
         if key not in known:
-            raise _Wrong((*path, key), f"no key {key!r} here; known: {', '.join(known)}")
+            raise _Wrong((*path, key), f"no key {key!r} here; {near(key, known)}")
 
 
 def _texts(value: Any, key: str) -> list[str]:

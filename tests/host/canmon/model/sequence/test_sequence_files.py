@@ -25,7 +25,7 @@ def refused(text: str) -> str:
     [
         ("", "a.toml:1: no [[step]]"),
         ("step = []\n", "a.toml:1: no [[step]]"),
-        ("[[step]]\nsend = \n", "a.toml:2: Invalid value"),
+        ("[[step]]\nsend = \n", "a.toml:2: a value is missing before the end of the line"),
         ('[[step]]\nsend = "080#', "a.toml:2: "),
         ('\n[[step]]\nsend = "080"\n', "a.toml:3: '080' is not a frame like 705#7F"),
         ('[[step]]\nsned = "080#"\n', "a.toml:1: a step has one of send, wait, expect, repeat;"),
@@ -50,6 +50,8 @@ def refused(text: str) -> str:
         ("[vars]\nid = 'x'\n[[step]]\nwait='1s'\n", "a.toml:2: id = 'x' is no whole number"),
         ("vars = 1\n", "a.toml:1: vars = 1 is no table"),
         ("step = 1\n", "a.toml:1: step = 1 is no list of steps"),
+        ('[[step]]\nsnd = "080#"\nwait = "1s"\n', "a.toml:2: no key 'snd' here; known: wait"),
+        ('[[step]]\nexpect = "080#"\nwithn = "1s"\n', "did you mean 'within'?"),
         ("[bus]\n[[step]]\nwait='1s'\n", "a.toml:1: no key 'bus' here; known: name, vars, step"),
     ],
 )
