@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 from tickrig.host.rtc.ucode.contents_interpretation import parse_contents
 from tickrig.host.text.names import near
-from tickrig.host.text.toml_reader import load_toml
+from tickrig.host.text.section import (
+    Field,
+    Schema,
+    Section,
+    anything,
+    in_a_line,
+    is_broken,
+    read_section,
+)
 from tickrig.wire.ucode import parse_ucode
 
 EXAMPLE: Final = """\
@@ -43,6 +51,12 @@ class UcodeTable:
     contents: Mapping[str, str] = field(default_factory=dict)
 
 
+_SECTIONS: Final[Schema] = {
+    "ucodes": Field(anything, "a table", "what each ucode stands for", "none"),
+    "contents": Field(anything, "a table", "what is there", "none"),
+}
+
+
 def parse_table(text: str) -> UcodeTable:
     """Read a table.
 
@@ -52,37 +66,44 @@ def parse_table(text: str) -> UcodeTable:
     >>> sorted(parse_table(EXAMPLE).contents)
     ['door', 'lift']
     """
-    found = load_toml(text)
-    if unknown := [name for name in found if name not in ("ucodes", "contents")]:
-        raise ValueError(f"no section {unknown[0]!r}; {near(unknown[0], ['ucodes', 'contents'])}")
-    contents = {name: _contents(name, each) for name, each in _tables(found, "contents").items()}
-    ucodes = {
-        parse_ucode(ucode): _target(ucode, target, contents)
-        for ucode, target in _tables(found, "ucodes").items()
-    }
+    top = read_section(text)
+    top.read(_SECTIONS)
+    contents = dict(_taken(top.sub("contents"), _contents))
+    targets = _taken(top.sub("ucodes"), lambda ucode, target: _target(ucode, target, contents))
+    ucodes = {parse_ucode(ucode): target for ucode, target in targets}
+    if mistakes := top.notes.all:
+        raise ValueError(in_a_line(mistakes))
     return UcodeTable(ucodes, contents)
 
 
-def _tables(found: Mapping[str, Any], name: str) -> Mapping[str, object]:
-    section = found.get(name, {})
-    if not isinstance(section, dict):
-        raise ValueError(f"[{name}] is a section, not {section!r}")
-    return section
+def _taken(
+    section: Section | None, take: Callable[[str, object], str]
+) -> Iterator[tuple[str, str]]:
+    """Yield the keys of a section with what is taken of their values; a wrong one is noted."""
+    if section is None:
+        return
+    for key, value in section.values.items():
+        try:
+            if not is_broken(value):
+                yield key, take(key, value)
+        except ValueError as error:
+            section.wrong(str(error), key)
 
 
 def _contents(name: str, found: object) -> str:
     if not (name.isascii() and name.replace("-", "").replace("_", "").isalnum()):
-        raise ValueError(f"contents {name!r}: a name has letters, digits, - and _")
+        raise ValueError("a name has letters, digits, - and _")
     try:
         text = json.dumps(found)
-        parse_contents(text)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"contents {name!r}: {error}") from None
+    except TypeError as error:
+        raise ValueError(str(error)) from None
+    parse_contents(text)
     return text
 
 
 def _target(ucode: str, target: object, contents: Mapping[str, str]) -> str:
+    parse_ucode(ucode)
     if isinstance(target, str) and (target in contents or target.startswith("http://")):
         return target
     hint = near(str(target), list(contents))
-    raise ValueError(f"ucode {ucode}: {target!r} is no name of contents and no http://...; {hint}")
+    raise ValueError(f"{target!r} is no name of contents and no http://...; {hint}")

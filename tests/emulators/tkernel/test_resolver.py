@@ -70,7 +70,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
         for words, told in {
             (): "give a TABLE, or --example",
             ("/nowhere",): "table /nowhere: No such file",
-            (str(bad),): "no section 'ucode'",
+            (str(bad),): "line 1: no key 'ucode'",
             (str(table), "--port", port): f"--port {port}: Address already in use",
             (str(table), "--fault", "nope"): "--fault: no fault 'nope'",
             (str(table), "--fault", "slow=0.5"): "--fault: slow takes no rate",

@@ -14,14 +14,14 @@ BASE = "http://127.0.0.1:8640"
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[ucode]", "no section 'ucode'; did you mean 'ucodes'?"),
-        ("ucodes = 1", "[ucodes] is a section, not 1"),
-        ("[ucodes]\n1 = 'a'", "ucode '1' is not 32 hex digits"),
-        (f"[ucodes]\n{DOOR} = 'lift'", f"ucode {DOOR}: 'lift' is no name of contents and no http"),
-        ("[contents.door]\nx_m = 1", "contents 'door': y_m is a number of metres, not null"),
-        ("[contents.'a/b']\nx_m = 1\ny_m = 1", "contents 'a/b': a name has letters, digits"),
-        ("[contents.door]\nx_m = 1\ny_m = 1\nd = 2026-01-01", "contents 'door': Object of type"),
-        ("[ucodes", "Expected ']' at the end of a table declaration"),
+        ("[ucode]", "line 1: no key 'ucode'; did you mean 'ucodes'?"),
+        ("ucodes = 1", "line 1: ucodes: it is a table [ucodes], not 1"),
+        ("[ucodes]\n1 = 'a'", "line 2: ucodes.1: ucode '1' is not 32 hex digits"),
+        (f"[ucodes]\n{DOOR} = 'lift'", f"ucodes.{DOOR}: 'lift' is no name of contents and no http"),
+        ("[contents.door]\nx_m = 1", "contents.door: y_m is a number of metres, not null"),
+        ("[contents.'a/b']\nx_m = 1\ny_m = 1", 'contents."a/b": a name has letters, digits'),
+        ("[contents.door]\nx_m = 1\ny_m = 1\nd = 2026-01-01", "contents.door: Object of type"),
+        ("[ucodes", "line 1: ']' is missing behind ucodes"),
     ],
 )
 def test_a_table_that_cannot_be_is_told_in_a_line(text: str, told: str) -> None:
