@@ -107,20 +107,6 @@ def some_time(value: object) -> int:
     return found
 
 
-def flag(value: object) -> bool:
-    """Take true or false."""
-    if not isinstance(value, bool):
-        raise ValueError(f"it takes true or false, not {value!r:.60}")
-    return value
-
-
-def word(value: object) -> str:
-    """Take a text."""
-    if not isinstance(value, str) or not value:
-        raise ValueError(f"it takes a text, not {value!r:.60}")
-    return value
-
-
 def formula(value: object) -> Formula:
     """Take a formula, or a number."""
     if isinstance(value, int | float):

@@ -21,7 +21,6 @@ from typing import Any, Final
 from tickrig.emulators.testing.signals.fields import (
     Keys,
     SignalMistake,
-    flag,
     formula,
     number,
     pair,
@@ -31,7 +30,6 @@ from tickrig.emulators.testing.signals.fields import (
     spread,
     step,
     time,
-    word,
 )
 from tickrig.emulators.testing.signals.sources import (
     SHAPES,
@@ -45,6 +43,7 @@ from tickrig.emulators.testing.signals.sources import (
 )
 from tickrig.emulators.testing.signals.table import read_table
 from tickrig.host.text.names import near
+from tickrig.host.text.section import anything, flag, text
 
 _EVERY_US: Final = 10_000
 """How often noise is drawn, and lags and integrals move on, unless told otherwise."""
@@ -131,8 +130,7 @@ FORMS: Final[Mapping[str, Form]] = {
         {"noise": spread, "mean": number, "seed": seed, **_FROM}, _noise, every_us=_EVERY_US
     ),
     "table": Form(
-        {"table": lambda value: value, "column": word, "interpolation": word, "repeat": flag}
-        | dict(_FROM),
+        {"table": anything, "column": text, "interpolation": text, "repeat": flag} | dict(_FROM),
         read_table,
     ),
     "formula": Form({"formula": formula, **_COMMON}, _formula),
