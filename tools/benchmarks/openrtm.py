@@ -23,8 +23,7 @@ from tickrig.host.rtc.engines.openrtm.connector_ends import INPORT_IOR, InPortCl
 from tickrig.host.rtc.engines.openrtm.orb import Orb
 from tickrig.host.rtc.engines.openrtm.port_service import ComponentPorts, SystemPorts
 from tickrig.host.rtc.engines.openrtm.stubs import DATA_TYPES, IDL, compile_idl, stubs
-from tickrig.host.rtc.engines.out_port import OutPortPushConnector
-from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
+from tickrig.host.rtc.engines.peer_ports import OutPortPushConnector, PeerEnd, cdr
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.host.rtc.system.schedule import RealTime

@@ -13,8 +13,7 @@ from tickrig.host.rtc import InPort, PortStatus, ReturnCode, RtcRefused
 from tickrig.host.rtc.commands.system_control import Probes
 from tickrig.host.rtc.component import ExecutionContext
 from tickrig.host.rtc.components import EXAMPLES, ConsoleIn, ConsoleOut, SeqOut
-from tickrig.host.rtc.engines.in_port import InPortPushConnector
-from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
+from tickrig.host.rtc.engines.peer_ports import InPortPushConnector, PeerEnd, cdr
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.wire.rtc_types.cdr import encode

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final
-
-import click
 
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.rtc.canopen.builder.c_header import write_header
@@ -131,20 +129,22 @@ def _pdo(port: PlacedPort) -> str:
 # What rtc-canopen-builder does, once its options are read.
 
 
-def run_builder(path: Path, out: Path | None, *, force: bool, every: bool) -> None:
-    """Check a profile, show it, and write its files.
+def run_builder(
+    path: Path, out: Path | None, warn: Callable[[str], None], *, force: bool, every: bool
+) -> Iterator[str]:
+    """Check a profile and write its files; yield the lines that show it.
 
     Args:
         path: of the profile.
         out: folder for the files; nothing is written if left out.
+        warn: takes a line about a file that is kept.
         force: overwrite a skeleton.
         every: show every object, not only those of ports.
     """
     project, files = _read_and_build(path)
     if out is not None:
-        _write_files(out, files, force=force)
-    for line in summary(project.profile, every=every):
-        click.echo(line)
+        _write_files(out, files, warn, force=force)
+    yield from summary(project.profile, every=every)
 
 
 def _read_and_build(path: Path) -> tuple[Project, dict[str, str]]:
@@ -159,14 +159,16 @@ def _read_and_build(path: Path) -> tuple[Project, dict[str, str]]:
         raise Refused(f"profile {path}: {error}") from None
 
 
-def _write_files(folder: Path, files: dict[str, str], *, force: bool) -> None:
+def _write_files(
+    folder: Path, files: dict[str, str], warn: Callable[[str], None], *, force: bool
+) -> None:
     """Write the files; a skeleton that is there may have been filled and is kept."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in files.items():
             path = folder / name
             if path.suffix == SKELETON_SUFFIX and path.exists() and not force:
-                click.echo(f"{path} is kept; --force overwrites it", err=True)
+                warn(f"{path} is kept; --force overwrites it")
                 continue
             write_whole(path, text)
     except OSError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import click
@@ -46,4 +47,6 @@ def main(
             from tickrig.host.rtc.canopen.builder.build import run_builder  # noqa: PLC0415 - [rtc]
     except ModuleNotFoundError:
         raise Refused(NEEDS_YAML) from None
-    run_builder(profile, out, force=force, every=every)
+    warn = partial(click.echo, err=True)
+    for line in run_builder(profile, out, warn, force=force, every=every):
+        click.echo(line)

@@ -10,11 +10,18 @@ from typing import Any, Final, Protocol
 
 from omniORB import CORBA
 
-from tickrig.host.rtc.engines.in_port import InPortPullConnector, InPortPushConnector
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.engines.out_port import OutPortPullConnector, OutPortPushConnector
-from tickrig.host.rtc.engines.peer_end import Codec, PeerEnd, PeerWatch, cdr
+from tickrig.host.rtc.engines.peer_ports import (
+    Codec,
+    InPortPullConnector,
+    InPortPushConnector,
+    OutPortPullConnector,
+    OutPortPushConnector,
+    PeerEnd,
+    PeerWatch,
+    cdr,
+)
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.connector import DataflowType
 from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort

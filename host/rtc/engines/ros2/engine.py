@@ -10,9 +10,12 @@ from typing import Any, Final
 
 from tickrig.host.cli.ros2_options import Ros2Options
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.engines.in_port import InPortPushConnector
-from tickrig.host.rtc.engines.out_port import OutPortPushConnector
-from tickrig.host.rtc.engines.peer_end import Codec, PeerEnd
+from tickrig.host.rtc.engines.peer_ports import (
+    Codec,
+    InPortPushConnector,
+    OutPortPushConnector,
+    PeerEnd,
+)
 from tickrig.host.rtc.engines.ros2.conversions import IN, OUT
 from tickrig.host.rtc.engines.ros2.message_types import Stamps, message_type
 from tickrig.host.rtc.engines.ros2.participant import (

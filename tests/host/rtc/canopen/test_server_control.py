@@ -10,7 +10,7 @@ import pytest
 from tests.emulators.can.can_bench import frames
 from tests.host.rtc.canopen.bench import Bench
 from tickrig.host.rtc import LifeCycleState
-from tickrig.host.rtc.canopen.commands.server_control import ServerControl
+from tickrig.host.rtc.canopen.commands.opening import ServerControl
 from tickrig.host.rtc.canopen.events import ServerEventType
 from tickrig.host.rtc.canopen.serve import ServerRunner
 from tickrig.host.rtc.canopen.served_node import NodePhase

@@ -14,9 +14,14 @@ from typing import Any
 from tests.host.rtc.chain import PERIOD_US, make_manager
 from tickrig.host.rtc import InPort, OutPort, PortStatus
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.engines.in_port import InPortPullConnector, InPortPushConnector
-from tickrig.host.rtc.engines.out_port import OutPortPullConnector, OutPortPushConnector
-from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
+from tickrig.host.rtc.engines.peer_ports import (
+    InPortPullConnector,
+    InPortPushConnector,
+    OutPortPullConnector,
+    OutPortPushConnector,
+    PeerEnd,
+    cdr,
+)
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.peer_thread import PeerThread
 from tickrig.wire.rtc_types.cdr import Endian

@@ -5,8 +5,7 @@ from __future__ import annotations
 from tests.host.rtc.chain import PERIOD_US, make_manager
 from tickrig.host.rtc import InPort
 from tickrig.host.rtc.components import ConsoleOut
-from tickrig.host.rtc.engines.in_port import InPortPushConnector
-from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
+from tickrig.host.rtc.engines.peer_ports import InPortPushConnector, PeerEnd, cdr
 from tickrig.host.rtc.system.call_queue import Arrivals, CallQueue
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rtc_types.rtc import Time, TimedLong

@@ -10,7 +10,7 @@ from tests.host.rtc.chain import PERIOD_US
 from tests.host.rtc.remote.engine import Pair, answer_get
 from tests.host.rtc.remote.test_push import long
 from tickrig.host.rtc import PortStatus
-from tickrig.host.rtc.engines.peer_end import PeerState
+from tickrig.host.rtc.engines.peer_ports import PeerState
 
 OK = PortStatus.PORT_OK
 

@@ -13,8 +13,7 @@ from tests.host.rtc.remote.engine import Pair, Reference, answer_put
 from tickrig.host.rtc import PortStatus, ReturnCode, RtcRefused
 from tickrig.host.rtc.commands.system_control import describe_component
 from tickrig.host.rtc.commands.verbs import component_lines
-from tickrig.host.rtc.engines.out_port import OutPortPushConnector
-from tickrig.host.rtc.engines.peer_end import PeerEnd, PeerState, cdr
+from tickrig.host.rtc.engines.peer_ports import OutPortPushConnector, PeerEnd, PeerState, cdr
 from tickrig.host.rtc.system.system import describe
 from tickrig.wire.rtc_types.cdr import Endian
 from tickrig.wire.rtc_types.rtc import Time, TimedLong

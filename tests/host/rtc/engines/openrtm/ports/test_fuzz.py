@@ -14,10 +14,9 @@ from omniORB import any as omni_any
 from tests.host.rtc.engines.openrtm.name_server import free_port
 from tests.host.rtc.engines.openrtm.ports.foreign import Peer, Served
 from tests.wire.rtc_types.test_rtc_types import TYPES
-from tickrig.host.rtc.engines.in_port import InPortPushConnector
 from tickrig.host.rtc.engines.openrtm.connector_ends import InPortAnswers
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.engines.peer_end import PeerEnd, cdr
+from tickrig.host.rtc.engines.peer_ports import InPortPushConnector, PeerEnd, cdr
 from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.wire.rtc_types.cdr import Endian, encode

@@ -1,0 +1,563 @@
+"""Connectors of data ports with ports of peers, whatever engine reaches them (OpenRTM-aist 1.x)."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import partial
+from typing import Any, Final, Generic, Protocol, TypeVar
+
+from tickrig.host.rtc.ports.connect import refuse_known_id
+from tickrig.host.rtc.ports.connector import (
+    Connector,
+    ConnectorOptions,
+    DataflowType,
+    SubscriptionType,
+)
+from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
+from tickrig.host.rtc.ports.port import ConnectorProfile
+from tickrig.host.rtc.ports.ring_buffer import BufferOptions, FullPolicy, RingBuffer
+from tickrig.host.rtc.states import PortStatus, RtcRefused
+from tickrig.host.rtc.system.call_queue import CallQueue
+from tickrig.host.rtc.system.peer_thread import PeerCaller
+from tickrig.host.text.log import log_of
+from tickrig.wire.rtc_types.cdr import Endian, decode, encode
+from tickrig.wire.rtc_types.idl import Struct
+
+# Whether the peer of a connector answers.
+
+_LOG: Final = log_of(__name__)
+
+
+class PeerState(StrEnum):
+    """What is known of a peer."""
+
+    CONNECTED = "connected"  # it answered the latest call, or none was made
+    LOST = "lost"  # the latest call had no answer
+
+
+class PeerWatch:
+    """Notes how each call into a peer ended; a peer that goes or comes back is logged in a line.
+
+    One thread notes, any thread looks.
+
+    Args:
+        who: the connector, for people.
+
+    Attributes:
+        state: of the peer.
+        status: what the latest call gave; CONNECTION_LOST without an answer.
+    """
+
+    def __init__(self, who: str) -> None:
+        self._who, self._lost_s = who, 0.0
+        self.state, self.status = PeerState.CONNECTED, PortStatus.PORT_OK
+
+    def answered(self, status: PortStatus) -> None:
+        """Note an answer."""
+        if self.state is PeerState.LOST:
+            gone_s = time.monotonic() - self._lost_s
+            _LOG.warning("%s: the peer answers again, after %.1f s", self._who, gone_s)
+        self.state, self.status = PeerState.CONNECTED, status
+
+    def unanswered(self, error: Exception) -> None:
+        """Note that there was no answer, and why."""
+        if self.state is PeerState.CONNECTED:
+            reason = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+            _LOG.warning("%s: the peer does not answer: %s", self._who, reason)
+            self._lost_s = time.monotonic()
+        self.state, self.status = PeerState.LOST, PortStatus.CONNECTION_LOST
+
+
+T = TypeVar("T", bound=Struct)
+P = TypeVar("P")
+
+_SEND_LENGTH: Final = "64"
+"""Values that wait for a peer, if the properties do not say how many."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codec(Generic[T, P]):
+    """How values of a port pass to a peer and back: as bytes, or as messages of an engine.
+
+    Attributes:
+        encode: makes what passes of a value; ValueError if that cannot be.
+        decode: makes a value of what passed; ValueError if it is none.
+    """
+
+    encode: Callable[[T], P]
+    decode: Callable[[P], T]
+
+
+def cdr(data_type: type[T], endian: Endian = Endian.LITTLE) -> Codec[T, bytes]:
+    """Return the codec for plain CDR."""
+    return Codec(partial(encode, endian=endian), partial(decode, data_type, endian=endian))
+
+
+@dataclass(frozen=True, slots=True)
+class PeerEnd:
+    """What is agreed about a connector with a peer.
+
+    Attributes:
+        port: how the peer's port is called, such as `other/ConsoleOut0.rtc:in`.
+        connector_id: unique here.
+        properties: `dataport.*`, as `ConnectorOptions.parse` takes them; others are kept.
+        name: for people; the ID if left out.
+    """
+
+    port: str
+    connector_id: str
+    properties: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
+
+    @property
+    def options(self) -> ConnectorOptions:
+        """What the properties say; RtcRefused if they cannot be."""
+        lengths = {"dataport.buffer.length", "dataport.outport.buffer.length"}
+        if lengths.isdisjoint(self.properties):
+            return ConnectorOptions.parse(
+                {**self.properties, "dataport.outport.buffer.length": _SEND_LENGTH}
+            )
+        return ConnectorOptions.parse(self.properties)
+
+    def profile(self, port: DataPort[Any]) -> ConnectorProfile:
+        """Return how the connector with a port of ours is described.
+
+        Raises:
+            RtcRefused: the port has a connector of this ID.
+        """
+        refuse_known_id(port, self.connector_id)
+        data_type = {"dataport.data_type": port.data_type.idl_id()}
+        properties = {**data_type, **self.options.stated, **self.properties}
+        ends = (port.full_name, self.port)
+        if isinstance(port, InPort):
+            ends = (self.port, port.full_name)
+        return ConnectorProfile(self.name or self.connector_id, self.connector_id, ends, properties)
+
+
+# Buffers between the thread of a manager and those of an engine.
+
+
+class LockedBuffer(RingBuffer[P]):
+    """A ring buffer that one thread fills and another one reads."""
+
+    __slots__ = ("_lock",)
+
+    def __init__(self, options: BufferOptions) -> None:
+        super().__init__(options)
+        self._lock = threading.Lock()
+
+    def write(self, value: P) -> PortStatus:
+        """Put a value behind the others; see `RingBuffer.write`."""
+        with self._lock:
+            return super().write(value)
+
+    def read(self) -> P | None:
+        """Take a value; see `RingBuffer.read`."""
+        with self._lock:
+            return super().read()
+
+
+class ArrivalBuffer(RingBuffer[P]):
+    """A ring buffer whose values come from other threads: they wait until they are let in.
+
+    What waits counts as if it were in the buffer; so the status of a value is known at once.
+    """
+
+    __slots__ = ("_arrived", "_lock")
+
+    def __init__(self, options: BufferOptions) -> None:
+        super().__init__(options)
+        self._lock, self._arrived = threading.Lock(), deque[P](maxlen=options.length)
+
+    def arrive(self, value: P) -> tuple[PortStatus, bool]:
+        """Take a value, in any thread.
+
+        Returns:
+            What `write` would return, and whether it is the first that waits.
+        """
+        options = self._options
+        with self._lock:
+            waiting = len(self._arrived) + len(self._values)
+            if waiting >= options.length and options.full is not FullPolicy.OVERWRITE:
+                blocks = options.full is FullPolicy.BLOCK
+                return (PortStatus.BUFFER_TIMEOUT if blocks else PortStatus.BUFFER_FULL), False
+            self._arrived.append(value)
+            return PortStatus.PORT_OK, len(self._arrived) == 1
+
+    def let_in(self) -> None:
+        """Put what waits into the buffer, in the thread of the manager."""
+        with self._lock:
+            for value in self._arrived:
+                self.write(value)
+            self._arrived.clear()
+
+
+class SendBuffer(RingBuffer[P]):
+    """A ring buffer that one thread fills and another one empties.
+
+    Args:
+        options: its length, and what is lost when it is full.
+        wake: called when there is something to take; `take` is called until it gives nothing.
+
+    Attributes:
+        dropped: how many values were lost because it was full.
+    """
+
+    __slots__ = ("_lock", "_wake", "_woken", "dropped")
+
+    def __init__(self, options: BufferOptions, wake: Callable[[], object]) -> None:
+        super().__init__(options)
+        self._lock, self._wake, self._woken, self.dropped = threading.Lock(), wake, False, 0
+
+    def write(self, value: P) -> PortStatus:
+        """Put a value behind the others; see `RingBuffer.write`."""
+        with self._lock:
+            self.dropped += len(self._values) == self._options.length
+            status = super().write(value)
+            wakes, self._woken = not self._woken, True
+        if wakes:
+            self._wake()
+        return status
+
+    def take(self) -> tuple[P, ...]:
+        """Take the oldest value, if there is one."""
+        with self._lock:
+            taken = self.pop()
+            self._woken = bool(taken)
+        return taken
+
+    def put_back(self, value: P) -> None:
+        """Put a value that was taken before the others again; if it is full, one is lost."""
+        with self._lock:
+            full = len(self._values) == self._options.length
+            self.dropped += full
+            if full and self._options.full is FullPolicy.OVERWRITE:
+                return
+            if full:
+                self._values.pop()
+            self._values.appendleft(value)
+
+
+# An InPort of ours: the peer pushes, or is pulled from.
+
+P_co = TypeVar("P_co", covariant=True)
+
+
+class OutPortConsumer(Protocol[P_co]):
+    """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
+
+    def get(self) -> P_co | None:
+        """Take the next value out of the peer's port; None if it has none.
+
+        It may wait up to a time-out. Whatever it raises means that there was no answer.
+        """
+        ...
+
+
+class _InPortConnector(Connector[T], Generic[T, P]):
+    """Decodes what comes from a peer; the first of what cannot be decoded is logged."""
+
+    def __init__(self, port: InPort[T], end: PeerEnd, codec: Codec[T, P], calls: CallQueue) -> None:
+        push, flush = DataflowType.PUSH, SubscriptionType.FLUSH
+        options = replace(end.options, dataflow=push, subscription=flush)  # the peer's matter
+        super().__init__(end.profile(port), (port,), options)
+        self._codec, self._calls, self._way = codec, calls, f"{end.port} to {port.full_name}"
+        self._invalid = False
+
+    def _decoded(self, payload: P) -> T | None:
+        try:
+            value = self._codec.decode(payload)
+        except ValueError as error:
+            if not self._invalid:
+                _LOG.warning("%s: what came is no value: %s", self._way, error)
+            self._invalid = True
+            return None
+        self._invalid = False
+        guard = self.ports[0].guard
+        return value if guard is None or guard.passes(self.ports[0], value) else None
+
+
+class InPortPushConnector(_InPortConnector[T, P]):
+    """Takes what a peer puts into an InPort.
+
+    Args:
+        port: of ours.
+        end: what was agreed with the peer.
+        codec: makes values of what passes.
+        calls: those of the manager's thread.
+        post: has a call made in that thread before the next tick, in its own way; else it is
+            woken up for each.
+
+    Raises:
+        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+    """
+
+    buffer: ArrivalBuffer[T]
+
+    def __init__(
+        self,
+        port: InPort[T],
+        end: PeerEnd,
+        codec: Codec[T, P],
+        calls: CallQueue,
+        post: Callable[[Callable[[], object]], object] | None = None,
+    ) -> None:
+        super().__init__(port, end, codec, calls)
+        self.buffer, self._post = ArrivalBuffer(end.options.inport), post or calls.post
+
+    def put(self, payload: P) -> PortStatus:
+        """Put a value into the buffer, in any thread; it is there before the next tick.
+
+        Nothing waits for the manager's thread: that would take twice as long as the call of an
+        ORB itself.
+
+        Returns:
+            PORT_OK, or what the buffer says; INVALID_ARGS if it is no value, CONNECTION_LOST
+            after the end.
+        """
+        if (value := self._decoded(payload)) is None:
+            return PortStatus.INVALID_ARGS
+        if not self.joined:
+            return PortStatus.CONNECTION_LOST
+        status, is_first = self.buffer.arrive(value)
+        try:
+            if is_first:
+                self._post(self.buffer.let_in)
+        except RtcRefused:
+            return PortStatus.CONNECTION_LOST
+        return status
+
+
+class PulledBuffer(RingBuffer[T]):
+    """A ring buffer that asks for more as soon as it is empty.
+
+    Args:
+        options: how it behaves.
+        request: called whenever somebody looks for a value that is not there, and after the
+            last one was read.
+    """
+
+    __slots__ = ("_request",)
+
+    def __init__(self, options: BufferOptions, request: Callable[[], object]) -> None:
+        super().__init__(options)
+        self._request = request
+
+    @property
+    def readable(self) -> bool:
+        """Whether `read` finds a new value; if not, one is fetched."""
+        found = len(self._values) > self._skip
+        if not found:
+            self._request()
+        return found
+
+    def read(self) -> T | None:
+        """Take a value; see `RingBuffer.read`."""
+        value = super().read()
+        if len(self._values) <= self._skip:
+            self._request()
+        return value
+
+
+class InPortPullConnector(_InPortConnector[T, P]):
+    """Fetches values of a peer's OutPort, in the thread of that peer.
+
+    Nothing waits: reading the InPort, or looking whether it has something new, has the next
+    value fetched, one at a time. So a value is as old as the reading before it.
+
+    Args:
+        port: of ours.
+        end: what was agreed with the peer.
+        codec: makes values of what passes.
+        consumer: reaches the peer's OutPort.
+        thread: makes the calls.
+        calls: those of the manager's thread.
+
+    Raises:
+        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+    """
+
+    def __init__(  # noqa: PLR0913, PLR0917 - as many as a connector has parts
+        self,
+        port: InPort[T],
+        end: PeerEnd,
+        codec: Codec[T, P],
+        consumer: OutPortConsumer[P],
+        thread: PeerCaller,
+        calls: CallQueue,
+    ) -> None:
+        super().__init__(port, end, codec, calls)
+        self.buffer = PulledBuffer(end.options.inport, self._request)
+        self._consumer, self._thread, self._fetching = consumer, thread, False
+        self._watch = PeerWatch(self._way)
+
+    @property
+    def state(self) -> PeerState:
+        """Whether the peer answers."""
+        return self._watch.state
+
+    def _request(self) -> None:
+        if self.joined and not self._fetching:
+            self._fetching = True
+            self._thread.submit(self._fetch)
+
+    def _fetch(self) -> float | None:
+        """Get a value, in the thread of the peer."""
+        if not self.joined:
+            return None
+        try:
+            payload = self._consumer.get()
+        except Exception as error:  # an ORB has errors of its own
+            self._watch.unanswered(error)
+            return self._thread.retry_s
+        self._watch.answered(PortStatus.PORT_OK)
+        value = None if payload is None else self._decoded(payload)
+        try:
+            self._calls.post(partial(self._deliver, value))
+        except RtcRefused:  # the system has ended
+            return None
+        return None
+
+    def _deliver(self, value: T | None) -> None:
+        self._fetching = False
+        if value is not None and self.joined:
+            self.buffer.write(value)
+
+
+# An OutPort of ours: the peer is pushed to, or pulls.
+
+P_contra = TypeVar("P_contra", contravariant=True)
+
+
+class InPortConsumer(Protocol[P_contra]):
+    """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
+
+    def put(self, payload: P_contra, /) -> PortStatus:
+        """Put a value into the peer's port, and return what it says.
+
+        It may wait up to a time-out. Whatever it raises means that there was no answer.
+        """
+        ...
+
+
+class OutPortPushConnector(Connector[Any], Generic[T, P]):
+    """Pushes values from an OutPort to a peer, in the thread of that peer.
+
+    `write` encodes, and puts what passes into a buffer; nothing waits. A value that the peer
+    gave no answer to is put again after the time of the thread's `retry_s`, and the
+    buffer's policy holds meanwhile.
+
+    Args:
+        port: of ours.
+        end: what was agreed with the peer.
+        codec: makes what passes.
+        consumer: reaches the peer's InPort.
+        thread: makes the calls.
+
+    Attributes:
+        buffer: what waits for the peer; its `dropped` counts what was lost.
+        sent: values that the peer took.
+        refused: values that the peer did not take, as with a full buffer.
+
+    Raises:
+        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+    """
+
+    buffer: SendBuffer[P]
+
+    def __init__(
+        self,
+        port: OutPort[T],
+        end: PeerEnd,
+        codec: Codec[T, P],
+        consumer: InPortConsumer[P],
+        thread: PeerCaller,
+    ) -> None:
+        options = replace(end.options, dataflow=DataflowType.PUSH)
+        super().__init__(end.profile(port), (port,), options)
+        self.buffer = SendBuffer(options.outport, partial(thread.submit, self._send))
+        self._codec, self._consumer, self._thread = codec, consumer, thread
+        self._watch = PeerWatch(f"{port.full_name} to {end.port}")
+        self.sent = self.refused = 0
+
+    @property
+    def state(self) -> PeerState:
+        """Whether the peer answers."""
+        return self._watch.state
+
+    def write(self, value: T) -> PortStatus:
+        """Take a value from the OutPort.
+
+        Returns:
+            INVALID_ARGS if it cannot be encoded; what the buffer says, if that is not PORT_OK;
+            else what the peer said of the latest value that it was given: PORT_OK, such as
+            BUFFER_FULL, or CONNECTION_LOST if it gave no answer.
+        """
+        try:
+            payload = self._codec.encode(value)
+        except ValueError:
+            return PortStatus.INVALID_ARGS
+        return (self._publisher or self.buffer).write(payload) or self._watch.status
+
+    def _send(self) -> float | None:
+        """Put the oldest value, in the thread of the peer."""
+        taken = self.buffer.take()
+        if not taken or not self.joined:
+            return None
+        try:
+            status = self._consumer.put(*taken)
+        except Exception as error:  # an ORB has errors of its own
+            self.buffer.put_back(*taken)
+            self._watch.unanswered(error)
+            return self._thread.retry_s
+        if status is PortStatus.PORT_OK:
+            self.sent += 1
+        else:
+            self.refused += 1
+        self._watch.answered(status)
+        return 0
+
+
+class OutPortPullConnector(Connector[Any], Generic[T, P]):
+    """Holds values of an OutPort until a peer takes them.
+
+    Args:
+        port: of ours.
+        end: what was agreed with the peer.
+        codec: makes what passes.
+
+    Raises:
+        RtcRefused: the port has a connector of this ID, or properties that cannot be.
+    """
+
+    buffer: LockedBuffer[P]
+
+    def __init__(self, port: OutPort[T], end: PeerEnd, codec: Codec[T, P]) -> None:
+        options = replace(end.options, dataflow=DataflowType.PULL)
+        super().__init__(end.profile(port), (port,), options)
+        self.buffer, self._codec = LockedBuffer(options.outport), codec
+
+    def write(self, value: T) -> PortStatus:
+        """Take a value from the OutPort; INVALID_ARGS if it cannot be encoded."""
+        try:
+            payload = self._codec.encode(value)
+        except ValueError:
+            return PortStatus.INVALID_ARGS
+        return self.buffer.write(payload)
+
+    def get(self) -> tuple[PortStatus, P | None]:
+        """Take the next value, in any thread.
+
+        Returns:
+            PORT_OK and what passes; else None with BUFFER_EMPTY, or with CONNECTION_LOST after
+            the end.
+        """
+        if not self.joined:
+            return PortStatus.CONNECTION_LOST, None
+        payload = self.buffer.read()
+        return (PortStatus.BUFFER_EMPTY if payload is None else PortStatus.PORT_OK), payload
