@@ -37,11 +37,10 @@ from tickrig.wire.canopen.eds.object_table import (
     CommunicationProfile,
     DeviceInfo,
     ObjectTable,
-    Pdo,
     add_communication,
 )
 from tickrig.wire.canopen.nmt import is_restricted
-from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
+from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject, PdoDescription
 from tickrig.wire.errors import FieldError
 
 T = TypeVar("T")
@@ -437,9 +436,11 @@ def device_info(profile: RtcProfile) -> DeviceInfo:
     return DeviceInfo(profile.vendor, profile.type_name, bit_rates=BIT_RATES)
 
 
-def _pdos(profile: RtcProfile, direction: PortDirection) -> list[Pdo]:
+def _pdos(profile: RtcProfile, direction: PortDirection) -> list[PdoDescription]:
     return [
-        Pdo(OFF if port.cob_id is None else port.cob_id, port.mapping, relative=port.relative)
+        PdoDescription(
+            OFF if port.cob_id is None else port.cob_id, port.mapping, relative=port.relative
+        )
         for port in profile.placed(direction)
     ]
 

@@ -1,7 +1,9 @@
-"""PDOs on the wire: mapping entries, bits in a frame, multiplexed PDOs (CiA 301, PDO).
+"""PDOs on the wire: what they carry, mapping entries, bits in a frame, MPDOs (CiA 301, PDO).
 
 >>> MappedObject.parse(0x6200_0108)
 MappedObject(index=25088, sub=1, bits=8)
+>>> [(mapped.index, shift) for mapped, shift in fields((0x6040_0010, 0x607A_0020))]
+[(24640, 0), (24698, 16)]
 >>> pack_bits(((1, 1), (0, 1), (5, 3))).hex()
 '15'
 >>> unpack_bits(bytes.fromhex("15"), (1, 1, 3))
@@ -12,10 +14,11 @@ MappedObject(index=25088, sub=1, bits=8)
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.wire.canopen.nmt import CAN_ID_MASK, INVALID
 from tickrig.wire.errors import FieldError, FramingError
 
 MAX_PDO_BYTES: Final = 8
@@ -57,6 +60,51 @@ class MappedObject:
     def encode(self) -> int:
         """Return the 32 bits of an entry."""
         return self.index << 16 | self.sub << 8 | self.bits
+
+
+def fields(mapping: Iterable[int]) -> Iterator[tuple[MappedObject, int]]:
+    """Give the objects of a mapping, whose entries are as 6040 0010h, and the bits before each."""
+    shift = 0
+    for value in mapping:
+        mapped = MappedObject.parse(value)
+        yield mapped, shift
+        shift += mapped.bits
+
+
+@dataclass(frozen=True, slots=True)
+class PdoDescription:
+    """A PDO: its communication parameter and its mapping.
+
+    Attributes:
+        cob_id: with its flags: bit 31 if it is off.
+        mapping: objects as 6040 0010h: index, sub-index, bits.
+        transmission_type: 0..255.
+        inhibit_100us: inhibit time of a TPDO.
+        event_ms: event timer.
+        relative: the node-ID is added to the COB-ID.
+    """
+
+    cob_id: int
+    mapping: tuple[int, ...] = ()
+    transmission_type: int = 255
+    inhibit_100us: int = 0
+    event_ms: int = 0
+    relative: bool = True
+
+    @property
+    def can_id(self) -> int:
+        """Its CAN-ID, 0 if it has none."""
+        return self.cob_id & CAN_ID_MASK
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it exists: bit 31 is 0."""
+        return not self.cob_id & INVALID
+
+    @property
+    def size(self) -> int:
+        """Its length in bytes."""
+        return (sum(value & 0xFF for value in self.mapping) + 7) // 8
 
 
 @dataclass(frozen=True, slots=True)

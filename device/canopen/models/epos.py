@@ -38,9 +38,9 @@ from tickrig.wire.canopen.eds.object_table import (
     Element,
     ObjectCode,
     ObjectTable,
-    Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.pdo import PdoDescription
 
 NODE_ID: Final = 1
 """beego: 1 is the left wheel, 2 the right one."""
@@ -64,16 +64,16 @@ PROFILE: Final = CommunicationProfile(
     software="tickrig",
     product_code=0x6210,
     rpdos=(
-        Pdo(0x200, (0x6040_0010, 0x60FF_0020)),
-        Pdo(0x300, (0x6040_0010, 0x607A_0020)),
-        Pdo(OFF | 0x400),
-        Pdo(OFF | 0x500),
+        PdoDescription(0x200, (0x6040_0010, 0x60FF_0020)),
+        PdoDescription(0x300, (0x6040_0010, 0x607A_0020)),
+        PdoDescription(OFF | 0x400),
+        PdoDescription(OFF | 0x500),
     ),
     tpdos=(
-        Pdo(0x180, (0x6041_0010, 0x6064_0020), inhibit_100us=100),
-        Pdo(OFF | 0x280, (0x606C_0020, 0x6077_0010, 0x6061_0008), inhibit_100us=100),
-        Pdo(OFF | 0x380),
-        Pdo(OFF | 0x480),
+        PdoDescription(0x180, (0x6041_0010, 0x6064_0020), inhibit_100us=100),
+        PdoDescription(OFF | 0x280, (0x606C_0020, 0x6077_0010, 0x6061_0008), inhibit_100us=100),
+        PdoDescription(OFF | 0x380),
+        PdoDescription(OFF | 0x480),
     ),
 )
 

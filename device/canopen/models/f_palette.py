@@ -21,9 +21,9 @@ from tickrig.wire.canopen.eds.object_table import (
     RWW,
     CommunicationProfile,
     ObjectTable,
-    Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.pdo import PdoDescription
 
 NODE_ID: Final = 16
 ANALOGUE_INPUTS: Final = 8
@@ -46,11 +46,11 @@ PROFILE: Final = CommunicationProfile(
     hardware="K22",
     software="tickrig",
     product_code=1,
-    rpdos=(Pdo(0x200, (0x6200_0108,)),),
+    rpdos=(PdoDescription(0x200, (0x6200_0108,)),),
     tpdos=(
-        Pdo(0x180, (0x6000_0108,)),
-        Pdo(0x280, (0x6401_0110, 0x6401_0210, 0x6401_0310, 0x6401_0410)),
-        Pdo(0x380, (0x6401_0510, 0x6401_0610, 0x6401_0710, 0x6401_0810)),
+        PdoDescription(0x180, (0x6000_0108,)),
+        PdoDescription(0x280, (0x6401_0110, 0x6401_0210, 0x6401_0310, 0x6401_0410)),
+        PdoDescription(0x380, (0x6401_0510, 0x6401_0610, 0x6401_0710, 0x6401_0810)),
     ),
 )
 

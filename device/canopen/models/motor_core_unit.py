@@ -39,11 +39,11 @@ from tickrig.wire.canopen.eds.object_table import (
     CommunicationProfile,
     Element,
     ObjectTable,
-    Pdo,
     add_communication,
 )
 from tickrig.wire.canopen.emcy import ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
+from tickrig.wire.canopen.pdo import PdoDescription
 from tickrig.wire.instant import NEVER
 
 # What may go wrong in a motor core unit, how it is seen, and the EMCYs of it.
@@ -470,8 +470,18 @@ _PROFILE: Final = CommunicationProfile(
     hardware="1.1",
     software="tickrig",
     product_code=2,
-    rpdos=[Pdo(OFF | 0x200), Pdo(0x300, _channels(0x6411)), Pdo(OFF | 0x400), Pdo(OFF | 0x500)],
-    tpdos=[Pdo(OFF | 0x180), Pdo(0x280, _channels(0x6401)), Pdo(OFF | 0x380), Pdo(OFF | 0x480)],
+    rpdos=[
+        PdoDescription(OFF | 0x200),
+        PdoDescription(0x300, _channels(0x6411)),
+        PdoDescription(OFF | 0x400),
+        PdoDescription(OFF | 0x500),
+    ],
+    tpdos=[
+        PdoDescription(OFF | 0x180),
+        PdoDescription(0x280, _channels(0x6401)),
+        PdoDescription(OFF | 0x380),
+        PdoDescription(OFF | 0x480),
+    ],
 )
 
 make_application: Final = MotorCoreUnit

@@ -31,9 +31,9 @@ from tickrig.wire.canopen.eds.object_table import (
     EntryDescription,
     ObjectCode,
     ObjectTable,
-    Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.pdo import PdoDescription
 
 # Names of CiA 301 as an EDS writes them in full, for nodes of which there is none.
 
@@ -48,7 +48,7 @@ def _standard_names() -> Mapping[str, tuple[int, int]]:
     >>> _standard_names()["identity_object.product_code"] == (0x1018, 2)
     True
     """
-    table, pdos = ObjectTable(), [Pdo(OFF)] * _PDOS
+    table, pdos = ObjectTable(), [PdoDescription(OFF)] * _PDOS
     profile = CommunicationProfile(
         device_type=0, name="", hardware="", software="", product_code=0, rpdos=pdos, tpdos=pdos
     )

@@ -38,6 +38,7 @@ from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import standard_object
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 from tickrig.wire.canopen.nmt import CAN_ID_MASK, ERROR_CONTROL_COB_ID, EXTENDED, FLAG_30, INVALID
+from tickrig.wire.canopen.pdo import fields
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID
 
 _BIT_7: Final = 0x80
@@ -309,12 +310,12 @@ def _pdo_text(name: str, attribute: str, pdo: BoundPdo) -> str:
 
 def _first(name: str, attribute: str, pdo: BoundPdo) -> str:
     """Return the first object that a PDO carries, as `6000:01`, or the zeros behind its byte 0."""
-    mapped = pdo.mapping[0] if pdo.mapping else 0
-    index, bits = mapped >> 16, mapped & 0xFF
+    mapped, _ = next(fields(pdo.mapping or (0,)))
+    index, sub, bits = mapped.index, mapped.sub, mapped.bits
     if index in _DRIVE:
         raise Unbound(name, f"{index:04X}h tells what a drive does: nobody can set it")
     texts = {
-        "first": f"{index:04X}:{mapped >> 8 & 0xFF:02X}",
+        "first": f"{index:04X}:{sub:02X}",
         "padding": "00" * ((bits + 7) // 8 - 1),
     }
     return texts[attribute]

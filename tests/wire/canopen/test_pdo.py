@@ -8,7 +8,9 @@ from tickrig.wire.canopen.pdo import (
     Dispatched,
     MappedObject,
     Mpdo,
+    PdoDescription,
     Scanned,
+    fields,
     pack_bits,
     unpack_bits,
 )
@@ -25,6 +27,17 @@ U32 = st.integers(0, 0xFFFF_FFFF)
 
 def test_a_mapping_entry_of_the_reference_dictionary() -> None:
     assert MappedObject.parse(0x6411_0210) == MappedObject(0x6411, 2, 16)
+
+
+def test_a_pdo_says_what_it_carries() -> None:
+    pdo = PdoDescription(0x8000_0205, (0x6040_0010, 0x0005_0008, 0x2000_0103))
+    assert (pdo.can_id, pdo.enabled, pdo.size) == (0x205, False, 4)
+    assert PdoDescription(0x205).enabled
+    assert list(fields(pdo.mapping)) == [
+        (MappedObject(0x6040, 0, 16), 0),
+        (MappedObject(0x0005, 0, 8), 16),
+        (MappedObject(0x2000, 1, 3), 24),
+    ]
 
 
 def test_a_scanner_list_entry() -> None:

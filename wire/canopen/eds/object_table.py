@@ -11,6 +11,7 @@ from typing import ClassVar, Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.pdo import PdoDescription
 from tickrig.wire.errors import FieldError
 
 MAX_VARIABLE_BYTES: Final = 0xFFFF_FFFF
@@ -361,27 +362,6 @@ _MAPPED: Final = 8
 """Entries that a mapping record holds."""
 
 
-@dataclass(frozen=True, slots=True)
-class Pdo:
-    """A PDO as it is at power-on.
-
-    Attributes:
-        cob_id: without the node-ID, with bit 31 if it is off.
-        mapping: objects as 6040 0010h: index, sub-index, bits.
-        transmission_type: 0..255.
-        inhibit_100us: inhibit time of a TPDO.
-        event_ms: event timer.
-        relative: the node-ID is added to the COB-ID.
-    """
-
-    cob_id: int
-    mapping: tuple[int, ...] = ()
-    transmission_type: int = 255
-    inhibit_100us: int = 0
-    event_ms: int = 0
-    relative: bool = True
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommunicationProfile:
     """What differs from device to device.
@@ -403,8 +383,8 @@ class CommunicationProfile:
     hardware: str
     software: str
     product_code: int
-    rpdos: Sequence[Pdo]
-    tpdos: Sequence[Pdo]
+    rpdos: Sequence[PdoDescription]
+    tpdos: Sequence[PdoDescription]
     revision: int = 0x1_0000
     heartbeat_ms: int = 0
 
@@ -462,7 +442,9 @@ def _add_supervision(objects: ObjectTable, profile: CommunicationProfile) -> Non
     objects.record(0x1200, "SDO server parameter", rows)
 
 
-def _add_pdo(objects: ObjectTable, kind: str, index: int, pdo: Pdo, timing: list[Element]) -> None:
+def _add_pdo(
+    objects: ObjectTable, kind: str, index: int, pdo: PdoDescription, timing: list[Element]
+) -> None:
     number = index % 0x200 + 1
     head = [
         Element(1, "COB-ID", U32, RW, pdo.cob_id, relative=pdo.relative),
@@ -475,11 +457,11 @@ def _add_pdo(objects: ObjectTable, kind: str, index: int, pdo: Pdo, timing: list
     objects.record(index + 0x200, title, rows, count_access=RW, count=len(pdo.mapping))
 
 
-def _rpdo_timing(pdo: Pdo) -> list[Element]:
+def _rpdo_timing(pdo: PdoDescription) -> list[Element]:
     return [Element(5, "Event timer", U16, RW, pdo.event_ms)]
 
 
-def _tpdo_timing(pdo: Pdo) -> list[Element]:
+def _tpdo_timing(pdo: PdoDescription) -> list[Element]:
     return [
         Element(3, "Inhibit time", U16, RW, pdo.inhibit_100us),
         Element(5, "Event timer", U16, RW, pdo.event_ms),

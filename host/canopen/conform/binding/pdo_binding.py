@@ -9,7 +9,8 @@ from typing import Final, NamedTuple
 
 from tickrig.host.canopen.conform.binding.object_reader import ObjectReader
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.nmt import CAN_ID_MASK, EXTENDED, FLAG_30, INVALID
+from tickrig.wire.canopen.nmt import EXTENDED, FLAG_30
+from tickrig.wire.canopen.pdo import PdoDescription, fields
 
 RPDOS: Final = range(0x1400, 0x1600)
 _TPDOS: Final = range(0x1800, 0x1A00)
@@ -32,15 +33,12 @@ _EVENT_DRIVEN: Final = (254, 255)
 _CYCLIC: Final = range(1, 241)
 
 
-@dataclass(frozen=True, slots=True)
-class BoundPdo:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoundPdo(PdoDescription):
     """A PDO as it was found.
 
     Attributes:
         index: of its communication parameter, 1400h.. or 1800h...
-        cob_id: sub-index 1, with its flags.
-        transmission_type: sub-index 2.
-        mapping: mapped objects as 6040 0010h.
         subs: sub-indices that its communication parameter has.
         remappable: its mapping and its COB-ID may be written.
         places: how many objects can be mapped.
@@ -48,9 +46,6 @@ class BoundPdo:
     """
 
     index: int
-    cob_id: int
-    transmission_type: int
-    mapping: tuple[int, ...]
     subs: frozenset[int]
     remappable: bool
     places: int
@@ -61,31 +56,13 @@ class BoundPdo:
         """Index of its mapping parameter."""
         return self.index + _MAPPING
 
-    @property
-    def can_id(self) -> int:
-        """Its CAN-ID, 0 if it has none."""
-        return self.cob_id & CAN_ID_MASK
-
-    @property
-    def enabled(self) -> bool:
-        """Whether it exists: bit 31 is 0."""
-        return not self.cob_id & INVALID
-
     def place(self, address: tuple[int, int]) -> tuple[int, int] | None:
         """Return how many bytes are before an object that it carries, and how many behind."""
-        before = 0
-        for mapped in self.mapping:
-            bits = mapped & 0xFF
-            if (mapped >> 16, mapped >> 8 & 0xFF) == address:
-                whole = not before % 8 and not bits % 8
-                return (before // 8, self.size - (before + bits) // 8) if whole else None
-            before += bits
+        for mapped, before in fields(self.mapping):
+            if (mapped.index, mapped.sub) == address:
+                whole = not before % 8 and not mapped.bits % 8
+                return (before // 8, self.size - (before + mapped.bits) // 8) if whole else None
         return None
-
-    @property
-    def size(self) -> int:
-        """Its length in bytes."""
-        return (sum(mapped & 0xFF for mapped in self.mapping) + 7) // 8
 
 
 class PdoKind(NamedTuple):
@@ -202,7 +179,7 @@ def _harmless(may_write: Callable[[int], bool]) -> PdoKind:
         lambda pdo: (
             pdo.enabled
             and bool(pdo.mapping)
-            and all(may_write(mapped >> 16) for mapped in pdo.mapping)
+            and all(may_write(mapped.index) for mapped, _ in fields(pdo.mapping))
         ),
     )
 
@@ -220,7 +197,10 @@ def _read(device: EdsDevice, reader: ObjectReader, area: range) -> Iterator[Boun
         head, body = subs[index], dict(subs.get(index + _MAPPING, {}))
         changeable = body.pop(0, False) and any(body.values()) and head.get(_COB_ID, False)
         yield BoundPdo(
-            *(index, cob_id, kind, mapping, frozenset(head)),
+            *(cob_id, mapping, kind),
+            relative=False,
+            index=index,
+            subs=frozenset(head),
             remappable=changeable,
             places=len(body),
             restless=any(

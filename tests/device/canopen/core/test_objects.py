@@ -19,9 +19,9 @@ from tickrig.wire.canopen.eds.object_table import (
     EntryDescription,
     ObjectCode,
     ObjectTable,
-    Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.pdo import PdoDescription
 from tickrig.wire.canopen.sdo_frame import AbortCode
 
 PROFILE = CommunicationProfile(
@@ -30,8 +30,8 @@ PROFILE = CommunicationProfile(
     hardware="A",
     software="1",
     product_code=7,
-    rpdos=(Pdo(0x200, (0x6200_0108,)), Pdo(OFF | 0x300)),
-    tpdos=(Pdo(0x180, (0x6000_0108,), inhibit_100us=100, event_ms=50),),
+    rpdos=(PdoDescription(0x200, (0x6200_0108,)), PdoDescription(OFF | 0x300)),
+    tpdos=(PdoDescription(0x180, (0x6000_0108,), inhibit_100us=100, event_ms=50),),
 )
 
 

@@ -12,9 +12,9 @@ from tickrig.wire.canopen.eds.object_table import (
     RWRW,
     CommunicationProfile,
     ObjectTable,
-    Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.pdo import PdoDescription
 
 Row = tuple[int, int, DataType, Value]
 """Index, number of elements, data type, default."""
@@ -37,7 +37,7 @@ def make_dictionary(rows: list[Row], sent: tuple[int, ...] = ()) -> Dictionary:
         software="",
         product_code=0,
         rpdos=(),
-        tpdos=(Pdo(0x180, sent),),
+        tpdos=(PdoDescription(0x180, sent),),
     )
     add_communication(objects, profile)
     for index, count, kind, default in rows:

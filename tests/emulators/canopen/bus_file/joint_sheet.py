@@ -23,9 +23,9 @@ from tickrig.wire.canopen.eds.object_table import (
     Element,
     ObjectCode,
     ObjectTable,
-    Pdo,
     add_communication,
 )
+from tickrig.wire.canopen.pdo import PdoDescription
 
 FOUR_MODES: Final = 0b1010_0101
 """6502h: pp, pv, hm, csp."""
@@ -39,8 +39,8 @@ PROFILE: Final = CommunicationProfile(
     hardware="1",
     software="1",
     product_code=0x4A,
-    rpdos=tuple(Pdo(OFF | 0x200 + 0x100 * n, (0x6040_0010,)) for n in range(4)),
-    tpdos=tuple(Pdo(OFF | 0x180 + 0x100 * n, (0x6041_0010,)) for n in range(4)),
+    rpdos=tuple(PdoDescription(OFF | 0x200 + 0x100 * n, (0x6040_0010,)) for n in range(4)),
+    tpdos=tuple(PdoDescription(OFF | 0x180 + 0x100 * n, (0x6041_0010,)) for n in range(4)),
 )
 
 
