@@ -1,27 +1,43 @@
-"""Scripts, what is said to a node in the order in which it is said, and what runs them.
+"""Scripts, what is said to a node in the order in which it is said, and what runs them."""
 
-A script is a generator. It yields steps, is given what came of each, and returns
-its result; what goes wrong is raised in it. It waits for nothing: a `Dialogue`
-goes on with it when there is an answer, or when a time has passed.
-
-Late answers. An SDO answer names its object, never its question: after a time-out, an answer
-that comes late looks like the answer to the next question about the same object. All that helps
-is order: a server answers one question after the other, and CAN keeps the order of its answers.
-So an answer that names an object is also the proof that no answer to an earlier question can
-follow. `Unanswered` keeps the objects whose questions may still be answered, in their order. Before
-the dialogue asks about one of them again it reads another object, a fence (1000h, else 1001h and
-so on), and waits for its answer. Nothing here depends on how late an answer is.
-
-Answers that come twice. CAN repeats a frame whose sender saw its last bit wrong, and a request that
-is repeated is answered twice. Such a copy is sent right after its original. So the dialogue waits
-before it asks about the object that was answered last: as long as that answer took, but at least
-`LEAST_COPY_US` and at most `MOST_COPY_US`.
-
-Answers that name another object. A dialogue ignores them, unless its holder asks for them: then
-an answer about an object that nobody has asked about ends the question, if the right answer does
-not come: within `MISNAMED_US` if no other question is open, else until the time-out. Ask for them
-only if no other client uses the server.
-"""
+# Theory of operation.
+#
+# A script is a generator. It yields steps, is given what came of each, and returns
+# its result; what goes wrong is raised in it. It waits for nothing: a `Dialogue`
+# goes on with it when there is an answer, or when a time has passed.
+#
+# Late answers. An SDO answer names its object, never its question: after a time-out, an answer
+# that comes late looks like the answer to the next question about the same object. All that helps
+# is order: a server answers one question after the other, and CAN keeps the order of its answers.
+# So an answer that names an object is also the proof that no answer to an earlier question can
+# follow. `Unanswered` keeps the objects whose questions may still be answered, in their order.
+# Before the dialogue asks about one of them again it reads another object, a fence (1000h, else
+# 1001h and so on), and waits for its answer. Nothing here depends on how late an answer is.
+#
+# Answers that come twice. CAN repeats a frame whose sender saw its last bit wrong, and a request
+# that is repeated is answered twice. Such a copy is sent right after its original. So the dialogue
+# waits before it asks about the object that was answered last: as long as that answer took, but at
+# least `LEAST_COPY_US` and at most `MOST_COPY_US`.
+#
+# Answers that name another object. A dialogue ignores them, unless its holder asks for them: then
+# an answer about an object that nobody has asked about ends the question, if the right answer does
+# not come: within `MISNAMED_US` if no other question is open, else until the time-out. Ask for them
+# only if no other client uses the server.
+#
+# What couples to what. `_unanswered` lasts as long as the dialogue, all else as long as a step:
+#
+#   _step        what the script waits for; None between scripts
+#   _expected    the object whose answer is awaited: that of the step, or a fence before it
+#   _transfer    the object of the latest request, which an abort names
+#   _answer      the latest answer; a segment that equals it is a copy: its toggle bit is the same
+#   due_us       the time-out of the step, or the end of a pause, or of the wait for a copy
+#
+# `_expected` differs from the object of the step only while a fence is open. `clear` ends the
+# scripts and keeps `_unanswered`: the questions stay open, whoever asked them.
+#
+# Where the numbers come from. CiA 301 gives no SDO time-out; 500 ms is our choice. A copy
+# follows its original within the time of the repeated request, so the wait is bounded by the time
+# that the answer took.
 
 from __future__ import annotations
 

@@ -1,34 +1,38 @@
-"""One node of a network as a host holds it: what is said to it, and what is heard of it.
+"""One node of a network as a host holds it: what is said to it, and what is heard of it."""
 
-A node session. Whoever talks with a node for a while holds a `NodeSession`: the test master for
-each of its slaves, `canmon net` and the gateway for each node they ask, the conformance tester for
-the node under test. It has three parts, which go together because one frame can concern all three:
-
-- the `Dialogue`: the scripts that run, and which questions the server may still answer. It must
-  live as long as the session. A new dialogue would take a late answer to an old question for the
-  answer to its own.
-- the NMT state that the node reported last. A boot-up is the report INITIALISING; the node is
-  Pre-operational after it by itself (CiA 301, 7.3.2.1), so the holder decides what to store.
-- `ErrorControl`, if the holder supervises the node.
-
-One frame, one order. `receive` stores the state first and tells the dialogue second: a script that
-waits for a state may end with this frame, and its holder reads `state` in the callback.
-
-Time. The session has no clock. A frame comes with the time at which it was on the bus, `tick` with
-the time of now, and `due_us` says when `tick` has something to do. A holder with nothing else to do
-calls `run`, which waits by itself; one with many nodes calls `tick` for each that is due.
-
-Before a script begins, `run` takes what came before: an answer in the queue of a driver does not
-belong to this script.
-
-Error control (CiA 301, 7.2.8.2). A node has heartbeat or node guarding, never both; where the
-holder expects a heartbeat, guarding is off. A node that falls silent is lost once, not again in
-each period: the next loss needs a sign of life between. Guarding counts requests without an answer
-that has the other toggle bit: an answer that repeats the toggle bit is the copy of an old one.
-
-Boot-up. A boot procedure is a script, as any other, so that a session runs that of CiA 302-2
-(`master.boot_slave.SlaveBoot`, also behind `canmon net boot`) or another one.
-"""
+# Theory of operation.
+#
+# A node session. Whoever talks with a node for a while holds a `NodeSession`: the test master for
+# each of its slaves, `canmon net` and the gateway for each node they ask, the conformance tester
+# for the node under test. It has three parts, which go together because one frame can concern all
+# three:
+#
+# - the `Dialogue`: the scripts that run, and which questions the server may still answer. It must
+#   live as long as the session. A new dialogue would take a late answer to an old question for the
+#   answer to its own.
+# - the NMT state that the node reported last. A boot-up is the report INITIALISING; the node is
+#   Pre-operational after it by itself (CiA 301, 7.3.2.2.2), so the holder decides what to store.
+# - `ErrorControl`, if the holder supervises the node.
+#
+# One frame, one order. `receive` stores the state first and tells the dialogue second: a script
+# that waits for a state may end with this frame, and its holder reads `state` in the callback.
+#
+# Time. The session has no clock. A frame comes with the time at which it was on the bus, `tick`
+# with the time of now, and `due_us` says when `tick` has something to do. A holder with nothing
+# else to do calls `run`, which waits by itself; one with many nodes calls `tick` for each that is
+# due.
+#
+# Before a script begins, `run` takes what came before: an answer in the queue of a driver does not
+# belong to this script.
+#
+# Error control (CiA 301, 7.2.8.2.2). A node has heartbeat or node guarding, never both; where the
+# holder expects a heartbeat, guarding is off. A node that falls silent is lost once, not again in
+# each period: the next loss needs a sign of life between. Guarding counts requests without an
+# answer that has the other toggle bit: an answer that repeats the toggle bit is the copy of an old
+# one.
+#
+# Boot-up. A boot procedure is a script, as any other, so that a session runs that of CiA 302-2
+# (`master.boot_slave.SlaveBoot`, also behind `canmon net boot`) or another one.
 
 from __future__ import annotations
 

@@ -13,6 +13,38 @@ SDO block transfer: its frames as values (CiA 301, SDO block protocols).
 BlockSegment(seqno=5, data=b'..\x00\x00\x00\x00\x00', last=True)
 """
 
+# Theory of operation of block transfer (CiA 301, SDO block protocols).
+#
+# A segmented transfer has an answer for each 7 bytes, a block transfer one for each block of up to
+# 127 segments. The three phases, with the first byte of each frame:
+#
+#   download   client                       server
+#   initiate   C0h | crc 4 | size 2      -> A0h | crc 4, and segments a block in byte 4
+#   block      01h .. 7Fh, the last one  -> A2h ackseq blksize: the last segment that came in
+#                with bit 7 (85h)             sequence, and how long the next block may be
+#   end        C1h | fill << 2, crc      -> A1h
+#
+#   upload     client                       server
+#   initiate   A0h | crc 4, blksize      -> C0h | crc 4 | size 2, size
+#   start      A3h                       -> 01h .. 7Fh
+#   block      A2h ackseq blksize        -> the next block, or the end
+#   end        A1h                       <- C1h | fill << 2, crc
+#
+# Rules. A segment has no command byte: its first byte is the sequence number, so it looks like any
+# other frame. Only who knows that a block is under way can read it, which is why `parse_request`
+# and `parse_response` know no segments and `BlockSegment.parse` is called by name. Bit 7 says "no
+# more segments", not "end of the block". The last segment is always 7 bytes; only the end frame
+# tells how many of them are fill. `ackseq` is 0 if not even segment 1 came; the
+# sender repeats from ackseq + 1 with new sequence numbers from 1. Either side ends the transfer by
+# an abort at any time, which a receiver must look for before it takes a segment: 80h is sequence
+# number 0 with bit 7, and no segment has number 0.
+#
+# The CRC is that of XMODEM (polynomial 1021h, initial value 0) over all data without the fill. It
+# counts only if both sides set the bit; else the field is 0.
+#
+# Lost frames. A segment that is lost is repeated after the receipt. CiA 301 has no way on if the
+# last segment of a block or its receipt is lost: both sides wait, and time out.
+
 from __future__ import annotations
 
 from dataclasses import dataclass

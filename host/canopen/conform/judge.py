@@ -1,5 +1,45 @@
 """Judges one check: may it be done, what came of it, and once more if it failed."""
 
+# Theory of operation.
+#
+# A run listens for a second, reads the node (`subject.examine`), brings it into the state in which
+# all checks begin (`NodeCare.prepare`), judges each check, and restores the node. This file is the
+# part between: one check in, one `Result` out. The order below is what a verdict means, so do not
+# change one part alone.
+#
+# 1. Bind. Names become the numbers of this node. A check that lacks an object, a feature, the level
+#    or a yes is NOT_APPLICABLE. Nothing has been sent for it by then. What it would write must have
+#    been read before, else the check is INCONCLUSIVE: what cannot be written back is not written.
+# 2. Play. `care.begin` notes what may change, `exchange.begin` forgets old frames and starts the
+#    clock of the check. Steps run until one fails; steps `at_end` run after that, and fail nothing.
+# 3. Judge. The first rule that fits decides:
+#      a step must not be done at this level                  NOT_APPLICABLE
+#      the host, the bus or another node disturbed            INCONCLUSIVE
+#      the program of the node raised                         FAIL, whatever else was seen
+#      a `given` step failed, or an object that CiA 301       NOT_APPLICABLE if the abort code says
+#        lets be constant was not written                       that the node need not take it, else
+#                                                               INCONCLUSIVE
+#      an upload went wrong in a step that only reads, in a   INCONCLUSIVE: group US judges uploads
+#        check that is not about uploads
+#      a disturbance was noted meanwhile                      INCONCLUSIVE
+#      another node may have sent the LSS answer              INCONCLUSIVE: 7E4h names no node
+#      the node had an error before the run, and was started  INCONCLUSIVE
+#      the clause leaves the answer to the device             IMPLEMENTATION_DEFINED
+#      none of these                                          FAIL
+# 4. Tidy. `care.tidy` writes back and reads again. If the node does not come back, a failure
+#    becomes BLOCKED: the check may have met a node that was already gone.
+# 5. Again. A failure is played a second time. A pass then makes the result INCONCLUSIVE; if the
+#    second go could not be prepared, the first one counts, as it has changed the state of the node.
+#
+# What couples to what. The evidence belongs to the exchange, and `exchange.begin` drops it: lines
+# and crashes are taken before `care.tidy`, which begins anew. `boots` is compared across the check,
+# because a node that booted has lost all that was written, not only what the check wrote.
+# `_wanted` is what the last failed step expected; reports show it.
+#
+# Numbers. Times are bus time since the start of the run, never the clock of this host. A check may
+# last the sum of all its waits and 2 s more (`notation.bind_check`); an answer is awaited for 1 s,
+# as CiA 301 gives no time.
+
 from __future__ import annotations
 
 from contextlib import suppress

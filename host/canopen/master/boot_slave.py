@@ -1,13 +1,45 @@
 """The boot slave process of CiA 302-2 as a script, in the order of Lely's master.
 
-Device type, identity, node state if it is to be kept alive, software, configuration,
-error control. It knows no time: a `Dialogue` says it to the slave.
-
 How the boot-up of a slave ended (CiA 302-2, error status of the boot slave process).
 
 >>> BootStatus("D").text
 '1018h:01 vendor-ID is another than expected, or cannot be read'
 """
+
+# Theory of operation.
+#
+# The boot procedure is one generator, so that the order of the standard is the order of the lines.
+# It has no clock and no bus: a `NodeSession` runs it, in the test master for each slave at once,
+# behind `canmon net boot` for one. What it needs to know is in `SlaveAssignment`; what it did is
+# told step by step to `on_step`, and how it ended is the `BootOutcome`. It raises nothing.
+#
+#   step                          frames to node 5               ends with, if it fails
+#   device type, 4 tries          605#40001000                   B no answer, C another type
+#   identity, what is expected    605#40181001 .. 04             D, M, N, O for 01h to 04h
+#   state, if kept alive          705#R, or waits for 705#       E heartbeat, F guarding
+#     Operational: go to error control, nothing else is done     (L, which is good)
+#     else reset communication    000#8205, waits for 705#00     E or F
+#   software, if a version        605#40561F01                   G no object, H no leave to update
+#     update, then all from the top                              I
+#   configuration, unless 1020h   605#40201001, 02               -
+#     holds the expected date
+#     restore, if asked for       605#23111002 "load", a reset   J
+#     the writes of 1F22h         605#2...                       J
+#   error control                 waits for a heartbeat, or      K
+#                                   705#R
+#
+# Rules. `BootTalk` is the only place that ends the procedure: it raises `BootEnded` with the error
+# status, after it has told the step. What is read first after a possible reset gets four tries, the
+# rest gets one: a node that has answered is there. An expected value of 0 is not looked at.
+#
+# Coupling. A boot-up message while the procedure runs is an answer to its own reset, or a slave
+# that resets by itself; `NetworkSlave` does not begin a second procedure then. The retry of status
+# B each second, the boot time of 1F89h and the start of the slave are policy of the master, not of
+# this file.
+#
+# Numbers. An answer to guarding is awaited for 100 ms, a boot-up after a reset for 1 s, a heartbeat
+# for the consumer heartbeat time of 1016h. Flash status and program control are looked at each
+# 100 ms, for a minute.
 
 from __future__ import annotations
 
