@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from queue import Empty, SimpleQueue
-from typing import Final
+from typing import Final, Protocol
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.bench.operator import PRESS_US
+from tickrig.emulators.bench.operator import PRESS_US, Operator, WireFaults
 from tickrig.emulators.bench.running_emulator import RunningEmulator
-from tickrig.emulators.rig.emulated import read_signal
+from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
@@ -22,15 +22,54 @@ _MAX_SINCE: Final = 2**63 - 1
 """As long as a command line can say."""
 
 
+class Controlled(Protocol):
+    """What requests are answered about: a `RunningEmulator`, or a thing without a wire.
+
+    Attributes:
+        name: what it is called.
+        operator: does what is asked for.
+    """
+
+    name: str
+    operator: Operator
+
+    @property
+    def device(self) -> HasSignals:
+        """Its inputs and outputs."""
+        ...
+
+    @property
+    def wire(self) -> WireFaults:
+        """Where faults of its wire are armed."""
+        ...
+
+    @property
+    def effective_us(self) -> int:
+        """When what is done now takes effect."""
+        ...
+
+    def status(self) -> Mapping[str, object]:
+        """Return how it is going."""
+        ...
+
+    @property
+    def stop(self) -> Callable[[], None]:
+        """End it."""
+        ...
+
+
 class EmulatorControl(RequestDispatcher):
     """Answers requests about one emulator.
 
     Args:
-        emulator: what is controlled. It must not be stepping meanwhile.
+        emulator: what is controlled. It must not be stepping meanwhile. One that is no
+            `RunningEmulator` has no lines to show.
     """
 
-    def __init__(self, emulator: RunningEmulator) -> None:
+    def __init__(self, emulator: Controlled) -> None:
         self._emulator = emulator
+        self._running = emulator if isinstance(emulator, RunningEmulator) else None
+        shows_lines = {"lines": (self._lines, ("since",))} if self._running else {}
         super().__init__(
             {
                 "describe": (self._describe, ()),
@@ -39,7 +78,7 @@ class EmulatorControl(RequestDispatcher):
                 "press": (self._press, ("name", "duration_us")),
                 "fault": (self._fault, ("spec",)),
                 "clear": (self._clear, ("name",)),
-                "lines": (self._lines, ("since",)),
+                **shows_lines,
                 "status": (self._status, ("since",)),
                 "stop": (self._stop, ()),
             }
@@ -111,10 +150,11 @@ class EmulatorControl(RequestDispatcher):
 
     def _lines(self, request: Object) -> Object:
         since = whole(request.get("since", 0), "since", 0, _MAX_SINCE)
+        assert self._running is not None
         return {
             "lines": [
                 {"number": x.number, "at_us": x.at_us, "mark": x.mark, "text": escape(x.data)}
-                for x in self._emulator.log.since(since)[-_MAX_LINES:]
+                for x in self._running.log.since(since)[-_MAX_LINES:]
             ]
         }
 
@@ -122,7 +162,8 @@ class EmulatorControl(RequestDispatcher):
         status: Object = dict(self._emulator.status())
         if "since" in request:
             since_us = whole(request["since"], "since", 0, _MAX_SINCE)
-            status["late_us"] = self._emulator.rig.late_since(since_us)
+            if self._running is not None:
+                status["late_us"] = self._running.rig.late_since(since_us)
         return status
 
     def _stop(self, request: Object) -> Object:

@@ -11,6 +11,7 @@ from typing import ClassVar, Final
 
 import click
 
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.tkernel.operated import Operated
 from tickrig.emulators.tkernel.resolution import ResolutionService
@@ -158,7 +159,7 @@ def run_service(
         http = _open(service, port)
         stack.callback(http.close)
         if control is not None:
-            stack.enter_context(serving_control(control, operated, clock))
+            stack.enter_context(serving_control(control, EmulatorControl(operated), clock))
         click.echo(http.url)
         say(f"{len(service.table.ucodes)} ucodes at {http.url}/ucodes/UCODE. Ctrl-C ends.")
         while running:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.running_emulator import keeping_time
 from tickrig.emulators.tkernel.board import Board
@@ -127,7 +128,9 @@ class NodeRun:
             stack.callback(self._board.close)
             if path := self._options.board:
                 stack.callback(self._operator_door.close)
-                stack.enter_context(serving_control(path, self._operated, self._operator_door))
+                stack.enter_context(
+                    serving_control(path, EmulatorControl(self._operated), self._operator_door)
+                )
             boot_s = self._options.limits.boot_us / 1e6
             say(f"The node boots, {boot_s:g} s. Ctrl-C ends.")
             stack.enter_context(keeping_time())

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 import pytest
 
 from tests.host.rtc.ucode.bench import DOOR, UcodeBench
+from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.tkernel.board import Board
 from tickrig.emulators.tkernel.node_manager import (
     CONTENTS,
@@ -58,7 +59,7 @@ class BoardBench:
         schedule.tick(until_us)
 
     def request(self, do: str, **fields: object) -> Object:
-        return self.operated.answer({"v": 1, "do": do, **fields})
+        return EmulatorControl(self.operated).answer({"v": 1, "do": do, **fields})
 
 
 def test_it_answers_after_its_boot_time() -> None:
@@ -143,7 +144,7 @@ def test_at_the_end_components_are_deactivated() -> None:
     [
         ("get", {"names": ["speed"]}, 'no input or output "speed"; known: reset'),
         ("get", {"names": 1}, "names is a list of names, not 1"),
-        ("set", {"name": "reset", "value": None}, "a value is a number or a text, not null"),
+        ("set", {"name": "reset", "value": None}, "value is a number or a string, not null"),
         ("press", {"name": "power_cut"}, "no button 'power_cut'"),
         ("fault", {"spec": "fire"}, "no fault 'fire'"),
         ("clear", {"name": "fire"}, "no fault 'fire'"),
