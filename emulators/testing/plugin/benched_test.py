@@ -6,7 +6,6 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -24,7 +23,7 @@ from tickrig.emulators.testing.plugin.bench_source import (
     check_needs,
     needs_of,
 )
-from tickrig.emulators.testing.plugin.compare import Fingerprint
+from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
 from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
 from tickrig.emulators.testing.plugin.health import (
     Health,
@@ -35,13 +34,12 @@ from tickrig.emulators.testing.plugin.health import (
 )
 from tickrig.emulators.testing.plugin.host_checks import THREADS, dead_threads, guard, never_awaited
 from tickrig.emulators.testing.plugin.settings import SETTINGS
-from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
 from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make_error
 from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.plugin.bench_evidence import (
-        BenchEvidence,
         BenchWitness,
     )
 
@@ -76,7 +74,7 @@ if TYPE_CHECKING:
 # on a bench that was too slow (`is_mistake`).
 
 
-class BenchedTest:
+class BenchedTest(TestWithBench):
     """A test, and its bench.
 
     Args:
@@ -86,32 +84,22 @@ class BenchedTest:
         warm_up: what is done to its bench before.
 
     Attributes:
-        bench: its bench, from the moment at which it is open.
         fingerprint: what happens on it, if that is compared.
-        evidence: what a report shows of it, when it is closed.
-        blocked: why the test came to no verdict, empty if it did.
-        unheard: what went wrong beside its body and was not told yet, each in a line.
-        kept: files that were kept of it.
-        not_kept: why other files were not, or not whole, each in a line.
     """
 
     def __init__(
         self, item: pytest.Function, wanted: WantedBench, safe: SafeState, warm_up: WarmUp = None
     ) -> None:
-        self.item, self.wanted, self._safe, self._warm_up = item, wanted, safe, warm_up
+        super().__init__(item, wanted)
+        self._safe, self._warm_up = safe, warm_up
         self._settings = item.config.stash[SETTINGS]
-        self.bench: Bench | None = None
+        item.stash[FINGERPRINT] = None
         self.fingerprint: Fingerprint | None = None
         self._witness: BenchWitness | None = None
-        self.evidence: BenchEvidence | None = None
-        self.blocked = ""
         self._health: Health | None = None
         self._allowed: tuple[str, ...] = ()
         self._passed, self._stack, self._others = False, ExitStack(), threading.enumerate()
-        self.unheard: list[str] = []
         self._is_misused = False
-        self.kept: list[Path] = []
-        self.not_kept: list[str] = []
 
     def open(self) -> Bench:
         """Open the bench.
@@ -137,7 +125,7 @@ class BenchedTest:
 
             self._witness = BenchWitness(bench)
         if self._settings.compare and bench.mode == VIRTUAL:
-            self.fingerprint = bench._mode.act(Fingerprint)
+            self.fingerprint = self.item.stash[FINGERPRINT] = bench._mode.act(Fingerprint)
         return bench
 
     def _listen(self) -> None:
@@ -170,12 +158,6 @@ class BenchedTest:
                 self.evidence = self._witness.evidence()
         finally:
             bench.close()
-
-    def take_unheard(self) -> list[str]:
-        """Return what went wrong beside the body of the test, and was not told yet."""
-        told = list(self.unheard)
-        del self.unheard[: len(told)]
-        return told
 
     def _keep(self) -> None:
         """Keep what is to be kept, once."""

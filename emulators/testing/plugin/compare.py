@@ -14,7 +14,6 @@ from _pytest.runner import runtestprotocol
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.plugin.journal_text import signals_of
-from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
@@ -81,6 +80,9 @@ class Fingerprint:
 
 _HASH: Final = "bench_hash"
 """The property of a test that has the hash of all that happened on its bench."""
+
+FINGERPRINT: Final[pytest.StashKey[Fingerprint | None]] = pytest.StashKey()
+"""Of a test with a bench: what happened in its latest run."""
 
 _FIRST: Final[pytest.StashKey[Fingerprint]] = pytest.StashKey()
 """Of the first run, while a test runs for the second time."""
@@ -163,8 +165,7 @@ def _end(item: pytest.Item, nextitem: pytest.Item | None) -> _Reports:
 
 
 def _fingerprint(item: pytest.Item) -> Fingerprint | None:
-    test = item.stash.get(BENCHED, None)
-    return test.fingerprint if test else None
+    return item.stash.get(FINGERPRINT, None)
 
 
 def _judge(item: pytest.Item, first: Fingerprint, last: pytest.TestReport) -> None:

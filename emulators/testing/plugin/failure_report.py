@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import pytest
 
@@ -18,16 +18,12 @@ from tickrig.emulators.testing.bench.journal import missing_of
 from tickrig.emulators.testing.plugin.journal_text import buses_of, frame_of, last_lines
 from tickrig.emulators.testing.plugin.parameters import words_of
 from tickrig.emulators.testing.plugin.settings import SETTINGS
-from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
 from tickrig.emulators.testing.report.bench_report import Outcome
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import format_time
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.can import LogLine
-
-if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.benched_test import BenchedTest
-
 
 # What is kept of a test: its trace, the frames of its buses, its transcript.
 
@@ -145,7 +141,7 @@ _LINES: Final = 20
 """So many lines and frames are told."""
 
 
-def sections_of(test: BenchedTest) -> list[tuple[str, str]]:
+def sections_of(test: TestWithBench) -> list[tuple[str, str]]:
     """Return the sections of a report, each with its title."""
     command = ("bench: repeat it with", repeat_command(test.item))
     if test.bench is None:
@@ -179,7 +175,7 @@ def repeat_command(item: pytest.Item) -> str:
     return shlex.join(words)
 
 
-def _wanted(test: BenchedTest) -> str:
+def _wanted(test: TestWithBench) -> str:
     bench = test.bench
     assert bench is not None
     what = test.wanted.text
@@ -188,7 +184,7 @@ def _wanted(test: BenchedTest) -> str:
     return f"{named}; {bench.mode}, seed {test.wanted.seed_used}, {format_time(bench.now_us)} s old"
 
 
-def _kept(test: BenchedTest) -> str:
+def _kept(test: TestWithBench) -> str:
     """Return the files that were kept; a trace is a command."""
     paths = [shlex.quote(relpath(path)) for path in test.kept]
     lines = [f"tickrig replay {path}" if path.endswith(_TRACE) else path for path in paths]

@@ -3,16 +3,70 @@
 from __future__ import annotations
 
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Final
 
 import pytest
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.benched_test import BenchedTest
+    from pathlib import Path
 
-BENCHED: Final[pytest.StashKey[BenchedTest]] = pytest.StashKey()
+    from tickrig.emulators.testing.bench.bench import Bench
+    from tickrig.emulators.testing.plugin.bench_evidence import BenchEvidence
+    from tickrig.emulators.testing.plugin.bench_source import WantedBench
+
+
+class TestWithBench(ABC):
+    """A test that asked for a bench, as hooks and reports see it.
+
+    Args:
+        item: the test.
+        wanted: what it asked for.
+
+    Attributes:
+        bench: its bench, from the moment at which it is open.
+        evidence: what a report shows of it, when it is closed.
+        blocked: why the test came to no verdict, empty if it did.
+        unheard: what went wrong beside its body and was not told yet, each in a line.
+        kept: files that were kept of it.
+        not_kept: why other files were not, or not whole, each in a line.
+    """
+
+    __test__ = False
+
+    def __init__(self, item: pytest.Function, wanted: WantedBench) -> None:
+        self.item, self.wanted = item, wanted
+        self.bench: Bench | None = None
+        self.evidence: BenchEvidence | None = None
+        self.blocked = ""
+        self.unheard: list[str] = []
+        self.kept: list[Path] = []
+        self.not_kept: list[str] = []
+
+    def take_unheard(self) -> list[str]:
+        """Return what went wrong beside the body of the test, and was not told yet."""
+        told = list(self.unheard)
+        del self.unheard[: len(told)]
+        return told
+
+    @abstractmethod
+    def judged(self) -> AbstractContextManager[None]:
+        """Fail the test if it looks at a wrong clock, or leaves its bench as none may be."""
+
+    @abstractmethod
+    def judge(
+        self, report: pytest.TestReport, call: pytest.CallInfo[None], *, mistaken: bool
+    ) -> None:
+        """Complete the report of a phase of the test."""
+
+    @abstractmethod
+    def run_body(self, function: pytest.Function) -> None:
+        """Run an async test: time of the bench passes while it waits."""
+
+
+BENCHED: Final[pytest.StashKey[TestWithBench]] = pytest.StashKey()
 """Of a test that asked for a bench."""
 
 _ERRORS: Final = "tickrig.emulators.testing.bench.errors"
