@@ -198,9 +198,10 @@ class BlockPrinter:
     Args:
         output: text, or a log.
         lines: writes single lines of text; it goes on where this ends, and the other way round.
+        decoder: tells what frames mean; it is fed by others in between. None where nobody asks.
     """
 
-    def __init__(self, output: DumpFormat, lines: DumpLines) -> None:
+    def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
         from tickrig.host.canmon.model.columns.column_text import (  # noqa: PLC0415 - numpy
             ScreenText,
             fits,
@@ -209,14 +210,25 @@ class BlockPrinter:
         from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
 
         self._fits, self._records, self._print = fits, records, printer_of(output, lines, raw=False)
-        self._write = log_lines if output is DumpFormat.LOG else ScreenText(lines).text
+        self._log_lines, self._screen = log_lines, ScreenText(lines)
+        self._output, self._meaning, self._decode = output, FilteredDecoder(decoder, None), None
+        if decoder is not None:
+            from tickrig.host.canmon.model.columns.column_meanings import (  # noqa: PLC0415
+                ColumnMeanings,
+            )
 
-    def text(self, columns: Columns, meaning: FilteredDecoder) -> str:
+            self._decode = ColumnMeanings(decoder).texts
+
+    def text(self, columns: Columns) -> str:
         """Write frames; the last line is without its end."""
+        if not len(columns):
+            return ""
         if not self._fits(columns):
-            found = meaning.take(self._records(columns))
+            found = self._meaning.take(self._records(columns))
             return "\n".join(self._print(*one) for one in found)
-        return self._write(columns)[:-1] if len(columns) else ""
+        if self._output is DumpFormat.LOG:
+            return self._log_lines(columns)[:-1]
+        return self._screen.text(columns, self._decode and self._decode(columns))[:-1]
 
 
 _DROPS: Final = {

@@ -203,9 +203,9 @@ def command(  # noqa: PLR0913 - options
     lines = DumpLines(Stamp(stamp or ""), extra)
     writer = StdoutWriter(printer_of(form, lines, plain, errors), form)
     take: _Take = writer.take
-    alike = form in (DumpFormat.TEXT, DumpFormat.LOG) and file is None and not errors and plain
+    alike = form in (DumpFormat.TEXT, DumpFormat.LOG) and file is None and not errors
     if alike and chosen is None and count is None and (pieces := piece_log(source)):
-        _pass_pieces(pieces, meaning, writer, BlockPrinter(form, lines))
+        _pass_pieces(pieces, meaning, writer, BlockPrinter(form, lines, decoder))
         report(pieces, strict)
         return
     with ExitStack() as held:
@@ -235,7 +235,7 @@ def _pass_pieces(
             if isinstance(piece, Sequence):
                 writer.take(list(meaning.take(piece)), log.lost, log.marks)
             else:
-                writer.take_text(blocks.text(piece, meaning), log.lost)
+                writer.take_text(blocks.text(piece), log.lost)
 
 
 def _with_keys(log: LogFile, keys: TriggerKeys) -> _Take:

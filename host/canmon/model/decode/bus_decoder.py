@@ -85,7 +85,8 @@ if TYPE_CHECKING:
 # stand in functions because `canmon check` of three lines has to start quickly
 # (tests/test_start_up.py).
 
-_Route = Callable[[int, CanFrame], Decoded]
+Route = Callable[[int, CanFrame], Decoded]
+"""Decodes the frames of a CAN-ID, each with its time."""
 
 _SYNC_ID: Final = 0x080
 _TIME_ID: Final = 0x100
@@ -94,7 +95,7 @@ _NODE_MASK: Final = 0x7F
 COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 _SDO_SERVERS: Final = range(0x1201, 0x1280)
 _LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
-_PRE_DEFINED: Final[dict[int, _Route]] = {
+_PRE_DEFINED: Final[dict[int, Route]] = {
     NMT_COB_ID: decode_nmt,
     _SYNC_ID: decode_sync,
     _TIME_ID: decode_time,
@@ -131,8 +132,8 @@ class BusDecoder:
         self._channels: dict[tuple[int, int], SdoChannel] = {}
         self._guarded: set[int] = set()
         self._pdos = PdoTable()
-        self._configured: dict[int, _Route] = {}
-        self._routes: dict[int, _Route] = {}
+        self._configured: dict[int, Route] = {}
+        self._routes: dict[int, Route] = {}
         for node, objects in eds.items():
             self._refresh(pdos_of(node, (index for index, _ in objects.values)))
             for index in (COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY, *_SDO_SERVERS):
@@ -160,6 +161,17 @@ class BusDecoder:
             return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
         return Effect.NONE if layout is None and route is not decode_nmt else Effect.EACH
 
+    def lasting(self, can_id: int) -> Route | None:
+        """Return what decodes a CAN-ID by the frame alone until `changes` grows; None for others.
+
+        Others are error control, SDO and multiplexed PDOs: there it counts what came before.
+        """
+        route = self._routes.get(can_id) or self._route(can_id)
+        told = route.func if isinstance(route, partial) else route
+        by_frame = told in (_unmapped, _emcy, _raw, decode_nmt, decode_sync, decode_time)
+        alone = by_frame or (can_id in _LSS_IDS and told is _lss_route())
+        return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
+
     def pending(self, now_us: int) -> tuple[Transfer, ...]:
         """Return the SDO transfers that run."""
         found = (channel.pending(now_us) for channel in self._channels.values())
@@ -172,7 +184,7 @@ class BusDecoder:
             memory = self._memories[node] = NodeMemory(self._eds.get(node))
         return memory
 
-    def _route(self, can_id: int) -> _Route:
+    def _route(self, can_id: int) -> Route:
         told = self._configured.get(can_id) or _PRE_DEFINED.get(can_id)
         if told is not None:
             return told
@@ -184,7 +196,7 @@ class BusDecoder:
         node = can_id & _NODE_MASK
         return self._node_route(node, can_id) if node else _raw
 
-    def _node_route(self, node: int, can_id: int) -> _Route:
+    def _node_route(self, node: int, can_id: int) -> Route:
         """Return what the pre-defined connection set says of a CAN-ID with a node-ID in it."""
         match can_id - node:
             case 0x080:
@@ -196,7 +208,7 @@ class BusDecoder:
             case _:
                 return partial(_unmapped, node) if can_id in _PDO_IDS else _raw
 
-    def _sdo_route(self, node: int, can_id: int, request_id: int) -> _Route:
+    def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
         from tickrig.host.canmon.model.decode.sdo import (  # noqa: PLC0415 - not on every bus
             SdoChannel,
         )
@@ -289,7 +301,7 @@ class BusDecoder:
         flags = EXTENDED if index in (COB_ID_SYNC, COB_ID_TIME) else EXTENDED | INVALID
         return None if cob_id is None or cob_id & flags else cob_id & CAN_ID_MASK
 
-    def _configure(self, can_id: int, route: _Route) -> None:
+    def _configure(self, can_id: int, route: Route) -> None:
         self.changes += 1
         self._configured[can_id] = route
         self._routes.pop(can_id, None)
@@ -316,7 +328,7 @@ def _signals(transfer: Transfer) -> tuple[Signal, ...]:
     return (Signal(name, transfer.value, transfer.unit, transfer.text),)
 
 
-def _lss_route() -> _Route:
+def _lss_route() -> Route:
     from tickrig.host.canmon.model.decode.services import (  # noqa: PLC0415 - on few buses
         decode_lss,
     )

@@ -56,6 +56,14 @@ class DbcFile:
             for ident, message in self._messages.items()
         }
 
+    def names(self, can_id: int, extended: bool) -> bool:
+        """Say whether the file names a CAN-ID."""
+        return (can_id, extended) in self._messages
+
+    def message(self, can_id: int, extended: bool) -> Message:
+        """Return what the file says of a CAN-ID that it names."""
+        return self._messages[can_id, extended]
+
     def decode(self, record: Record) -> Decoded | None:
         """Return the signals of a frame; None where the file does not name its CAN-ID."""
         frame = record.frame
@@ -79,7 +87,7 @@ class DbcFile:
             if not found and not failed:
                 return Decoded("dbc", None, f"{message.name}: {error}", (), DBC)
         units = self._units[ident]  # DBCs made from EDS have several messages of one name
-        signals = tuple(_signal(name, value, units[name]) for name, value in found.items())
+        signals = tuple(signal_of(name, value, units[name]) for name, value in found.items())
         return Decoded(
             "dbc", None, " ".join([message.name, *map(str, signals), *note]), signals, DBC
         )
@@ -140,7 +148,7 @@ def _alone(message: Message, signal: SignalOfDbc) -> Message:
     )
 
 
-def _signal(name: str, value: Value | NamedSignalValue, unit: str) -> Signal:
+def signal_of(name: str, value: Value | NamedSignalValue, unit: str) -> Signal:
     """Return a signal; an enumerated one has its name as text."""
     if isinstance(value, bool | int | float | str | bytes):
         return Signal(name, value, unit)

@@ -37,6 +37,9 @@ class Decoder:
         dbc: DBC files; the CAN-IDs that they name mean nothing else.
         first: asked before anything else what a frame says.
 
+    Attributes:
+        first: these, and behind them the DBC files.
+
     Raises:
         OSError: a file cannot be read.
         EdsError: an EDS is malformed.
@@ -53,20 +56,20 @@ class Decoder:
             node: read_eds_objects(item, node) if isinstance(item, Path) else item
             for node, item in eds.items()
         }
-        self._first: tuple[FrameDecoder, ...] = (*first, *map(DbcFile, dbc))
+        self.first: tuple[FrameDecoder, ...] = (*first, *map(DbcFile, dbc))
         self._buses: dict[str, BusDecoder] = {}
 
     @property
     def standard(self) -> bool:
         """Whether nothing but the standard, EDS and traffic tell what frames mean."""
-        return not self._first
+        return not self.first
 
     def take(self, record: Record) -> Decoded:
         """Decode a frame, and learn from it."""
         frame = record.frame
         if isinstance(frame, ErrorFrame):
             return decode_error(frame)
-        for decoder in self._first:
+        for decoder in self.first:
             decoded = decoder.decode(record)
             if decoded is not None:
                 return decoded

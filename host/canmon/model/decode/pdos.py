@@ -53,31 +53,34 @@ class PdoDecoder:
         fields: its signals; none where the mapping is not known.
         bits: how many are mapped.
         note: what people must know of the mapping.
+
+    Attributes:
+        size: how many bytes are mapped.
     """
 
     def __init__(
         self, pdo: tuple[str, int, str], fields: Sequence[Field] = (), bits: int = 0, note: str = ""
     ) -> None:
         self.kind, self.node, self.source = pdo
-        self._fields, self._size, self._note = tuple(fields), (bits + 7) // 8, note
-        self._wanted = None if note else self._size
+        self.fields, self.size, self.note = tuple(fields), (bits + 7) // 8, note
+        self._wanted = None if note else self.size
 
     def decode(self, at_us: int, frame: CanFrame) -> Decoded:
         """Return the signals of a frame."""
         data = frame.data
         if frame.remote:
             return Decoded(self.kind, self.node, "asked for by RTR", (), self.source)
-        if len(data) < self._size:
-            text = f"{len(data)} B, {self._size} are mapped: not processed"
+        if len(data) < self.size:
+            text = f"{len(data)} B, {self.size} are mapped: not processed"
             return Decoded(self.kind, self.node, text, (), self.source, size=self._wanted)
         number = int.from_bytes(data, "little")
         signals = []
-        for name, shift, mask, sign, convert, unit, write in self._fields:
+        for name, shift, mask, sign, convert, unit, write in self.fields:
             raw = number >> shift & mask
             # Two's complement without a branch: `sign` is 0 for a type without one.
             value: Value = (raw ^ sign) - sign if convert is None else convert(raw)
             signals.append(Signal(name, value, unit, "" if write is None else write(raw)))
-        said = " ".join([*map(str, signals), self._note]) if self._note else None
+        said = " ".join([*map(str, signals), self.note]) if self.note else None
         kind, node, told = self.kind, self.node, self._wanted
         return Decoded(kind, node, said, tuple(signals), self.source, size=told)
 
