@@ -6,22 +6,38 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
+
+import click
 
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen.build import describe_nodes, make_nodes
+from tickrig.emulators.canopen.choices import parse_node
+from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.node import Node
-from tickrig.emulators.commands.device_type import ConfiguredDevice
-from tickrig.emulators.record.comparison import Pair, Said, Tolerance, compare
-from tickrig.emulators.record.replay import BenchRecording, do, play_device, traffic_of
+from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice, configure
+from tickrig.emulators.commands.run import mistakes_in
+from tickrig.emulators.record.comparison import Pair, Said, Tolerance, compare, parse_number_rule
+from tickrig.emulators.record.replay import (
+    BenchRecording,
+    do,
+    play_device,
+    read_bench_recording,
+    traffic_of,
+)
 from tickrig.emulators.record.wire_log import Splitter, WireLine, line_splitter
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.emulator import Emulator
+from tickrig.emulators.testing.bench.recorded_device import make_recorded, user_code
+from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say, show_findings
 from tickrig.host.text.bench_record import BenchRecord
 from tickrig.host.text.byte_text import escape
+from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
-from tickrig.host.text.values import counted, format_time
+from tickrig.host.text.values import counted, format_time, parse_setting
 from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.instant import NEVER
 
@@ -393,3 +409,128 @@ def _counts(name: str, pairs: Sequence[Pair]) -> tuple[str, str, str, str, str]:
         str(sum(bool(pair.difference) for pair in pairs)),
         f"{worst_us / 1_000:.1f} ms",
     )
+
+
+# `tickrig compare`: the runs that its command line names.
+
+_BIT_RATE: Final = 1_000_000
+
+
+def run_compare(file: Path, options: Mapping[str, Any], *, verbose: bool) -> int:
+    """Compare as the command line asks, and return the exit status."""
+    tolerance = _read_tolerance(options)
+    try:
+        recording = read_bench_recording(file.read_bytes())
+        mine = [*user_code(recording.header.devices.values()), *_given_code(options)]
+        with mistakes_in(mine):
+            runs = dict(_runs(file, recording, tolerance, options))
+    except OSError as error:
+        refuse_path("trace", error)
+    except ValueError as error:
+        raise Refused(f"trace {file}: {error}") from None
+    if not any(run.recorded for run in runs.values()):
+        raise Refused(f"trace {file}: no device says anything in it that could be compared")
+    if not recording.ended:
+        say(f"{file}: no end line (killed?); its last tick is left out")
+    pairs = {
+        name: compare(run.recorded, run.emulated, recording.until_us, tolerance)
+        for name, run in runs.items()
+    }
+    lines, same = report(str(file), pairs, tolerance.time_us, everything=verbose)
+    for line in lines:
+        click.echo(line)
+    return 0 if same else 1
+
+
+def _given_code(options: Mapping[str, Any]) -> list[str]:
+    """Return what may be a `FILE.py:Class` of a user in --node and --config."""
+    return [text.partition("=")[2] for text in (*options["nodes"], *options["config"])]
+
+
+def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
+    with refused_at("--number"):
+        numbers = [parse_number_rule(text) for text in options["numbers"]]
+    return Tolerance(options["time_us"], numbers, options["ignore"], options["kinds"])
+
+
+def _runs(
+    file: Path, recording: BenchRecording, tolerance: Tolerance, options: Mapping[str, Any]
+) -> Iterator[tuple[str, ComparedRun]]:
+    """Give the two runs of each device, of a recorded bus those of all nodes together."""
+    for name in recording.header.devices:
+        if not recording.at_port:
+            yield name, _ticked(file, recording, name, options)
+        elif recording.header.on_can(name):
+            yield name, _on_bus(recording, name, tolerance, options)
+        else:
+            yield name, _on_line(recording, name, tolerance, options)
+
+
+def _ticked(
+    file: Path, recording: BenchRecording, name: str, options: Mapping[str, Any]
+) -> ComparedRun:
+    """Compare tick by tick."""
+    header = recording.header
+    entry, on_can = header.devices[name], header.on_can(name)
+    if options["type_name"] and not on_can:
+        return compare_ticks(recording, name, _configured(options, ""))
+    device = make_recorded(header, name, file.parent, EdsCache(), run_code=options["run_code"])
+    if on_can:
+        return compare_node_ticks(recording, name, device)
+    configured = ConfiguredDevice(DEVICES.load(entry.type), device, entry.config)
+    return compare_ticks(recording, name, configured)
+
+
+def _on_line(
+    recording: BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
+) -> ComparedRun:
+    """Compare what passed a serial port."""
+    recorded = recording.header.devices[name].type
+    if not (recorded or options["type_name"]):
+        raise ValueError("it does not say of which type the device is: add --type, as --type rrc")
+
+    def make() -> ConfiguredDevice:
+        return _configured(options, recorded)
+
+    return compare_port(recording, name, make, tolerance, options["settle_us"])
+
+
+def _on_bus(
+    recording: BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
+) -> ComparedRun:
+    """Compare what passed a bus."""
+    try:
+        specs = [spec for text in options["nodes"] for spec in parse_node(text)]
+        described = describe_nodes(specs)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    if not specs:
+        raise ValueError("which nodes were on the bus? add --node, as --node 5=epos")
+    show_findings(odd for item in described for odd in item.description.warnings)
+    wire = recording.header.wires[recording.header.devices[name].wire]
+    bit_rate = wire.config.get("bit_rate", _BIT_RATE)
+    if not isinstance(bit_rate, int):
+        raise ValueError(f"its bit rate is {bit_rate!r:.60}")
+    return compare_bus(
+        recording,
+        lambda bus: make_nodes(described, bus),
+        tolerance,
+        options["settle_us"],
+        bit_rate,
+    )
+
+
+def _configured(options: Mapping[str, Any], recorded: str) -> ConfiguredDevice:
+    """Make the device of --type and --config, or of the trace."""
+    name = options["type_name"] or recorded
+    if name not in DEVICES.names():
+        raise Refused(f"no device type {name!r:.60}; {near(name, DEVICES.names())}")
+    words: Sequence[str] = options["config"]
+    with refused_at("--config"):
+        config = {}
+        for word in words:
+            key, equals, value = word.partition("=")
+            if not equals:
+                raise ValueError(f"{word!r} is not NAME=VALUE")
+            config[key] = parse_setting(value)
+        return configure(name, config)
