@@ -14,9 +14,9 @@ import click
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import describe_nodes, make_nodes
-from tickrig.emulators.canopen.choices import parse_node
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.canopen.node import Node
+from tickrig.emulators.canopen.node_spec import parse_node
 from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice, configure
 from tickrig.emulators.commands.run import mistakes_in
 from tickrig.emulators.record.comparison import Pair, Said, Tolerance, compare, parse_number_rule

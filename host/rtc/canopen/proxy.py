@@ -10,8 +10,13 @@ from typing import Any, Final, TypeVar
 from tickrig.host.canopen.dialogue import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry
-from tickrig.host.rtc.canopen.pdo_decoder import pdo_decoder
-from tickrig.host.rtc.canopen.pdo_layout import PORT_KINDS, PdoField, PdoLayout, sequence_of
+from tickrig.host.rtc.canopen.pdo_layout import (
+    PORT_KINDS,
+    PdoField,
+    PdoLayout,
+    pdo_decoder,
+    sequence_of,
+)
 from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode

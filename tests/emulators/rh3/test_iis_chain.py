@@ -10,8 +10,13 @@ import pytest
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.host.rtc import InPort, OutPort, connect
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.iis.interfaces import GoalInterface, RunningInformation
-from tickrig.host.rtc.motion.iis.path_interface import PASSED, STOPPED, PathInterface
+from tickrig.host.rtc.motion.iis_interfaces import (
+    PASSED,
+    STOPPED,
+    GoalInterface,
+    PathInterface,
+    RunningInformation,
+)
 from tickrig.host.rtc.motion.ports import read_all, to_pose_2d
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.idl import Struct

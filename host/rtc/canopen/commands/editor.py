@@ -38,7 +38,7 @@ def main(
     """  # noqa: D301 - click wants the backspace
     try:
         with loading():
-            from tickrig.host.rtc.canopen.editor.app import run_editor  # noqa: PLC0415 - an extra
+            from tickrig.host.rtc.canopen.commands.editor_run import run_editor  # noqa: PLC0415 - an extra
     except ImportError as error:
         raise Refused(f"the editor needs Textual: pip install 'tickrig[tui]' ({error})") from None
     run_editor(file, log, components, start, BusOptions(**options))

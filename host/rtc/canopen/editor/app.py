@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable
 from itertools import chain, repeat
 from pathlib import Path
 from textwrap import wrap
@@ -15,17 +14,6 @@ from textual.binding import Binding, BindingType
 from textual.containers import Container
 
 from tickrig.host.canmon.model.decode.decoded import write_entry
-from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import BusFailed, Refused
-from tickrig.host.links.link import LinkClosed
-from tickrig.host.rtc.canopen.commands.opening import (
-    STANDARD_OUTPUT,
-    add_components,
-    bus_of,
-    log_listener,
-    open_link,
-    read_server,
-)
 from tickrig.host.rtc.canopen.definition import ServerRefused
 from tickrig.host.rtc.canopen.editor.objects_pane import ObjectsPane
 from tickrig.host.rtc.canopen.editor.session import EditorSession
@@ -36,7 +24,6 @@ from tickrig.host.rtc.canopen.served_node import NodePhase
 from tickrig.host.rtc.canopen.view import NodeView, ServerView
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.tui import FramedApp, KeyFooter, Line, LineView
-from tickrig.wire.can import ErrorState
 
 # The line at the bottom, and lines of events.
 
@@ -310,39 +297,3 @@ class SystemEditor(FramedApp):
     def _refuse(self, why: str) -> bool:
         self.notify(why, severity="error", markup=False)
         return False
-
-
-def run_editor(
-    file: Path, log: Path | None, components: Sequence[str], start: bool, bus_options: BusOptions
-) -> None:
-    """Serve a System Definition and edit it on the terminal.
-
-    Args:
-        file: the definition.
-        log: where events are written, a line of JSON each.
-        components: of users' files, as `Logger0=parts.py:Logger`.
-        start: activate all nodes.
-        bus_options: the bus of the command line.
-    """
-    if log == STANDARD_OUTPUT:
-        raise Refused("--log -: the screen is on standard output; name a file")
-    server = read_server(file, components)
-    if not sys.stdout.isatty():
-        raise Refused("the editor needs a terminal; rtc-canopen-server does without one")
-    with ExitStack() as stack:
-        listeners = tuple(log_listener(log, stack))
-        bus = bus_of(bus_options, server.definition.bus)
-
-        def bus_state(state: ErrorState) -> None:
-            session.bus_state(state)
-
-        bus_link, name = open_link(bus, bus_state, stack)
-        session = EditorSession(
-            server, file, bus_link, lambda other: add_components(other, components), listeners
-        )
-        if start:
-            server.start()
-        try:
-            SystemEditor(session, name).run_session()
-        except LinkClosed as error:
-            raise BusFailed(str(error)) from None

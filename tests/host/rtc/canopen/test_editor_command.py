@@ -34,7 +34,7 @@ def test_what_cannot_be_is_one_line(words: tuple[str, ...], reason: str) -> None
 
 
 def test_without_textual_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "tickrig.host.rtc.canopen.editor.app", None)
+    monkeypatch.setitem(sys.modules, "tickrig.host.rtc.canopen.commands.editor_run", None)
     result = run(FIG_120)
     assert result.exit_code == 2
     assert "pip install 'tickrig[tui]'" in result.stderr

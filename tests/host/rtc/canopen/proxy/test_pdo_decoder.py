@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickrig.host.rtc.canopen.pdo_decoder import pdo_decoder
-from tickrig.host.rtc.canopen.pdo_layout import PDO_FIELD_TYPES, PdoLayout, lay_out
+from tickrig.host.rtc.canopen.pdo_layout import PDO_FIELD_TYPES, PdoLayout, lay_out, pdo_decoder
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.pdo import MappedObject
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.host.rtc.motion.port_bench import PortBench, at
 from tickrig.host.rtc import RtComponent
 from tickrig.host.rtc.motion.geometry import wrap
-from tickrig.host.rtc.motion.iis.adapters import (
+from tickrig.host.rtc.motion.iis_interfaces import (
     Position2To3,
     Position3To2,
     PositiveHeading,

@@ -6,7 +6,7 @@ import pytest
 
 from tests.host.rtc.motion.port_bench import PortBench, at, way
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.iis.path_interface import PASSED, STOPPED, PathInterface
+from tickrig.host.rtc.motion.iis_interfaces import PASSED, STOPPED, PathInterface
 from tickrig.host.rtc.motion.ports import RunMode
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Path, Velocity2D

@@ -9,7 +9,7 @@ import pytest
 from tests.host.rtc.motion.port_bench import PortBench, at
 from tickrig.host.rtc import InPort, Manager, OutPort, connect
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.iis.interfaces import GoalInterface, RunningInformation
+from tickrig.host.rtc.motion.iis_interfaces import GoalInterface, RunningInformation
 from tickrig.host.rtc.motion.ports import read_all, to_pose_2d
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time

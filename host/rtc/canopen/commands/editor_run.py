@@ -1,0 +1,59 @@
+"""What rtc-canopen-editor does, once its options are read; it needs the extra `tui`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import BusFailed, Refused
+from tickrig.host.links.link import LinkClosed
+from tickrig.host.rtc.canopen.commands.opening import (
+    STANDARD_OUTPUT,
+    add_components,
+    bus_of,
+    log_listener,
+    open_link,
+    read_server,
+)
+from tickrig.host.rtc.canopen.editor.app import SystemEditor
+from tickrig.host.rtc.canopen.editor.session import EditorSession
+from tickrig.wire.can import ErrorState
+
+
+def run_editor(
+    file: Path, log: Path | None, components: Sequence[str], start: bool, bus_options: BusOptions
+) -> None:
+    """Serve a System Definition and edit it on the terminal.
+
+    Args:
+        file: the definition.
+        log: where events are written, a line of JSON each.
+        components: of users' files, as `Logger0=parts.py:Logger`.
+        start: activate all nodes.
+        bus_options: the bus of the command line.
+    """
+    if log == STANDARD_OUTPUT:
+        raise Refused("--log -: the screen is on standard output; name a file")
+    server = read_server(file, components)
+    if not sys.stdout.isatty():
+        raise Refused("the editor needs a terminal; rtc-canopen-server does without one")
+    with ExitStack() as stack:
+        listeners = tuple(log_listener(log, stack))
+        bus = bus_of(bus_options, server.definition.bus)
+
+        def bus_state(state: ErrorState) -> None:
+            session.bus_state(state)
+
+        link, name = open_link(bus, bus_state, stack)
+        session = EditorSession(
+            server, file, link, lambda other: add_components(other, components), listeners
+        )
+        if start:
+            server.start()
+        try:
+            SystemEditor(session, name).run_session()
+        except LinkClosed as error:
+            raise BusFailed(str(error)) from None
