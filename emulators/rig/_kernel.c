@@ -20,6 +20,7 @@
 
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
+#include <math.h>
 #include <stdint.h>
 #include <structmember.h>
 
@@ -190,6 +191,15 @@ done(PyObject *result) /* drops what a call returned; -1 if it raised */
 static int
 read_time(PyObject *item, us *value)
 {
+    if (PyFloat_Check(item)) { /* a device of users may be due at infinity */
+        double time = ceil(PyFloat_AS_DOUBLE(item));
+        if (!(time > -(double)FAR)) {
+            PyErr_SetString(PyExc_ValueError, "a time is not a number, or before all others");
+            return -1;
+        }
+        *value = time < (double)FAR ? (us)time : NEVER;
+        return 0;
+    }
     *value = PyLong_AsLongLong(item);
     return *value == -1 && PyErr_Occurred() ? -1 : 0;
 }
@@ -1250,6 +1260,24 @@ tick_all(Timetable *table, us now_us, PyObject *number) /* the woken stations, a
     return result;
 }
 
+static int enter_due(PyObject *stations, Timetable *table);
+
+static PyObject *
+enter_stations(PyObject *module, PyObject *const *args, Py_ssize_t count)
+{
+    if (wrong_number("enter_stations", count, 2))
+        return NULL;
+    if (!is_table(args[0]) || !PyTuple_CheckExact(args[1])) {
+        PyErr_SetString(PyExc_TypeError, "enter_stations() takes a Timetable and its stations");
+        return NULL;
+    }
+    if (!enabled)
+        Py_RETURN_FALSE;
+    if (enter_due(args[1], (Timetable *)args[0]) < 0)
+        return NULL;
+    Py_RETURN_TRUE;
+}
+
 static PyObject *
 tick_stations(PyObject *module, PyObject *const *args, Py_ssize_t count)
 {
@@ -1285,8 +1313,22 @@ enter_due(PyObject *stations, Timetable *table) /* Rig._enter_due */
 }
 
 static int
-make_tick(PyObject *rig, Timetable *table, Segment *segment, PyObject *horizon, us now_us)
+watch(PyObject *watchers, PyObject *number) /* Rig._watch */
 {
+    PyObject *all = PyList_AsTuple(watchers);
+    int result = all == NULL ? -1 : 0;
+    for (Py_ssize_t i = 0; result == 0 && i < PyTuple_GET_SIZE(all); i++)
+        result = done(PyObject_CallOneArg(PyTuple_GET_ITEM(all, i), number));
+    Py_XDECREF(all);
+    return result;
+}
+
+static int
+make_tick(PyObject *rig, PyObject *const *part, us now_us) /* Rig._happen and Rig._run */
+{
+    Timetable *table = (Timetable *)part[0];
+    Segment *segment = (Segment *)part[1];
+    PyObject *horizon = part[3], *watchers = part[4];
     PyObject *number = PyLong_FromLongLong(now_us), *outer = PyObject_GetAttr(rig, s_in_step);
     int result = number == NULL || outer == NULL ||
                          PyObject_SetAttr(rig, s_in_step, Py_True) < 0 ||
@@ -1298,6 +1340,13 @@ make_tick(PyObject *rig, Timetable *table, Segment *segment, PyObject *horizon, 
         result = tick_all(table, now_us, number);
     if (result == 0)
         result = PyObject_SetAttr(horizon, s_passed_us, number);
+    if (result == 0 && PyList_GET_SIZE(watchers)) {
+        result = advance(segment, now_us);
+        if (result == 0)
+            result = watch(watchers, number);
+        if (result == 0)
+            result = enter_due(part[6], table);
+    }
     if (outer != NULL) {
         PyObject *type, *value, *trace;
         PyErr_Fetch(&type, &value, &trace);
@@ -1334,18 +1383,18 @@ run(PyObject *module, PyObject *const *args, Py_ssize_t count)
     Segment *segment = (Segment *)part[1];
     if (read_time(args[2], &until_us) < 0 || read_time(args[3], &unseen_us) < 0)
         return NULL;
-    if (!enabled || segment->whole != Py_True || PyList_GET_SIZE(watchers) ||
-        PyList_GET_SIZE(hosts) || until_us > FAR)
+    if (!enabled || segment->whole != Py_True || PyList_GET_SIZE(hosts) || until_us > FAR)
         Py_RETURN_FALSE;
     if (read_attribute(rig, s_now_us, &now_us) < 0 || enter_due(part[6], table) < 0 ||
         read_attribute(queue, s_due_us, &due_us) < 0)
         return NULL;
-    if (unseen_us > due_us - 1)
+    if (PyList_GET_SIZE(watchers))
+        unseen_us = 0;
+    else if (unseen_us > due_us - 1)
         unseen_us = due_us - 1;
     if (write_attribute(horizon, s_until_us, unseen_us) < 0)
         return NULL;
-    while (enabled && segment->whole == Py_True && !PyList_GET_SIZE(watchers) &&
-           !PyList_GET_SIZE(hosts)) {
+    while (enabled && segment->whole == Py_True && !PyList_GET_SIZE(hosts)) {
         us tick_us = table->first_us > now_us ? table->first_us : now_us;
         us next_us = tick_us < due_us ? tick_us : due_us;
         int woken = advance_until(segment, next_us - 1 < until_us ? next_us - 1 : until_us);
@@ -1367,7 +1416,7 @@ run(PyObject *module, PyObject *const *args, Py_ssize_t count)
             if (due_us <= next_us)
                 break; /* an action of the event queue */
             now_us = next_us;
-            if (make_tick(rig, table, segment, horizon, now_us) < 0)
+            if (make_tick(rig, part, now_us) < 0 || read_attribute(rig, s_now_us, &now_us) < 0)
                 return NULL;
         } else if (!PyList_GET_SIZE(segment->observers)) {
             continue; /* nobody could have entered an action */
@@ -1430,7 +1479,7 @@ bits_of(PyObject *module, PyObject *item)
 }
 
 static PyMethodDef functions[] = {
-    FAST("run", run), FAST("tick_stations", tick_stations), {"method", method, METH_VARARGS, NULL},
+    FAST("run", run), FAST("tick_stations", tick_stations), FAST("enter_stations", enter_stations), {"method", method, METH_VARARGS, NULL},
     {"enable", enable, METH_O, NULL}, {"frame_bits", bits_of, METH_O, NULL}, {NULL}};
 
 static struct PyModuleDef kernel = {PyModuleDef_HEAD_INIT, "_kernel", NULL, -1, functions};

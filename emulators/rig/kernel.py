@@ -111,8 +111,13 @@ if TYPE_CHECKING or _KERNEL is None:
         """Let the stations compute and send that have work; False if Python has to."""
         return False
 
+    def enter_stations(timetable: object, stations: object, /) -> bool:
+        """Enter the stations that are due earlier than they stand; False if Python has to."""
+        return False
+
 else:
     run, tick_stations = _KERNEL.run, _KERNEL.tick_stations
+    enter_stations = _KERNEL.enter_stations
     StationFields, TimetableFields = _KERNEL.StationFields, _KERNEL.TimetableFields
     EndFields, ArbiterFields = _KERNEL.EndFields, _KERNEL.ArbiterFields
     RoutesFields, BusyFields = _KERNEL.RoutesFields, _KERNEL.BusyFields

@@ -33,9 +33,9 @@
 # far time has come when somebody asks the drive all the same.
 #
 # With the kernel (`kernel.py`), a rig whose stations are all on one bus, in virtual time, without
-# bridges, couplings, watchers and hosts, is run in C from tick to tick: `run` is the loop of
-# `_go_on`, `_happen` and `_tick` over the same fields. It returns False where an action is due,
-# a plug is pulled or somebody began to watch, and the loop here goes on.
+# bridges, couplings and hosts, is run in C from tick to tick: `run` is the loop of
+# `_go_on`, `_happen` and `_run` over the same fields. It returns False where an action is due or a
+# plug is pulled, and the loop here goes on.
 #
 # In real time (`_in_real_time`) the rig wakes at every tick, bridges take in before it and give out
 # after it, and lateness is counted; nothing is skipped.
@@ -54,7 +54,7 @@ from tickrig.device.horizon import Horizon
 from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.kernel import kernel, run, tick_stations
+from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
 from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
 from tickrig.emulators.rig.station import Station, Timetable, next_tick_us
 from tickrig.emulators.rig.wire_port import is_wire_port
@@ -479,6 +479,8 @@ class Rig(Copyable):
 
     def _enter_due(self) -> None:
         """Enter what has come due between steps: inputs set, a dictionary written."""
+        if kernel and enter_stations(self._timetable, self._woken):
+            return
         for station in self._woken:
             if (due_us := station.device.due_us) < station.at_us:
                 self._timetable.enter(station, due_us)

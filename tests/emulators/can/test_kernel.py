@@ -72,7 +72,22 @@ nodes = st.lists(
 FAULTS = ("drop", "corrupt", "duplicate", "delay", "babble", "short")
 acts = st.tuples(
     st.integers(1, 20_000),
-    st.sampled_from(("run", "run", "send", "send", "arm", "clear", "pull", "plug", "cut", "join")),
+    st.sampled_from(
+        (
+            "run",
+            "run",
+            "send",
+            "send",
+            "arm",
+            "clear",
+            "pull",
+            "plug",
+            "cut",
+            "join",
+            "watch",
+            "put",
+        )
+    ),
     st.integers(0, MOST_NODES - 1),
     st.sampled_from(FAULTS),
     st.lists(some_frames(), max_size=3).map(tuple),
@@ -86,6 +101,7 @@ class Played:
     def __init__(self, bit_rate: int, made: list[tuple[int, dict[int, Frames]]]) -> None:
         self.wire = CanWire(bit_rate, seed=3)
         self.log: list[tuple[int, CanFrame | ErrorFrame]] = []
+        self.watched: list[tuple[int, bool, int, int]] = []
         self.wire.observers.append(self.hear)
         ends = [self.wire.end() for _ in made]
         self.nodes = [Node(n, tick_us, its) for n, (tick_us, its) in enumerate(made)]
@@ -114,17 +130,41 @@ class Played:
                 self.wire.reconnect(end)
             case "cut":
                 self.wire.cut_power(end)
+            case "watch":
+                self.rig.watchers.append(self.watch)
+            case "put":
+                self.rig.event_queue.put(number, self.rig.now_us + after_us // 2, self.put)
             case "join":
                 self.ends.append(self.wire.end(frozenset({0x100, 0x181})))
                 self.wire.bus.recover(end, self.rig.now_us)
         self.rig.run_for(after_us)
+
+    def watch(self, now_us: int) -> None:
+        """Look at the rig, and set something now and then."""
+        self.watched.append((now_us, self.rig.in_step, self.rig.now_us, len(self.log)))
+        if now_us % 7_000 == 0:
+            self.nodes[0].bursts.insert(0, (now_us, (CanFrame(0x101, b"w"),)))
+        if len(self.watched) > 40:
+            self.rig.watchers.clear()
+
+    def put(self, now_us: int) -> None:
+        """Send what an action sends."""
+        self.host.send(now_us, (CanFrame(0x1FF, now_us.to_bytes(4, "big")),))
 
     def seen(self) -> object:
         """Return all that can be seen, and the whole state."""
         ends = [(e.poll_stamped(self.rig.now_us), e.lost, e.controller.tec) for e in self.ends]
         heard = [node.heard for node in self.nodes]
         rest = self.wire.due_us, self.wire.load_permille(), self.rig.next_us
-        return self.log, heard, ends, rest, state_of(self.wire.bus), state_of(self.ends[0])
+        return (
+            self.log,
+            self.watched,
+            heard,
+            ends,
+            rest,
+            state_of(self.wire.bus),
+            state_of(self.ends[0]),
+        )
 
 
 def state_of(item: Any) -> dict[str, object]:
