@@ -28,9 +28,9 @@ from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode.filter import Filter
     from tickrig.host.canmon.model.frames import AnyRecord
+    from tickrig.host.canmon.model.logs.log_writer import TextBlock
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
 
@@ -90,9 +90,9 @@ class LogFile:
             raise SourceFailed(self.recorder.failed)
         return bool(self.recorder.ended)
 
-    def take_block(self, block: Columns) -> bool:
+    def take_block(self, block: TextBlock) -> bool:
         """Add many frames at once, one at least; False where `take` is to add them."""
-        self._watch.latest_us = int(block.at_us[-1])
+        self._watch.latest_us = block.last_us
         taken = self.recorder.take_block(block, self._now_us)
         if self.recorder.failed:
             raise SourceFailed(self.recorder.failed)

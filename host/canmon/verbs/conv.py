@@ -28,7 +28,7 @@ from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import INTERRUPTED
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.logs.log_writer import TextBlock
     from tickrig.host.canmon.model.logs.mark import Mark
 
 
@@ -84,16 +84,16 @@ def command(  # noqa: PLR0913 - options
 def _pass_pieces(
     log: PieceLog,
     take: Callable[[list[DecodedFrame], int, Sequence[Mark]], bool],
-    take_block: Callable[[Columns], bool],
+    take_block: Callable[[TextBlock], bool],
 ) -> None:
     """Pass a large log on, of which all frames are wanted."""
-    from tickrig.host.canmon.model.columns.column_text import fits  # noqa: PLC0415 - numpy
+    from tickrig.host.canmon.model.columns.column_text import ColumnText, fits  # noqa: PLC0415 - numpy
     from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
 
     for piece in log.pieces():
         if isinstance(piece, Sequence):
             take([(record, None) for record in piece], log.lost, log.marks)
-        elif len(piece) and not (fits(piece) and take_block(piece)):
+        elif len(piece) and not (fits(piece) and take_block(ColumnText(piece))):
             take([(record, None) for record in records(piece)], log.lost, log.marks)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from tickrig.host.canmon.model.logs.can_log import (
     BLF_FRAMES,
     BLF_NOTES,
     OBJECT_BYTES,
+    BlfBlock,
     channel_name,
 )
 from tickrig.host.canmon.model.logs.log_file import END_S
@@ -51,20 +52,6 @@ _KINDS: Final = np.full(256, _PLAIN, np.uint8)
 _KINDS[list(_FRAMES)], _KINDS[list(BLF_NOTES)], _KINDS[list(BLF_FRAMES)] = _FRAME, _NOTE, _ODD
 
 _Places = npt.NDArray[np.int64]
-
-
-class BlfBlock(NamedTuple):
-    """What is in a container.
-
-    Attributes:
-        rows: its frames.
-        notes: place, size and type of the objects that tell of errors.
-        end: where its last whole object ends.
-    """
-
-    rows: Rows
-    notes: list[tuple[int, int, int]]
-    end: int
 
 
 class _Objects:
@@ -123,7 +110,8 @@ class BlfBlocks:
         rows = self._rows(found.select(np.flatnonzero(kinds == _FRAME)), start_s)
         if rows is None:
             return None
-        return BlfBlock(rows, [(*one, kind) for one, kind in zip(told, types, strict=True)], end)
+        noted = [(*one, kind) for one, kind in zip(told, types, strict=True)]
+        return BlfBlock(rows, len(rows.known), noted, end)
 
     def _rows(self, frames: _Objects, start_s: float) -> Rows | None:
         """Return a row for each frame; None where one is not as usual."""

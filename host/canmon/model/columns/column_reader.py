@@ -383,7 +383,8 @@ class ColumnReader:
         from tickrig.host.canmon.model.logs.can_log import CanLogReader  # noqa: PLC0415
 
         assert isinstance(reader, CanLogReader), "it reads BLF"
-        return reader.blocks(BlfBlocks(self._channels))
+        found = reader.blocks(BlfBlocks(self._channels))
+        return (one if isinstance(one, Record) else one.rows for one in found)
 
     def _of_lines(self) -> Iterator[Rows]:
         whole, number, clock = WholeLines(), 0, None

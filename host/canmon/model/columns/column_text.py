@@ -213,6 +213,32 @@ class ScreenText:
         return [b" (", *told, b")"]
 
 
+class ColumnText:
+    """Frames as a writer of a log takes them, one at least; see `TextBlock`.
+
+    Args:
+        columns: the frames.
+    """
+
+    def __init__(self, columns: Columns) -> None:
+        self._columns, at_us = columns, columns.at_us
+        self.first_us, self.last_us = int(at_us[0]), int(at_us[-1])
+        self.earliest_us, self.latest_us = int(at_us.min()), int(at_us.max())
+        self.errors = bool((columns.ident & np.uint32(ERROR)).any())
+
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        return len(self._columns)
+
+    def log_lines(self) -> str:
+        """Write lines as candump does."""
+        return log_lines(self._columns)
+
+    def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
+        """Write lines as a log of Vector's has them."""
+        return asc_lines(self._columns, begin_us, number)
+
+
 def asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) -> str:
     """Write data and remote frames as a log of Vector's has them, each line with its end.
 

@@ -17,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, Final, TextIO, cast
+from typing import Any, BinaryIO, Final, NamedTuple, TextIO, cast
 
 import can
 from can.io.blf import FILE_HEADER_SIZE, BLFParseError
@@ -32,7 +32,7 @@ from tickrig.host.canmon.model.logs.log_file import (
     open_log,
     to_us,
 )
-from tickrig.host.canmon.model.logs.log_writer import BusNumbers
+from tickrig.host.canmon.model.logs.log_writer import BusNumbers, TextBlock
 from tickrig.host.canmon.model.logs.mark import (
     BAD_FRAMES,
     COUNTERS_TOLD,
@@ -44,12 +44,8 @@ from tickrig.host.canmon.model.logs.mark import (
 )
 from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
 from tickrig.host.links.can_link import to_error_frame, to_fd_frame, to_frame, to_message
-from tickrig.wire.can import ERROR_FLAG, STANDARD_MAX, ErrorClass, ErrorFrame
+from tickrig.wire.can import STANDARD_MAX, ErrorClass, ErrorFrame
 from tickrig.wire.errors import WireError
-
-if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.blf_block import BlfBlock
-    from tickrig.host.canmon.model.columns.columns import Columns, Rows
 
 # What python-can heard.
 
@@ -105,8 +101,8 @@ class CanLogReader:
         """Read the file."""
         return cast("Iterator[Record]", self.blocks(None))
 
-    def blocks(self, apart: TakeApart | None) -> Iterator[Record | Rows]:
-        """Read the file; what `apart` takes apart of a BLF log comes as rows."""
+    def blocks(self, apart: TakeApart | None) -> Iterator[Record | BlfBlock]:
+        """Read the file; what `apart` takes apart of a BLF log comes as it gives it."""
         self.tally = LogTally()
         names: dict[object, str] = {}
         for message in self._messages(apart):
@@ -124,7 +120,7 @@ class CanLogReader:
         """Read the file; its marks are counted alone."""
         return iter(self)
 
-    def _messages(self, apart: TakeApart | None) -> Iterator[can.Message | Rows]:
+    def _messages(self, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
         logging.getLogger("can.io.blf").addHandler(_UNSAID)
         with open_log(self._path) as file:
             try:
@@ -149,10 +145,10 @@ class CanLogReader:
         except NotImplementedError as error:
             raise LogError(f"{self._path}: {NO_MF4}") from error
 
-    def _blf(self, reader: BlfReader, apart: TakeApart | None) -> Iterator[can.Message | Rows]:
+    def _blf(self, reader: BlfReader, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
         count, reader.tally, reader.apart = 0, self.tally, apart
-        for message in cast("Iterator[can.Message | Rows]", reader):
-            count += 1 if isinstance(message, can.Message) else len(message.known)
+        for message in cast("Iterator[can.Message | BlfBlock]", reader):
+            count += 1 if isinstance(message, can.Message) else message.frames
             yield message
         with open_log(self._path) as file:
             ended = _has_end(file)
@@ -172,7 +168,23 @@ def channel_name(channel: object) -> str:
     return (f"can{name}" if name.isdecimal() else name)[:LONGEST_NAME]
 
 
-TakeApart = Callable[[bytes, float], "BlfBlock | None"]
+class BlfBlock(NamedTuple):
+    """What is in a container that was taken apart.
+
+    Attributes:
+        rows: its frames, as who takes it apart has them.
+        frames: how many there are.
+        notes: place, size and type of the objects that tell of errors.
+        end: where its last whole object ends.
+    """
+
+    rows: Any
+    frames: int
+    notes: list[tuple[int, int, int]]
+    end: int
+
+
+TakeApart = Callable[[bytes, float], BlfBlock | None]
 """Takes the contents of a container apart, whose log begins at a time in s."""
 
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
@@ -216,7 +228,7 @@ class BlfReader(can.BLFReader):
             for at, size, kind in block.notes:
                 self._note(data[at : at + size], kind)
             self._pos = block.end
-            yield block.rows
+            yield block
             return
         begin = at = 0
         for at, size, kind in _objects(data):
@@ -378,24 +390,22 @@ class AscWriter:
         seconds, micros = divmod(at_us - self._begin_us, 1_000_000)
         self._file.write(f"{seconds:4d}.{micros:06d} {_event(message)}\n")
 
-    def write_block(self, block: Columns, number: Callable[[str], int]) -> bool:
+    def write_block(self, block: TextBlock, number: Callable[[str], int]) -> bool:
         """Write many frames at once, 0.4 us each where one by one takes 6; False if it cannot.
 
         It leaves error frames, a frame that begins another block, and times that are not exact as
         floating-point numbers to who writes them one by one.
         """
-        from tickrig.host.canmon.model.columns.column_text import asc_lines  # noqa: PLC0415 - numpy
-
-        first_us, earliest_us = int(block.at_us[0]), int(block.at_us.min())
+        first_us, earliest_us = block.first_us, block.earliest_us
         begin_us = self._begin_us
         if earliest_us < (first_us if begin_us is None else begin_us):
             return False
-        if (block.ident & ERROR_FLAG).any() or int(block.at_us.max()) >= _EXACT_US:
+        if block.errors or block.latest_us >= _EXACT_US:
             return False
         if begin_us is None:
             self._begin(first_us)
         assert self._begin_us is not None, "it has begun"
-        self._file.write(asc_lines(block, self._begin_us, number))
+        self._file.write(block.asc_lines(self._begin_us, number))
         return True
 
     def mark(self, mark: Mark) -> None:
@@ -592,7 +602,7 @@ class CanLogWriter:
                 return
         self._writer.on_message_received(to_can(record, self._numbers.number(record.channel)))
 
-    def write_block(self, block: Columns, /) -> bool:
+    def write_block(self, block: TextBlock, /) -> bool:
         """Add many frames at once; False where they are to be added one by one."""
         writer = self._writer
         return isinstance(writer, AscWriter) and writer.write_block(block, self._numbers.number)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol, cast, runtime_checkable
+from typing import Final, Protocol, cast, runtime_checkable
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
@@ -19,9 +20,6 @@ from tickrig.host.canmon.model.logs.notation import (
     json_line,
 )
 from tickrig.wire.can import CanFrame, ErrorFrame
-
-if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.columns import Columns
 
 _BLOCK_LINES: Final = 256
 
@@ -76,11 +74,41 @@ class LogWriter(Protocol):
         ...
 
 
+class TextBlock(Protocol):
+    """Many frames that write themselves as lines at once; `column_text` has it.
+
+    Attributes:
+        first_us: when the first frame came.
+        last_us: when the last one came.
+        earliest_us: the least time.
+        latest_us: the greatest time.
+        errors: whether there are error frames.
+    """
+
+    first_us: int
+    last_us: int
+    earliest_us: int
+    latest_us: int
+    errors: bool
+
+    def __len__(self) -> int:
+        """Return how many frames there are."""
+        ...
+
+    def log_lines(self) -> str:
+        """Write them as `log_line` does, each line with its end."""
+        ...
+
+    def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
+        """Write them as `AscWriter` does; it tells the numbers of buses, from 0."""
+        ...
+
+
 @runtime_checkable
 class BlockWriter(Protocol):
     """A log that takes many frames at once."""
 
-    def write_block(self, block: Columns, /) -> bool:
+    def write_block(self, block: TextBlock, /) -> bool:
         """Add frames, one at least; False where they are to be added one by one."""
         ...
 
@@ -138,14 +166,12 @@ class TextLogWriter:
         if len(self._lines) >= _BLOCK_LINES:
             self._give()
 
-    def write_block(self, block: Columns, /) -> bool:
+    def write_block(self, block: TextBlock, /) -> bool:
         """Add many frames at once; False where they are to be added one by one."""
         if self._kind is not LogFormat.CANDUMP:
             return False
-        from tickrig.host.canmon.model.columns.column_text import log_lines  # noqa: PLC0415 - numpy
-
         self._give()
-        self._file.write(log_lines(block).encode())
+        self._file.write(block.log_lines().encode())
         return True
 
     def mark(self, mark: Mark, /) -> None:

@@ -21,7 +21,7 @@ from tickrig.host.canmon.model.logs.mark import BACK, TRIGGER, VERSION, Mark
 from tickrig.host.canmon.model.recorder.plan import RESERVE_BYTES, AtLimit, RecordingPlan
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.columns import Columns
+    from tickrig.host.canmon.model.logs.log_writer import TextBlock
 
 # One file of a recording.
 
@@ -78,13 +78,13 @@ class RecordingPart:
         self.first_us = records[0].at_us if self.first_us is None else self.first_us
         self.last_us, self._pending = records[-1].at_us, True
 
-    def write_block(self, block: Columns) -> bool:
+    def write_block(self, block: TextBlock) -> bool:
         """Add many frames at once; False where its format wants them one by one."""
         if not isinstance(self._writer, BlockWriter) or not self._writer.write_block(block):
             return False
         self.frames += len(block)
-        self.first_us = int(block.at_us[0]) if self.first_us is None else self.first_us
-        self.last_us, self._pending = int(block.at_us[-1]), True
+        self.first_us = block.first_us if self.first_us is None else self.first_us
+        self.last_us, self._pending = block.last_us, True
         return True
 
     def mark(self, mark: Mark) -> None:
@@ -309,13 +309,13 @@ class Files:
             begin = end
             self._keep_limit()
 
-    def store_block(self, block: Columns) -> bool:
+    def store_block(self, block: TextBlock) -> bool:
         """Add many frames at once; False where they are to be stored one by one."""
         part = self._part
         if self._index is not None or part is None or not part.write_block(block):
             return False
         self.frames += len(block)
-        self._latest_us = int(block.at_us[-1])
+        self._latest_us = block.last_us
         part.flush(self._latest_us)
         return True
 

@@ -21,9 +21,9 @@ from tickrig.host.canmon.model.recorder.plan import (
 from tickrig.host.text.values import counted
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.columns import Columns
     from tickrig.host.canmon.model.decode.decoded import Decoded
     from tickrig.host.canmon.model.frames import AnyRecord
+    from tickrig.host.canmon.model.logs.log_writer import TextBlock
     from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
 
@@ -245,7 +245,7 @@ class Recorder:
         except (OSError, LogError) as error:
             self._fail(error)
 
-    def take_block(self, block: Columns, now_us: int) -> bool:
+    def take_block(self, block: TextBlock, now_us: int) -> bool:
         """Take many frames, one at least; False where they are to be taken one by one.
 
         Args:

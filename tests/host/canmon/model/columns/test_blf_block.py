@@ -12,9 +12,9 @@ from tests.host.canmon.model.columns.test_column_reader import rows_of, rows_of_
 from tests.host.canmon.model.strategies import traffic
 from tickrig.host.canmon.model.columns.blf_block import BlfBlocks
 from tickrig.host.canmon.model.columns.column_reader import read_columns
-from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, NoColumnsError, Rows
+from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, NoColumnsError
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.can_log import CanLogReader
+from tickrig.host.canmon.model.logs.can_log import BlfBlock, CanLogReader
 from tickrig.host.canmon.model.logs.log_file import LogError, LogFormat
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
@@ -126,4 +126,4 @@ def test_usual_containers_take_the_fast_way(tmp_path: Path) -> None:
         writer.write(Record(1_700_000_000_000_000 + n, "can0", CanFrame(n % 0x800, bytes(n % 9))))
     writer.close()
     found = CanLogReader(path, LogFormat.BLF).blocks(BlfBlocks(ChannelNames()))
-    assert sum(len(rows.known) for rows in found if isinstance(rows, Rows)) == 10_000
+    assert sum(one.frames for one in found if isinstance(one, BlfBlock)) == 10_000
