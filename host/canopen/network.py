@@ -78,7 +78,7 @@ class ErrorControl:
         heartbeat_us: consumer heartbeat time, 0 for none.
         guard_us: guard time, 0 for none.
         life_time_factor: so many requests without an answer are too many.
-        ask: sends a request of node guarding.
+        request: sends a request of node guarding.
 
     Attributes:
         due_us: when `tick` has something to do.
@@ -87,9 +87,9 @@ class ErrorControl:
     """
 
     def __init__(
-        self, heartbeat_us: int, guard_us: int, life_time_factor: int, ask: Callable[[], None]
+        self, heartbeat_us: int, guard_us: int, life_time_factor: int, request: Callable[[], None]
     ) -> None:
-        self._heartbeat_us, self._ask = heartbeat_us, ask
+        self._heartbeat_us, self._request = heartbeat_us, request
         self._factor = 0 if heartbeat_us else life_time_factor
         self._guard_us = guard_us if self._factor else 0
         self.what = "heartbeat" if heartbeat_us else "guarding"
@@ -125,7 +125,7 @@ class ErrorControl:
             self._unanswered += 1
             if self._unanswered == self._factor:
                 return True
-        self._ask()
+        self._request()
         return False
 
 

@@ -58,7 +58,7 @@ class NetworkSlave:
         self.dialogue = self.session.dialogue
         self._control = ErrorControl(
             *(assignment.heartbeat_us, assignment.guard_us, assignment.life_time_factor),
-            ask=lambda: guard(ERROR_CONTROL_COB_ID + assignment.node_id),
+            request=lambda: guard(ERROR_CONTROL_COB_ID + assignment.node_id),
         )
         self._boot_time_us = plan.boot_time_us
         self.outcome: BootOutcome | None = None
