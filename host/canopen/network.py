@@ -3,7 +3,7 @@
 # Theory of operation.
 #
 # A node session. Whoever talks with a node for a while holds a `NodeSession`: the test master for
-# each of its slaves, `canmon net` and the gateway for each node they request, the conformance tester
+# each of its slaves, `canmon net` and the gateway for each node they talk to, the tester
 # for the node under test. It has three parts, which go together because one frame can concern all
 # three:
 #
