@@ -8,7 +8,7 @@ from typing import Final
 from tickrig._compiled import mypyc_attr
 from tickrig.device.twin import Copyable, Listeners
 from tickrig.emulators.can.bus_device import Accepted
-from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.can.end import Babbler, CanEnd
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.can.segment import CanSegment
 from tickrig.emulators.can.transmission_outcomes import Observer
@@ -185,24 +185,12 @@ class CanWire(Copyable):
 
     def _babble(self, now_us: int, *, armed: bool) -> None:
         if armed:
-            self._babbler = _Babbler(self, _BABBLER, frozenset())
+            self._babbler = Babbler(self, _BABBLER, frozenset())
             self._babbler.enqueue((CanFrame(0),))
             self.bus.join(self._babbler, now_us)
         elif self._babbler is not None:
             self.bus.leave(self._babbler, now_us)
             self._babbler = None
-
-
-class _Babbler(CanEnd):
-    """A node that always has its frame to send: it does not care for its error state either."""
-
-    __slots__ = ()
-
-    def take(self) -> CanFrame:
-        return self.next
-
-    def drop(self) -> None:
-        return
 
 
 def _ignore(name: str, armed: bool) -> None:
