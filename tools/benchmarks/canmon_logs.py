@@ -1,12 +1,15 @@
-"""canmon's log readers beside python-can's, and how fast its verbs start."""
+"""canmon's log readers beside python-can's, whole verbs beside their peers, and their starts."""
 
 from __future__ import annotations
 
+import os
 import random
+import resource
+import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -40,6 +43,7 @@ def run(seconds: float) -> None:
             lambda: taken(can.CanutilsLogReader(part)),
         )
         others(part)
+        whole_programs(log)
         starts(log)
 
 
@@ -58,6 +62,58 @@ def others(part: Path) -> None:
             PEER_FRAMES,
             lambda log=log, reader=reader: taken(reader(log)),
         )
+
+
+READ_BLF = "import can, sys; sum(1 for _ in can.BLFReader(sys.argv[1]))"
+DBC = """VERSION ""
+BU_: A
+BO_ 385 Motor: 8 A
+ SG_ speed : 0|16@1- (0.125,0) [0|0] "rpm" A
+ SG_ torque : 16|16@1- (0.1,-5) [0|0] "Nm" A
+ SG_ count : 32|32@1+ (1,0) [0|0] "" A
+
+BO_ 641 Position: 8 A
+ SG_ position : 7|32@0- (0.001,0) [0|0] "m" A
+ SG_ state : 32|4@1+ (1,0) [0|0] "" A
+
+VAL_ 641 state 0 "off" 1 "on" 2 "fault" ;
+"""
+
+
+def whole_programs(log: Path) -> None:
+    """Run verbs and their peers in turn, start to end, on the log of a million frames."""
+    folder = log.parent
+    blf, dbc = folder / "run.blf", folder / "run.dbc"
+    subprocess.run([*CANMON, "conv", log, blf], check=True)
+    dbc.write_text(DBC, "ascii")
+    pair("stats of a BLF log", ("stats", blf), (sys.executable, "-c", READ_BLF, blf))
+    pair("dump -r", ("dump", "-r", log), ("log2long",), log)
+    pair("conv to ASC", ("conv", log, folder / "ours.asc"),
+         ("log2asc", "can0", "-I", log, "-O", folder / "theirs.asc"))  # fmt: skip
+    pair("dump --dbc", ("dump", log, "--dbc", dbc), ("cantools", "decode", dbc), log)
+    pair("dump", ("dump", log), ("tshark", "-r", log, "-d", "can.subdissector,canopen"))
+
+
+def pair(
+    what: str, verb: Sequence[str | Path], peer: Sequence[str | Path], stdin: Path | None = None
+) -> None:
+    """Print the processor time of a verb as a multiple of its peer's, run by run."""
+    if shutil.which(str(peer[0])) is None:
+        print(f"| canmon {what} | {peer[0]} is not installed | |")
+        return
+    times = [(processor_s([*CANMON, *verb]), processor_s(peer, stdin)) for _ in range(RUNS)]
+    row(f"canmon {what}, 1 M frames, start to end", [ours for ours, _ in times], "s of processor")
+    name = "python-can reading" if peer[0] == sys.executable else str(peer[0])
+    row(f"the same as a multiple of {name}", [ours / theirs for ours, theirs in times], "x")
+
+
+def processor_s(command: Sequence[str | Path], stdin: Path | None = None) -> float:
+    """Run a program; return its processor time."""
+    with open(stdin or os.devnull, "rb") as file:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(command, stdin=file, stdout=subprocess.DEVNULL, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def rates(what: str, frames: int, work: Callable[[], None]) -> None:
