@@ -96,6 +96,10 @@ def _channels(columns: Columns, write: Callable[[str], str] = str) -> Cells:
     return _cells(texts[:, np.newaxis])[columns.channel]
 
 
+def _escaped(name: str) -> str:
+    return name.replace("%", "%%")
+
+
 def _octets(columns: Columns, table: npt.NDArray[Any], remote: npt.NDArray[np.bool_]) -> Cells:
     """Write the bytes of the data."""
     octets = columns.payload.astype("<u8").view(np.uint8).reshape(-1, MAX_DATA_BYTES)
@@ -162,7 +166,8 @@ class ScreenText:
         lines = self._lines
         ident, remote = columns.ident, columns.ident & np.uint32(REMOTE) != 0
         cells, long = _idents(ident)
-        parts = [*self._stamps(columns.at_us), b"  ", _channels(columns)]
+        escape: Callable[[str], str] = str if meanings is None else _escaped
+        parts = [*self._stamps(columns.at_us), b"  ", _channels(columns, escape)]
         if lines.extra:
             parts += [b"  ", _where(columns.sent, b"TX - -", b"RX - -")]
         parts += [b"  ", *self._indents(long), cells, b"  "]
@@ -178,9 +183,8 @@ class ScreenText:
         said = np.fromiter(map(bool, meanings), np.bool_, len(meanings))
         blanks = DATA_WIDTH + 1 - len(b" [8] ") - 3 * np.where(remote, 5, columns.dlc)
         blanks = np.where(said, 3 + np.where(errors, 0, blanks), 0)
-        data += [_of_values(blanks, lambda count: " " * count), b"\n"]
-        heads = _lines(len(columns), [*parts, *data])[:-1].split("\n")
-        return "\n".join(map(str.__add__, heads, meanings)) + "\n"
+        data += [_of_values(blanks, lambda count: " " * count), b"%s\n"]
+        return _lines(len(columns), [*parts, *data]) % tuple(meanings)
 
     def _indents(self, long: npt.NDArray[np.bool_]) -> list[bytes | Cells]:
         """Return what stands before identifiers of three digits once one of eight was there."""

@@ -65,6 +65,7 @@ def said(small_bytes: int, *words: object) -> tuple[object, ...]:
 
 @given(words=st.sampled_from(WORDS), lines=TEXTS)
 @example(words=("-L",), lines=["(0000000001.000000) can0 123#01", "# 12 frames were lost", ""])
+@example(words=(), lines=["(1000000000.000000) a%s%d%% 701#05"] * 9)
 def test_lines_of_columns_are_those_of_frames(words: tuple[str, ...], lines: list[str]) -> None:
     with TemporaryDirectory() as folder:
         path = Path(folder, "run.log")
