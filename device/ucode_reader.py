@@ -164,7 +164,7 @@ class UcodeReader(Copyable):
 
     Attributes:
         type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `terminals.INPUTS`.
+        inputs: what the world does to it, see `INPUTS`.
         markers: they may be changed; the next round hears them.
     """
 

@@ -26,9 +26,9 @@ SCIP 1.1, in which a URG-04LX starts: no sums, statuses of one character, distan
 Sources: HokuyoAIST, urg_nz (gearbox) and urg_library as hosts; two recordings of real sensors
 (`tests/golden/scip_urg_04lx.json`). The document itself is not public any more.
 
->>> encode_reply(b"L1", OK)
+>>> encode_reply(b"L1", SCIP1_OK)
 b'L1\n0\n\n'
->>> encode_reply(b"G38438401", OK, encode_distances([1_234]))
+>>> encode_reply(b"G38438401", SCIP1_OK, encode_distances([1_234]))
 b'G38438401\n0\nCB\n\n'
 
 What a sensor answers: echo, status, lines of data, an empty line.

@@ -171,7 +171,7 @@ _READ: Final[Mapping[str, Callable[[BaseState], float]]] = {
     "served": lambda state: state.frames[0],
     "garbled": lambda state: state.frames[1],
 }
-"""By the names in `terminals.OUTPUTS`."""
+"""By the names in `driver.OUTPUTS`."""
 
 
 _TICK_US: Final = 1_000
@@ -196,7 +196,7 @@ class Rh3Base(Copyable):
 
     Attributes:
         type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `terminals.INPUTS`.
+        inputs: what the world does to it, see `driver.INPUTS`.
         ground: where it is; its pose may be set.
         sides: left and right wheel with their loops.
         slave: its end of the line.

@@ -183,7 +183,7 @@ class Rrc(Copyable):
     Attributes:
         type_name: what its device type is called, for traces.
         config: durations, names and sizes.
-        inputs: what the world does to it, see `terminals.INPUTS`.
+        inputs: what the world does to it, see `board.INPUTS`.
         state: where it is in the manual's state diagram.
     """
 

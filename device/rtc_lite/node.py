@@ -227,7 +227,7 @@ class RtcLiteNode(Copyable):
 
     Attributes:
         type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `terminals.INPUTS`.
+        inputs: what the world does to it, see `INPUTS`.
 
     Raises:
         ValueError: a component that a PIC has no room for.

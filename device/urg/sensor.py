@@ -69,7 +69,7 @@ class Urg(Copyable):
 
     Attributes:
         type_name: what its device type is called, for traces.
-        inputs: what the world does to it, see `terminals.INPUTS`.
+        inputs: what the world does to it, see `INPUTS`.
         world: it may be changed; the next scan sees it.
     """
 

@@ -64,7 +64,7 @@ _HEAD: Final = "  time s   potentiometer V   290h    reference deg   shaft deg"
 def row(sample: CurveSample) -> str:
     """Write a sample as a line of the table.
 
-    >>> row(Sample(0.35, 2.5, 16384, 90.0021))
+    >>> row(CurveSample(0.35, 2.5, 16384, 90.0021))
     '   0.350             2.500   00 40         90.0027     90.0021'
     """
     data = sample.reference.to_bytes(2, "little", signed=True).hex(" ").upper()

@@ -578,8 +578,6 @@ class NetworkPort(NonCopyable):
     def _connected(self, connection: socket.socket) -> HostConnection:
         if self.url.startswith("socket:"):
             return HostConnection(connection, self._buffer_bytes)
-        # slow to load, and only wanted here
-
         return Rfc2217Connection(connection, self._buffer_bytes, self._baud)
 
     def _refuse(self, connection: socket.socket, peer: str, now_us: int) -> None:

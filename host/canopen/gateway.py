@@ -2,8 +2,9 @@ r"""What a gateway does for one client: SDO, NMT and its own settings (CiA 309-3
 
 Lines that a client of a gateway sends (CiA 309-3, syntax of commands).
 
->>> parse_request('[7] 1 4 w 0x2000 3 vs "Don said ""go"" # 1"  # a comment')
-Request(sequence=7, numbers=(1, 4), verb='w', words=('0x2000', '3', 'vs', 'Don said "go" # 1'))
+>>> request = parse_request('[7] 1 4 w 0x2000 3 vs "Don said ""go"" # 1"  # a comment')
+>>> request.sequence, request.numbers, request.verb, request.words
+(7, (1, 4), 'w', ('0x2000', '3', 'vs', 'Don said "go" # 1'))
 >>> parse_request("# nothing") is None
 True
 

@@ -154,7 +154,7 @@ class RtnoPacketDecoder:
 
 @dataclass(slots=True)
 class RtnoDecoder(RtnoPacketDecoder):
-    """Reads the packets of a proxy as frames; used as `Decoder` is.
+    """Reads the packets of a proxy as frames; used as `LiteDecoder` is.
 
     An unknown letter has the same effect as more data than fit.
     """

@@ -1,7 +1,6 @@
 """`tickrig:` in a node of a bus.yml: its motor, gear and switches, its modes and inputs.
 
->>> from tickrig.host.text.document import FileMistake, FilePlace, Item
-from tickrig.host.text.section import Field, flag, number, one_of, shown, whole
+>>> from tickrig.host.text.document import FilePlace, Item
 >>> value = Item(100, FilePlace("bus.yml", 7), "100")
 >>> KEYS["gear_ratio"].field(value.plain)
 100

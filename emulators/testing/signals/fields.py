@@ -25,7 +25,7 @@ class SignalMistake(NamedTuple):
         keys: where it is.
         reason: what came, and what was allowed.
 
-    >>> print(Mistake(("signal", "load", "over"), "it is missing"))
+    >>> print(SignalMistake(("signal", "load", "over"), "it is missing"))
     signal.load.over: it is missing
     """
 

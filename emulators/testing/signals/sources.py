@@ -1,6 +1,6 @@
 """Values that depend on time alone: pure functions, the same whoever asks how often.
 
->>> Ramp(12.0, 9.5, over_us=10_000_000).value(4_000_000)
+>>> RampSource(12.0, 9.5, over_us=10_000_000).value(4_000_000)
 11.0
 >>> Wave("square", 0, 1, period_us=1_000_000).next_us(0)
 500000

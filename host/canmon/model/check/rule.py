@@ -38,7 +38,7 @@ class TrafficFinding(NamedTuple):
     def line(self) -> str:
         """One line, time and frame as candump does.
 
-        >>> Finding(1_500_000, "nodes", "node 3 was never heard").line
+        >>> TrafficFinding(1_500_000, "nodes", "node 3 was never heard").line
         '(1.500000) nodes: node 3 was never heard'
         """
         seconds, micros = divmod(self.at_us, 1_000_000)

@@ -1,6 +1,6 @@
 """Vector's ASC logs: whatever header they have, with absolute and with relative times.
 
->>> lines, tally = AscLines(), Tally()
+>>> lines, tally = AscLines(), LogTally()
 >>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
 ...     record = lines.read(line, tally)
 >>> record.at_us, record.channel, str(record.frame)

@@ -4,7 +4,7 @@ r"""Log files, and logs that come in pieces, as the frames that are in them.
 >>> lines.push(b"one\ntw"), lines.push(b"o"), lines.push(b"\n"), lines.finish()
 (b'one\n', b'', b'two\n', b'')
 
->>> tally = Tally()
+>>> tally = LogTally()
 >>> record = parse_log_line("(0.01) vcan0 705#7F T", 1, tally)
 >>> record.at_us, record.channel, str(record.frame), record.sent
 (10000, 'vcan0', '705#7F', True)

@@ -1,6 +1,6 @@
 """Lines that candump, `canmon dump` and python-can show on a screen, with or without time.
 
->>> tally, clock = Tally(), ScreenClock()
+>>> tally, clock = LogTally(), ScreenClock()
 >>> shown = "(000.000250)  can0  TX - -  705   [1]  7F   '.'"
 >>> record = parse_screen_line(shown, tally, clock)
 >>> record.at_us, record.channel, str(record.frame), record.sent

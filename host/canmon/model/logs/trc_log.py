@@ -1,6 +1,6 @@
 """PEAK's traces (TRC), of versions 1.0 to 3.0, with their error frames.
 
->>> lines, tally = TrcLines(), Tally()
+>>> lines, tally = TrcLines(), LogTally()
 >>> lines.read(";$FILEVERSION=1.1", tally)
 ';$FILEVERSION=1.1'
 >>> record = lines.read("     6)      1349.2  Error      0008  4  00 19 08 08", tally)

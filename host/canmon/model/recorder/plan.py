@@ -6,7 +6,7 @@
 >>> plan.part(12).name, plan.index.name
 ('run-00012.log.gz', 'run.index.jsonl')
 >>> _parse_span("post", "500ms"), _parse_span("pre", "2000")
-(Span(frames=None, us=500000), Span(frames=2000, us=None))
+(TriggerSpan(frames=None, us=500000), TriggerSpan(frames=2000, us=None))
 """
 
 from __future__ import annotations

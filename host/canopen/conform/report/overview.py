@@ -3,7 +3,8 @@
 The frames of a check, as `canmon dump` shows them.
 
 >>> from tickrig.host.canopen.conform.verdict import Direction
->>> plain_frames([Line(1_250, Direction.SENT, "605#40"), Line(2_000, Direction.REMARK, "?")])
+>>> lines = FrameLine(1_250, Direction.SENT, "605#40"), FrameLine(2_000, Direction.REMARK, "?")
+>>> plain_frames(lines)
 [' (000.001250)  >  605   [1]  40', ' (000.002000)  #  ?']
 """
 
@@ -166,7 +167,7 @@ def verdict_counts(results: Iterable[Result]) -> dict[CheckVerdict, int]:
 def counts_text(counts: dict[CheckVerdict, int]) -> str:
     """Write counts for people.
 
-    >>> counts_text({Verdict.PASS: 3, Verdict.FAIL: 1})
+    >>> counts_text({CheckVerdict.PASS: 3, CheckVerdict.FAIL: 1})
     '3 pass, 1 fail'
     """
     return ", ".join(f"{number} {verdict}" for verdict, number in counts.items()) or "none"
