@@ -261,7 +261,7 @@ PARSES: Final = re.compile(
 ELSEWHERE: Final = {
     "emulators.testing.campaign.parquet_file": "a message of pyarrow",
     "emulators.testing.campaign.worker": "what pytest says",
-    "emulators.testing.commands.replay_cli": "whether a line begins with +",
+    "emulators.testing.commands.replay": "whether a line begins with +",
     "emulators.testing.machine.host_runs": "our own transcript",
     "emulators.testing.plugin.report_plugin": "of a worker of pytest",
     "emulators.testing.plugin.settings": "lines of pytest.ini",

@@ -52,7 +52,7 @@ def replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
     return 1
 
 
-def replay_host(file: Path, host: str) -> int:
+def replay_with_host(file: Path, host: str) -> int:
     """Do a scenario again; return 1 if something is wrong."""
     from tickrig.emulators.testing.machine.bench_machine import BenchMachine  # noqa: PLC0415 - slow
     from tickrig.emulators.testing.machine.host_runs import HostRuns, parse_steps  # noqa: PLC0415

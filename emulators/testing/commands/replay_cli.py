@@ -35,5 +35,5 @@ def replay_command(
     """  # noqa: D301 - click wants the backspace
     module = "tickrig.emulators.testing.commands.replay"
     if host is not None:
-        context.exit(load(f"{module}:replay_host")(file, host))
+        context.exit(load(f"{module}:replay_with_host")(file, host))
     context.exit(load(f"{module}:replay_trace")(file, verbose=verbose, run_code=run_code))

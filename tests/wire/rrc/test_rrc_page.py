@@ -111,4 +111,4 @@ def test_the_example_of_check_is_right() -> None:
 def test_the_supply_and_its_warning_stand_there() -> None:
     page = " ".join(PAGE.read_text("utf-8").split())
     assert "24 V, 6.5 mA from the VR2 battery, or 5 V, 20 mA from USB" in page
-    assert "must not be plugged into a USB port that delivers power" in page
+    assert "Do not plug an RRC that is fed from the VR2 battery into a USB port" in page

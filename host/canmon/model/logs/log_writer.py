@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Final, Protocol, cast, runtime_checkable
+from typing import Final, Protocol, cast
 
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
@@ -101,15 +101,6 @@ class TextBlock(Protocol):
 
     def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
         """Write them as `AscWriter` does; it tells the numbers of buses, from 0."""
-        ...
-
-
-@runtime_checkable
-class BlockWriter(Protocol):
-    """A log that takes many frames at once."""
-
-    def write_block(self, block: TextBlock, /) -> bool:
-        """Add frames, one at least; False where they are to be added one by one."""
         ...
 
 

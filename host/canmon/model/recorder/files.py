@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
-from tickrig.host.canmon.model.logs.log_writer import BlockWriter, in_blocks, write_log
+from tickrig.host.canmon.model.logs.log_writer import in_blocks, write_log
 from tickrig.host.canmon.model.logs.mark import BACK, TRIGGER, VERSION, Mark
 from tickrig.host.canmon.model.recorder.plan import RESERVE_BYTES, AtLimit, RecordingPlan
 
@@ -56,6 +56,8 @@ class RecordingPart:
 
     def __init__(self, path: Path) -> None:
         self.path, self._writer, self._in_blocks = path, write_log(path), in_blocks(path)
+        self._write_block: Callable[[TextBlock], bool] | None
+        self._write_block = getattr(self._writer, "write_block", None)  # not each format has it
         self.frames = self.safe_frames = self.bytes = 0
         self.first_us: int | None = None
         self.last_us: int | None = None
@@ -80,7 +82,7 @@ class RecordingPart:
 
     def write_block(self, block: TextBlock) -> bool:
         """Add many frames at once; False where its format wants them one by one."""
-        if not isinstance(self._writer, BlockWriter) or not self._writer.write_block(block):
+        if self._write_block is None or not self._write_block(block):
             return False
         self.frames += len(block)
         self.first_us = block.first_us if self.first_us is None else self.first_us
