@@ -87,6 +87,21 @@ def parse_size(text: str) -> int:
     return int(match[1]) << _SHIFT.get(match[2], 0)
 
 
+MOST_PORT: Final = 0xFFFF
+
+
+def parse_port(text: str) -> int | None:
+    """Read a TCP port, 0..65535; None if it is none, however many digits it has.
+
+    >>> parse_port("7000"), parse_port("007000"), parse_port("0100000"), parse_port("-1")
+    (7000, 7000, None, None)
+    """
+    if not (text.isascii() and text.isdecimal()):
+        return None
+    number = int(text.lstrip("0")[:6] or "0")
+    return number if number <= MOST_PORT else None
+
+
 def counted(number: int, noun: str) -> str:
     """Write a number with its noun.
 

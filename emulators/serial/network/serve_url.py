@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.host.text.values import MOST_PORT, parse_port
+
 SCHEMES: Final = ("rfc2217", "socket")
 LOOPBACK: Final = "127.0.0.1"
-MAX_PORT: Final = 65_535
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +51,9 @@ def parse_serve_url(text: str) -> ServeUrl:
     bare = host[1:-1] if host[:1] + host[-1:] == "[]" else host
     if colon and not bare:
         raise ValueError(f"{text!r}: no host before the colon; 0.0.0.0 is every address")
-    if not (port.isascii() and port.isdecimal()) or int(port[:6]) > MAX_PORT:
-        raise ValueError(f"{text!r}: port {port!r} is not in 0..{MAX_PORT}")
+    number = parse_port(port)
+    if number is None:
+        raise ValueError(f"{text!r}: port {port!r} is not in 0..{MOST_PORT}")
     if ":" in bare and bare == host:
         raise ValueError(f"{text!r}: an IPv6 address stands in brackets, as [::1]")
-    return ServeUrl(scheme, bare or LOOPBACK, int(port))
+    return ServeUrl(scheme, bare or LOOPBACK, number)

@@ -24,13 +24,13 @@ from tickrig.host.cli.serving import stopped_by_signals
 from tickrig.host.control.line_server import Answer, LineServer
 from tickrig.host.control.unix_socket import listen_at
 from tickrig.host.links.errors import LinkClosed
+from tickrig.host.text.values import parse_port
 
 LOOPBACK: Final = "127.0.0.1"
 WAIT_US: Final = 20_000
 """How long clients are waited for before the bus is listened to again."""
 MAX_LINE: Final = 16 << 20
 MOST_NET: Final = 0xFFFF
-MOST_PORT: Final = 0xFFFF
 ERROR: Final = "] ERROR:"
 
 
@@ -82,8 +82,8 @@ def command(
 def parse_address(text: str) -> tuple[str, int]:
     """Read HOST:PORT or PORT; Refused if it is neither."""
     host, colon, port = text.rpartition(":")
-    number = int(port[:6]) if port.isascii() and port.isdecimal() else -1
-    if not 0 <= number <= MOST_PORT or (colon and not host):
+    number = parse_port(port)
+    if number is None or (colon and not host):
         raise Refused(f"--listen {text!r}: a port 0..65535 is wanted, or HOST:PORT")
     return host.removeprefix("[").removesuffix("]") or LOOPBACK, number
 

@@ -29,6 +29,7 @@ def test_a_host_may_be_left_out(text: str, url: ServeUrl) -> None:
         ("tcp://7000", "'tcp://7000' is not rfc2217://[HOST:]PORT or socket://[HOST:]PORT"),
         ("socket://", "'socket://': port '' is not in 0..65535"),
         ("socket://65536", "'socket://65536': port '65536' is not in 0..65535"),
+        ("socket://0100000", "'socket://0100000': port '0100000' is not in 0..65535"),
         ("socket://host", "'socket://host': port 'host' is not in 0..65535"),
         ("socket://-1", "'socket://-1': port '-1' is not in 0..65535"),
         ("socket://٣", "'socket://٣': port '٣' is not in 0..65535"),

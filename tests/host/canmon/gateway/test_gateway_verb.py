@@ -55,7 +55,9 @@ def test_bytes_of_a_text_come_back_as_they_went_in(rig: Path) -> None:
     assert b"\xec" in lines[2]
 
 
-@pytest.mark.parametrize("text", ["", "x", "127.0.0.1:", ":80", "65536", "-1", "1e3", "9" * 5_000])
+@pytest.mark.parametrize(
+    "text", ["", "x", "127.0.0.1:", ":80", "65536", "0100000", "-1", "1e3", "9" * 5_000]
+)
 def test_an_address_that_is_none_is_refused(rig: Path, text: str) -> None:
     result = gateway(rig, "--listen", text)
     assert result.exit_code == 2
