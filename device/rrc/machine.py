@@ -323,4 +323,4 @@ _READERS: Final[dict[str, Callable[[Rrc], int | str]]] = {
     "backlog_pct": lambda rrc: rrc._load.backlog_pct,
     "pace_lines_s": lambda rrc: rrc._pace_lines_s,
 }
-"""What `RrcMachine.read` gives for each of `outputs`; only what is asked for is reckoned."""
+"""What `Rrc.read` returns for each of `outputs`; only the signal that is read is computed."""

@@ -1,3 +1,3 @@
-"""The version of the package, for whoever needs no more of it."""
+"""The version of the package; this module imports nothing."""
 
 __version__ = "0.1.0"

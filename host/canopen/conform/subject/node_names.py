@@ -26,7 +26,7 @@ DRIVE: Final = range(0x603F, 0x6100)
 """Of CiA 402: modes, states and positions."""
 HIGHEST_NODE_ID: Final = 127
 BIT_7: Final = 0x80
-"""No node-ID has it: what is behind 127 is none."""
+"""Set in no node-ID: they end at 127."""
 HEARTBEAT: Final = (0x1017, 0)
 BEATS_MS: Final = (100, 90, 110)
 IDENTITY: Final = ("vendor", "product", "revision", "serial")
