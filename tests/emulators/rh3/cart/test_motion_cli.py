@@ -220,7 +220,7 @@ def environment() -> dict[str, str]:
 
 @pytest.mark.realtime
 def test_a_base_on_a_pty_is_driven_in_real_time(emulated: str) -> None:
-    words = [sys.executable, "-c", PROGRAM.format("cart.motion_cli"), "goto", "0.1", "0", "0"]
+    words = [sys.executable, "-c", PROGRAM.format("commands.motion_cli"), "goto", "0.1", "0", "0"]
     done = subprocess.run(
         [*words, "--device", emulated],
         env=environment(),
@@ -242,7 +242,7 @@ def test_virtual_time_can_be_held_back() -> None:
 
 @pytest.mark.realtime
 def test_ctrl_c_stops_the_base(emulated: str) -> None:
-    words = ["-c", PROGRAM.format("cart.motion_cli"), "goto", "9", "0", "0", "--device", emulated]
+    words = ["-c", PROGRAM.format("commands.motion_cli"), "goto", "9", "0", "0", "--device", emulated]
     rh3 = pexpect.spawn(sys.executable, words, env=environment(), timeout=30, encoding="utf-8")
     rh3.expect(r"\+0\.1\d m/s")  # the map has a line of numbers
     rh3.kill(signal.SIGINT)
@@ -254,7 +254,7 @@ def test_ctrl_c_stops_the_base(emulated: str) -> None:
 
 @pytest.mark.realtime
 def test_ctrl_c_leaves_a_question() -> None:
-    words = ["-c", PROGRAM.format("cart.motion_cli"), "square", "--device", "/dev/nothing"]
+    words = ["-c", PROGRAM.format("commands.motion_cli"), "square", "--device", "/dev/nothing"]
     rh3 = pexpect.spawn(sys.executable, words, env=environment(), timeout=30, encoding="utf-8")
     rh3.expect("press a key")
     rh3.kill(signal.SIGINT)
