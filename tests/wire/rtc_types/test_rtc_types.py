@@ -331,6 +331,11 @@ class Later(rtc.TimedLong):
     after: rtc.Time = rtc.Time()
 
 
+def test_structs_without_fields_are_equal() -> None:
+    assert Struct() == Struct()
+    assert hash(Struct()) == hash(Struct())
+
+
 def test_a_struct_has_the_fields_of_its_base_first() -> None:
     assert Later(TM, 5) == Later(TM, 5, rtc.Time())
     assert Later.__match_args__ == ("tm", "data", "after")
