@@ -242,7 +242,8 @@ def test_virtual_time_can_be_held_back() -> None:
 
 @pytest.mark.realtime
 def test_ctrl_c_stops_the_base(emulated: str) -> None:
-    words = ["-c", PROGRAM.format("commands.motion_cli"), "goto", "9", "0", "0", "--device", emulated]
+    program = PROGRAM.format("commands.motion_cli")
+    words = ["-c", program, "goto", "9", "0", "0", "--device", emulated]
     rh3 = pexpect.spawn(sys.executable, words, env=environment(), timeout=30, encoding="utf-8")
     rh3.expect(r"\+0\.1\d m/s")  # the map has a line of numbers
     rh3.kill(signal.SIGINT)
