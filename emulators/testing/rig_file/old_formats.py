@@ -57,9 +57,7 @@ def refuse_old_tables(top: Section) -> Section:
     Args:
         top: the whole file.
     """
-    given = top.values
-    if "device" in given:
-        return top
+    given, before = top.values, len(top.notes.all)
     nodes = given.get("node")
     if isinstance(nodes, list):
         for at, node in enumerate(nodes):
@@ -69,7 +67,9 @@ def refuse_old_tables(top: Section) -> Section:
         top.wrong(_DUT, "dut")
     if isinstance(given.get("component"), list):
         top.wrong(_SYSTEM, "component")
-    return Section(top.notes, (), {"device": {}}) if top.notes.all else top
+    if len(top.notes.all) > before or ("device" not in given and before):
+        return Section(top.notes, (), {"device": {}})
+    return top
 
 
 def _device(node: object, number: int) -> str:

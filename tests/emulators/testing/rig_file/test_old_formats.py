@@ -30,6 +30,10 @@ NODE = "[[node]] is a device now, one for each node-ID:"
             '[dut.rrc]\nport = "/dev/ttyACM0"\n[tolerance]\nstick_pct = 5\n',
             ['1: dut: a real RRC is a device now: [device.rrc] with type = "rrc", [hardware.rrc]'],
         ),
+        (
+            '[device.a]\ntype = "rrc"\n[[node]]\nmodel = "epos"',
+            [f'3: node[1]: {NODE} [device.node1] with type = "epos"'],
+        ),
         ('[[component]]\nname = "a"', ["1: component: it is a system of RT components"]),
         ("# drive\n\n0.1s press power_button\n", ["1: it is a scenario: --scenario FILE plays"]),
         ("+10ms send hello", ["1: it is a scenario"]),
