@@ -85,7 +85,7 @@ class Workers(Protocol):
         ...
 
     def submit(self, runs: Sequence[Run]) -> Future[list[RunVerdict]]:
-        """Let runs be done; the future may raise Refusal."""
+        """Let runs be done; the future may raise CampaignRefusal."""
         ...
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ class Campaign:
         """Do all runs; give verdicts as they are on the disk.
 
         Raises:
-            Refusal: the workers cannot go on.
+            CampaignRefusal: the workers cannot go on.
             JournalFullError: nothing can be written any more.
         """
         while self._submit():
@@ -212,7 +212,7 @@ class CampaignRun:
         options: what the command line says.
 
     Raises:
-        Refusal: what cannot be.
+        CampaignRefusal: what cannot be.
     """
 
     def __init__(self, options: CampaignOptions) -> None:
@@ -243,7 +243,7 @@ class CampaignRun:
         """Do all that is left to do, and write the tables.
 
         Raises:
-            Refusal: it cannot be done; what was done is kept.
+            CampaignRefusal: it cannot be done; what was done is kept.
         """
         crew = Crew(self._options.order)
         try:

@@ -416,7 +416,7 @@ def _counts(name: str, pairs: Sequence[Pair]) -> tuple[str, str, str, str, str]:
 _BIT_RATE: Final = 1_000_000
 
 
-def run_compare(file: Path, options: Mapping[str, Any], *, verbose: bool) -> int:
+def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
     """Compare as the command line asks, and return the exit status."""
     tolerance = _read_tolerance(options)
     try:

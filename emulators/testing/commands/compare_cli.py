@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, Final
 
 import click
 
 from tickrig.emulators.commands.run_options import type_option
-from tickrig.host.cli.options import PATH, add_options, run_code_option, time_option
-from tickrig.host.cli.start import load
+from tickrig.host.cli.options import PATH, add_options, run_code_option, time_option, works_in
 
 _device: Final = add_options(
     type_option("Device type, if the trace has none."),
@@ -47,10 +45,8 @@ _tolerance: Final = add_options(
 @_tolerance
 @run_code_option
 @click.option("-v", "--verbose", is_flag=True, help="All that was said, the same too.")
-@click.pass_context
-def compare_command(
-    context: click.Context, /, *, file: Path, verbose: bool, **options: Any
-) -> None:
+@works_in("tickrig.emulators.testing.commands.compare:run_compare")
+def compare_command(**options: Any) -> None:
     """Let the host of a recorded run talk to an emulator; say where it answers otherwise.
 
     FILE is a trace of 'tickrig record', of an emulator or of a bench. Exit status 0 if the
@@ -61,5 +57,3 @@ def compare_command(
     tickrig compare run.trace
     tickrig compare run.trace --tolerance 50ms --ignore 'Version*' --number 'EV:batt*=5'
     """  # noqa: D301 - click wants the backspace
-    run = load("tickrig.emulators.testing.commands.compare:run_compare")
-    context.exit(run(file, options, verbose=verbose))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 import click
 
 from tickrig.emulators.commands.run_options import type_option
-from tickrig.host.cli.options import PATH
-from tickrig.host.cli.start import load
+from tickrig.host.cli.options import PATH, works_in
 
 
 @click.command("record")
@@ -17,17 +16,8 @@ from tickrig.host.cli.start import load
 @type_option("Device type, as of 'tickrig emu': rrc.")
 @click.option("--link", type=PATH, help="Symbolic link to make to the host's terminal.")
 @click.option("--baud", type=click.IntRange(1), help="Of the port.  [that of the type, or 115200]")
-@click.pass_context
-def record_command(  # noqa: PLR0913 - options
-    context: click.Context,
-    /,
-    *,
-    port: str,
-    out: Path,
-    type_name: str,
-    link: Path | None,
-    baud: int | None,
-) -> None:
+@works_in("tickrig.emulators.testing.commands.port_tap:record_port")
+def record_command(**options: Any) -> None:
     """Record what passes between a host and the device at PORT, for `tickrig compare`.
 
     The host opens the terminal that is printed, or --link, instead of PORT: a device path
@@ -41,5 +31,3 @@ def record_command(  # noqa: PLR0913 - options
     tickrig record /dev/ttyUSB0 --out run.trace --type rrc --link /tmp/rrc
     tickrig compare run.trace
     """  # noqa: D301 - click wants the backspace
-    run = load("tickrig.emulators.testing.commands.port_tap:record_port")
-    context.exit(run(port, out, type_name, link, baud))

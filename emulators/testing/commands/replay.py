@@ -26,7 +26,14 @@ from tickrig.host.text.user_file import find_class
 from tickrig.host.text.values import counted, format_time
 
 
-def replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
+def run_replay(file: Path, *, verbose: bool, host: str | None, run_code: bool) -> int:
+    """Replay a trace, or a scenario with its host, and return the exit status."""
+    if host is not None:
+        return _replay_with_host(file, host)
+    return _replay_trace(file, verbose=verbose, run_code=run_code)
+
+
+def _replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
     """Replay a trace, and return the exit status: 1 if a device says anything else."""
     try:
         data = file.read_bytes()
@@ -52,7 +59,7 @@ def replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
     return 1
 
 
-def replay_with_host(file: Path, host: str) -> int:
+def _replay_with_host(file: Path, host: str) -> int:
     """Do a scenario again; return 1 if something is wrong."""
     from tickrig.emulators.testing.machine.bench_machine import BenchMachine  # noqa: PLC0415 - slow
     from tickrig.emulators.testing.machine.host_runs import HostRuns, parse_steps  # noqa: PLC0415

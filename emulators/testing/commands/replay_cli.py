@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 import click
 
-from tickrig.host.cli.options import PATH, run_code_option
-from tickrig.host.cli.start import load
+from tickrig.host.cli.options import PATH, run_code_option, works_in
 
 
 @click.command("replay")
@@ -19,10 +18,8 @@ from tickrig.host.cli.start import load
     help="FILE is a scenario that a search has found: do it with this BenchMachine.",
 )
 @run_code_option
-@click.pass_context
-def replay_command(
-    context: click.Context, /, file: Path, *, verbose: bool, host: str | None, run_code: bool
-) -> None:
+@works_in("tickrig.emulators.testing.commands.replay:run_replay")
+def replay_command(**options: Any) -> None:
     """Replay the trace FILE on fresh devices; exit status 1 if one says anything else.
 
     With --host a scenario of check_host is done again, with a fresh bench and host; exit status 1
@@ -33,7 +30,3 @@ def replay_command(
     tickrig replay run.trace
     tickrig replay found.txt --host test_chair.py:Chair
     """  # noqa: D301 - click wants the backspace
-    module = "tickrig.emulators.testing.commands.replay"
-    if host is not None:
-        context.exit(load(f"{module}:replay_with_host")(file, host))
-    context.exit(load(f"{module}:replay_trace")(file, verbose=verbose, run_code=run_code))

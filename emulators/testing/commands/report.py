@@ -7,6 +7,7 @@ from pathlib import Path
 from tickrig.emulators.testing.report.bench_report import BenchReport, merge_reports
 from tickrig.emulators.testing.report.report_file import check_report, read_run, write_report
 from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.text.values import counted
 
 
 def make_report(runs: tuple[Path, ...], output: Path, title: str) -> None:
@@ -20,8 +21,7 @@ def make_report(runs: tuple[Path, ...], output: Path, title: str) -> None:
         write_report(report, output)
     except OSError as error:
         refuse_path("report", error)
-    tests = len(report.tests)
-    say(f"{output}: {tests} {'test' if tests == 1 else 'tests'}")
+    say(f"{output}: {counted(len(report.tests), 'test')}")
 
 
 def _read(path: Path) -> BenchReport:
