@@ -13,8 +13,6 @@ from pathlib import Path
 import click
 import pytest
 
-from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.emulators.canopen import choices
 from tickrig.emulators.canopen.choices import AUTO, MODELS, PROFILES
 from tickrig.emulators.canopen.eds import PROFILES as CANOPEN_PROFILES
 from tickrig.emulators.canopen.models import MODELS as CANOPEN_MODELS
@@ -115,5 +113,4 @@ def test_the_work_of_a_command_takes_its_options(command: click.Command) -> None
 def test_what_can_be_named_is_what_there_is() -> None:
     assert tuple(CANOPEN_MODELS) == MODELS
     assert (AUTO, *CANOPEN_PROFILES) == PROFILES
-    assert choices.UNCONFIGURED == UNCONFIGURED
     assert next(each.proposals for each in LITE_FIELDS if each.name == "node") == tuple(COMPONENTS)

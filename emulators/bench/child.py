@@ -67,5 +67,5 @@ def _wait_until_up(child: Child, paths: list[Path]) -> None:
         if child.process.poll() is not None or time.monotonic() > deadline:
             said = child.log.read_text("utf-8", "replace").split("\n")
             last = next((line for line in reversed(said) if line), "it said nothing")
-            raise RuntimeError(f"the emulator did not start: {last}")
+            raise RuntimeError(f"the emulator did not start: {last.removeprefix('Error: ')}")
         time.sleep(0.01)

@@ -23,9 +23,6 @@ MODEL_FAULTS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """Physical faults by the name of the model, beside those of every node."""
 
-UNCONFIGURED: Final = 0xFF
-"""That of `device/canopen/slave.py`."""
-
 _BUS_NODE: Final = re.compile(r".+\.ya?ml:.+", re.IGNORECASE)
 
 

@@ -88,8 +88,8 @@ class DeviceType:
             return self.configure(self, options, seed)
         try:
             device = self.build(options)
-        except ValueError as error:
-            raise ValueError(str(error)) from None
+        except ValueError:
+            raise  # it says what is wrong
         except Exception as error:  # of another package, it may raise anything
             raise ValueError(f"{self.name} cannot be built: {explain_error(error)}") from error
         if missing := [name for name in _MEMBERS if not hasattr(device, name)]:

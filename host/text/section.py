@@ -231,6 +231,14 @@ Schema = Mapping[str, Field]
 """The keys that a table can have."""
 
 
+def rows(schema: Schema) -> Iterator[str]:
+    """Yield the lines of a schema's table for the page."""
+    yield "| key | value | unless given | meaning |"
+    yield "|---|---|---|---|"
+    for name, key in schema.items():
+        yield f"| `{name}` | {key.values} | {key.default or 'needed'} | {key.text} |"
+
+
 @dataclass(slots=True)
 class Notes:
     """What is wrong with a document.

@@ -8,7 +8,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -239,11 +239,3 @@ def read_keys(
         found.get("start", {}),
         places,
     )
-
-
-def rows() -> Iterator[str]:
-    """Yield the lines of the table of the page."""
-    yield "| key | value | unless given | meaning |"
-    yield "|---|---|---|---|"
-    for name, key in KEYS.items():
-        yield f"| `{name}` | {key.values} | {key.default} | {key.text} |"

@@ -267,8 +267,8 @@ def open_rig(path: Path, node_id: int | None = None) -> ConformSource:
 
     Raises:
         OSError: it cannot be read.
-        ValueError: something is wrong in it, or no node of it has this node-ID.
-        ValueError: a device cannot be made.
+        ValueError: something is wrong in it, a device cannot be made, or no node of it has this
+            node-ID.
     """
     plan = read_rig_file(path)
     bench = Bench.of_plan(plan)

@@ -19,7 +19,7 @@ from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.canopen.body import BodyPlan
 from tickrig.emulators.canopen.node_spec import LSS
 from tickrig.emulators.testing.signals.sources import SignalSpec
-from tickrig.host.text.values import Setting
+from tickrig.host.text.values import Setting, counted
 
 _LATE_MS: Final = 50
 _STICK_PCT: Final = 10
@@ -386,7 +386,7 @@ def _driven(device: DevicePlan) -> int:
 
 
 def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'s' if number > 1 else ''}" if number else ""
+    return counted(number, what) if number else ""
 
 
 def seed_of(seed: int, name: str, *, alone: bool) -> int:

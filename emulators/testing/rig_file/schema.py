@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Final
 
 from tickrig.device.body import SIDES
@@ -224,11 +224,3 @@ PAGE: Final[Mapping[str, Schema]] = {
     "`[hardware.tolerance]`": TOLERANCE,
 }
 """All tables, by what the page calls them."""
-
-
-def rows(schema: Schema) -> Iterator[str]:
-    """Yield the lines of a schema's table for the page."""
-    yield "| key | value | unless given | meaning |"
-    yield "|---|---|---|---|"
-    for name, key in schema.items():
-        yield f"| `{name}` | {key.values} | {key.default or 'needed'} | {key.text} |"

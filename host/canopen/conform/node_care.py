@@ -207,7 +207,6 @@ _RETURN_MS: Final = 3_000
 _GONE_MS: Final = 10_000
 """So long is waited at the end for a node that was lost, to restore it."""
 
-_TRIES: Final = 2
 _PROBE_MS: Final = 50
 HEARTBEAT: Final = (0x1017, 0)
 _ERROR_REGISTER: Final = (0x1001, 0)

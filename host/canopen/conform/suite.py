@@ -24,8 +24,8 @@ ORDER: Final = (
 
 
 OBJECTS: Final = "OD"
-_OF_EACH_OBJECT: Final = "each object of the EDS"
 """The group of checks that are made of an EDS."""
+_OF_EACH_OBJECT: Final = "each object of the EDS"
 
 
 class Group(NamedTuple):

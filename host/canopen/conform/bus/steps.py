@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final, Protocol
 
 from tickrig.host.canopen.conform.bus.exchange import (
@@ -23,6 +23,7 @@ from tickrig.host.canopen.conform.check import (
     ExpectNone,
     Forget,
     Hold,
+    Keep,
     Macro,
     OfObject,
     Period,
@@ -33,6 +34,7 @@ from tickrig.host.canopen.conform.check import (
     RefuseWrite,
     Send,
     Step,
+    Stimulus,
     Wait,
     Write,
 )
@@ -40,8 +42,6 @@ from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.sdo_frame import describe_abort
-
-_Stimulus = Callable[..., str]
 
 _REMOTE: Final = re.compile(r"^(\w+?)R(?=\d$)")
 _POWER_OFF_MS: Final = 200
@@ -61,7 +61,7 @@ class StepPlayer:
         self,
         exchange: BusExchange,
         node_id: int,
-        stimulus: _Stimulus | None,
+        stimulus: Stimulus | None,
         client: Client,
     ) -> None:
         self._exchange, self._stimulus, self._client = exchange, stimulus, client
@@ -110,6 +110,10 @@ class StepPlayer:
                 sdo.read(at, data)
             case ReadOther(_, data):
                 sdo.read_other(at, data)
+            case Keep():
+                pass  # what it names is written back at the end
+            case _:
+                raise AssertionError(action)
 
     def _act_within(self, within_ms: int, *words: str) -> None:
         """Act; Disturbed if that took longer than what is looked at then."""

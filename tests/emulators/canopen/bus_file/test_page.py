@@ -13,9 +13,10 @@ from click.testing import CliRunner
 from tests.emulators.canopen.bus_file.joint_sheet import joint_sheet
 from tests.emulators.canopen.bus_file.system import write_system
 from tickrig import open_bench
-from tickrig.emulators.canopen.bus_file.node_keys import KEYS, rows
+from tickrig.emulators.canopen.bus_file.node_keys import KEYS
 from tickrig.emulators.canopen.cli import main
 from tickrig.emulators.testing.commands.check_cli import check
+from tickrig.host.text.section import rows
 from tickrig.testing import open_master
 
 ROOT = Path(__file__).parents[4]
@@ -81,7 +82,7 @@ def test_the_node_that_is_shown_is_right(tmp_path: Path) -> None:
 
 
 def test_the_keys_are_those_of_the_code() -> None:
-    assert "\n".join(["", *rows(), ""]) in TEXT
+    assert "\n".join(["", *rows(KEYS), ""]) in TEXT
     assert all(f"`{name}`" in TEXT for name in KEYS)
 
 

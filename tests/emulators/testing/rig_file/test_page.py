@@ -11,7 +11,8 @@ from click.testing import CliRunner
 
 from tickrig.emulators.commands.cli import main
 from tickrig.emulators.testing.rig_file.reader import parse_rig_file
-from tickrig.emulators.testing.rig_file.schema import PAGE, rows
+from tickrig.emulators.testing.rig_file.schema import PAGE
+from tickrig.host.text.section import rows
 
 FILE = Path(__file__).parents[4] / "docs" / "reference/bench/rig-file.md"
 RIGS = sorted(FILE.parents[1].glob("examples/rigs/*.toml"))
