@@ -46,7 +46,7 @@ def test_the_pages_name_the_pythons_of_the_classifiers() -> None:
     first, *others, last = re.findall(pattern, "\n".join(project["classifiers"]), re.MULTILINE)
     assert project["requires-python"] == f">={first}"
     readme, page = ((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/install.md"))
-    assert f"Linux with Python {first} to {last}:" in readme
+    assert f"Linux, Python {first} to {last} and make" in readme
     assert f"Linux and Python {first} to {last} " in page
     assert f"Python {first}, {', '.join(others)} and {last} are tested" in page
 

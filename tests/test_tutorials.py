@@ -80,9 +80,9 @@ def test_the_commands_of_a_page_work(
 @pytest.mark.realtime
 def test_the_first_commands_of_the_readme_work(environment: Environment, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples" / "chair", tmp_path / "examples" / "chair")
-    (block,) = re.findall(r"^In a clone.*?```console\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
-    install, *commands = [line.partition("  #")[0].split() for line in block.splitlines()]
-    assert (install[:2], len(commands)) == (["pip", "install"], 2)
+    (block,) = re.findall(r"^Or install .*?```console\n(.*?)^```", README, re.DOTALL | re.MULTILINE)
+    make, install, *commands = [line.partition("  #")[0].split() for line in block.splitlines()]
+    assert (make[0], install[:2], len(commands)) == ("python3", ["pip", "install"], 2)
     for command in commands:
         environment.run(*command, cwd=tmp_path)
 
