@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.emulators.fields import DeviceField
-from tickrig.host.cli.options import (
-    PATH,
-    Decorator,
-    NumberRange,
-    add_options,
-    version_option,
-)
+from tickrig.host.cli.options import PATH, Decorator, NumberRange, add_options, version_option
 from tickrig.host.cli.start import load, loading
 
 if TYPE_CHECKING:

@@ -18,9 +18,6 @@ def tkernel(no_caches: bool) -> None:
     on. In virtual time: the same lines each time.
     """
     with loading():
-        from tickrig.emulators.demos.tkernel import (  # noqa: PLC0415
-            CorridorStage,
-            run_demo,
-        )
+        from tickrig.emulators.demos.tkernel import CorridorStage, run_demo  # noqa: PLC0415
 
     run_demo(CorridorStage(caches=not no_caches), click.echo)

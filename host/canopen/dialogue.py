@@ -53,12 +53,7 @@ from tickrig.host.canopen.errors import (
     StateTimeout,
     WrongIdentity,
 )
-from tickrig.wire.canopen.nmt import (
-    ERROR_CONTROL_COB_ID,
-    NMT_COB_ID,
-    NmtCommand,
-    NmtState,
-)
+from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand, NmtState
 from tickrig.wire.canopen.sdo import (
     Abort,
     DownloadInitiateResponse,

@@ -3,14 +3,7 @@
 Ctrl-C must end them from the first moment: this module imports nothing before that is so.
 """
 
-from _signal import (  # type: ignore[import-not-found] # signal itself takes milliseconds
-    SIG_DFL,
-    SIG_IGN,
-    SIGINT,
-    default_int_handler,
-    getsignal,
-    signal,
-)
+from _signal import SIG_DFL, SIG_IGN, SIGINT, default_int_handler, getsignal, signal  # type: ignore[import-not-found] # signal itself takes milliseconds
 
 
 def _start(name: str, module: str) -> None:

@@ -338,9 +338,7 @@ class Bench(BenchDevice, Closing):
             OSError: no port is to be had, or no link or socket can be made.
         """
         if mode == HARDWARE:
-            from tickrig.emulators.testing.bench.modes.hardware_mode import (  # noqa: PLC0415 - POSIX
-                HardwareMode,
-            )
+            from tickrig.emulators.testing.bench.modes.hardware_mode import HardwareMode  # noqa: PLC0415 - POSIX
 
             return cls.of_mode(HardwareMode(plan, terminal))
         return cls.of_mode(_emulated(mode, parts_of(plan), plan))
@@ -600,8 +598,6 @@ def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
         return VirtualMode(rig_of(parts, plan))
     if mode != _REAL:
         raise ValueError(f"a bench of emulated devices is virtual or real, not {mode!r}")
-    from tickrig.emulators.testing.bench.modes.real_mode import (  # noqa: PLC0415 - POSIX
-        RealMode,
-    )
+    from tickrig.emulators.testing.bench.modes.real_mode import RealMode  # noqa: PLC0415 - POSIX
 
     return RealMode.open(parts.mounts, plan.real, lambda outside: rig_of(parts, plan, outside))

@@ -104,9 +104,7 @@ def write_table(table: CampaignTable, path: Path) -> None:
         OSError: it cannot be written.
     """
     if path.suffix == PARQUET:
-        from tickrig.emulators.testing.campaign.parquet_file import (  # noqa: PLC0415 - slow
-            parquet_of,
-        )
+        from tickrig.emulators.testing.campaign.parquet_file import parquet_of  # noqa: PLC0415 - slow
 
         write_whole(path, parquet_of(table.columns, [row.cells() for row in table.rows]))
         return
@@ -125,9 +123,7 @@ def read_table(path: Path) -> CampaignTable:
         OSError: it cannot be read.
     """
     if path.suffix == PARQUET:
-        from tickrig.emulators.testing.campaign.parquet_file import (  # noqa: PLC0415 - slow
-            read_parquet,
-        )
+        from tickrig.emulators.testing.campaign.parquet_file import read_parquet  # noqa: PLC0415 - slow
 
         return _table(path, read_parquet(path))
     try:

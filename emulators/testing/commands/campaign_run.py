@@ -286,9 +286,7 @@ class CampaignRun:
         if not self._options.scheduler:
             return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
         try:
-            from tickrig.emulators.testing.campaign.dask_workers import (  # noqa: PLC0415 - slow
-                DaskWorkers,
-            )
+            from tickrig.emulators.testing.campaign.dask_workers import DaskWorkers  # noqa: PLC0415 - slow
         except ImportError:
             raise CampaignRefusal(
                 "--scheduler needs Dask: pip install 'tickrig[campaign]'"

@@ -63,10 +63,7 @@ def run(  # noqa: PLR0913 - options
         from dataclasses import replace  # noqa: PLC0415 - slow
 
         from tickrig.emulators.commands.run import mistakes_in  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.commands.bench_run import (  # noqa: PLC0415 - slow
-            BenchOptions,
-            BenchRun,
-        )
+        from tickrig.emulators.testing.commands.bench_run import BenchOptions, BenchRun  # noqa: PLC0415 - slow
         from tickrig.emulators.testing.rig_file.reader import read_rig_file  # noqa: PLC0415
         from tickrig.emulators.testing.rig_file.schema import RigFileError  # noqa: PLC0415
 

@@ -297,9 +297,7 @@ def _loops(passing: Passing) -> AbstractContextManager[None]:
     """Return what lets event loops have this time; nothing where asyncio is not in use."""
     if "asyncio" not in sys.modules:
         return nullcontext()
-    from tickrig.emulators.testing.host_clock.bench_loop import (  # noqa: PLC0415 - imports asyncio
-        bench_loops,
-    )
+    from tickrig.emulators.testing.host_clock.bench_loop import bench_loops  # noqa: PLC0415 - imports asyncio
 
     return bench_loops(passing)
 

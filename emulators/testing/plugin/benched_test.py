@@ -25,13 +25,7 @@ from tickrig.emulators.testing.plugin.bench_source import (
 )
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
 from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
-from tickrig.emulators.testing.plugin.health import (
-    Health,
-    SafeState,
-    check_safe,
-    unsafe,
-    with_plan,
-)
+from tickrig.emulators.testing.plugin.health import Health, SafeState, check_safe, unsafe, with_plan
 from tickrig.emulators.testing.plugin.host_checks import THREADS, dead_threads, guard, never_awaited
 from tickrig.emulators.testing.plugin.settings import SETTINGS
 from tickrig.emulators.testing.plugin.stash import BENCHED, TestWithBench
@@ -39,9 +33,7 @@ from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make
 from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.bench_evidence import (
-        BenchWitness,
-    )
+    from tickrig.emulators.testing.plugin.bench_evidence import BenchWitness
 
 
 # Theory of operation
@@ -119,9 +111,7 @@ class BenchedTest(TestWithBench):
         _offer(bench)
         self._health = Health(bench)
         if self._settings.report:
-            from tickrig.emulators.testing.plugin.bench_evidence import (  # noqa: PLC0415
-                BenchWitness,
-            )
+            from tickrig.emulators.testing.plugin.bench_evidence import BenchWitness  # noqa: PLC0415
 
             self._witness = BenchWitness(bench)
         if self._settings.compare and bench.mode == VIRTUAL:

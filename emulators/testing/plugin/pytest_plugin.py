@@ -198,19 +198,13 @@ def pytest_runtest_makereport(
     if (test := item.stash.get(BENCHED, None)) is None:
         report = yield
         if call.excinfo is not None and is_blocked(call.excinfo.value):
-            from tickrig.emulators.testing.plugin.verdict import (  # noqa: PLC0415 - it is
-                blocked,
-                make_error,
-            )
+            from tickrig.emulators.testing.plugin.verdict import blocked, make_error  # noqa: PLC0415 - it is
 
             make_error(report, blocked(report, call, None))
         return report
     mistaken = False
     if call.excinfo is not None:
-        from tickrig.emulators.testing.plugin.verdict import (  # noqa: PLC0415 - it is loaded
-            end_at_caller,
-            is_mistake,
-        )
+        from tickrig.emulators.testing.plugin.verdict import end_at_caller, is_mistake  # noqa: PLC0415 - it is loaded
 
         mistaken = is_mistake(call.excinfo.value)
         if not item.config.getoption("fulltrace", False):
@@ -265,9 +259,7 @@ def _prepare(config: pytest.Config, settings: PluginSettings) -> None:
             where = f"--bench-artifacts {settings.artifacts}"
             raise pytest.UsageError(f"{where}: {error.strerror}") from None
     if settings.report:
-        from tickrig.emulators.testing.plugin.report_plugin import (  # noqa: PLC0415 - asked for
-            ReportPlugin,
-        )
+        from tickrig.emulators.testing.plugin.report_plugin import ReportPlugin  # noqa: PLC0415 - asked for
         from tickrig.emulators.testing.report.report_file import check_report  # noqa: PLC0415
 
         with _usage():

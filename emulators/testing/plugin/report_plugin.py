@@ -16,11 +16,7 @@ import pytest
 from tickrig.emulators.testing.plugin.failure_report import outcome_of, repeat_command
 from tickrig.emulators.testing.plugin.settings import PluginSettings
 from tickrig.emulators.testing.plugin.stash import BENCHED
-from tickrig.emulators.testing.report.bench_report import (
-    BenchReport,
-    RunEnvironment,
-    TestRecord,
-)
+from tickrig.emulators.testing.report.bench_report import BenchReport, RunEnvironment, TestRecord
 from tickrig.emulators.testing.report.overview import (
     UNWELL,
     OverallVerdict,

@@ -6,9 +6,7 @@ import json
 import re
 from typing import Final
 
-from tickrig.host.text.section import (
-    Section,
-)
+from tickrig.host.text.section import Section
 from tickrig.host.text.toml_reader import BROKEN
 from tickrig.host.text.trace import BEGIN
 

@@ -9,12 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.sources.source import (
-    BusSpec,
-    FileSpec,
-    LineSpec,
-    parse_source,
-)
+from tickrig.host.canmon.sources.source import BusSpec, FileSpec, LineSpec, parse_source
 from tickrig.host.canopen.conform.check import Stimulus
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup

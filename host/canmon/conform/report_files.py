@@ -89,9 +89,7 @@ def file_text(option: str, report: Report, baseline: Baseline, show: ShowFrames)
     """
     match option:
         case "--html":
-            from tickrig.host.canopen.conform.report.page import (  # noqa: PLC0415 - an extra
-                html_page,
-            )
+            from tickrig.host.canopen.conform.report.page import html_page  # noqa: PLC0415 - an extra
 
             return html_page(report, baseline, show)
         case "--junit":

@@ -43,9 +43,7 @@ class FilteredDecoder:
         self._decoder, self._wanted = decoder, wanted
         self._missing: MissingSignals | None = None
         if wanted is not None and (wanted.signals or wanted.words):
-            from tickrig.host.canmon.model.decode.filter_terms import (  # noqa: PLC0415 - slow
-                MissingSignals,
-            )
+            from tickrig.host.canmon.model.decode.filter_terms import MissingSignals  # noqa: PLC0415 - slow
 
             self._missing = MissingSignals(wanted.signals, wanted.words)
 
@@ -116,9 +114,7 @@ def _writer(output: DumpFormat, lines: DumpLines) -> _Printer:
 def _error_meaning(record: AnyRecord) -> Decoded | None:
     if not isinstance(record.frame, ErrorFrame):
         return None
-    from tickrig.host.canmon.model.decode.services import (  # noqa: PLC0415 - seldom wanted
-        decode_error,
-    )
+    from tickrig.host.canmon.model.decode.services import decode_error  # noqa: PLC0415 - seldom wanted
 
     return decode_error(record.frame)
 
@@ -202,20 +198,14 @@ class BlockPrinter:
     """
 
     def __init__(self, output: DumpFormat, lines: DumpLines, decoder: Decoder | None) -> None:
-        from tickrig.host.canmon.model.columns.column_text import (  # noqa: PLC0415 - numpy
-            ScreenText,
-            fits,
-            log_lines,
-        )
+        from tickrig.host.canmon.model.columns.column_text import ScreenText, fits, log_lines  # noqa: PLC0415 - numpy
         from tickrig.host.canmon.model.columns.columns import records  # noqa: PLC0415
 
         self._fits, self._records, self._print = fits, records, printer_of(output, lines, raw=False)
         self._log_lines, self._screen = log_lines, ScreenText(lines)
         self._output, self._meaning, self._decode = output, FilteredDecoder(decoder, None), None
         if decoder is not None:
-            from tickrig.host.canmon.model.columns.column_meanings import (  # noqa: PLC0415
-                ColumnMeanings,
-            )
+            from tickrig.host.canmon.model.columns.column_meanings import ColumnMeanings  # noqa: PLC0415
 
             self._decode = ColumnMeanings(decoder).texts
 

@@ -301,11 +301,7 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
     if word.endswith(_RULE_FILE):
         return _rules(word, bit_rate)
     from tickrig.host.canmon.model.check.rule_parser import errors_alone  # noqa: PLC0415 - slow
-    from tickrig.host.canmon.model.decode.filter import (  # noqa: PLC0415
-        FilterError,
-        parse_filter,
-        tokens_of,
-    )
+    from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter, tokens_of  # noqa: PLC0415
 
     try:
         wanted = parse_filter(word)
@@ -318,11 +314,7 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
 def _rules(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
     from tickrig.host.canmon.model.check.alarms import Alarms  # noqa: PLC0415
-    from tickrig.host.canmon.model.check.rules import (  # noqa: PLC0415
-        Rules,
-        parse_rule_file,
-        parse_rules,
-    )
+    from tickrig.host.canmon.model.check.rules import Rules, parse_rule_file, parse_rules  # noqa: PLC0415
     from tickrig.host.canmon.model.recorder.trigger import RuleTrigger  # noqa: PLC0415
 
     try:

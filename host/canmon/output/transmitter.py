@@ -10,13 +10,7 @@ import can
 
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.sources.bus_source import (
-    BusReader,
-    BusSource,
-    merged,
-    open_bus,
-    reader_of,
-)
+from tickrig.host.canmon.sources.bus_source import BusReader, BusSource, merged, open_bus, reader_of
 from tickrig.host.canmon.sources.source import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused

@@ -13,11 +13,7 @@ from tickrig.host.canopen.eds import read_sheet
 from tickrig.host.text.document import FilePlace
 from tickrig.host.text.names import closest
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_device import (
-    COMMISSIONING,
-    HIGHEST_NODE_ID,
-    EdsDevice,
-)
+from tickrig.wire.canopen.eds.eds_device import COMMISSIONING, HIGHEST_NODE_ID, EdsDevice
 from tickrig.wire.canopen.eds.eds_file import EdsError, EdsFile, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.object_table import EntryDescription

@@ -5,20 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from tickrig.host.canopen.bus_file.bus_values import (
-    BusDefaults,
-    BusSlave,
-    DriveChannel,
-    Identity,
-)
-from tickrig.host.canopen.bus_file.known_keys import (
-    DRIVER,
-    EXTRA,
-    SCALES,
-    SLAVE,
-    WRITE,
-    check_keys,
-)
+from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusSlave, DriveChannel, Identity
+from tickrig.host.canopen.bus_file.known_keys import DRIVER, EXTRA, SCALES, SLAVE, WRITE, check_keys
 from tickrig.host.canopen.bus_file.notes import UNSIGNED8, UNSIGNED16, BusFileSection
 from tickrig.host.canopen.bus_file.pdo_reader import RPDO, TPDO, CobIds, PdoReader
 from tickrig.host.canopen.bus_file.sheet import IDENTITY, Sheet, Writes

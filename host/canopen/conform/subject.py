@@ -14,11 +14,7 @@ from tickrig.host.canopen.conform.binding.binding import (
     BoundPlace,
     bind,
 )
-from tickrig.host.canopen.conform.binding.capabilities import (
-    EdsClaims,
-    NodeFeatures,
-    find_features,
-)
+from tickrig.host.canopen.conform.binding.capabilities import EdsClaims, NodeFeatures, find_features
 from tickrig.host.canopen.conform.binding.pdo_binding import CARRIED, RPDOS, BoundPdo
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, SizeOf, multiplexer
 from tickrig.host.canopen.conform.check import (

@@ -22,12 +22,7 @@ from tickrig.host.rtc.components import EXAMPLES
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.host.rtc.system.schedule import RealTime
 from tickrig.host.rtc.system.system import System, restore, with_remotes
-from tickrig.host.rtc.system.system_file import (
-    check_system,
-    file_format,
-    read_system,
-    write_system,
-)
+from tickrig.host.rtc.system.system_file import check_system, file_format, read_system, write_system
 from tickrig.host.text.user_file import explain_error, find_class
 
 _ATTACH_LITE: Final = "tickrig.host.rtc.lite.attachment:attach_lite"

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
         conformance_tests as conformance_tests,
     )
     from tickrig.emulators.testing.fuzz import DeviceFuzz as DeviceFuzz
-    from tickrig.emulators.testing.fuzz import (
-        SilentDeviceError as SilentDeviceError,
-    )
+    from tickrig.emulators.testing.fuzz import SilentDeviceError as SilentDeviceError
     from tickrig.emulators.testing.machine import strategies as strategies
     from tickrig.emulators.testing.machine.bench_machine import BenchMachine as BenchMachine
     from tickrig.emulators.testing.machine.bench_machine import host_rule as host_rule

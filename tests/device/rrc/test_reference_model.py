@@ -7,14 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.device.rrc.reference_model import (
-    FAULTS,
-    INPUTS,
-    ReferenceRrc,
-    check,
-    limited,
-    shape,
-)
+from tests.device.rrc.reference_model import FAULTS, INPUTS, ReferenceRrc, check, limited, shape
 
 VECTORS: dict[str, list[dict[str, Any]]] = json.loads(
     (Path(__file__).parents[2] / "golden" / "rrc.json").read_text(encoding="utf-8")

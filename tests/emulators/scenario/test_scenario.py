@@ -7,14 +7,7 @@ import pytest
 from tests.emulators.lamp import Lamp
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.bench.running_emulator import Transcript
-from tickrig.emulators.scenario import (
-    Press,
-    ScenarioEnd,
-    ScenarioParser,
-    ScenarioPlayer,
-    Send,
-    Set,
-)
+from tickrig.emulators.scenario import Press, ScenarioEnd, ScenarioParser, ScenarioPlayer, Send, Set
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.text.steps import StepError
 

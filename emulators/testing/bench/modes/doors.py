@@ -84,9 +84,7 @@ class Doors:
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
         """Open a line by pyserial; see `BenchMode`."""
-        from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415 - slow
-            open_watched_serial,
-        )
+        from tickrig.emulators.testing.bench.modes.watched_ports import open_watched_serial  # noqa: PLC0415 - slow
 
         place = self._place(wire)
         if isinstance(place, BusPlan):
@@ -100,9 +98,7 @@ class Doors:
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can; see `BenchMode`."""
-        from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415 - slow
-            open_watched_bus,
-        )
+        from tickrig.emulators.testing.bench.modes.watched_ports import open_watched_bus  # noqa: PLC0415 - slow
         from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
 
         bus = open_watched_bus(self._bus(wire), self._watch_of(wire), options)
@@ -152,10 +148,7 @@ def _line_link(place: LinePlace) -> Link[bytes]:
 
 
 def _frame_link(place: BusPlan, watch: DoorWatch) -> StampedLink:
-    from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415 - slow
-        name_of,
-        open_bus,
-    )
+    from tickrig.emulators.testing.bench.modes.watched_ports import name_of, open_bus  # noqa: PLC0415 - slow
     from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
     from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
 
@@ -237,10 +230,7 @@ class OutsideEnds:
         from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow
         from tickrig.emulators.can.outside.bus_port import port_on  # noqa: PLC0415 - slow
         from tickrig.emulators.testing.bench.modes.door_watch import LinkGone  # noqa: PLC0415
-        from tickrig.emulators.testing.bench.modes.watched_ports import (  # noqa: PLC0415
-            name_of,
-            open_bus,
-        )
+        from tickrig.emulators.testing.bench.modes.watched_ports import name_of, open_bus  # noqa: PLC0415
         from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
 
         bus = open_bus(plan, {})

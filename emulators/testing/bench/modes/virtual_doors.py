@@ -143,9 +143,7 @@ class VirtualDoors:
         """Offer a wire under a name that nobody else has."""
         mount = self._mounts[wire]
         if isinstance(mount, LineMount):
-            from tickrig.emulators.serial.outside.serial_ports import (  # noqa: PLC0415 - slow
-                SERIAL_PORTS,
-            )
+            from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS  # noqa: PLC0415 - slow
 
             name = _free(wire, SERIAL_PORTS.names)
             self._offers.enter(SERIAL_PORTS.offer(name, self._side(wire)))

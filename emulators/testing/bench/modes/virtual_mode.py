@@ -105,9 +105,7 @@ class VirtualMode(EmulatedMode):
 
     def patched_time(self) -> AbstractContextManager[object]:
         """Let hosts that look at a clock live in the rig's time; see `patched_time`."""
-        from tickrig.emulators.testing.host_clock.patched_time import (  # noqa: PLC0415 - seldom
-            patched_time,
-        )
+        from tickrig.emulators.testing.host_clock.patched_time import patched_time  # noqa: PLC0415 - seldom
 
         return patched_time(RigPassing(self._rig.rig))
 

@@ -205,9 +205,7 @@ def _named_and_written(texts: Iterable[str]) -> tuple[list[str], tuple[Expressio
         if _NAMES.fullmatch(text) and text not in _ONE_WORD:
             names += [part.strip() for part in text.split(",")]
             continue
-        from tickrig.host.canmon.model.check.rule_parser import (  # noqa: PLC0415 - seldom wanted
-            parse_rule,
-        )
+        from tickrig.host.canmon.model.check.rule_parser import parse_rule  # noqa: PLC0415 - seldom wanted
 
         named = _NAMED.fullmatch(text)
         expressions.append(parse_rule(named[2], named[1].strip()) if named else parse_rule(text))

@@ -25,9 +25,7 @@ from tickrig.host.canmon.model.logs.log_file import (
     open_log,
     read_blocks,
 )
-from tickrig.host.canmon.model.logs.log_reader import (
-    BLOCK_BYTES as PIECE,
-)
+from tickrig.host.canmon.model.logs.log_reader import BLOCK_BYTES as PIECE
 from tickrig.host.canmon.model.logs.log_reader import (
     Item,
     LogLines,

@@ -209,9 +209,7 @@ class BusDecoder:
                 return partial(_unmapped, node) if can_id in _PDO_IDS else _raw
 
     def _sdo_route(self, node: int, can_id: int, request_id: int) -> Route:
-        from tickrig.host.canmon.model.decode.sdo import (  # noqa: PLC0415 - not on every bus
-            SdoChannel,
-        )
+        from tickrig.host.canmon.model.decode.sdo import SdoChannel  # noqa: PLC0415 - not on every bus
 
         channel = self._channels.setdefault((node, request_id), SdoChannel(node))
         take = channel.request if can_id == request_id else channel.response
@@ -329,9 +327,7 @@ def _signals(transfer: Transfer) -> tuple[Signal, ...]:
 
 
 def _lss_route() -> Route:
-    from tickrig.host.canmon.model.decode.services import (  # noqa: PLC0415 - on few buses
-        decode_lss,
-    )
+    from tickrig.host.canmon.model.decode.services import decode_lss  # noqa: PLC0415 - on few buses
 
     return decode_lss
 

@@ -18,12 +18,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from tickrig.host.canmon.model.logs.log_file import (
-    COMPRESSED,
-    LogFormat,
-    log_ending,
-    log_format,
-)
+from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_ending, log_format
 
 _MIN_BYTES: Final = 64 << 10
 """Of a file: smaller ones are no use."""

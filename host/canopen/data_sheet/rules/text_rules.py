@@ -8,12 +8,7 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
-from tickrig.host.canopen.data_sheet.rules.known_keys import (
-    SECTION,
-    is_number,
-    keys_of,
-    numbered,
-)
+from tickrig.host.canopen.data_sheet.rules.known_keys import SECTION, is_number, keys_of, numbered
 from tickrig.host.canopen.data_sheet.rules.value_rules import kind_of
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_value import KNOWN_SECTIONS, EdsLine, without_comment

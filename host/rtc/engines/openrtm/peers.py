@@ -9,11 +9,7 @@ import CosNaming
 from omniORB import CORBA
 
 from tickrig.host.cli.engine_options import Endpoint, parse_endpoint
-from tickrig.host.rtc.engines.openrtm.connector_ends import (
-    CORBA_CDR,
-    DATA_TYPE,
-    INTERFACE,
-)
+from tickrig.host.rtc.engines.openrtm.connector_ends import CORBA_CDR, DATA_TYPE, INTERFACE
 from tickrig.host.rtc.engines.openrtm.names import name_of
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, carried, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.port_service import SystemPorts

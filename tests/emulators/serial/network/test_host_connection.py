@@ -8,12 +8,7 @@ from contextlib import suppress
 
 import pytest
 
-from tickrig.emulators.serial.network import (
-    LAST_WORDS_US,
-    READ_BYTES,
-    STUCK_US,
-    HostConnection,
-)
+from tickrig.emulators.serial.network import LAST_WORDS_US, READ_BYTES, STUCK_US, HostConnection
 
 Ends = tuple[HostConnection, socket.socket]
 

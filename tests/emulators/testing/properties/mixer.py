@@ -5,15 +5,7 @@ from __future__ import annotations
 from itertools import count
 from typing import Any
 
-from tickrig import (
-    NEVER,
-    Copyable,
-    InputBank,
-    InputSignal,
-    LineSplitter,
-    OutputSignal,
-    SignalType,
-)
+from tickrig import NEVER, Copyable, InputBank, InputSignal, LineSplitter, OutputSignal, SignalType
 
 STOP_US, TRIP_US = 30_000_000, 500_000
 INPUTS = (

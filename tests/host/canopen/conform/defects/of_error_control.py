@@ -5,14 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from tests.host.canopen.conform.defects.defect import (
-    Bends,
-    Defect,
-    Plant,
-    hears,
-    says,
-    tolerant,
-)
+from tests.host.canopen.conform.defects.defect import Bends, Defect, Plant, hears, says, tolerant
 from tickrig.device.canopen.dictionary import Entry, SdoAbort
 from tickrig.device.canopen.errors import ErrorBehaviour
 from tickrig.device.canopen.nmt import HeartbeatConsumer, HeartbeatProducer, NodeGuarding

@@ -5,13 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from tests.host.canopen.conform.defects.defect import (
-    Bends,
-    Defect,
-    Plant,
-    hears,
-    says,
-)
+from tests.host.canopen.conform.defects.defect import Bends, Defect, Plant, hears, says
 from tickrig.device.canopen.nmt import NmtSlave
 from tickrig.device.canopen.pdo.rpdo import PdoConsumer
 from tickrig.device.canopen.sdo import SdoServers

@@ -7,14 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from operator import eq, gt, lt
 from typing import Any, ClassVar, Final
 
-from tests.host.canopen.conform.defects.defect import (
-    Bends,
-    Defect,
-    Plant,
-    hears,
-    says,
-    together,
-)
+from tests.host.canopen.conform.defects.defect import Bends, Defect, Plant, hears, says, together
 from tests.host.canopen.conform.defects.of_clauses import keeping, loses
 from tickrig.device.canopen.dictionary import Entry, SdoAbort
 from tickrig.device.canopen.errors import EmcyProducer, ErrorBehaviour

@@ -6,14 +6,7 @@ from collections.abc import Iterable
 from typing import Final
 
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO
-from tests.host.canopen.conform.defects.defect import (
-    Bends,
-    Defect,
-    Plant,
-    acts_as,
-    hears,
-    says,
-)
+from tests.host.canopen.conform.defects.defect import Bends, Defect, Plant, acts_as, hears, says
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.wire.canopen.datatypes import DataType
 from tickrig.wire.canopen.eds.object_table import RW, EntryDescription

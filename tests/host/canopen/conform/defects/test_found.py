@@ -12,13 +12,7 @@ from tests.device.canopen.actions import DriveActions, GenericIoActions, SlaveAc
 from tests.device.canopen.profile_objects import DRIVE, GENERIC_IO, make_dictionary
 from tests.device.canopen.reference import NODE_ID
 from tests.host.canopen.conform.defects import of_others
-from tests.host.canopen.conform.defects.defect import (
-    Bends,
-    Defect,
-    Plant,
-    make_defective,
-    says,
-)
+from tests.host.canopen.conform.defects.defect import Bends, Defect, Plant, make_defective, says
 from tests.host.canopen.conform.defects.table import DEFECTS
 from tests.host.canopen.conform.r1 import EDS, R1, Stimulus, yes
 from tickrig.device.canopen.slave import CanopenSlave

@@ -2,14 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canopen.conform.check import (
-    Action,
-    Hold,
-    Macro,
-    RefuseRewrite,
-    Step,
-    Write,
-)
+from tickrig.host.canopen.conform.check import Action, Hold, Macro, RefuseRewrite, Step, Write
 from tickrig.host.canopen.conform.notation import parse_step, step_words
 from tickrig.host.canopen.conform.suite import suite_checks
 
