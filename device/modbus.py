@@ -8,20 +8,9 @@ from typing import Final
 
 from tickrig._compiled import mypyc_attr
 from tickrig.device.twin import Copyable, Immutable, Part
+from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
-from tickrig.wire.modbus import (
-    BROADCAST,
-    MAX_FRAME_BYTES,
-    SHORTEST_SILENCE_US,
-    ExceptionCode,
-    Refusal,
-    encode_exception,
-    encode_frame,
-    encode_response,
-    parse_frame,
-    parse_request,
-)
 
 # Holding registers under names; a number of 32 bits takes two, its high half first.
 
@@ -119,7 +108,7 @@ class Registers(Part):
             register, word = self._find(at)
             words = values[at - first : at - first + register.words]
             if word or len(words) < register.words or not register.writable:
-                raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS)
+                raise modbus.Refusal(modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
             written[register.name] = _joined(register, words)
             at += register.words
         self._values.update(written)
@@ -129,7 +118,7 @@ class Registers(Part):
         try:
             return self._at[address]
         except KeyError:
-            raise Refusal(ExceptionCode.ILLEGAL_DATA_ADDRESS) from None
+            raise modbus.Refusal(modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS) from None
 
 
 def _joined(register: Register, words: Sequence[int]) -> int:
@@ -140,7 +129,7 @@ def _joined(register: Register, words: Sequence[int]) -> int:
     if register.signed and value >= top // 2:
         value -= top
     if not register.low <= value <= register.high:
-        raise Refusal(ExceptionCode.ILLEGAL_DATA_VALUE)
+        raise modbus.Refusal(modbus.ExceptionCode.ILLEGAL_DATA_VALUE)
     return value
 
 
@@ -174,7 +163,7 @@ class ModbusSlave(Copyable):
         registers: Registers,
         written: Callable[[Mapping[str, int]], None],
         address: int = 1,
-        silence_us: int = SHORTEST_SILENCE_US,
+        silence_us: int = modbus.SHORTEST_SILENCE_US,
     ) -> None:
         self._registers, self._written = registers, written
         self._address, self._silence_us = address, silence_us
@@ -196,32 +185,32 @@ class ModbusSlave(Copyable):
         if now_us >= self.due_us:
             answer, self._frame = self._serve(now_us, self._frame), b""
         if rx:
-            self._frame = (self._frame + rx)[: MAX_FRAME_BYTES + 1]
+            self._frame = (self._frame + rx)[: modbus.MAX_FRAME_BYTES + 1]
             self._last_us = now_us
         return answer
 
     def _serve(self, now_us: int, frame: bytes) -> bytes:
         try:
-            address, message = parse_frame(frame)
+            address, message = modbus.parse_frame(frame)
         except WireError:
             self.garbled += 1
             return b""
-        if address not in (BROADCAST, self._address):
+        if address not in (modbus.BROADCAST, self._address):
             return b""
         self.served, self.last_request_us = self.served + 1, now_us
         answer = self._obey(message)
-        return b"" if address == BROADCAST else encode_frame(address, answer)
+        return b"" if address == modbus.BROADCAST else modbus.encode_frame(address, answer)
 
     def _obey(self, message: bytes) -> bytes:
         registers, values = self._registers, list[int]()
         try:
-            request = parse_request(message)
+            request = modbus.parse_request(message)
             if request.read is not None:
                 registers.check(*request.read)  # nothing is written if this is refused
             if request.write is not None:
                 self._written(registers.write(*request.write))
             if request.read is not None:
                 values = registers.read(*request.read)
-        except Refusal as refusal:
-            return encode_exception(message[0], refusal.code)
-        return encode_response(request, values)
+        except modbus.Refusal as refusal:
+            return modbus.encode_exception(message[0], refusal.code)
+        return modbus.encode_response(request, values)

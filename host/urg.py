@@ -8,17 +8,9 @@ from math import tau
 from typing import Final
 
 from tickrig.host.links.link import DeviceRefused, Link
+from tickrig.wire import scip
 from tickrig.wire import scip as status
 from tickrig.wire.errors import WireError
-from tickrig.wire.scip import (
-    SWITCH,
-    WIDTHS,
-    Command,
-    Reply,
-    ReplySplitter,
-    Specification,
-    parse_scan,
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +29,7 @@ class UrgScan:
     first: int
     cluster: int
     distances_mm: tuple[int, ...]
-    specification: Specification
+    specification: scip.Specification
 
     def angle_rad(self, place: int) -> float:
         """Return the direction of a number, from straight ahead to the left."""
@@ -79,7 +71,7 @@ class UrgClient:
 
     def __init__(self, link: Link[bytes], cluster: int = 1, interval: int = 0) -> None:
         self._link, self._cluster, self._interval = link, cluster, interval
-        self.specification: Specification | None = None
+        self.specification: scip.Specification | None = None
         self.restarts = self._spoilt = 0
         self._begin()
 
@@ -109,19 +101,19 @@ class UrgClient:
 
     def close(self) -> None:
         """Switch the laser off, and give the line back."""
-        self._link.send(Command("QT").encode())
+        self._link.send(scip.Command("QT").encode())
         self._link.close()
 
     def _begin(self) -> None:
-        self._splitter, self._received_us = ReplySplitter(), self._link.now_us
-        commands = (Command("TM", _LEAVE_ADJUST), Command("QT"), Command("PP"))
-        switch = SWITCH + b"\n"
+        self._splitter, self._received_us = scip.ReplySplitter(), self._link.now_us
+        commands = (scip.Command("TM", _LEAVE_ADJUST), scip.Command("QT"), scip.Command("PP"))
+        switch = scip.SWITCH + b"\n"
         self._link.send(switch + b"".join(command.encode() for command in commands))
 
-    def _take(self, reply: Reply) -> list[UrgScan]:
-        command = Command.parse(reply.echo)
+    def _take(self, reply: scip.Reply) -> list[UrgScan]:
+        command = scip.Command.parse(reply.echo)
         if command.symbol == "PP" and reply.status == status.OK:
-            self.specification = Specification.parse(reply.lines)
+            self.specification = scip.Specification.parse(reply.lines)
             self._received_us = self._link.now_us
             self._measure(self.specification)
         if command.symbol != "MD" or reply.status in (status.OK, status.REPEATED):
@@ -130,13 +122,13 @@ class UrgClient:
             raise DeviceRefused(f"{reply.echo!r}: status {reply.status}", reply.status)
         if self.specification is None:
             return []
-        time_ms, distances = parse_scan(reply.lines, WIDTHS["D"])
+        time_ms, distances = scip.parse_scan(reply.lines, scip.WIDTHS["D"])
         self._received_us = self._link.now_us
         return [
             UrgScan(time_ms, self.specification.first, self._cluster, distances, self.specification)
         ]
 
-    def _measure(self, specification: Specification) -> None:
+    def _measure(self, specification: scip.Specification) -> None:
         steps = f"{specification.first:04}{specification.last:04}"
         rest = f"{self._cluster:02}{self._interval}{_ENDLESS:02}"
-        self._link.send(Command("MD", steps + rest).encode())
+        self._link.send(scip.Command("MD", steps + rest).encode())

@@ -14,16 +14,8 @@ from tickrig.device.canopen.slave import Application, CanopenSlave, Nonvolatile,
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.component import CallbackRunner, DeviceComponent, Result, Timer, declared, shown
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
+from tickrig.wire import rtc_canopen
 from tickrig.wire.canopen.nmt import NmtCommand, NmtState
-from tickrig.wire.rtc_canopen import (
-    LONG,
-    CanopenPortProfile,
-    CanopenPortType,
-    PortDirection,
-    PortTransport,
-    RtcProfile,
-    object_table,
-)
 
 # Data ports of a DeviceRTC: a value in the dictionary, carried by a PDO.
 
@@ -41,15 +33,15 @@ class CanopenPort(Generic[T]):
         transport: None for a PDO if the type fits into one, else SDO.
     """
 
-    direction: ClassVar[PortDirection]
+    direction: ClassVar[rtc_canopen.PortDirection]
 
     def __init__(
         self,
         name: str,
-        port_type: CanopenPortType[T],
+        port_type: rtc_canopen.CanopenPortType[T],
         *,
         cob_id: int | None = None,
-        transport: PortTransport | None = None,
+        transport: rtc_canopen.PortTransport | None = None,
     ) -> None:
         self.name, self.port_type = name, port_type
         self.cob_id, self.transport = cob_id, transport
@@ -60,9 +52,9 @@ class CanopenPort(Generic[T]):
         self.entries, self._event = entries, event
 
     @property
-    def profile(self) -> CanopenPortProfile:
+    def profile(self) -> rtc_canopen.CanopenPortProfile:
         """The port as the profile of its component has it."""
-        return CanopenPortProfile(
+        return rtc_canopen.CanopenPortProfile(
             self.name, self.direction, self.port_type, self.cob_id, self.transport
         )
 
@@ -79,7 +71,7 @@ class CanopenInPort(CanopenPort[T]):
         is_new: whether the bus has written since it was read, also the same value.
     """
 
-    direction: ClassVar[PortDirection] = PortDirection.IN
+    direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.IN
     is_new: bool = False
 
     def join(self, entries: Sequence[Entry], event: Callable[[Entry], None]) -> None:
@@ -100,7 +92,7 @@ class CanopenInPort(CanopenPort[T]):
 class CanopenOutPort(CanopenPort[T]):
     """Where the component writes; its TPDO goes out once in a tick with a write."""
 
-    direction: ClassVar[PortDirection] = PortDirection.OUT
+    direction: ClassVar[rtc_canopen.PortDirection] = rtc_canopen.PortDirection.OUT
 
     def write(self, value: T) -> None:
         """Leave a value; it is sent in Active, also if it is the same as before.
@@ -159,10 +151,10 @@ class CanopenComponent(DeviceComponent):
         self.ports = {port.name: port for port in self._own_ports(CanopenPort)}
 
     @classmethod
-    def profile(cls) -> RtcProfile:
+    def profile(cls) -> rtc_canopen.RtcProfile:
         """Return what the component says of itself; ValueError if that cannot be."""
         try:
-            return RtcProfile(
+            return rtc_canopen.RtcProfile(
                 type_name=cls.type_name,
                 version=cls.version,
                 vendor=cls.vendor,
@@ -184,8 +176,8 @@ class CanopenEcho(CanopenComponent):
     type_name = "Echo"
     vendor = "tickrig"
     category = "example"
-    inlet = CanopenInPort("in", LONG)
-    outlet = CanopenOutPort("out", LONG)
+    inlet = CanopenInPort("in", rtc_canopen.LONG)
+    outlet = CanopenOutPort("out", rtc_canopen.LONG)
 
     def on_execute(self) -> None:
         """Hand on what is new."""
@@ -502,7 +494,7 @@ class DeviceRtc(Application):
 
 def make_dictionary(kind: type[CanopenComponent]) -> Dictionary:
     """Make the objects of a component; ValueError if its profile cannot be."""
-    table = object_table(kind.profile())
+    table = rtc_canopen.object_table(kind.profile())
     return Dictionary(table, table.objects)
 
 

@@ -11,24 +11,18 @@ from tickrig.device.canopen.dictionary import Entry, SdoAbort
 from tickrig.device.canopen.slave import ALWAYS, UNCONFIGURED, CanopenSlave, Handler, Service
 from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen import nmt
 from tickrig.wire.canopen.datatypes import Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
-from tickrig.wire.canopen.nmt import (
-    ALL_NODES,
-    ERROR_CONTROL_COB_ID,
-    NMT_COB_ID,
-    NmtCommand,
-    NmtState,
-)
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
 # NMT slave: boot-up, commands, self start (CiA 301, network management).
 
 _NEXT_STATE: Final = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+    nmt.NmtCommand.START: nmt.NmtState.OPERATIONAL,
+    nmt.NmtCommand.STOP: nmt.NmtState.STOPPED,
+    nmt.NmtCommand.ENTER_PRE_OPERATIONAL: nmt.NmtState.PRE_OPERATIONAL,
 }
 """The same from every state but Initialising (CiA 301, NMT state diagram)."""
 
@@ -46,40 +40,42 @@ class NmtSlave(Service):
         """Send the boot-up message and enter Pre-operational, or Operational by itself."""
         if not self.node.boots():
             return
-        self.node.send(ERROR_CONTROL_COB_ID + self.node.node_id, bytes([NmtState.INITIALISING]))
-        self.node.enter(NmtState.PRE_OPERATIONAL)
+        self.node.send(
+            nmt.ERROR_CONTROL_COB_ID + self.node.node_id, bytes([nmt.NmtState.INITIALISING])
+        )
+        self.node.enter(nmt.NmtState.PRE_OPERATIONAL)
         startup = self.node.dictionary.find(_NMT_STARTUP)
         # 1F80h = 8: bits 0 (is the NMT master), 2 and 3 are 0, 0 and 1; bit 1 concerns
         # masters only.
         if startup is not None and startup.number & _SELF_START_MASK == _SELF_START:
-            self.node.enter(NmtState.OPERATIONAL)
+            self.node.enter(nmt.NmtState.OPERATIONAL)
 
-    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+    def handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
         """Listen to the NMT master; a node without node-ID waits for LSS alone."""
         if self.node.node_id != UNCONFIGURED:
-            yield NMT_COB_ID, self._receive
+            yield nmt.NMT_COB_ID, self._receive
 
-    def reconfigured_by(self, state: NmtState) -> Iterator[int]:
+    def reconfigured_by(self, state: nmt.NmtState) -> Iterator[int]:
         """Name the NMT master: what it listens to follows the state."""
         return (can_id for can_id, _ in self.handlers(state))
 
     def _receive(self, frame: CanFrame) -> None:
         """Obey; what is not a command for this node is ignored."""
         # 000#8105: command, node-ID; 000#8100: all nodes.
-        if len(frame.data) != 2 or frame.data[1] not in (ALL_NODES, self.node.node_id):
+        if len(frame.data) != 2 or frame.data[1] not in (nmt.ALL_NODES, self.node.node_id):
             return
         try:
-            command = NmtCommand(frame.data[0])
+            command = nmt.NmtCommand(frame.data[0])
         except ValueError:
             return
         if self.node.admits(command):
             self._obey(command)
 
-    def _obey(self, command: NmtCommand) -> None:
+    def _obey(self, command: nmt.NmtCommand) -> None:
         match command:
-            case NmtCommand.RESET_NODE:
+            case nmt.NmtCommand.RESET_NODE:
                 self.node.reset_node()
-            case NmtCommand.RESET_COMMUNICATION:
+            case nmt.NmtCommand.RESET_COMMUNICATION:
                 self.node.reset_communication()
             case _:
                 self.node.enter(_NEXT_STATE[command])
@@ -117,7 +113,7 @@ class HeartbeatProducer(Service):
         if self._begins:
             self._due_us = now_us
         else:
-            node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
+            node.send(nmt.ERROR_CONTROL_COB_ID + node.node_id, bytes([node.state]))
         self._begins = False
         # From the last due time, not from now: no drift.
         self._due_us += period_us
@@ -130,7 +126,7 @@ class HeartbeatProducer(Service):
         """Count from the next tick on, or from this one; not before the boot-up message."""
         # While the node initialises the values of a reset arrive here, too; `booted` begins
         # then.
-        if self.node.state is not NmtState.INITIALISING:
+        if self.node.state is not nmt.NmtState.INITIALISING:
             self._begins = True
             self.schedule(0)
 
@@ -177,10 +173,10 @@ class NodeGuarding(Service):
         """Begin with toggle 0, and wait for the first request."""
         self._toggle = 0
 
-    def remote_handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+    def remote_handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
         """Listen to requests in every state but Initialising."""
         if state in ALWAYS and self._guard_time is not None:
-            yield ERROR_CONTROL_COB_ID + self.node.node_id, self._receive
+            yield nmt.ERROR_CONTROL_COB_ID + self.node.node_id, self._receive
 
     def tick(self, now_us: int) -> None:
         """Note that the master does not guard any more."""
@@ -192,7 +188,7 @@ class NodeGuarding(Service):
             return
         node = self.node
         # 705#7F, 705#FF, 705#7F: the toggle bit is bit 7, Pre-operational the other seven.
-        node.send(ERROR_CONTROL_COB_ID + node.node_id, bytes([self._toggle | node.state]))
+        node.send(nmt.ERROR_CONTROL_COB_ID + node.node_id, bytes([self._toggle | node.state]))
         self._toggle ^= _TOGGLE
         node.emergency_clear(EmcyCode.HEARTBEAT, b"")
         life_time_us = self.life_time_us
@@ -297,11 +293,11 @@ class HeartbeatConsumer(Service):
         for entry in self._entries:
             self._watch(entry)
 
-    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+    def handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
         """Listen to heartbeats in every state but Initialising."""
         if state in ALWAYS:
             for monitor in self.monitors.values():
-                yield ERROR_CONTROL_COB_ID + monitor.node_id, monitor.receive
+                yield nmt.ERROR_CONTROL_COB_ID + monitor.node_id, monitor.receive
 
     def tick(self, now_us: int) -> None:
         """See which heartbeats are late."""

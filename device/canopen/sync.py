@@ -9,16 +9,9 @@ from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.dictionary import Entry, SdoAbort, check_time_cob_id, whole_number
 from tickrig.device.canopen.slave import ALIVE, CanopenSlave, Handler, Service
 from tickrig.wire.can import CanFrame
+from tickrig.wire.canopen import nmt
 from tickrig.wire.canopen.datatypes import TimeOfDay, Value
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
-from tickrig.wire.canopen.nmt import (
-    CAN_ID_MASK,
-    EXTENDED,
-    FLAG_30,
-    INVALID,
-    NmtState,
-    is_restricted,
-)
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
@@ -30,7 +23,7 @@ _COMMUNICATION_CYCLE_PERIOD: Final = 0x1006
 _SYNC_COUNTER_OVERFLOW: Final = 0x1019
 
 _COUNTER_OVERFLOWS: Final = (0, *range(2, 241))
-_NOT_IN_A_CAN_ID: Final = EXTENDED | 0x1FFF_F800
+_NOT_IN_A_CAN_ID: Final = nmt.EXTENDED | 0x1FFF_F800
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -70,7 +63,7 @@ class Sync(Service):
     @property
     def can_id(self) -> int:
         """The CAN-ID, 0 if SYNC is neither consumed nor produced."""
-        return self._cob_id.number & CAN_ID_MASK if self._cob_id is not None else 0
+        return self._cob_id.number & nmt.CAN_ID_MASK if self._cob_id is not None else 0
 
     @property
     def period_us(self) -> int:
@@ -84,21 +77,21 @@ class Sync(Service):
 
     @property
     def _produces(self) -> bool:
-        return self._cob_id is not None and bool(self._cob_id.number & FLAG_30)
+        return self._cob_id is not None and bool(self._cob_id.number & nmt.FLAG_30)
 
     def start(self) -> None:
         """Know of no error."""
         self._length_error = False
 
-    def state_changed(self, old: NmtState, new: NmtState) -> None:
+    def state_changed(self, old: nmt.NmtState, new: nmt.NmtState) -> None:
         """Begin to produce, or stop."""
         if (old in ALIVE) is not (new in ALIVE):
             self._begin()
 
-    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+    def handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
         """Listen to SYNC in Pre-operational and Operational."""
         self._length = 1 if self.overflow else 0
-        if state in ALIVE and not is_restricted(self.can_id):
+        if state in ALIVE and not nmt.is_restricted(self.can_id):
             yield self.can_id, self._receive
 
     def tick(self, now_us: int) -> None:
@@ -153,8 +146,8 @@ class Sync(Service):
     def _check_cob_id(self, entry: Entry, value: Value) -> None:
         """Refuse what is no CAN-ID for it, and another one while it produces."""
         cob_id = whole_number(value)
-        can_id, producer = cob_id & CAN_ID_MASK, bool(cob_id & FLAG_30)
-        if cob_id & _NOT_IN_A_CAN_ID or is_restricted(can_id):
+        can_id, producer = cob_id & nmt.CAN_ID_MASK, bool(cob_id & nmt.FLAG_30)
+        if cob_id & _NOT_IN_A_CAN_ID or nmt.is_restricted(can_id):
             raise SdoAbort(AbortCode.VALUE_RANGE)
         # A producer needs 1006h; while it produces, the CAN-ID must not change (CiA 301,
         # 1005h).
@@ -170,8 +163,8 @@ class Sync(Service):
 
 
 _COB_ID_TIME: Final = 0x1012
-_CONSUMES: Final = INVALID
-_PRODUCES: Final = FLAG_30
+_CONSUMES: Final = nmt.INVALID
+_PRODUCES: Final = nmt.FLAG_30
 
 
 class TimeStamp(Service):
@@ -198,11 +191,11 @@ class TimeStamp(Service):
         latest = self.node.time_of_day
         return None if latest is None else latest.after(self.node.now_us - self._set_us)
 
-    def handlers(self, state: NmtState) -> Iterator[tuple[int, Handler]]:
+    def handlers(self, state: nmt.NmtState) -> Iterator[tuple[int, Handler]]:
         """Listen to TIME in Pre-operational and Operational."""
         cob_id = self._number
         if state in ALIVE and cob_id & _CONSUMES:
-            yield cob_id & CAN_ID_MASK, self._receive
+            yield cob_id & nmt.CAN_ID_MASK, self._receive
 
     def produce(self, time: TimeOfDay) -> None:
         """Set the clock in the next tick, and send TIME then if 1012h and NMT state allow it.
@@ -218,7 +211,7 @@ class TimeStamp(Service):
         self._set(self._ordered)
         cob_id = self._number
         if self.node.state in ALIVE and cob_id & _PRODUCES:
-            self.node.send(cob_id & CAN_ID_MASK, self._ordered.encode())
+            self.node.send(cob_id & nmt.CAN_ID_MASK, self._ordered.encode())
 
     @property
     def _number(self) -> int:

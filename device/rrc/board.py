@@ -9,15 +9,7 @@ from typing import Final, NamedTuple
 from tickrig.device.physical import InputBank, InputSignal, OutputSignal, SignalType
 from tickrig.device.rrc.settings import POWERED_ON, FailTarget, Move, RrcConfig, RrcState
 from tickrig.wire.instant import NEVER
-from tickrig.wire.rrc.message import (
-    BASE_PCT,
-    LINE_FEED_PCT,
-    OVERFLOW_PCT,
-    PERIOD_PCT,
-    REPLY_PCT,
-    STATUS_PCT,
-    TOO_FAR_BEHIND_PCT,
-)
+from tickrig.wire.rrc import message
 from tickrig.wire.rrc.replies import RrcEvent
 
 # The physical side of the RRC and of the VR2 around it.
@@ -122,7 +114,7 @@ class LoadAccount:
     @property
     def too_far_behind(self) -> bool:
         """Whether the work has piled up so far that the RRC gives up."""
-        return self.backlog_pct >= TOO_FAR_BEHIND_PCT
+        return self.backlog_pct >= message.TOO_FAR_BEHIND_PCT
 
     def spend(
         self, line_feeds: int, overflows: int, replies: int, *, status: bool, extra_pct: int
@@ -137,10 +129,10 @@ class LoadAccount:
             extra_pct: work that the world adds, in per cent of a period.
         """
         self.extra_pct = extra_pct
-        idle_pct = BASE_PCT + extra_pct + (STATUS_PCT if status else 0)
-        cost_pct = idle_pct + LINE_FEED_PCT * line_feeds + OVERFLOW_PCT * overflows
-        cost_pct += REPLY_PCT * replies
-        self.backlog_pct = max(0, self.backlog_pct + cost_pct - PERIOD_PCT)
+        idle_pct = message.BASE_PCT + extra_pct + (message.STATUS_PCT if status else 0)
+        cost_pct = idle_pct + message.LINE_FEED_PCT * line_feeds + message.OVERFLOW_PCT * overflows
+        cost_pct += message.REPLY_PCT * replies
+        self.backlog_pct = max(0, self.backlog_pct + cost_pct - message.PERIOD_PCT)
         # Only the idle cost of ten periods in a row is settled: until then `load_pct`, a
         # mean of the last ten, still changes without traffic, and each tick has to be run.
         self._costs_pct = (*self._costs_pct[1:], cost_pct)

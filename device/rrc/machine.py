@@ -15,6 +15,7 @@ from tickrig.device.twin import Copyable
 from tickrig.wire.errors import ChecksumError
 from tickrig.wire.instant import NEVER
 from tickrig.wire.rrc import commands as cmd
+from tickrig.wire.rrc import replies
 from tickrig.wire.rrc.commands import BadParameters, Command, UnknownCommand, parse_command
 from tickrig.wire.rrc.message import (
     LINES_A_PERIOD,
@@ -22,16 +23,6 @@ from tickrig.wire.rrc.message import (
     PERIOD_PCT,
     pace_lines_s,
     strip_check,
-)
-from tickrig.wire.rrc.replies import (
-    COMMAND_CHECKSUM,
-    COMMAND_UNKNOWN,
-    RECEIVE_BUFFER_OVERFLOW,
-    Event,
-    Ok,
-    Refusal,
-    RrcEvent,
-    Text,
 )
 from tickrig.wire.rrc.replies import StatusA as Status
 
@@ -145,7 +136,7 @@ class ReceiveBuffer:
         self.thrown_blocks += self._thrown // self.size - before // self.size
 
 
-def _read_line(line: bytes, *, check_wanted: bool) -> Command | Refusal | None:
+def _read_line(line: bytes, *, check_wanted: bool) -> Command | replies.Refusal | None:
     """Return what a line without LF asks for, its refusal (DECISION R11), or None if empty."""
     # One CR before the LF is taken off: terminals send CR LF (R11). An empty line is what a
     # person who presses Enter sends; it has no reply.
@@ -155,11 +146,11 @@ def _read_line(line: bytes, *, check_wanted: bool) -> Command | Refusal | None:
     try:
         return parse_command(strip_check(message) if check_wanted else message)
     except ChecksumError:
-        return Refusal(COMMAND_CHECKSUM)
+        return replies.Refusal(replies.COMMAND_CHECKSUM)
     except UnknownCommand:
-        return Refusal(COMMAND_UNKNOWN)
+        return replies.Refusal(replies.COMMAND_UNKNOWN)
     except BadParameters as error:
-        return Refusal(error.name.decode())
+        return replies.Refusal(error.name.decode())
 
 
 TICK_US: Final = 10_000
@@ -294,7 +285,7 @@ class Rrc(Copyable):
         overflows, thrown = buffer.overflows, buffer.thrown_blocks
         buffer.push(rx)
         overflows, thrown = buffer.overflows - overflows, buffer.thrown_blocks - thrown
-        self._sent += [Refusal(RECEIVE_BUFFER_OVERFLOW).encode()] * overflows
+        self._sent += [replies.Refusal(replies.RECEIVE_BUFFER_OVERFLOW).encode()] * overflows
         return overflows + thrown
 
     def _read_inputs(self, tick: int) -> None:
@@ -303,7 +294,7 @@ class Rrc(Copyable):
             self._choose_drive()
         event, move = self._power.step(self.state, tick, self.inputs)
         if event is not None:
-            self._sent.append(Event(event).encode())
+            self._sent.append(replies.Event(event).encode())
         if move is not None:
             self._move(move, tick)
 
@@ -332,7 +323,7 @@ class Rrc(Copyable):
         request = _read_line(line, check_wanted=stable)
         if request is None:
             return
-        if isinstance(request, Refusal):
+        if isinstance(request, replies.Refusal):
             if line.startswith(cmd.Beep.name):  # refused for whatever reason (DECISION R9)
                 self._buzzer.silence()
             self._reply(request)
@@ -341,10 +332,10 @@ class Rrc(Copyable):
             # `watchdog`).
             self._renewed = tick
             if not stable:
-                self._reply(Ok(request.name.decode()))
+                self._reply(replies.Ok(request.name.decode()))
             self._follow_up(request)
         else:
-            self._reply(Refusal(request.name.decode()))
+            self._reply(replies.Refusal(request.name.decode()))
 
     def _obey(self, command: cmd.Command, tick: int) -> bool:
         """Carry out a command; False if it is not allowed in this state (DECISION R10)."""
@@ -366,13 +357,13 @@ class Rrc(Copyable):
         """Send what follows the OK line (DECISION R12, R26)."""
         match command:
             case cmd.DeviceName():
-                self._reply(Text(self.config.device_name))
+                self._reply(replies.Text(self.config.device_name))
             case cmd.Version():
-                self._reply(Text(self.config.version))
+                self._reply(replies.Text(self.config.version))
             case cmd.Date():
-                self._reply(Text(self.config.date))
+                self._reply(replies.Text(self.config.date))
             case cmd.PowerOff():
-                self._sent.append(Event(RrcEvent.BY_HOST).encode())
+                self._sent.append(replies.Event(replies.RrcEvent.BY_HOST).encode())
             case _:
                 return
 
@@ -380,11 +371,11 @@ class Rrc(Copyable):
         """Trip the watchdog (DECISION R20)."""
         ticks = self._settings.watchdog_ticks
         if ticks and self.state in POWERED_ON and tick - self._renewed >= ticks:
-            self._stop_by_force(RrcEvent.BY_WATCHDOG, tick)
+            self._stop_by_force(replies.RrcEvent.BY_WATCHDOG, tick)
 
-    def _stop_by_force(self, cause: RrcEvent, tick: int) -> None:
+    def _stop_by_force(self, cause: replies.RrcEvent, tick: int) -> None:
         self._move(Move.FORCED, tick)
-        self._sent.append(Event(cause).encode())
+        self._sent.append(replies.Event(cause).encode())
 
     def _report_and_account(self, tick: int, line_feeds: int, overflows: int) -> None:
         """Send the SA line, then see whether the period was long enough for it all."""
@@ -395,7 +386,7 @@ class Rrc(Copyable):
             extra_pct = self.inputs["extra_load_pct"]
             load.spend(line_feeds, overflows, self._replies, status=status, extra_pct=extra_pct)
             if self.config.overtime and load.too_far_behind:
-                self._stop_by_force(RrcEvent.BY_OVER_TIME, tick)
+                self._stop_by_force(replies.RrcEvent.BY_OVER_TIME, tick)
                 # The motors had their values for this tick already, in the state before;
                 # stop them now, not one tick later.
                 self._drive.step(tick, self.state, self._settings, self.inputs)  # motors stop
@@ -413,7 +404,7 @@ class Rrc(Copyable):
             settings.alarm_count,
         )
 
-    def _reply(self, reply: Ok | Refusal | Text) -> None:
+    def _reply(self, reply: replies.Ok | replies.Refusal | replies.Text) -> None:
         self._replies += 1
         self._sent.append(reply.encode())
 

@@ -9,15 +9,9 @@ from tickrig.device.component import Timer
 from tickrig.device.rtc_lite.component import LitePort
 from tickrig.device.rtc_lite.life_cycle import LiteLifeCycle
 from tickrig.device.twin import Immutable
+from tickrig.wire.rtc_lite import messages
 from tickrig.wire.rtc_lite.codes import LiteCommand, LiteContextType, LiteState, LiteStatus
 from tickrig.wire.rtc_lite.frame import WITH_FIELDS, Checksum, Framing, LiteFrame
-from tickrig.wire.rtc_lite.messages import (
-    LiteComponentProfile,
-    LitePortData,
-    LitePortProfile,
-    LiteReply,
-    parse_port_data,
-)
 
 # What differs from one node to another, and what the paper leaves open.
 
@@ -81,15 +75,15 @@ class LiteServer:
             case LiteCommand.PROFILE:
                 return self._profile()
             case LiteCommand.STATE:
-                reply = LiteReply(LiteStatus.OK, bytes([self.life.state]))
+                reply = messages.LiteReply(LiteStatus.OK, bytes([self.life.state]))
             case LiteCommand.PING:
-                reply = LiteReply(LiteStatus.OK, request.data)
+                reply = messages.LiteReply(LiteStatus.OK, request.data)
             case LiteCommand.CONTEXT:
-                reply = LiteReply(LiteStatus.OK, bytes([self.context]))
+                reply = messages.LiteReply(LiteStatus.OK, bytes([self.context]))
             case LiteCommand.RATE:
-                reply = LiteReply(self._set_rate(int.from_bytes(request.data, "little")))
+                reply = messages.LiteReply(self._set_rate(int.from_bytes(request.data, "little")))
             case LiteCommand.WRITE:
-                reply = LiteReply(self._write(parse_port_data(request.data)))
+                reply = messages.LiteReply(self._write(messages.parse_port_data(request.data)))
             case LiteCommand.POLL:
                 reply = self._poll(request.data[1:])
             case command:
@@ -115,13 +109,13 @@ class LiteServer:
         # The state after the command; with `!` the reply ends behind the status, because
         # the parser of the proxy takes the length from it (spec, section 4).
         fields = bytes([self.life.state]) if status in WITH_FIELDS else b""
-        reply = LiteFrame(command, LiteReply(status, fields).encode())
+        reply = LiteFrame(command, messages.LiteReply(status, fields).encode())
         return [*self._fresh_data(), reply] if executed else [reply]
 
     def _fresh_data(self) -> list[LiteFrame]:
         """Take what is new out of the out-ports."""
         return [
-            LiteFrame(LiteCommand.DATA, LitePortData(port.name, port.take()).encode())
+            LiteFrame(LiteCommand.DATA, messages.LitePortData(port.name, port.take()).encode())
             for port in self.life.component.out_ports.values()
             if port.is_new
         ]
@@ -130,11 +124,13 @@ class LiteServer:
         """Describe the ports, then the component."""
         component = self.life.component
         ins, outs = component.in_ports.values(), component.out_ports.values()
-        end = LiteComponentProfile(len(ins), len(outs), component.type_name.encode())
+        end = messages.LiteComponentProfile(len(ins), len(outs), component.type_name.encode())
         return [
             *(LiteFrame(LiteCommand.IN_PROFILE, _profile_of(port)) for port in ins),
             *(LiteFrame(LiteCommand.OUT_PROFILE, _profile_of(port)) for port in outs),
-            LiteFrame(LiteCommand.PROFILE, LiteReply(LiteStatus.OK, end.encode()).encode()),
+            LiteFrame(
+                LiteCommand.PROFILE, messages.LiteReply(LiteStatus.OK, end.encode()).encode()
+            ),
         ]
 
     def _set_rate(self, rate_hz: int) -> LiteStatus:
@@ -146,21 +142,21 @@ class LiteServer:
         self.timer.stop()
         return LiteStatus.OK
 
-    def _write(self, sent: LitePortData) -> LiteStatus:
+    def _write(self, sent: messages.LitePortData) -> LiteStatus:
         port = self.life.component.in_ports.get(sent.name)
         if port is None:
             return LiteStatus.NO_IN_PORT
         return LiteStatus.OK if port.accept(sent.data) else LiteStatus.UNSUPPORTED
 
-    def _poll(self, name: bytes) -> LiteReply:
+    def _poll(self, name: bytes) -> messages.LiteReply:
         port = self.life.component.out_ports.get(name)
         if port is None:
-            return LiteReply(LiteStatus.NO_OUT_PORT)
+            return messages.LiteReply(LiteStatus.NO_OUT_PORT)
         if not port.is_new:
-            return LiteReply(LiteStatus.EMPTY)
+            return messages.LiteReply(LiteStatus.EMPTY)
         data = port.take()
-        return LiteReply(LiteStatus.OK, bytes([len(data)]) + data)
+        return messages.LiteReply(LiteStatus.OK, bytes([len(data)]) + data)
 
 
 def _profile_of(port: LitePort[Any]) -> bytes:
-    return LitePortProfile(port.port_type.code, port.name).encode()
+    return messages.LitePortProfile(port.port_type.code, port.name).encode()

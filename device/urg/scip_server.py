@@ -11,20 +11,9 @@ from tickrig.device.twin import Part
 from tickrig.device.urg import first_protocol
 from tickrig.device.urg.first_protocol import BY_DEFAULT, CONDITION, Capture, Settings, version
 from tickrig.device.urg.world import LAST_STEP, URG_04LX, UrgParameters, View, World
+from tickrig.wire import scip
 from tickrig.wire import scip as status
 from tickrig.wire.instant import NEVER
-from tickrig.wire.scip import (
-    LETTERS,
-    MOST_STRING,
-    SIZES,
-    WIDTHS,
-    Command,
-    Reply,
-    encode_lines,
-    encode_number,
-    encode_scan,
-    with_sum,
-)
 
 # Theory of operation
 # ===================
@@ -75,16 +64,16 @@ _NOT_A_NUMBER = ("01", "02", "03", "06", "07")
 """Starting step, end step, cluster count, scan interval, number of scans."""
 
 
-def _refusal(command: Command, *, adjusting: bool) -> str:
+def _refusal(command: scip.Command, *, adjusting: bool) -> str:
     """Return the status for what is no command, or not now; empty if nothing is wrong."""
-    if command.symbol not in SIZES:
+    if command.symbol not in scip.SIZES:
         return status.UNKNOWN
     # The semicolon is part of `string`, the 16 letters of SCIP 2.0 come behind it.
-    if len(command.string) > MOST_STRING + 1:
+    if len(command.string) > scip.MOST_STRING + 1:
         return status.STRING_TOO_LONG
-    if not LETTERS.issuperset(command.string[1:]):
+    if not scip.LETTERS.issuperset(command.string[1:]):
         return status.STRING_LETTERS
-    wanted: int = sum(SIZES[command.symbol])
+    wanted: int = sum(scip.SIZES[command.symbol])
     if len(command.parameters) != wanted:
         return status.TOO_SHORT if len(command.parameters) < wanted else status.TOO_LONG
     if adjusting and command.symbol not in ("TM", "RS"):
@@ -92,7 +81,7 @@ def _refusal(command: Command, *, adjusting: bool) -> str:
     return ""
 
 
-def _flaw(command: Command) -> str:
+def _flaw(command: scip.Command) -> str:
     """Return the status that refuses MD, MS, GD or GS for its parameters, empty if none does."""
     # GD and GS have three fields, MD and MS five; the codes follow the order of the fields.
     for text, code in zip(command.fields, _NOT_A_NUMBER, strict=False):
@@ -168,7 +157,7 @@ class Stream:
         skipped: scans that are still left out.
     """
 
-    command: Command
+    command: scip.Command
     begins_us: int
     left: int = 0
     skipped: int = 0
@@ -181,11 +170,11 @@ class Stream:
     def reply(self, view: View, code: str, echo: bytes) -> bytes:
         """Return a scan as it was asked for."""
         first, last, cluster = (int(text) for text in self.command.fields[:3])
-        width = WIDTHS[self.command.symbol[1]]
+        width = scip.WIDTHS[self.command.symbol[1]]
         numbers, widest = view.distances(first, last, cluster), _WIDEST[width]
         if max(numbers, default=0) > widest:
             numbers = tuple(min(number, widest) for number in numbers)
-        return Reply(echo, code, encode_scan(view.time_ms, numbers, width)).encode()
+        return scip.Reply(echo, code, scip.encode_scan(view.time_ms, numbers, width)).encode()
 
     def answer(self, view: View) -> bytes:
         """Return the scan of GD or GS."""
@@ -193,7 +182,7 @@ class Stream:
 
     def refuse(self, code: str) -> bytes:
         """Return why there will be no scan."""
-        return Reply(self.command.echo, code).encode()
+        return scip.Reply(self.command.echo, code).encode()
 
     def take(self, ended_us: int, view: View) -> bytes:
         """Return what is sent of a scan of MD or MS."""
@@ -214,7 +203,7 @@ class Stream:
     def echo(self) -> bytes:
         """The command with the scans that remain."""
         head, command = self.command.parameters[:-2], self.command
-        return Command(command.symbol, f"{head}{self.left:02}", command.string).echo
+        return scip.Command(command.symbol, f"{head}{self.left:02}", command.string).echo
 
 
 _TIMER: Final = 2**24
@@ -250,7 +239,7 @@ class ScipServer(Part):
 
     def __init__(self, parameters: UrgParameters) -> None:
         self.parameters, self.trouble = parameters, ""
-        self._commands: Mapping[str, Callable[[int, Command], _Answer]] = {
+        self._commands: Mapping[str, Callable[[int, scip.Command], _Answer]] = {
             **dict.fromkeys(("MD", "MS"), self._stream),
             "BM": self._laser_on,
             "QT": self._quit,
@@ -293,14 +282,14 @@ class ScipServer(Part):
         self.served += 1
         if not self._switched:
             return first_protocol.obey(self, now_us, line)
-        command = Command.parse(line)
+        command = scip.Command.parse(line)
         code = _refusal(command, adjusting=self._adjusting)
         if code:
-            return Reply(command.echo, code).encode()
+            return scip.Reply(command.echo, code).encode()
         if command.symbol in ("GD", "GS"):
             return self._single(now_us, command)
         code, lines = self._commands[command.symbol](now_us, command)
-        return Reply(command.echo, code, lines).encode()
+        return scip.Reply(command.echo, code, lines).encode()
 
     def fail(self, code: str) -> bytes:
         """Stop for trouble; tell whoever waits for a scan."""
@@ -349,17 +338,17 @@ class ScipServer(Part):
         self._waiting = capture
         return b""
 
-    def _single(self, now_us: int, command: Command) -> bytes:
+    def _single(self, now_us: int, command: scip.Command) -> bytes:
         code = _flaw(command) or self.trouble
         if not (code or self.laser):
             code = status.LASER_OFF
         if not code and self._waiting is not None:
             code = status.REPEATED
         if code:
-            return Reply(command.echo, code).encode()
+            return scip.Reply(command.echo, code).encode()
         return self.measure(Stream(command, now_us)) or b""
 
-    def _stream(self, now_us: int, command: Command) -> _Answer:
+    def _stream(self, now_us: int, command: scip.Command) -> _Answer:
         code = _flaw(command) or self.trouble
         if not code and self._running is not None:
             code = status.REPEATED
@@ -371,7 +360,7 @@ class ScipServer(Part):
         self._running = Stream(command, begins_us, int(command.fields[-1]))
         return status.OK, ()
 
-    def _laser_on(self, now_us: int, command: Command) -> _Answer:
+    def _laser_on(self, now_us: int, command: scip.Command) -> _Answer:
         if self.trouble:
             return "01", ()
         if self.laser:
@@ -379,15 +368,15 @@ class ScipServer(Part):
         self.light(now_us)
         return status.OK, ()
 
-    def _quit(self, now_us: int, command: Command) -> _Answer:
+    def _quit(self, now_us: int, command: scip.Command) -> _Answer:
         self.stop()
         return status.OK, ()
 
-    def _reset(self, now_us: int, command: Command) -> _Answer:
+    def _reset(self, now_us: int, command: scip.Command) -> _Answer:
         self._begin(now_us)
         return status.OK, ()
 
-    def _time(self, now_us: int, command: Command) -> _Answer:
+    def _time(self, now_us: int, command: scip.Command) -> _Answer:
         match command.parameters:
             case "0" | "2" as code:
                 on = code == "0"
@@ -399,11 +388,11 @@ class ScipServer(Part):
             case "1":
                 if not self._adjusting:
                     return "04", ()
-                return status.OK, (with_sum(encode_number(self._timer(now_us), 4)),)
+                return status.OK, (scip.with_sum(scip.encode_number(self._timer(now_us), 4)),)
             case _:
                 return "01", ()
 
-    def _speed(self, now_us: int, command: Command) -> _Answer:
+    def _speed(self, now_us: int, command: scip.Command) -> _Answer:
         if not command.parameters.isdecimal():
             return "01", ()
         level = int(command.parameters)
@@ -417,22 +406,22 @@ class ScipServer(Part):
             self.due_us = self.rotation.whole_end_us(now_us)
         return status.OK, ()
 
-    def _rate(self, now_us: int, command: Command) -> _Answer:
+    def _rate(self, now_us: int, command: scip.Command) -> _Answer:
         return self.settings.set_rate(command.parameters), ()
 
-    def _sensitivity(self, now_us: int, command: Command) -> _Answer:
+    def _sensitivity(self, now_us: int, command: scip.Command) -> _Answer:
         return self.settings.set_sensitivity(command.parameters), ()
 
-    def _version(self, now_us: int, command: Command) -> _Answer:
-        return status.OK, encode_lines(version(self.serial))
+    def _version(self, now_us: int, command: scip.Command) -> _Answer:
+        return status.OK, scip.encode_lines(version(self.serial))
 
-    def _specification(self, now_us: int, command: Command) -> _Answer:
+    def _specification(self, now_us: int, command: scip.Command) -> _Answer:
         return status.OK, URG_04LX.lines
 
     def _timer(self, at_us: int) -> int:
         return (at_us - self._zero_us) // 1_000 % _TIMER
 
-    def _state(self, now_us: int, command: Command) -> _Answer:
+    def _state(self, now_us: int, command: scip.Command) -> _Answer:
         texts = {
             "MODL": URG_04LX.model,
             "LASR": "ON" if self.laser else "OFF",
@@ -442,7 +431,7 @@ class ScipServer(Part):
             "TIME": f"{self._timer(now_us):06X}",
             "STAT": CONDITION[self.trouble],
         }
-        return status.OK, encode_lines(texts)
+        return status.OK, scip.encode_lines(texts)
 
     @property
     def _mode(self) -> str:

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 from tickrig.device.core import Device
 from tickrig.device.twin import state_of, twin
-from tickrig.emulators.can.bus_device import (
-    Accepted,
-    ErrorAware,
-    Filtering,
-    is_error_aware,
-    is_filtering,
-)
+from tickrig.emulators.can import bus_device
 from tickrig.emulators.can.fault_confinement import ErrorCounters
 from tickrig.emulators.rig.kernel import EndFields, in_kernel
 from tickrig.wire.can import CanFrame, ErrorState, Frames
@@ -62,7 +56,7 @@ class CanEnd(EndFields):
 
     __slots__ = ()
 
-    def __init__(self, wire: CanWire, number: int, accepts: Accepted = None) -> None:
+    def __init__(self, wire: CanWire, number: int, accepts: bus_device.Accepted = None) -> None:
         self.wire, self.number, self._accepts = wire, number, accepts
         self.segment = wire.bus
         self.controller = ErrorCounters()
@@ -77,8 +71,8 @@ class CanEnd(EndFields):
         self.wake: Callable[[int], None] = _ignore
         self.on_error_state: Callable[[int, ErrorState], None] | None = None
         self.auto_recovery = False
-        self._device: Filtering | None = None
-        self._error_aware: ErrorAware | None = None
+        self._device: bus_device.Filtering | None = None
+        self._error_aware: bus_device.ErrorAware | None = None
 
     def __getstate__(self) -> object:
         """Return the state that a twin begins with."""
@@ -93,12 +87,12 @@ class CanEnd(EndFields):
         return twin(self, memo)
 
     @property
-    def accepts(self) -> Accepted:
+    def accepts(self) -> bus_device.Accepted:
         """CAN-IDs that are received; a change holds for frames that end after it."""
         return self._accepts
 
     @accepts.setter
-    def accepts(self, accepts: Accepted) -> None:
+    def accepts(self, accepts: bus_device.Accepted) -> None:
         self._accepts = accepts
         self.segment.routes.forget()
 
@@ -115,11 +109,11 @@ class CanEnd(EndFields):
     def attach(self, device: Device[Any], wake: Callable[[int], None], /) -> None:
         """Take the filter from a device, tell it the error state, say when a frame has arrived."""
         self.wake = wake
-        if is_filtering(device):
+        if bus_device.is_filtering(device):
             self._device = device
             device.on_accepts.append(self._refilter)
             self._refilter()
-        if is_error_aware(device):
+        if bus_device.is_error_aware(device):
             self._error_aware = device
 
     @in_kernel

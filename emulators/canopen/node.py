@@ -14,17 +14,7 @@ from tickrig.device.twin import Copyable
 from tickrig.emulators.can.bus_device import Accepted
 from tickrig.emulators.can.outside.bridge import CountingPort, PortBefore
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.signals import (
-    Emergency,
-    NodeSignal,
-    NotedSignal,
-    ObjectSignal,
-    OnSet,
-    Quantity,
-    SwitchSignal,
-    find_object,
-    object_name,
-)
+from tickrig.emulators.canopen import signals
 from tickrig.host.text.log import log_of
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
@@ -92,14 +82,16 @@ class Node(Copyable):
         self._wire, self._on, self._ticked = wire, True, False
         self._coasts_us = NEVER
         self._pending: list[Callable[[], None]] = []
-        self.on_set: OnSet | None = None
+        self.on_set: signals.OnSet | None = None
         self.on_crash: Callable[[Exception], object] | None = None
         bank = self.application.inputs
-        self.physical: Mapping[str, NodeSignal] = {
-            "power_off": SwitchSignal("power_off", "its supply is cut", self._switch),
-            "unplugged": SwitchSignal("unplugged", "its CAN plug is pulled", self._plug),
-            "emergency": Emergency(slave, self._defer),
-            **{name: Quantity(bank, item, self._coast) for name, item in bank.table.items()},
+        self.physical: Mapping[str, signals.NodeSignal] = {
+            "power_off": signals.SwitchSignal("power_off", "its supply is cut", self._switch),
+            "unplugged": signals.SwitchSignal("unplugged", "its CAN plug is pulled", self._plug),
+            "emergency": signals.Emergency(slave, self._defer),
+            **{
+                name: signals.Quantity(bank, item, self._coast) for name, item in bank.table.items()
+            },
         }
         self.groups = bank.groups
         self.outputs: Mapping[str, OutputSignal] = {
@@ -180,21 +172,23 @@ class Node(Copyable):
             self._begin_anew(self.on_crash)
             return ()
 
-    def signal(self, name: str) -> NodeSignal | None:
+    def signal(self, name: str) -> signals.NodeSignal | None:
         """Return the thing of this name, None if there is none."""
         signal = self.physical.get(name) or self._object(name)
-        return NotedSignal(signal, self.on_set) if signal and self.on_set else signal
+        return signals.NotedSignal(signal, self.on_set) if signal and self.on_set else signal
 
-    def _object(self, name: str) -> NodeSignal | None:
-        entry = find_object(self.slave.dictionary, name)
+    def _object(self, name: str) -> signals.NodeSignal | None:
+        entry = signals.find_object(self.slave.dictionary, name)
         if entry is None:
             return None
-        return ObjectSignal(object_name(self.slave.dictionary, entry), entry, self._defer)
+        return signals.ObjectSignal(
+            signals.object_name(self.slave.dictionary, entry), entry, self._defer
+        )
 
     def signal_names(self) -> list[str]:
         """Return all names."""
         dictionary = self.slave.dictionary
-        return [*self.physical, *(object_name(dictionary, entry) for entry in dictionary)]
+        return [*self.physical, *(signals.object_name(dictionary, entry) for entry in dictionary)]
 
     def begin_with(self, start: Mapping[str, Setting]) -> None:
         """Set inputs and objects that are not as usual when it begins; ValueError if it cannot."""
@@ -268,11 +262,11 @@ class NodePart(Protocol):
     """
 
     name: str
-    physical: Mapping[str, NodeSignal]
+    physical: Mapping[str, signals.NodeSignal]
     groups: Mapping[str, tuple[str, ...]]
     outputs: Mapping[str, OutputSignal]
 
-    def signal(self, name: str) -> NodeSignal | None:
+    def signal(self, name: str) -> signals.NodeSignal | None:
         """Return the thing of this name, None if there is none."""
 
     def signal_names(self) -> list[str]:
@@ -386,7 +380,7 @@ class NodeInputs:
             )
         return tuple(name for name in self.table if self.table[name].type is signal_type)
 
-    def _signal(self, name: str) -> NodeSignal:
+    def _signal(self, name: str) -> signals.NodeSignal:
         part, rest = self._nodes.find(name)
         signal = part.signal(rest) if part else None
         if signal is None:

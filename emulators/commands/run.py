@@ -18,15 +18,8 @@ from tickrig.emulators.bench.fault_spec import FaultSpec, parse_fault_spec
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator, keeping_time
 from tickrig.emulators.scenario import ScenarioParser, ScenarioPlayer, ScenarioStep
+from tickrig.host.cli import messages
 from tickrig.host.cli.control import serving_control, stopped_by_signals
-from tickrig.host.cli.messages import (
-    BusFailed,
-    Refused,
-    refuse_path,
-    refused_at,
-    say,
-    warnings_shown,
-)
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.user_file import explain_error
@@ -70,7 +63,7 @@ class EmulatorRun(ABC):
         """
         with ExitStack() as stack:
             if self._shows_warnings:
-                stack.enter_context(warnings_shown())
+                stack.enter_context(messages.warnings_shown())
             faults, scenario = self._checked()
             if self._in_real_time:
                 stack.enter_context(stopped_by_signals(self._stop))
@@ -95,7 +88,7 @@ class EmulatorRun(ABC):
                 player.finish(bench.rig.now_us)
         status = self._sum_up(bench, player)
         if gone:
-            raise BusFailed(gone)
+            raise messages.BusFailed(gone)
         return status
 
     @property
@@ -124,14 +117,14 @@ class EmulatorRun(ABC):
     def _checked(self) -> tuple[list[FaultSpec], tuple[ScenarioStep, ...]]:
         """Read all that can be wrong before anything is opened."""
         hands, parser = self._make()
-        with refused_at("--fault"):
+        with messages.refused_at("--fault"):
             faults = [parse_fault_spec(text, hands.check_clear) for text in self._shared.faults]
             for spec in faults:
                 hands.check_fault(spec)
         try:
             return faults, parser.parse(*_read(self._shared.scenario))
         except ValueError as error:
-            raise Refused(str(error)) from None
+            raise messages.Refused(str(error)) from None
 
     def _go_on(self, bench: RunningEmulator) -> None:
         """Step until somebody stops it."""
@@ -149,11 +142,11 @@ class EmulatorRun(ABC):
         worst = f" (up to {rig.worst_late_us / 1_000:.1f} ms)" if rig.late_ticks else ""
         late = f"; late ticks: {rig.late_ticks}{worst}" if self._in_real_time else ""
         lost = "".join(f"; {what.replace('lost_', '')} lost: {n}" for what, n in bench.lost.items())
-        say(f"ran {rig.now_us / 1e6:.3f} s{late}{lost}")
+        messages.say(f"ran {rig.now_us / 1e6:.3f} s{late}{lost}")
         if player and player.met + player.missed:
-            say(f"expectations met: {player.met}; missed: {player.missed}")
+            messages.say(f"expectations met: {player.met}; missed: {player.missed}")
         if bench.trace_error:
-            say(f"the recording ended early: {bench.trace_error}")
+            messages.say(f"the recording ended early: {bench.trace_error}")
             return _RECORDING_ENDED
         return 1 if player and player.missed else 0
 
@@ -165,9 +158,9 @@ def _read(scenario: Path | None) -> tuple[str, str]:
     try:
         text = sys.stdin.read() if str(scenario) == "-" else scenario.read_text("utf-8")
     except UnicodeDecodeError as error:
-        raise Refused(f"scenario {scenario}: byte {error.start} is not UTF-8") from None
+        raise messages.Refused(f"scenario {scenario}: byte {error.start} is not UTF-8") from None
     except OSError as error:
-        refuse_path("scenario", error)
+        messages.refuse_path("scenario", error)
     return text, str(scenario)
 
 
@@ -188,4 +181,4 @@ def mistakes_in(specs: Iterable[object]) -> Iterator[None]:
         mine = next((file for file in files if file in frames), None)
         if mine is None:
             raise
-        raise Refused(f"{files[mine]}: {explain_error(error, mine)}") from error
+        raise messages.Refused(f"{files[mine]}: {explain_error(error, mine)}") from error

@@ -15,16 +15,8 @@ from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import SerialLine
+from tickrig.emulators.tkernel import node_manager
 from tickrig.emulators.tkernel.board import Board
-from tickrig.emulators.tkernel.node_manager import (
-    CONTENTS,
-    READER,
-    SETTLEMENT,
-    BoardLines,
-    NodeLimits,
-    NodeManager,
-    add_position_detection,
-)
 from tickrig.emulators.tkernel.resolution import ResolutionService, opener
 from tickrig.emulators.tkernel.ucode_table import UcodeTable
 from tickrig.host.rtc import InPort
@@ -165,8 +157,8 @@ class CorridorStage:
         )
         self.loop = ClosedLoop(worn, aboard=lambda base: self._mount(base, markers))
         self.estimate = Estimate(self._mounted.reader.parameters.range_m)
-        lines = BoardLines(self._open, self._open, opener(self.service))
-        self._lines, self.board = lines, Board(NodeLimits(), self._start, lines)
+        lines = node_manager.BoardLines(self._open, self._open, opener(self.service))
+        self._lines, self.board = lines, Board(node_manager.NodeLimits(), self._start, lines)
         self.loop.manager.add_item(self.board)
         self._odometry = self.loop.chain.odometry.pose
         self._probes: list[InPort[Any]] = []
@@ -209,18 +201,18 @@ class CorridorStage:
     def _open(self, name: str) -> SimLink:
         return SimLink(self.loop.rig, self._mounted.line.b)
 
-    def _start(self, manager: NodeManager, stack: ExitStack) -> None:
-        add_position_detection(manager, self._lines, "", _BASE)
-        for name in (SETTLEMENT, CONTENTS):
+    def _start(self, manager: node_manager.NodeManager, stack: ExitStack) -> None:
+        node_manager.add_position_detection(manager, self._lines, "", _BASE)
+        for name in (node_manager.SETTLEMENT, node_manager.CONTENTS):
             configuration = manager.find(name).configuration
             configuration.set("fresh", "5")
             if not self._caches:
                 configuration.set("keep", "5")
         wanted: dict[str, type] = {
-            f"{READER}.ucodes": TimedStringSeq,
-            f"{READER}.levels": TimedLongSeq,
-            f"{CONTENTS}.place": TimedStringSeq,
-            f"{CONTENTS}.position": TimedPoint2D,
+            f"{node_manager.READER}.ucodes": TimedStringSeq,
+            f"{node_manager.READER}.levels": TimedLongSeq,
+            f"{node_manager.CONTENTS}.place": TimedStringSeq,
+            f"{node_manager.CONTENTS}.position": TimedPoint2D,
         }
         self._probes = [InPort("in", kind) for kind in wanted.values()]
         for name, probe in zip(wanted, self._probes, strict=True):
@@ -321,7 +313,7 @@ def _moment(stage: CorridorStage) -> Moment:
 
 
 def _row(stage: CorridorStage) -> str:
-    counts = stage.lookup(SETTLEMENT).cache.counts
+    counts = stage.lookup(node_manager.SETTLEMENT).cache.counts
     loop = stage.loop
     return (
         f"{loop.now_us / 1e6:6.1f} s {loop.pose.x:6.2f} m {loop.chain.odometry.pose.x:10.2f} m"

@@ -12,26 +12,8 @@ from tickrig.device.core import Device, W
 from tickrig.device.horizon import Horizon
 from tickrig.emulators.rig.emulated import Emulated
 from tickrig.emulators.rig.station import next_tick_us
-from tickrig.host.text.bench_header import (
-    PREFIX,
-    BenchHeader,
-    DeviceEntry,
-    Place,
-    WireEntry,
-    WireType,
-    parse_bench_header,
-)
+from tickrig.host.text import bench_header, trace
 from tickrig.host.text.bench_record import BUS_STATE, BenchParser, BenchRecord
-from tickrig.host.text.trace import (
-    RESET,
-    Header,
-    Mark,
-    Record,
-    TraceError,
-    parse_header,
-    parse_records,
-    trace_text,
-)
 from tickrig.wire.can import Frames
 from tickrig.wire.instant import NEVER
 
@@ -140,8 +122,8 @@ class RecordedRun:
             tick, which may not be whole, is left out.
     """
 
-    header: Header
-    records: tuple[Record, ...]
+    header: trace.Header
+    records: tuple[trace.Record, ...]
     ended: bool
 
     @property
@@ -152,7 +134,7 @@ class RecordedRun:
     @property
     def ticks(self) -> int:
         """How many ticks had traffic or a change."""
-        return len({record.at_us for record in self.records if record.mark is not Mark.END})
+        return len({record.at_us for record in self.records if record.mark is not trace.Mark.END})
 
 
 def read_recording(data: bytes) -> RecordedRun:
@@ -161,10 +143,10 @@ def read_recording(data: bytes) -> RecordedRun:
     Raises:
         TraceError: not a trace of this version, or a line of it is damaged.
     """
-    first, *lines = trace_text(data).split("\n")
-    header = parse_header(first)
-    records = tuple(parse_records(lines[:-1]))
-    ended = bool(records) and records[-1].mark is Mark.END
+    first, *lines = trace.trace_text(data).split("\n")
+    header = trace.parse_header(first)
+    records = tuple(trace.parse_records(lines[:-1]))
+    ended = bool(records) and records[-1].mark is trace.Mark.END
     if not ended:
         records = tuple(r for r in records if r.at_us < records[-1].at_us)
     return RecordedRun(header, records, ended)
@@ -177,25 +159,25 @@ def replay(recording: RecordedRun, device: Emulated[bytes]) -> ReplayDifference[
         TraceError: the trace names an input that the device does not have.
     """
     records = recording.records
-    received = ((r.at_us, r.data) for r in records if r.mark is Mark.TO_DEVICE)
+    received = ((r.at_us, r.data) for r in records if r.mark is trace.Mark.TO_DEVICE)
     changes = (
         _Change(r.at_us, partial(_set_signal, device, r))
         for r in records
-        if r.mark is Mark.PHYSICAL
+        if r.mark is trace.Mark.PHYSICAL
     )
     sent = _play(device, received, changes, b"", recording.until_us)
-    said = [(r.at_us, r.data, r.line) for r in records if r.mark is Mark.FROM_DEVICE]
+    said = [(r.at_us, r.data, r.line) for r in records if r.mark is trace.Mark.FROM_DEVICE]
     return _first_difference(said, sent, b"")
 
 
-def _set_signal(device: Emulated[bytes], record: Record) -> None:
-    if record.text == RESET:
+def _set_signal(device: Emulated[bytes], record: trace.Record) -> None:
+    if record.text == trace.RESET:
         device.reset()
         return
     try:
         device.inputs.set(*record.change)
     except ValueError as error:
-        raise TraceError(f"line {record.line}: {error}") from None
+        raise trace.TraceError(f"line {record.line}: {error}") from None
 
 
 # Replay the recorded run of a bench, device by device.
@@ -215,7 +197,7 @@ class BenchRecording:
             tick, which may not be whole, is left out.
     """
 
-    header: BenchHeader
+    header: bench_header.BenchHeader
     records: tuple[BenchRecord, ...]
     ended: bool
     _by_name: dict[str, list[BenchRecord]] = field(
@@ -224,7 +206,7 @@ class BenchRecording:
 
     def __post_init__(self) -> None:
         for record in self.records:
-            if record.mark is not Mark.WIRE:
+            if record.mark is not trace.Mark.WIRE:
                 self._by_name.setdefault(record.name, []).append(record)
 
     @property
@@ -235,7 +217,7 @@ class BenchRecording:
     @property
     def at_port(self) -> bool:
         """Whether its times are those of a host at its port, not of ticks."""
-        return self.header.place is Place.PORT
+        return self.header.place is bench_header.Place.PORT
 
     def ticks_of(self, name: str) -> set[int]:
         """Return the ticks at which a device had traffic or a change."""
@@ -252,12 +234,12 @@ def read_bench_recording(data: bytes) -> BenchRecording:
     Raises:
         TraceError: not a trace, or a line of it is damaged.
     """
-    if not data.startswith(PREFIX.encode()):
+    if not data.startswith(bench_header.PREFIX.encode()):
         return _as_bench(read_recording(data))
-    first, *lines = trace_text(data).split("\n")
-    header = parse_bench_header(first)
+    first, *lines = trace.trace_text(data).split("\n")
+    header = bench_header.parse_bench_header(first)
     records = tuple(BenchParser(header).parse(lines[:-1]))
-    ended = bool(records) and records[-1].mark is Mark.END
+    ended = bool(records) and records[-1].mark is trace.Mark.END
     if not ended:
         records = tuple(r for r in records if r.at_us < records[-1].at_us)
     return BenchRecording(header, records, ended)
@@ -265,13 +247,18 @@ def read_bench_recording(data: bytes) -> BenchRecording:
 
 def _as_bench(recording: RecordedRun) -> BenchRecording:
     """Return the recording of one device on a serial line as that of a bench."""
-    name, wires = recording.header.device, {"line": WireEntry(WireType.SERIAL)}
-    entry = DeviceEntry("line", name, recording.header.config)
+    name, wires = (
+        recording.header.device,
+        {"line": bench_header.WireEntry(bench_header.WireType.SERIAL)},
+    )
+    entry = bench_header.DeviceEntry("line", name, recording.header.config)
     records = tuple(
-        BenchRecord(x.at_us, "" if x.mark is Mark.END else name, x.mark, x.data, x.text, x.line)
+        BenchRecord(
+            x.at_us, "" if x.mark is trace.Mark.END else name, x.mark, x.data, x.text, x.line
+        )
         for x in recording.records
     )
-    return BenchRecording(BenchHeader({name: entry}, wires), records, recording.ended)
+    return BenchRecording(bench_header.BenchHeader({name: entry}, wires), records, recording.ended)
 
 
 def replay_device(
@@ -288,7 +275,7 @@ def replay_device(
         TraceError: the trace names an input that the device does not have.
     """
     nothing: Traffic = () if recording.header.on_can(name) else b""
-    said = [*traffic_of(recording.of(name), Mark.FROM_DEVICE)]
+    said = [*traffic_of(recording.of(name), trace.Mark.FROM_DEVICE)]
     return _first_difference(said, play_device(recording, name, device), nothing)
 
 
@@ -300,16 +287,18 @@ def play_device(recording: BenchRecording, name: str, device: Device[Any]) -> li
     """
     nothing: Traffic = () if recording.header.on_can(name) else b""
     records = recording.of(name)
-    received = ((at, what) for at, what, _ in traffic_of(records, Mark.TO_DEVICE))
+    received = ((at, what) for at, what, _ in traffic_of(records, trace.Mark.TO_DEVICE))
     changes = (
         _Change(record.at_us, partial(do, device, record))
         for record in records
-        if record.mark is Mark.PHYSICAL
+        if record.mark is trace.Mark.PHYSICAL
     )
     return _play(device, received, changes, nothing, recording.until_us)
 
 
-def traffic_of(records: Sequence[BenchRecord], mark: Mark) -> Iterator[tuple[int, Traffic, int]]:
+def traffic_of(
+    records: Sequence[BenchRecord], mark: trace.Mark
+) -> Iterator[tuple[int, Traffic, int]]:
     """Give what passed one way: the time, all of that tick, the first line of it."""
     passed = (record for record in records if record.mark is mark)
     for at_us, group in groupby(passed, key=lambda record: record.at_us):
@@ -327,7 +316,7 @@ def do(device: Any, record: BenchRecord) -> None:
         TraceError: it has no such input, or cannot have that value.
     """
     try:
-        if record.text == RESET:
+        if record.text == trace.RESET:
             device.reset()
         elif (change := record.change) is None:
             device.bus_state(BUS_STATE[record.text])
@@ -339,4 +328,4 @@ def do(device: Any, record: BenchRecord) -> None:
         else:
             device.inputs.set(*change)
     except (ValueError, AttributeError) as error:
-        raise TraceError(f"line {record.line}: {record.name}: {error}") from None
+        raise trace.TraceError(f"line {record.line}: {record.name}: {error}") from None

@@ -18,17 +18,8 @@ from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.serial.rs485_line import Rs485Line
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Config, Mark
+from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
-from tickrig.wire.modbus import (
-    MAX_FRAME_BYTES,
-    READ,
-    SHORTEST_SILENCE_US,
-    WRITE,
-    Request,
-    encode_frame,
-    encode_request,
-    parse_frame,
-)
 
 # Cut what passes on the line into frames, shown in hex without their CRC: `01 03 00 00 00 02`.
 
@@ -48,13 +39,13 @@ class _FrameSplitter:
 
     def split(self, at_us: int, data: bytes) -> list[bytes]:
         out = []
-        if self._begun and at_us - self._received_us >= SHORTEST_SILENCE_US:
+        if self._begun and at_us - self._received_us >= modbus.SHORTEST_SILENCE_US:
             out.append(b"(no frame) " + _hex(self._begun))
             self._begun = b""
         self._received_us = at_us
-        self._begun = (self._begun + data)[:MAX_FRAME_BYTES]
+        self._begun = (self._begun + data)[: modbus.MAX_FRAME_BYTES]
         try:
-            parse_frame(self._begun)
+            modbus.parse_frame(self._begun)
         except WireError:
             return out
         whole, self._begun = self._begun, b""
@@ -78,9 +69,11 @@ def verbs(address: int) -> Mapping[str, Sender]:
         words = rest.split()
         if len(words) == 1 and words[0] in _BY_NAME:
             register = _BY_NAME[words[0]]
-            return _packed(address, Request(READ, (register.address, register.words)))
+            return _packed(address, modbus.Request(modbus.READ, (register.address, register.words)))
         if len(words) == 2:
-            return _packed(address, Request(READ, (_register(words[0]), _whole(words[1]))))
+            return _packed(
+                address, modbus.Request(modbus.READ, (_register(words[0]), _whole(words[1])))
+            )
         raise ValueError(f"read takes a register's name, or an address and a number, got {rest!r}")
 
     def write(rest: str) -> Send:
@@ -91,13 +84,13 @@ def verbs(address: int) -> Mapping[str, Sender]:
             values = tuple(_whole(word) & _WORD for word in words)
         else:
             raise ValueError(f"write takes a register and its value, got {rest!r}")
-        return _packed(address, Request(WRITE, write=(_register(name), values)))
+        return _packed(address, modbus.Request(modbus.WRITE, write=(_register(name), values)))
 
     return {"read": read, "write": write, "raw": parse_raw}
 
 
-def _packed(address: int, request: Request) -> Send:
-    frame = encode_frame(address, encode_request(request))
+def _packed(address: int, request: modbus.Request) -> Send:
+    frame = modbus.encode_frame(address, modbus.encode_request(request))
     return Send(frame, frame[:-_CRC_BYTES].hex(" ").encode())
 
 

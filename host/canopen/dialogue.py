@@ -46,30 +46,9 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, TypeVar
 
-from tickrig.host.canopen.errors import (
-    SdoFailed,
-    SdoMisnamed,
-    SdoTimeout,
-    StateTimeout,
-    WrongIdentity,
-)
+from tickrig.host.canopen import errors
+from tickrig.wire.canopen import sdo, sdo_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NMT_COB_ID, NmtCommand, NmtState
-from tickrig.wire.canopen.sdo import (
-    Abort,
-    DownloadInitiateResponse,
-    Response,
-    UploadInitiateRequest,
-    UploadInitiateResponse,
-    parse_response,
-)
-from tickrig.wire.canopen.sdo_frame import (
-    REQUEST_COB_ID,
-    AbortCode,
-    BlockAcknowledge,
-    BlockDownloadInitiateResponse,
-    BlockUploadInitiateResponse,
-    ClientCommand,
-)
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 
@@ -163,9 +142,9 @@ T = TypeVar("T")
 Script = Generator[Step, Any, T]
 """A script that returns a T; it is sent what its step gives, None if that gives nothing."""
 
-Answer = Response | None
+Answer = sdo.Response | None
 
-Failure = SdoFailed | StateTimeout | WrongIdentity
+Failure = errors.SdoFailed | errors.StateTimeout | errors.WrongIdentity
 Send = Callable[[int, bytes], None]
 
 
@@ -310,10 +289,10 @@ class Dialogue:
             job.script.close()
             job.dropped()
 
-    def abort(self, code: AbortCode) -> None:
+    def abort(self, code: sdo_frame.AbortCode) -> None:
         """Forget all jobs; the node is told that the transfer under way has ended, if one was."""
         if self.job is not None and self._transfer is not None:
-            self._say(Abort(*self._transfer, code).encode())
+            self._say(sdo.Abort(*self._transfer, code).encode())
         self.clear()
 
     def remember(self, at: Object) -> None:
@@ -324,7 +303,7 @@ class Dialogue:
         """Take a response; the answer to another question, or a copy, is ignored."""
         self._now_us = now_us
         try:
-            answer = parse_response(data)
+            answer = sdo.parse_response(data)
         except WireError:
             return
         named = _named(answer)
@@ -354,7 +333,7 @@ class Dialogue:
         if len(self._unanswered) == 1:
             self.due_us = min(self.due_us, now_us + MISNAMED_US)
 
-    def _end_misnamed(self, step: SdoRequest) -> Abort | SdoMisnamed:
+    def _end_misnamed(self, step: SdoRequest) -> sdo.Abort | errors.SdoMisnamed:
         """Return what an answer that names another object says about the one that was asked for.
 
         An abort ends the only open transfer, whatever it names. A value may be that of another
@@ -364,14 +343,14 @@ class Dialogue:
         self._unanswered.clear()
         if self._on_misnamed is not None:
             self._on_misnamed(self._expected or at, data)
-        answer = parse_response(data)
-        if isinstance(answer, Abort) and alone:
-            return Abort(*at, answer.code)
-        self._say(Abort(*at, AbortCode.GENERAL).encode())
-        return SdoMisnamed(*at)
+        answer = sdo.parse_response(data)
+        if isinstance(answer, sdo.Abort) and alone:
+            return sdo.Abort(*at, answer.code)
+        self._say(sdo.Abort(*at, sdo_frame.AbortCode.GENERAL).encode())
+        return errors.SdoMisnamed(*at)
 
     def _is_answer(
-        self, step: SdoRequest, answer: Response, named: Object | None, data: bytes
+        self, step: SdoRequest, answer: sdo.Response, named: Object | None, data: bytes
     ) -> bool:
         """Say whether a response can be the answer to a step, and to nothing else.
 
@@ -382,13 +361,13 @@ class Dialogue:
             mine = named == (step.index, step.sub)
         else:
             mine = len(self._unanswered) == 1
-        may_repeat = isinstance(answer, BlockAcknowledge)
+        may_repeat = isinstance(answer, sdo_frame.BlockAcknowledge)
         return mine and (may_repeat or not step.goes_on or data != self._answer)
 
-    def _pass_fence(self, step: SdoRequest, fence: Response) -> None:
+    def _pass_fence(self, step: SdoRequest, fence: sdo.Response) -> None:
         """Ask at last what the script asks: all earlier questions are settled."""
-        if isinstance(fence, UploadInitiateResponse) and fence.data is None:
-            self._say(Abort(fence.index, fence.sub, AbortCode.GENERAL).encode())
+        if isinstance(fence, sdo.UploadInitiateResponse) and fence.data is None:
+            self._say(sdo.Abort(fence.index, fence.sub, sdo_frame.AbortCode.GENERAL).encode())
         self._send_request((step.index, step.sub), step.request)
 
     def receive_state(self, now_us: int, state: NmtState) -> None:
@@ -415,10 +394,10 @@ class Dialogue:
                 if self._misnamed:
                     self._go_on(self._end_misnamed(step))
                     return
-                self._say(Abort(*self._expected, AbortCode.TIMEOUT).encode())
-                self._go_on(SdoTimeout(step.index, step.sub, self.sdo_timeout_us))
+                self._say(sdo.Abort(*self._expected, sdo_frame.AbortCode.TIMEOUT).encode())
+                self._go_on(errors.SdoTimeout(step.index, step.sub, self.sdo_timeout_us))
             case AwaitState() as wait:
-                self._go_on(StateTimeout(f"{wait.state.name} was not reported"))
+                self._go_on(errors.StateTimeout(f"{wait.state.name} was not reported"))
             case _:
                 self._go_on(None)
 
@@ -438,7 +417,7 @@ class Dialogue:
                 step = job.script.send(None)
         except StopIteration as end:
             self._end(job.done, end.value)
-        except (SdoFailed, StateTimeout, WrongIdentity) as error:
+        except (errors.SdoFailed, errors.StateTimeout, errors.WrongIdentity) as error:
             self._end(job.failed, error)
 
     def _end(self, callback: Callable[[Any], None], what: object) -> None:
@@ -460,7 +439,7 @@ class Dialogue:
                 self._step, self.due_us = step, self._now_us + step.duration_us
             case SdoFrame():
                 self._say(step.request)
-                if self._transfer is not None and step.request[0] == ClientCommand.ABORT:
+                if self._transfer is not None and step.request[0] == sdo_frame.ClientCommand.ABORT:
                     self._unanswered.add(self._transfer)
             case Guard():
                 self._guard(ERROR_CONTROL_COB_ID + self._node_id)
@@ -475,7 +454,7 @@ class Dialogue:
             self._send_request(at, step.request)
         elif at in self._unanswered:
             fence = self._unanswered.fence(at)
-            self._send_request(fence, UploadInitiateRequest(*fence).encode())
+            self._send_request(fence, sdo.UploadInitiateRequest(*fence).encode())
         elif at == self._transfer and self._now_us < self._settled_us:
             self.due_us = self._settled_us
         else:
@@ -489,20 +468,20 @@ class Dialogue:
         self._sent_us, self.due_us = self._now_us, self._now_us + self.sdo_timeout_us
 
     def _say(self, data: bytes) -> None:
-        self._send(REQUEST_COB_ID + self._node_id, data)
+        self._send(sdo_frame.REQUEST_COB_ID + self._node_id, data)
 
 
 _NAMING: Final = (
-    UploadInitiateResponse,
-    DownloadInitiateResponse,
-    Abort,
-    BlockDownloadInitiateResponse,
-    BlockUploadInitiateResponse,
+    sdo.UploadInitiateResponse,
+    sdo.DownloadInitiateResponse,
+    sdo.Abort,
+    sdo_frame.BlockDownloadInitiateResponse,
+    sdo_frame.BlockUploadInitiateResponse,
 )
 """Responses that name an object, the most frequent one first."""
 
 
-def _named(answer: Response) -> Object | None:
+def _named(answer: sdo.Response) -> Object | None:
     """Return the object that a response names, None if it names none."""
     if isinstance(answer, _NAMING):
         return answer.index, answer.sub

@@ -39,15 +39,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeVar
 
-from tickrig.host.canopen.dialogue import (
-    SDO_TIMEOUT_US,
-    Dialogue,
-    Misnamed,
-    QueuedScript,
-    Script,
-    Send,
-    nothing,
-)
+from tickrig.host.canopen import dialogue
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
@@ -148,13 +140,13 @@ class NodeSession:
     def __init__(
         self,
         node_id: int,
-        send: Send,
-        guard: Callable[[int], None] = nothing,
-        sdo_timeout_us: int = SDO_TIMEOUT_US,
-        on_misnamed: Misnamed | None = None,
+        send: dialogue.Send,
+        guard: Callable[[int], None] = dialogue.nothing,
+        sdo_timeout_us: int = dialogue.SDO_TIMEOUT_US,
+        on_misnamed: dialogue.Misnamed | None = None,
     ) -> None:
         self.node_id = node_id
-        self.dialogue = Dialogue(node_id, send, guard, sdo_timeout_us, on_misnamed)
+        self.dialogue = dialogue.Dialogue(node_id, send, guard, sdo_timeout_us, on_misnamed)
         self.state: NmtState | None = None
         self._response = RESPONSE_COB_ID + node_id
         self._error_control = ERROR_CONTROL_COB_ID + node_id
@@ -172,7 +164,7 @@ class NodeSession:
             return state
         return None
 
-    def run(self, script: Script[T], now_us: int, listen: _Listen) -> T:
+    def run(self, script: dialogue.Script[T], now_us: int, listen: _Listen) -> T:
         """Run a script to its end, and return or raise what it does.
 
         Args:
@@ -185,7 +177,7 @@ class NodeSession:
         """
         ended: list[T | Exception] = []
         now_us = self._take(listen(now_us))
-        self.dialogue.start(now_us, QueuedScript("", script, ended.append, ended.append))
+        self.dialogue.start(now_us, dialogue.QueuedScript("", script, ended.append, ended.append))
         while not ended:
             self.dialogue.tick(self._take(listen(self.dialogue.due_us)))
         if isinstance(ended[0], Exception):

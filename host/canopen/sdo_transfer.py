@@ -9,16 +9,7 @@ from __future__ import annotations
 
 from tickrig.host.canopen.dialogue import Answer, Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.wire.canopen.sdo import (
-    Abort,
-    DownloadInitiateRequest,
-    DownloadInitiateResponse,
-    DownloadSegmentResponse,
-    Segment,
-    UploadInitiateRequest,
-    UploadInitiateResponse,
-    UploadSegmentRequest,
-)
+from tickrig.wire.canopen import sdo
 from tickrig.wire.canopen.sdo_frame import EXPEDITED_BYTES, SEGMENT_BYTES, AbortCode
 
 
@@ -35,9 +26,9 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
         SdoAborted: the device refuses, or answers something else.
         SdoTimeout: it does not answer.
     """
-    answer = yield SdoRequest(UploadInitiateRequest(index, sub).encode(), index, sub)
+    answer = yield SdoRequest(sdo.UploadInitiateRequest(index, sub).encode(), index, sub)
     match answer:
-        case UploadInitiateResponse():
+        case sdo.UploadInitiateResponse():
             if answer.data is not None:
                 return answer.data if answer.size or not size else answer.data[:size]
             return (yield from _upload_segments(index, sub))
@@ -47,12 +38,12 @@ def upload(index: int, sub: int, size: int = 0) -> Script[bytes]:
 def download(index: int, sub: int, data: bytes) -> Script[None]:
     """Write an object; raises as `upload`."""
     if 1 <= len(data) <= EXPEDITED_BYTES:
-        request = DownloadInitiateRequest(index, sub, data, len(data))
+        request = sdo.DownloadInitiateRequest(index, sub, data, len(data))
     else:
-        request = DownloadInitiateRequest(index, sub, None, len(data))
+        request = sdo.DownloadInitiateRequest(index, sub, None, len(data))
     answer = yield SdoRequest(request.encode(), index, sub)
     match answer:
-        case DownloadInitiateResponse():
+        case sdo.DownloadInitiateResponse():
             if request.data is None:
                 yield from _download_segments(index, sub, data)
         case _:
@@ -72,10 +63,10 @@ def download_number(index: int, sub: int, value: int, size: int) -> Script[None]
 def _upload_segments(index: int, sub: int) -> Script[bytes]:
     data, toggle = b"", False
     while True:
-        request = UploadSegmentRequest(toggle).encode()
+        request = sdo.UploadSegmentRequest(toggle).encode()
         answer = yield SdoRequest(request, index, sub, goes_on=True)
         match answer:
-            case Segment() if answer.toggle == toggle:
+            case sdo.Segment() if answer.toggle == toggle:
                 data += answer.data
             case _:
                 yield from _fail(index, sub, answer)
@@ -88,18 +79,18 @@ def _download_segments(index: int, sub: int, data: bytes) -> Script[None]:
     toggle = False
     for start in range(0, max(1, len(data)), SEGMENT_BYTES):
         part, last = data[start : start + SEGMENT_BYTES], start + SEGMENT_BYTES >= len(data)
-        request = Segment(toggle, part, last).encode()
+        request = sdo.Segment(toggle, part, last).encode()
         answer = yield SdoRequest(request, index, sub, goes_on=True)
-        if not isinstance(answer, DownloadSegmentResponse) or answer.toggle != toggle:
+        if not isinstance(answer, sdo.DownloadSegmentResponse) or answer.toggle != toggle:
             yield from _fail(index, sub, answer)
         toggle = not toggle
 
 
 def _fail(index: int, sub: int, answer: Answer) -> Script[bytes]:
     """Raise what an answer means that is not the one awaited; abort unless the device did."""
-    if isinstance(answer, Abort):
+    if isinstance(answer, sdo.Abort):
         raise SdoAborted(index, sub, answer.code)
-    toggled = isinstance(answer, Segment | DownloadSegmentResponse)
+    toggled = isinstance(answer, sdo.Segment | sdo.DownloadSegmentResponse)
     code = AbortCode.TOGGLE_BIT if toggled else AbortCode.COMMAND_SPECIFIER
-    yield SdoFrame(Abort(index, sub, code).encode())
+    yield SdoFrame(sdo.Abort(index, sub, code).encode())
     raise SdoAborted(index, sub, code)

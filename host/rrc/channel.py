@@ -18,18 +18,8 @@ from tickrig.host.rrc.inbox import Answer, Exchange, Inbox
 from tickrig.host.rrc.reply_matcher import OnRefusals, ReplyMatcher
 from tickrig.host.text.log import log_of
 from tickrig.wire.instant import NEVER
+from tickrig.wire.rrc import message
 from tickrig.wire.rrc.commands import Command, PowerOff, Watchdog
-from tickrig.wire.rrc.message import (
-    BASE_PCT,
-    LINE_FEED_PCT,
-    OVERFLOW_PCT,
-    PERIOD_PCT,
-    PERIOD_US,
-    PERIODS_A_SECOND,
-    REPLY_PCT,
-    SAFE_PCT,
-    STATUS_PCT,
-)
 from tickrig.wire.rrc.replies import (
     COMMAND_CHECKSUM,
     COMMAND_UNKNOWN,
@@ -128,11 +118,11 @@ class RrcStopped(DeviceRefused):
         super().__init__(f"{what} (last answer ER:{code}); resume() lifts the stop", code)
 
 
-_PCT_US: Final = PERIOD_US // (SAFE_PCT - BASE_PCT - STATUS_PCT)
+_PCT_US: Final = message.PERIOD_US // (message.SAFE_PCT - message.BASE_PCT - message.STATUS_PCT)
 """What 1 % of the RRC's period takes of the time that its own work and a status line leave."""
 
-_LINE_US: Final = LINE_FEED_PCT * _PCT_US
-_REPLY_US: Final = REPLY_PCT * _PCT_US
+_LINE_US: Final = message.LINE_FEED_PCT * _PCT_US
+_REPLY_US: Final = message.REPLY_PCT * _PCT_US
 """What a line to the RRC takes, 6.25 ms, and what its answer takes, 3.75 ms."""
 
 _SECOND_US: Final = 1_000_000
@@ -196,9 +186,9 @@ class Channel:
     def load(self) -> RrcLoad:
         """How busy the RRC is with what passed here."""
         self._forget_costs()
-        load_pct = BASE_PCT + sum(pct for _, pct in self._costs) // PERIODS_A_SECOND
+        load_pct = message.BASE_PCT + sum(pct for _, pct in self._costs) // message.PERIODS_A_SECOND
         line_us = _LINE_US + _REPLY_US * (not self.matcher.settings.stable)
-        return RrcLoad(load_pct, PERIOD_PCT - load_pct, _SECOND_US // line_us)
+        return RrcLoad(load_pct, message.PERIOD_PCT - load_pct, _SECOND_US // line_us)
 
     def send(self, command: Command) -> None:
         """Send a command that nobody waits for."""
@@ -256,7 +246,7 @@ class Channel:
                     if reply.kind in _FORGETTING:
                         self.matcher.initialized()
                 case StatusA():
-                    self._account(STATUS_PCT)
+                    self._account(message.STATUS_PCT)
                 case _:
                     self._deliver(reply, exchange)
         self.matcher.settle(now_us)
@@ -267,7 +257,7 @@ class Channel:
         watchdog_10ms = self.matcher.settings.watchdog_10ms
         if not watchdog_10ms or self.matcher.refusals.stopped is not None:
             return NEVER
-        due_us = self._renewed_us + max(PERIOD_US, watchdog_10ms * 10_000 // _RENEWALS)
+        due_us = self._renewed_us + max(message.PERIOD_US, watchdog_10ms * 10_000 // _RENEWALS)
         return max(due_us, self.matcher.unconfirmed.doubt_ends_us)  # VR2 is off meanwhile
 
     def _receive(self, until_us: int) -> bytes:
@@ -301,7 +291,7 @@ class Channel:
         _log.debug("sent %r", line)
         now_us = self._link.now_us
         self._link.send(line)
-        self._account(LINE_FEED_PCT)
+        self._account(message.LINE_FEED_PCT)
         self._free_us = max(now_us, self._free_us) + _LINE_US + _REPLY_US * replies
         self._renewed_us = now_us
 
@@ -317,7 +307,7 @@ class Channel:
     def _deliver(self, reply: Answer, exchange: Exchange | None) -> None:
         stopped_before = self.matcher.refusals.stopped
         overflow = reply == Refusal(RECEIVE_BUFFER_OVERFLOW)
-        cost_pct = OVERFLOW_PCT if overflow else REPLY_PCT
+        cost_pct = message.OVERFLOW_PCT if overflow else message.REPLY_PCT
         self._account(cost_pct)
         if isinstance(reply, Refusal) and (overflow or self.matcher.settings.stable):
             # nothing was planned for this answer

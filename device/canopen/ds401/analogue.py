@@ -7,21 +7,7 @@ from math import copysign, floor, inf, isfinite, isnan
 from typing import Final
 
 from tickrig.device.canopen.dictionary import Dictionary, Entry
-from tickrig.device.canopen.ds401.families import (
-    ANALOGUE_ERROR_MODE,
-    ANALOGUE_INPUT,
-    ANALOGUE_OUTPUT,
-    DEFAULT_TRIGGER,
-    INTEGER_ERROR_VALUE,
-    INTEGER_LIMITS,
-    INTERRUPT_SOURCE,
-    INTERRUPT_TRIGGER,
-    REAL_ERROR_VALUE,
-    REAL_LIMITS,
-    AnalogueObjects,
-    elements,
-    find_number,
-)
+from tickrig.device.canopen.ds401 import families
 from tickrig.device.physical import InputSignal, OutputSignal
 from tickrig.device.twin import Immutable, Part
 
@@ -132,13 +118,13 @@ class AnalogueChannel(Part):
     def __init__(
         self,
         dictionary: Dictionary,
-        objects: AnalogueObjects,
+        objects: families.AnalogueObjects,
         prefix: str,
         number: int,
         converter: Converter | None,
     ) -> None:
         def find(index: int) -> Entry | None:
-            return find_number(dictionary, index, number)
+            return families.find_number(dictionary, index, number)
 
         self.name = f"{prefix}{number}" + (f"_{converter.suffix}" if converter else "")
         self.converter = converter
@@ -211,7 +197,7 @@ class EventRule(Part):
     """
 
     def __init__(self, dictionary: Dictionary, number: int, index: int, entry: Entry) -> None:
-        objects = [find_number(dictionary, index + offset, number) for offset in range(5)]
+        objects = [families.find_number(dictionary, index + offset, number) for offset in range(5)]
         self._upper, self._lower, *self._deltas = objects
         self.settings = [found for found in objects if found is not None]
         self._entry = entry
@@ -254,7 +240,7 @@ class InterruptSource(Part):
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
-        self._banks = dict(elements(dictionary, INTERRUPT_SOURCE))
+        self._banks = dict(families.elements(dictionary, families.INTERRUPT_SOURCE))
         self.entries = list(self._banks.values())
         for entry in self.entries:
             entry.source = _read
@@ -289,12 +275,14 @@ class AnalogueInput(Part):
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
         self.number = number
-        self.channel = AnalogueChannel(dictionary, ANALOGUE_INPUT, "ai", number, converter)
+        self.channel = AnalogueChannel(dictionary, families.ANALOGUE_INPUT, "ai", number, converter)
         real = [self.channel.real] if self.channel.real is not None else []
         self.entries = [*self.channel.integers, *real]
-        self._trigger = find_number(dictionary, INTERRUPT_TRIGGER, number)
-        whole = EventRule(dictionary, number, INTEGER_LIMITS, ([*real, *self.channel.integers])[-1])
-        fraction = EventRule(dictionary, number, REAL_LIMITS, self.entries[-1])
+        self._trigger = families.find_number(dictionary, families.INTERRUPT_TRIGGER, number)
+        whole = EventRule(
+            dictionary, number, families.INTEGER_LIMITS, ([*real, *self.channel.integers])[-1]
+        )
+        fraction = EventRule(dictionary, number, families.REAL_LIMITS, self.entries[-1])
         self._rules = [rule for rule in (whole, fraction) if rule.settings] or [whole]
         self._judged: tuple[float, bool] | None = None
         for entry in self.objects():
@@ -347,7 +335,7 @@ class AnalogueInput(Part):
             return False
         self._judged = physical, enabled
         self._convert(physical)
-        trigger = int(_quantity(self._trigger, DEFAULT_TRIGGER))
+        trigger = int(_quantity(self._trigger, families.DEFAULT_TRIGGER))
         events = [rule.judge(trigger) for rule in self._rules]
         event = enabled and any(events)
         if event:
@@ -399,13 +387,15 @@ class AnalogueOutput(Part):
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
         self.number, self.level, self.failed = number, 0.0, False
-        self.channel = AnalogueChannel(dictionary, ANALOGUE_OUTPUT, "ao", number, converter)
+        self.channel = AnalogueChannel(
+            dictionary, families.ANALOGUE_OUTPUT, "ao", number, converter
+        )
         real = [self.channel.real] if self.channel.real is not None else []
         self._written = [*real, *self.channel.integers]
         self._latest = self._written[-1]
-        self._mode = find_number(dictionary, ANALOGUE_ERROR_MODE, number)
-        self._error = find_number(dictionary, INTEGER_ERROR_VALUE, number)
-        self._real_error = find_number(dictionary, REAL_ERROR_VALUE, number)
+        self._mode = families.find_number(dictionary, families.ANALOGUE_ERROR_MODE, number)
+        self._error = families.find_number(dictionary, families.INTEGER_ERROR_VALUE, number)
+        self._real_error = families.find_number(dictionary, families.REAL_ERROR_VALUE, number)
         for entry in self._written:
             entry.watch(self._write)
 

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.dictionary import Dictionary, Entry
+from tickrig.device.canopen.ds401 import families
 from tickrig.device.canopen.ds401.analogue import (
     AnalogueInput,
     AnalogueOutput,
@@ -15,13 +16,6 @@ from tickrig.device.canopen.ds401.analogue import (
     InterruptSource,
 )
 from tickrig.device.canopen.ds401.digital import DigitalInputs, DigitalOutputs
-from tickrig.device.canopen.ds401.families import (
-    ANALOGUE_INPUT,
-    ANALOGUE_INTERRUPT_ENABLE,
-    ANALOGUE_OUTPUT,
-    DIGITAL_INTERRUPT_ENABLE,
-    channels,
-)
 from tickrig.device.canopen.errors import INPUT_ERROR, OUTPUT_ERROR, ErrorBehaviour
 from tickrig.device.canopen.pdo.tpdo import PdoProducer
 from tickrig.device.canopen.slave import Application, CanopenSlave, number_of
@@ -264,8 +258,8 @@ class Ds401(Application):
             entry.key: channel for channel in self.analogue_inputs for entry in channel.entries
         }
         self._source = InterruptSource(dictionary)
-        self._digital_enable = dictionary.find(DIGITAL_INTERRUPT_ENABLE)
-        self._analogue_enable = dictionary.find(ANALOGUE_INTERRUPT_ENABLE)
+        self._digital_enable = dictionary.find(families.DIGITAL_INTERRUPT_ENABLE)
+        self._analogue_enable = dictionary.find(families.ANALOGUE_INTERRUPT_ENABLE)
         self._faults = self._make_faults()
         self._lines = _digital_input_names(self._digital_inputs.lines)
         self._terminals = _outputs_by_name(self._digital_outputs, self._analogue_outputs)
@@ -386,7 +380,7 @@ def _analogue_inputs(
 ) -> list[AnalogueInput]:
     return [
         AnalogueInput(dictionary, number, _at(converters, number))
-        for number in channels(dictionary, ANALOGUE_INPUT)
+        for number in families.channels(dictionary, families.ANALOGUE_INPUT)
     ]
 
 
@@ -395,7 +389,7 @@ def _analogue_outputs(
 ) -> list[AnalogueOutput]:
     return [
         AnalogueOutput(dictionary, number, _at(converters, number))
-        for number in channels(dictionary, ANALOGUE_OUTPUT)
+        for number in families.channels(dictionary, families.ANALOGUE_OUTPUT)
     ]
 
 

@@ -43,16 +43,8 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort
-from tickrig.device.canopen.ds402 import indices, terminals
+from tickrig.device.canopen.ds402 import automaton, indices, settings, terminals
 from tickrig.device.canopen.ds402.actual_values import MEASURES, ActualValues, Measure
-from tickrig.device.canopen.ds402.automaton import (
-    Automaton,
-    Bounds,
-    Controlword,
-    DriveState,
-    Supervision,
-    command_of,
-)
 from tickrig.device.canopen.ds402.axis import (
     Axis,
     IdealMotor,
@@ -65,14 +57,6 @@ from tickrig.device.canopen.ds402.axis import (
 from tickrig.device.canopen.ds402.modes.homing import METHODS
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.modes import MODES, offered, supported
-from tickrig.device.canopen.ds402.settings import (
-    COMMUNICATION_ERRORS,
-    CONFIGURATION,
-    ErrorCode,
-    Parameters,
-    read_settings,
-    register_of,
-)
 from tickrig.device.canopen.ds402.stretch import Stretch
 from tickrig.device.canopen.ds402.trapezoid import RampShape
 from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave
@@ -120,7 +104,7 @@ _TARGETS: Final = (
     indices.INTERPOLATION_DATA,
 )
 
-_MOVING: Final = (DriveState.OPERATION_ENABLED, DriveState.QUICK_STOP_ACTIVE)
+_MOVING: Final = (automaton.DriveState.OPERATION_ENABLED, automaton.DriveState.QUICK_STOP_ACTIVE)
 """States in which a lost connection matters."""
 
 _COOLING_US: Final = 1_000_000
@@ -175,8 +159,8 @@ class Ds402(Application):
 
     modes: ClassVar[Mapping[int, type[Mode]]] = MODES
     measures: ClassVar[Mapping[int, Measure]] = MEASURES
-    bounds: ClassVar[Bounds] = Bounds()
-    encoder_error: ClassVar[ErrorCode] = ErrorCode.INCREMENTAL_SENSOR
+    bounds: ClassVar[automaton.Bounds] = automaton.Bounds()
+    encoder_error: ClassVar[settings.ErrorCode] = settings.ErrorCode.INCREMENTAL_SENSOR
     limits_are_faults: ClassVar[bool] = False
     more_targets: ClassVar[tuple[int, ...]] = ()
 
@@ -194,11 +178,11 @@ class Ds402(Application):
         super().__init__(node, slot)
         self._servo, self.outputs = servo, terminals.OUTPUTS
         motor: Motor = servo or IdealMotor()
-        self.parameters = parameters = Parameters(node.dictionary, defaults)
+        self.parameters = parameters = settings.Parameters(node.dictionary, defaults)
         listed = parameters.number(indices.SUPPORTED_MODES)
         self.offered: Mapping[int, type[Mode]] = offered(self.modes, listed)
         self._supported = listed or supported(self.offered)
-        self._axis = Axis(motor, read_settings(parameters, motor.counts_per_turn))
+        self._axis = Axis(motor, settings.read_settings(parameters, motor.counts_per_turn))
         self.switches, self.stopping = Switches(), Stopping(self._axis, parameters)
         self.limits = Limits(self._axis, self.switches)
         self._view = DriveView(
@@ -209,8 +193,8 @@ class Ds402(Application):
             stopping=self.stopping,
         )
         self.mode, self.mode_number = Mode(self._view), 0
-        self.automaton = Automaton(self.stopping, self._begin_mode)
-        self.supervision = Supervision(self._axis, self.bounds)
+        self.automaton = automaton.Automaton(self.stopping, self._begin_mode)
+        self.supervision = automaton.Supervision(self._axis, self.bounds)
         self.actual_values = ActualValues(self, node.dictionary)
         self._limited, self._stale, self._winding_dc = False, True, 0
         self._stretch, self._requested = Stretch(self, self._axis, servo), True
@@ -221,12 +205,12 @@ class Ds402(Application):
         parameters.watch((indices.CONTROLWORD,), self._controlled)
         parameters.watch((indices.MODES_OF_OPERATION,), self._mode_written)
         parameters.watch((*_TARGETS, *self.more_targets), self._target_written)
-        parameters.watch(CONFIGURATION, self._configuration_written)
+        parameters.watch(settings.CONFIGURATION, self._configuration_written)
         _guard_values(node.dictionary, self.offered)
         node.sync_handlers.append(self._sync)
 
     @property
-    def state(self) -> DriveState:
+    def state(self) -> automaton.DriveState:
         """The state of the drive."""
         return self.automaton.state
 
@@ -252,7 +236,7 @@ class Ds402(Application):
     @property
     def enabled(self) -> bool:
         """Whether it is in Operation enabled."""
-        return self.automaton.state is DriveState.OPERATION_ENABLED
+        return self.automaton.state is automaton.DriveState.OPERATION_ENABLED
 
     @property
     def error_code(self) -> int:
@@ -277,7 +261,7 @@ class Ds402(Application):
         """Have a fault with an emergency error code; one that is there already is none."""
         if code not in self._faults:
             self._note(code)
-            self.node.emergency(code, register_of(code))
+            self.node.emergency(code, settings.register_of(code))
 
     def power_on(self) -> None:
         """Count from 0 on."""
@@ -310,7 +294,7 @@ class Ds402(Application):
 
     def emergency(self, code: int, register: int, text: bytes) -> None:
         """Remember that the connection is lost."""
-        if code in COMMUNICATION_ERRORS:
+        if code in settings.COMMUNICATION_ERRORS:
             self._lost.add(code)
 
     def emergency_clear(self, code: int, text: bytes | None) -> None:
@@ -329,11 +313,11 @@ class Ds402(Application):
         self._interrupt()
         match self.parameters.number(indices.ABORT_CONNECTION):
             case AbortConnection.FAULT:
-                self._note(max(self._lost, default=ErrorCode.COMMUNICATION))
+                self._note(max(self._lost, default=settings.ErrorCode.COMMUNICATION))
             case AbortConnection.DISABLE_VOLTAGE:
-                self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
+                self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
             case AbortConnection.QUICK_STOP:
-                self.automaton.enter(DriveState.QUICK_STOP_ACTIVE)
+                self.automaton.enter(automaton.DriveState.QUICK_STOP_ACTIVE)
             case _:  # no action, or what a manufacturer might mean
                 return
         self.request()
@@ -400,7 +384,7 @@ class Ds402(Application):
             self.node.emergency_clear(code)
         self._faults.clear()
         self.parameters.write(indices.ERROR_CODE, 0)
-        self.automaton.enter(DriveState.SWITCH_ON_DISABLED)
+        self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
 
     def _begin_mode(self, *, enabled: bool = False) -> None:
         """Begin the chosen mode anew."""
@@ -436,7 +420,7 @@ class Ds402(Application):
             self._stale = False
             motor = self._axis.motor
             motor.step_to(self.node.now_us)
-            self._axis.configure(read_settings(self.parameters, motor.counts_per_turn))
+            self._axis.configure(settings.read_settings(self.parameters, motor.counts_per_turn))
 
     def _follow_inputs(self) -> None:
         inputs = self.inputs
@@ -445,7 +429,7 @@ class Ds402(Application):
         inputs.changed = False
         self.switches.set(inputs)
         wired = (
-            (terminals.SHORT_CIRCUIT, ErrorCode.OVER_CURRENT),
+            (terminals.SHORT_CIRCUIT, settings.ErrorCode.OVER_CURRENT),
             (terminals.ENCODER_UNPLUGGED, self.encoder_error),
         )
         self.supervision.wired = tuple(code for name, code in wired if inputs[name])
@@ -470,15 +454,15 @@ class Ds402(Application):
         before = self._view.controlword
         self._view.controlword = controlword = self.parameters.number(indices.CONTROLWORD)
         rising, falling = controlword & ~before, before & ~controlword
-        command = command_of(controlword)
-        if self.state is DriveState.FAULT and rising & Controlword.FAULT_RESET:
+        command = automaton.command_of(controlword)
+        if self.state is automaton.DriveState.FAULT and rising & automaton.Controlword.FAULT_RESET:
             self._reset_faults()
         elif command is not None:
             self.automaton.obey(command)
         if self.enabled:
-            if rising & Controlword.START:
+            if rising & automaton.Controlword.START:
                 self.mode.start()
-            if falling & Controlword.START:
+            if falling & automaton.Controlword.START:
                 self.mode.stop()
         self.request()
 

@@ -10,17 +10,7 @@ from typing import Final
 
 from tickrig._compiled import mypyc_attr
 from tickrig.device.canopen.dictionary import Dictionary, Entry
-from tickrig.device.canopen.models.motor_core_motion import (
-    ACTIONS,
-    CONTROL_US,
-    DEGREE,
-    Action,
-    Display,
-    Motion,
-    References,
-    Shaft,
-    mode_of,
-)
+from tickrig.device.canopen.models import motor_core_motion
 from tickrig.device.canopen.slave import TICK_US, Application, CanopenSlave, Nonvolatile
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import InputSignal, OutputSignal, QuantityBank, SignalType
@@ -28,19 +18,7 @@ from tickrig.device.servo.parameters import MOTOR_CORE_UNIT
 from tickrig.device.servo.servo import Servo
 from tickrig.device.twin import Immutable, Part
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.object_table import (
-    OFF,
-    ROT,
-    RW,
-    RWW,
-    U8,
-    U16,
-    U32,
-    CommunicationProfile,
-    Element,
-    ObjectTable,
-    add_communication,
-)
+from tickrig.wire.canopen.eds import object_table
 from tickrig.wire.canopen.emcy import ErrorRegister
 from tickrig.wire.canopen.nmt import NmtState
 from tickrig.wire.canopen.pdo import PdoDescription
@@ -319,10 +297,13 @@ class MotorCoreUnit(Application):
         self.has_inputs(INPUTS)
         self.outputs = {output.name: output for output in _OUTPUTS}
         self.servo = Servo(MOTOR_CORE_UNIT)
-        self._shaft, self._references = Shaft(self.servo), References(node, self.request)
-        self._motion = Motion(self._shaft, self._references)
+        self._shaft, self._references = (
+            motor_core_motion.Shaft(self.servo),
+            motor_core_motion.References(node, self.request),
+        )
+        self._motion = motor_core_motion.Motion(self._shaft, self._references)
         self._supervision = Supervision(node)
-        self._display = Display(node.dictionary, self._shaft, self._references)
+        self._display = motor_core_motion.Display(node.dictionary, self._shaft, self._references)
         self._mode = node.dictionary[_MODE, 0]
         self._mode.written = self._mode_written
         self.watch([self._mode, *self._references.entries])
@@ -334,9 +315,9 @@ class MotorCoreUnit(Application):
             return _READINGS[name](self.servo)
         match name:
             case "target_deg":
-                return self._references.target_ndeg / DEGREE
+                return self._references.target_ndeg / motor_core_motion.DEGREE
             case "mode":
-                return mode_of(self._mode.number).name.lower()
+                return motor_core_motion.mode_of(self._mode.number).name.lower()
             case "status":
                 return self._status
         raise KeyError(name)
@@ -376,7 +357,7 @@ class MotorCoreUnit(Application):
         self.servo.step_to(now_us)
         _apply_inputs(self.servo, self.inputs)
         failed = self._supervise(now_us)
-        controls = failed or now_us - self._begin_us >= CONTROL_US
+        controls = failed or now_us - self._begin_us >= motor_core_motion.CONTROL_US
         if controls:
             self._control(now_us)
         self._motion.drive(now_us - self._begin_us)
@@ -400,14 +381,14 @@ class MotorCoreUnit(Application):
         self._display.show(self._motion, faulty=bool(self._supervision.faults))
 
     @property
-    def _action(self) -> Action:
+    def _action(self) -> motor_core_motion.Action:
         """What faults, NMT state and mode let the motor do."""
         if self._supervision.faults:
-            return Action.COAST
-        action = ACTIONS[mode_of(self._mode.number)]
-        if action is Action.COAST or self.node.state is NmtState.OPERATIONAL:
+            return motor_core_motion.Action.COAST
+        action = motor_core_motion.ACTIONS[motor_core_motion.mode_of(self._mode.number)]
+        if action is motor_core_motion.Action.COAST or self.node.state is NmtState.OPERATIONAL:
             return action
-        return Action.BRAKE
+        return motor_core_motion.Action.BRAKE
 
     def _measurements(self, now_us: int) -> Measurements:
         servo, on = self.servo, self._motion.on
@@ -464,23 +445,23 @@ def _channels(index: int) -> tuple[int, ...]:
     return tuple(index << 16 | sub << 8 | I16.bits for sub in range(1, _CHANNELS + 1))
 
 
-_PROFILE: Final = CommunicationProfile(
+_PROFILE: Final = object_table.CommunicationProfile(
     device_type=_ANALOGUE_IN_AND_OUT,
     name="motor core unit",
     hardware="1.1",
     software="tickrig",
     product_code=2,
     rpdos=[
-        PdoDescription(OFF | 0x200),
+        PdoDescription(object_table.OFF | 0x200),
         PdoDescription(0x300, _channels(0x6411)),
-        PdoDescription(OFF | 0x400),
-        PdoDescription(OFF | 0x500),
+        PdoDescription(object_table.OFF | 0x400),
+        PdoDescription(object_table.OFF | 0x500),
     ],
     tpdos=[
-        PdoDescription(OFF | 0x180),
+        PdoDescription(object_table.OFF | 0x180),
         PdoDescription(0x280, _channels(0x6401)),
-        PdoDescription(OFF | 0x380),
-        PdoDescription(OFF | 0x480),
+        PdoDescription(object_table.OFF | 0x380),
+        PdoDescription(object_table.OFF | 0x480),
     ],
 )
 
@@ -515,19 +496,25 @@ def dictionary() -> Dictionary:
 
 @cache
 def _template() -> Dictionary:
-    objects = ObjectTable()
-    add_communication(objects, _PROFILE)
-    objects.variable(0x2000, "Mode", U8, RW, high=3)
-    objects.variable(0x2001, "Status", U16, ROT)
+    objects = object_table.ObjectTable()
+    object_table.add_communication(objects, _PROFILE)
+    objects.variable(0x2000, "Mode", object_table.U8, object_table.RW, high=3)
+    objects.variable(0x2001, "Status", object_table.U16, object_table.ROT)
     full_scales = (
-        Element(1, "Full scale angle, 0.001 deg", U32, RW, 180_000),
-        Element(2, "Full scale velocity, 0.001 deg/s", U32, RW, 360_000),
-        Element(3, "Full scale current, mA", U32, RW, 10_000),
+        object_table.Element(
+            1, "Full scale angle, 0.001 deg", object_table.U32, object_table.RW, 180_000
+        ),
+        object_table.Element(
+            2, "Full scale velocity, 0.001 deg/s", object_table.U32, object_table.RW, 360_000
+        ),
+        object_table.Element(
+            3, "Full scale current, mA", object_table.U32, object_table.RW, 10_000
+        ),
     )
     objects.record(0x2010, "Full scale", full_scales)
-    objects.variable(0x2011, "Angle offset, 0.001 deg", I32, RW)
-    objects.array(0x6401, "Read analogue input 16-bit", _CHANNELS, I16, ROT)
-    objects.array(0x6411, "Write analogue output 16-bit", _CHANNELS, I16, RWW)
-    objects.array(0x6443, "Analogue output error mode", 1, U8, RW, 1)
-    objects.array(0x6444, "Analogue output error value", 1, I32, RW)
+    objects.variable(0x2011, "Angle offset, 0.001 deg", I32, object_table.RW)
+    objects.array(0x6401, "Read analogue input 16-bit", _CHANNELS, I16, object_table.ROT)
+    objects.array(0x6411, "Write analogue output 16-bit", _CHANNELS, I16, object_table.RWW)
+    objects.array(0x6443, "Analogue output error mode", 1, object_table.U8, object_table.RW, 1)
+    objects.array(0x6444, "Analogue output error value", 1, I32, object_table.RW)
     return Dictionary(objects, objects.objects)

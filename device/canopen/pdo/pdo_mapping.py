@@ -11,22 +11,10 @@ from tickrig.device.canopen.dictionary import Dictionary, Entry, SdoAbort, whole
 from tickrig.device.canopen.pdo.pdo_parameters import PdoParameters, PdoSender, TpdoMode
 from tickrig.device.canopen.slave import CanopenSlave
 from tickrig.device.twin import Part
+from tickrig.wire.canopen import pdo
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.canopen.eds.object_table import Access
 from tickrig.wire.canopen.emcy import EmcyCode, ErrorRegister
-from tickrig.wire.canopen.pdo import (
-    DAM_MPDO,
-    MAX_MAPPED_OBJECTS,
-    MAX_PDO_BITS,
-    MPDO_DATA_BYTES,
-    SAM_MPDO,
-    Dispatched,
-    MappedObject,
-    Mpdo,
-    Scanned,
-    pack_bits,
-    unpack_bits,
-)
 from tickrig.wire.canopen.sdo_frame import AbortCode
 from tickrig.wire.instant import NEVER
 
@@ -136,14 +124,14 @@ class _Bits(Part):
         self._slots = slots
 
     def pack(self) -> bytes:
-        return pack_bits(
+        return pdo.pack_bits(
             (int.from_bytes(_present(entry), "little"), bits)
             for entry, bits in self._slots
             if entry is not None
         )
 
     def unpack(self, data: bytes) -> None:
-        values = unpack_bits(data, [slot.bits for slot in self._slots])
+        values = pdo.unpack_bits(data, [slot.bits for slot in self._slots])
         for value, (entry, bits) in zip(values, self._slots, strict=True):
             if entry is not None:
                 _make_write(entry)(value.to_bytes(entry.size or bits // 8, "little"))
@@ -160,13 +148,13 @@ _Source = tuple[int, int, int]
 
 def _fits_mpdo(entry: Entry, direction: Access) -> bool:
     """Return whether an object may be in an MPDO: mappable and of one to four bytes."""
-    return direction in entry.description.access and 0 < entry.size <= MPDO_DATA_BYTES
+    return direction in entry.description.access and 0 < entry.size <= pdo.MPDO_DATA_BYTES
 
 
 def scanned_entries(dictionary: Dictionary) -> Iterator[Entry]:
     """Give the objects of the scanner lists that an MPDO can carry."""
     for value in _list_values(dictionary, _SCANNER_LISTS):
-        row = Scanned.parse(value)
+        row = pdo.Scanned.parse(value)
         for step in range(row.block):
             entry = dictionary.find(row.index, row.sub + step)
             if entry is not None and _fits_mpdo(entry, Access.TPDO):
@@ -176,7 +164,7 @@ def scanned_entries(dictionary: Dictionary) -> Iterator[Entry]:
 def _dispatched_entries(dictionary: Dictionary) -> Iterator[tuple[_Source, Entry]]:
     """Give the objects of the dispatching lists, each with where its value comes from."""
     for value in _list_values(dictionary, _DISPATCHING_LISTS):
-        row = Dispatched.parse(value)
+        row = pdo.Dispatched.parse(value)
         for step in range(row.block):
             entry = dictionary.find(row.index, row.sub + step)
             if entry is not None and _fits_mpdo(entry, Access.RPDO):
@@ -225,7 +213,7 @@ class MpdoQueue(TpdoMode):
         """Send nothing: a remote frame cannot say which object."""
 
     def _frame_of(self, entry: Entry) -> bytes:
-        return Mpdo(False, self._node_id, entry.index, entry.sub, _present(entry)).encode()
+        return pdo.Mpdo(False, self._node_id, entry.index, entry.sub, _present(entry)).encode()
 
 
 class DamProducer(MpdoQueue):
@@ -236,7 +224,7 @@ class DamProducer(MpdoQueue):
 
     def send_to(self, node_id: int, index: int, sub: int, data: bytes) -> None:
         """Write an object of another node, or of all with node-ID 0."""
-        self.put((node_id, index, sub), Mpdo(True, node_id, index, sub, data).encode())
+        self.put((node_id, index, sub), pdo.Mpdo(True, node_id, index, sub, data).encode())
 
 
 class SamProducer(MpdoQueue):
@@ -260,7 +248,7 @@ class DamConsumer(Part):
 
     def unpack(self, data: bytes) -> None:
         """Take the eight bytes of a frame."""
-        mpdo = Mpdo.parse(data[:8])
+        mpdo = pdo.Mpdo.parse(data[:8])
         if not mpdo.destination or mpdo.node_id not in (0, self._node.node_id):
             return
         entry = self._node.dictionary.find(mpdo.index, mpdo.sub)
@@ -290,7 +278,7 @@ class SamConsumer(Part):
 
     def unpack(self, data: bytes) -> None:
         """Take the eight bytes of a frame."""
-        mpdo = Mpdo.parse(data[:8])
+        mpdo = pdo.Mpdo.parse(data[:8])
         found = self._writes.get((mpdo.node_id, mpdo.index, mpdo.sub))
         if found is not None and not mpdo.destination:
             write, size = found
@@ -309,7 +297,7 @@ _DUMMIES: Final = {
 _SAM_LISTS: Final = {Access.RPDO: _DISPATCHING_LISTS, Access.TPDO: _SCANNER_LISTS}
 """Without a dispatching or a scanner list there is no MPDO in source address mode."""
 
-_NOTHING: Final = MappedObject(0, 0, 0)
+_NOTHING: Final = pdo.MappedObject(0, 0, 0)
 
 
 class PdoMapping(Part):
@@ -333,7 +321,7 @@ class PdoMapping(Part):
     ) -> None:
         self._dictionary, self._direction, self._parameters = dictionary, direction, parameters
         self._count = dictionary.find(index)
-        self._objects = dictionary.elements(index, MAX_MAPPED_OBJECTS)
+        self._objects = dictionary.elements(index, pdo.MAX_MAPPED_OBJECTS)
         if self._count is not None:
             self._count.guard = self._check_count
         check = self._check_object
@@ -351,15 +339,15 @@ class PdoMapping(Part):
             slots = self._slots(self.count)
         except SdoAbort:
             return ()
-        return slots if total_bits(slots) <= MAX_PDO_BITS else ()
+        return slots if total_bits(slots) <= pdo.MAX_PDO_BITS else ()
 
     def _slots(self, count: int) -> tuple[Slot, ...]:
         if count > len(self._objects):
             raise SdoAbort(AbortCode.PDO_LENGTH)
-        mapped = [MappedObject.parse(entry.number) for entry in self._objects[:count]]
+        mapped = [pdo.MappedObject.parse(entry.number) for entry in self._objects[:count]]
         return tuple(self._slot(each) for each in mapped if each != _NOTHING)
 
-    def _slot(self, mapped: MappedObject) -> Slot:
+    def _slot(self, mapped: pdo.MappedObject) -> Slot:
         """Find an object; SdoAbort if there is none or it has not so many bits."""
         # 0005 00 08h: eight bits that an RPDO carries and nobody takes (CiA 301, dummy
         # mapping).
@@ -382,7 +370,7 @@ class PdoMapping(Part):
         # sub-index 0 to 0, then the objects, then sub-index 0, then the COB-ID.
         if self._parameters.valid or self.count:
             raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
-        mapped = MappedObject.parse(whole_number(value))
+        mapped = pdo.MappedObject.parse(whole_number(value))
         if mapped != _NOTHING:
             self._check_slot(self._slot(mapped))
 
@@ -390,12 +378,12 @@ class PdoMapping(Part):
         if self._parameters.valid:
             raise SdoAbort(AbortCode.UNSUPPORTED_ACCESS)
         count = whole_number(value)
-        if count == DAM_MPDO or (count == SAM_MPDO and self._has_sam_list()):
+        if count == pdo.DAM_MPDO or (count == pdo.SAM_MPDO and self._has_sam_list()):
             return
         slots = self._slots(count)
         for slot in slots:
             self._check_slot(slot)
-        if total_bits(slots) > MAX_PDO_BITS:
+        if total_bits(slots) > pdo.MAX_PDO_BITS:
             raise SdoAbort(AbortCode.PDO_LENGTH)
         if count and not slots:
             raise SdoAbort(AbortCode.VALUE_RANGE)

@@ -6,14 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Final
 
 from tickrig.device.canopen.dictionary import Entry
-from tickrig.device.canopen.pdo.pdo_mapping import (
-    DamConsumer,
-    PdoMapping,
-    SamConsumer,
-    Unpack,
-    make_unpack,
-    total_bits,
-)
+from tickrig.device.canopen.pdo import pdo_mapping
 from tickrig.device.canopen.pdo.pdo_parameters import (
     EVENT_TIMER,
     RPDO_TYPES,
@@ -33,7 +26,7 @@ from tickrig.wire.instant import NEVER
 _RPDO_PARAMETERS: Final = range(0x1400, 0x1600)
 _RPDO_MAPPINGS: Final = 0x1600
 
-_Target = tuple[Unpack, int]
+_Target = tuple[pdo_mapping.Unpack, int]
 """What takes the bytes, and how many it needs."""
 
 
@@ -60,9 +53,11 @@ class Rpdo(Part):
         self.parameters = PdoParameters(
             dictionary, _RPDO_PARAMETERS[offset], RPDO_TYPES, self._changed
         )
-        self.mapping = PdoMapping(dictionary, _RPDO_MAPPINGS + offset, Access.RPDO, self.parameters)
+        self.mapping = pdo_mapping.PdoMapping(
+            dictionary, _RPDO_MAPPINGS + offset, Access.RPDO, self.parameters
+        )
         self._text = number.to_bytes(2, "little")
-        self._unpack: Unpack
+        self._unpack: pdo_mapping.Unpack
         self._pending: bytes | None
         self._length: int
         self._event_us: int
@@ -100,7 +95,7 @@ class Rpdo(Part):
     def restart(self) -> None:
         """Know of no error and no frame."""
         self._errors: set[int] = set()
-        self._dam: DamConsumer | None = None
+        self._dam: pdo_mapping.DamConsumer | None = None
         self.stop()
 
     def stop(self) -> None:
@@ -121,12 +116,16 @@ class Rpdo(Part):
     def _target(self) -> _Target | None:
         count = self.mapping.count
         if count == DAM_MPDO:
-            self._dam = self._dam or DamConsumer(self._consumer.node)
+            self._dam = self._dam or pdo_mapping.DamConsumer(self._consumer.node)
             return self._dam.unpack, MAX_PDO_BYTES
         if count == SAM_MPDO:
-            return SamConsumer(self._consumer.node.dictionary).unpack, MAX_PDO_BYTES
+            return pdo_mapping.SamConsumer(self._consumer.node.dictionary).unpack, MAX_PDO_BYTES
         slots = self.mapping.slots()
-        return (make_unpack(slots), (total_bits(slots) + 7) // 8) if slots else None
+        return (
+            (pdo_mapping.make_unpack(slots), (pdo_mapping.total_bits(slots) + 7) // 8)
+            if slots
+            else None
+        )
 
     def _take(self, frame: CanFrame) -> None:
         """Use a frame at once."""

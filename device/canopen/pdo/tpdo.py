@@ -6,30 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Final
 
 from tickrig.device.canopen.dictionary import Entry
-from tickrig.device.canopen.pdo.pdo_mapping import (
-    DamProducer,
-    Pack,
-    PdoMapping,
-    SamProducer,
-    alone_in,
-    make_pack,
-    scanned_entries,
-)
-from tickrig.device.canopen.pdo.pdo_parameters import (
-    EVENT_DRIVEN,
-    EVENT_TIMER,
-    RTR_EVENT,
-    RTR_SYNCHRONOUS,
-    SYNCHRONOUS,
-    TPDO_TYPES,
-    EventDriven,
-    PdoParameters,
-    RtrSynchronous,
-    Silent,
-    SynchronousAcyclic,
-    SynchronousCyclic,
-    TpdoMode,
-)
+from tickrig.device.canopen.pdo import pdo_mapping, pdo_parameters
 from tickrig.device.canopen.slave import CanopenSlave, Handler, Service
 from tickrig.device.twin import Part
 from tickrig.wire.can import CanFrame
@@ -78,9 +55,9 @@ from tickrig.wire.instant import NEVER
 _TPDO_PARAMETERS: Final = range(0x1800, 0x1A00)
 _TPDO_MAPPINGS: Final = 0x1A00
 
-_RTR_MODES: Final[dict[int, type[TpdoMode]]] = {
-    RTR_SYNCHRONOUS: RtrSynchronous,
-    RTR_EVENT: TpdoMode,
+_RTR_MODES: Final[dict[int, type[pdo_parameters.TpdoMode]]] = {
+    pdo_parameters.RTR_SYNCHRONOUS: pdo_parameters.RtrSynchronous,
+    pdo_parameters.RTR_EVENT: pdo_parameters.TpdoMode,
 }
 
 
@@ -107,12 +84,14 @@ class Tpdo(Part):
     def __init__(self, producer: PdoProducer, number: int) -> None:
         self.number, self._producer, self._node = number, producer, producer.node
         offset, dictionary = number - 1, producer.node.dictionary
-        self.parameters = PdoParameters(
-            dictionary, _TPDO_PARAMETERS[offset], TPDO_TYPES, self._changed
+        self.parameters = pdo_parameters.PdoParameters(
+            dictionary, _TPDO_PARAMETERS[offset], pdo_parameters.TPDO_TYPES, self._changed
         )
-        self.mapping = PdoMapping(dictionary, _TPDO_MAPPINGS + offset, Access.TPDO, self.parameters)
-        self.mode: TpdoMode = Silent(self)
-        self.pack: Pack
+        self.mapping = pdo_mapping.PdoMapping(
+            dictionary, _TPDO_MAPPINGS + offset, Access.TPDO, self.parameters
+        )
+        self.mode: pdo_parameters.TpdoMode = pdo_parameters.Silent(self)
+        self.pack: pdo_mapping.Pack
         self.entries: list[Entry] = []
         self._alone: Entry | None
         self.wake = producer.wake
@@ -124,11 +103,11 @@ class Tpdo(Part):
         self.end()
         self._can_id = self.parameters.can_id
         slots = self.mapping.slots()
-        self.pack, self._alone = make_pack(slots), alone_in(slots)
+        self.pack, self._alone = pdo_mapping.make_pack(slots), pdo_mapping.alone_in(slots)
         self.entries = [slot.entry for slot in slots if slot.entry is not None]
         self.mode = self._make_mode()
-        if isinstance(self.mode, SamProducer):
-            self._watch(scanned_entries(self._node.dictionary))
+        if isinstance(self.mode, pdo_mapping.SamProducer):
+            self._watch(pdo_mapping.scanned_entries(self._node.dictionary))
         elif self.mode.on_change:
             self._watch(self.entries)
 
@@ -136,7 +115,7 @@ class Tpdo(Part):
         """Send no more."""
         for entry in self._watched:
             entry.unwatch(self.mode.request)
-        self.mode = Silent(self)
+        self.mode = pdo_parameters.Silent(self)
 
     def send(self, data: bytes | None = None) -> None:
         """Send bytes, or the mapped objects as they are now."""
@@ -163,26 +142,34 @@ class Tpdo(Part):
     def _changed(self, entry: Entry) -> None:
         # The event timer may change at any time, without a new beginning (CiA 301, PDO
         # parameter).
-        if entry.sub == EVENT_TIMER:
+        if entry.sub == pdo_parameters.EVENT_TIMER:
             self.mode.retime(self._node.now_us)
         else:
             self._producer.changed(self)
 
-    def _make_mode(self) -> TpdoMode:
+    def _make_mode(self) -> pdo_parameters.TpdoMode:
         """Return the transmission type at work."""
         kind, count = self.parameters.transmission_type, self.mapping.count
         if not self.parameters.valid:
-            return Silent(self)
+            return pdo_parameters.Silent(self)
         # Sub-index 0 is FEh or FFh: no number of mapped objects but a kind of PDO.
         if count in (SAM_MPDO, DAM_MPDO):
-            if kind not in EVENT_DRIVEN:
-                return Silent(self)
-            return DamProducer(self) if count == DAM_MPDO else SamProducer(self, self._node.node_id)
+            if kind not in pdo_parameters.EVENT_DRIVEN:
+                return pdo_parameters.Silent(self)
+            return (
+                pdo_mapping.DamProducer(self)
+                if count == DAM_MPDO
+                else pdo_mapping.SamProducer(self, self._node.node_id)
+            )
         if not self.entries:
-            return Silent(self)
-        if kind in SYNCHRONOUS:
-            return SynchronousCyclic(self) if kind else SynchronousAcyclic(self)
-        return _RTR_MODES.get(kind, EventDriven)(self)
+            return pdo_parameters.Silent(self)
+        if kind in pdo_parameters.SYNCHRONOUS:
+            return (
+                pdo_parameters.SynchronousCyclic(self)
+                if kind
+                else pdo_parameters.SynchronousAcyclic(self)
+            )
+        return _RTR_MODES.get(kind, pdo_parameters.EventDriven)(self)
 
 
 # PDO producer: all TPDOs of a slave (CiA 301, PDO).
@@ -216,8 +203,8 @@ class PdoProducer(Service):
             Tpdo(self, index - _TPDO_PARAMETERS[0] + 1)
             for index in node.dictionary.within(_TPDO_PARAMETERS)
         ]
-        self._synchronous: tuple[TpdoMode, ...] = ()
-        self._timed: tuple[TpdoMode, ...] = ()
+        self._synchronous: tuple[pdo_parameters.TpdoMode, ...] = ()
+        self._timed: tuple[pdo_parameters.TpdoMode, ...] = ()
         self._counters: tuple[int, ...] = ()
         self._due_us = NEVER
         node.sync_handlers.append(self._sync)
@@ -242,7 +229,7 @@ class PdoProducer(Service):
             data: up to four bytes.
         """
         for tpdo in self.tpdos:
-            if isinstance(tpdo.mode, DamProducer):
+            if isinstance(tpdo.mode, pdo_mapping.DamProducer):
                 tpdo.mode.send_to(node_id, index, sub, data)
                 return
 

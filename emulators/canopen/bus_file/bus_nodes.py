@@ -12,34 +12,10 @@ from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.ds402 import Ds402, indices
 from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.bus_file.joint_drive import (
-    NAMES,
-    UNITS,
-    UNITS_OF_POSITION,
-    JointDrive,
-    complete,
-    missing,
-    modes_listed,
-    with_factors,
-    with_values,
-)
-from tickrig.emulators.canopen.bus_file.node_keys import (
-    JOINT_KEYS,
-    URDF,
-    BusMistakesError,
-    NodeKeys,
-    read_keys,
-)
+from tickrig.emulators.canopen import eds
+from tickrig.emulators.canopen.bus_file import joint_drive, node_keys
 from tickrig.emulators.canopen.bus_file.urdf import PRISMATIC, Urdf, UrdfJoint, read_urdf
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.eds import (
-    DeviceDescription,
-    EdsCache,
-    Version,
-    application_of,
-    in_profile,
-    version_of,
-)
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusSlave
@@ -78,7 +54,7 @@ class BusNode:
     name: str
     node_id: int
     line: int
-    description: DeviceDescription
+    description: eds.DeviceDescription
     about: str = ""
 
 
@@ -101,7 +77,7 @@ class NodeMaker:
         self,
         bus: BusFile,
         robot: Urdf | None,
-        cache: EdsCache,
+        cache: eds.EdsCache,
         mistakes: list[FileMistake],
         profile: str,
     ) -> None:
@@ -115,7 +91,9 @@ class NodeMaker:
     def nodes(self) -> Iterator[BusNode]:
         """Give all slaves of which something can be made."""
         for slave in self._bus.slaves.values():
-            keys = read_keys((slave.extra, self._bus.options.extra), slave.name, self._mistakes)
+            keys = node_keys.read_keys(
+                (slave.extra, self._bus.options.extra), slave.name, self._mistakes
+            )
             try:
                 sheet = self._cache.read(slave.sheet, None)
             except (EdsError, OSError):
@@ -138,24 +116,26 @@ class NodeMaker:
                 text = f"joint {joint.name!r}: no {what} in {self._bus.path.name}"
                 self.remarks.append(FileMistake(joint.place, text))
 
-    def _node(self, slave: BusSlave, keys: NodeKeys, sheet: DeviceDescription) -> BusNode:
+    def _node(
+        self, slave: BusSlave, keys: node_keys.NodeKeys, sheet: eds.DeviceDescription
+    ) -> BusNode:
         sheet = replace(sheet, template=self._identified(slave, sheet.template))
         profile, about = keys.profile or self._profile, ""
         start = dict(keys.start)
-        if application_of(sheet.template, profile) is Ds402:
+        if eds.application_of(sheet.template, profile) is Ds402:
             self._check_axes(slave, sheet.template)
             joint = self._joint(slave, keys)
             self._check_units(slave, sheet.template)
-            sheet = in_profile(sheet, profile, joint.defaults())
+            sheet = eds.in_profile(sheet, profile, joint.defaults())
             template = self._completed(slave, keys, sheet.template, joint)
             sheet = replace(sheet, template=template, application=joint.application())
             about, start = joint.about(template), {**joint.start, **start}
         else:
-            sheet = in_profile(sheet, profile)
+            sheet = eds.in_profile(sheet, profile)
             self._check_no_joint(slave, keys)
         if keys.configured:
             written = {(each.index, each.sub_index): each.data for each in slave.writes}
-            sheet = replace(sheet, template=with_values(sheet.template, written))
+            sheet = replace(sheet, template=joint_drive.with_values(sheet.template, written))
         files = (slave.sheet, *self._robot)
         description = replace(sheet, start=start, files=files)
         self._check_start(slave, keys, description)
@@ -171,7 +151,9 @@ class NodeMaker:
             (_IDENTITY, 4): identity.serial_number,
             _SOFTWARE: slave.software_version,
         }
-        return with_values(dictionary, {at: value for at, value in wanted.items() if value})
+        return joint_drive.with_values(
+            dictionary, {at: value for at, value in wanted.items() if value}
+        )
 
     def _check_axes(self, slave: BusSlave, dictionary: Dictionary) -> None:
         """Note a drive of several axes: the profile has one. Of others that nobody uses, tell."""
@@ -197,17 +179,17 @@ class NodeMaker:
                 )
                 self.remarks.append(FileMistake(slave.place, text))
 
-    def _check_no_joint(self, slave: BusSlave, keys: NodeKeys) -> None:
+    def _check_no_joint(self, slave: BusSlave, keys: node_keys.NodeKeys) -> None:
         """Note keys of a motor in a node that has none."""
-        for name in (*JOINT_KEYS, "modes"):
+        for name in (*node_keys.JOINT_KEYS, "modes"):
             if name in slave.extra:
                 text = f"{slave.name}.tickrig.{name}: it is no CiA 402 drive, and has no motor"
                 self._mistakes.append(FileMistake(keys.places[name], text))
 
-    def _joint(self, slave: BusSlave, keys: NodeKeys) -> JointDrive:
+    def _joint(self, slave: BusSlave, keys: node_keys.NodeKeys) -> joint_drive.JointDrive:
         """Return what moves a node: what its keys say, else the robot, else the driver's scale."""
-        scale = slave.channels[0].scale_pos_to_dev if slave.channels else UNITS
-        found: dict[str, Any] = {"units": abs(scale) or UNITS}
+        scale = slave.channels[0].scale_pos_to_dev if slave.channels else joint_drive.UNITS
+        found: dict[str, Any] = {"units": abs(scale) or joint_drive.UNITS}
         if robot := self._joints.get(slave.name):
             beyond = _BEYOND_M if robot.kind == PRISMATIC else _BEYOND_RAD
             found |= {
@@ -225,37 +207,45 @@ class NodeMaker:
             place = keys.places.get("lower", keys.places.get("upper", slave.place))
             text = f"{slave.name}.tickrig.lower: {lower:g} is not below upper, which is {upper:g}"
             self._mistakes.append(FileMistake(place, text))
-        return JointDrive(**found)
+        return joint_drive.JointDrive(**found)
 
     def _completed(
-        self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
+        self,
+        slave: BusSlave,
+        keys: node_keys.NodeKeys,
+        dictionary: Dictionary,
+        joint: joint_drive.JointDrive,
     ) -> Dictionary:
         """Return the objects of a drive, and remark those that its EDS has not."""
-        listed = modes_listed(dictionary)
+        listed = joint_drive.modes_listed(dictionary)
         modes = keys.modes or listed | self._asked_for(slave, listed)
         wanted = modes if keys.modes else modes - listed
-        if added := missing(dictionary, wanted):
+        if added := joint_drive.missing(dictionary, wanted):
             names = ", ".join(f"{index:04X}h" for index in added)
             text = f"its EDS lacks {names}, which its modes need: they are added"
             self.added.append(FileMistake(slave.place, f"{slave.name}: {text}"))
-        template = complete(dictionary, modes, added, joint.defaults())
+        template = joint_drive.complete(dictionary, modes, added, joint.defaults())
         return self._in_units(slave, keys, template, joint)
 
     def _in_units(
-        self, slave: BusSlave, keys: NodeKeys, dictionary: Dictionary, joint: JointDrive
+        self,
+        slave: BusSlave,
+        keys: node_keys.NodeKeys,
+        dictionary: Dictionary,
+        joint: joint_drive.JointDrive,
     ) -> Dictionary:
         """Return the objects of a drive with the units of its keys; those of others are told."""
         written = {
             (each.index, each.sub_index): each.data
             for each in slave.writes
-            if each.index in UNITS_OF_POSITION
+            if each.index in joint_drive.UNITS_OF_POSITION
         }
         given, place = joint.units_of(dictionary), slave.place
         said, result = f"scale_pos_to_dev {joint.units:g}", dictionary
         if "units" in keys.joint:
-            result = with_factors(dictionary, joint.defaults())
+            result = joint_drive.with_factors(dictionary, joint.defaults())
             said, place = f"tickrig.units {joint.units:g}", keys.places["units"]
-        found = joint.units_of(with_values(result, written))
+        found = joint.units_of(joint_drive.with_values(result, written))
         differs = (
             f"{slave.name}: {said}, but {slave.sheet.name} says {given:g} units a {joint.unit}"
         )
@@ -275,17 +265,20 @@ class NodeMaker:
             if write.index != indices.MODES_OF_OPERATION:
                 continue
             number = int.from_bytes(write.data, "little", signed=True)
-            if number in NAMES.keys() - listed:
-                text = f"mode {number} ({NAMES[number]}) is not in 6502h of its EDS: it is added"
+            if number in joint_drive.NAMES.keys() - listed:
+                mode = joint_drive.NAMES[number]
+                text = f"mode {number} ({mode}) is not in 6502h of its EDS: it is added"
                 found.add(number)
-            elif number and number not in NAMES:
+            elif number and number not in joint_drive.NAMES:
                 text = f"mode {number} is not emulated: 6060h refuses it, and so fails the boot-up"
             else:
                 continue
             self.remarks.append(FileMistake(write.place, f"{slave.name}: {text}"))
         return frozenset(found)
 
-    def _check_start(self, slave: BusSlave, keys: NodeKeys, description: DeviceDescription) -> None:
+    def _check_start(
+        self, slave: BusSlave, keys: node_keys.NodeKeys, description: eds.DeviceDescription
+    ) -> None:
         """Note inputs at the start that there are not, or that do not take their value."""
         if not keys.start:
             return
@@ -317,7 +310,7 @@ class BusNodes:
 def read_bus(
     path: Path,
     urdf: Path | None = None,
-    cache: EdsCache | None = None,
+    cache: eds.EdsCache | None = None,
     profile: str = AUTO,
 ) -> BusNodes:
     """Read a bus.yml, the files that it names, and make its slaves once.
@@ -332,14 +325,14 @@ def read_bus(
         OSError: the bus.yml or the URDF cannot be read.
         BusMistakesError: all that is wrong.
     """
-    cache = cache or EdsCache()
+    cache = cache or eds.EdsCache()
     versions, found = cache.others.get((path, urdf, profile), ({}, None))
     if isinstance(found, BusNodes) and all(_is_same(*each) for each in versions.items()):
         return found
     bus = read_bus_file(path)
     found = _nodes_of(bus, urdf, cache, profile)
     files = {path, *(file for node in found.nodes for file in node.description.files)}
-    versions = {file: version_of(file) for file in sorted(files)}
+    versions = {file: eds.version_of(file) for file in sorted(files)}
     cache.others[path, urdf, profile] = versions, found
     return found
 
@@ -353,7 +346,7 @@ def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
     if not bus.slaves:
         return ()
     told = {FilePlace(one.file, one.line) for one in bus.errors}
-    made = _made(bus, None, EdsCache(), AUTO)
+    made = _made(bus, None, eds.EdsCache(), AUTO)
     notes = BusFileNotes()
     for rule, found in (("tickrig", made.mistakes), ("joint", made.remarks)):
         for place, text, _ in sorted(found):
@@ -362,9 +355,9 @@ def check_nodes(bus: BusFile) -> tuple[RuleFinding, ...]:
     return notes.all
 
 
-def _is_same(file: Path, version: Version) -> bool:
+def _is_same(file: Path, version: eds.Version) -> bool:
     try:
-        return version_of(file) == version
+        return eds.version_of(file) == version
     except OSError:
         return False
 
@@ -378,25 +371,27 @@ class _Made(NamedTuple):
     added: list[FileMistake]
 
 
-def _made(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> _Made:
+def _made(bus: BusFile, urdf: Path | None, cache: eds.EdsCache, profile: str) -> _Made:
     mistakes: list[FileMistake] = []
     robot = None
     try:
         robot = _robot(bus, urdf)
-    except BusMistakesError as error:
+    except node_keys.BusMistakesError as error:
         mistakes += error.mistakes
     maker = NodeMaker(bus, robot, cache, mistakes, profile)
     return _Made(tuple(maker.nodes()), mistakes, maker.remarks, maker.added)
 
 
-def _nodes_of(bus: BusFile, urdf: Path | None, cache: EdsCache, profile: str) -> BusNodes:
+def _nodes_of(bus: BusFile, urdf: Path | None, cache: eds.EdsCache, profile: str) -> BusNodes:
     made = _made(bus, urdf, cache, profile)
     mistakes = [FileMistake(FilePlace(one.file, one.line), _said(one)) for one in bus.errors]
     mistakes += made.mistakes
     if mistakes:
-        raise BusMistakesError(mistakes)
+        raise node_keys.BusMistakesError(mistakes)
     if not bus.slaves:
-        raise BusMistakesError([FileMistake(FilePlace(str(bus.path), 1), "no node with a dcf")])
+        raise node_keys.BusMistakesError(
+            [FileMistake(FilePlace(str(bus.path), 1), "no node with a dcf")]
+        )
     remarks = tuple(map(str, (*bus.warnings, *made.remarks, *made.added)))
     return BusNodes(made.nodes, remarks)
 
@@ -410,11 +405,11 @@ def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
     """Return the robot that is named, None if none is."""
     if urdf is not None:
         return read_urdf(urdf)
-    item = bus.options.extra.get(URDF)
+    item = bus.options.extra.get(node_keys.URDF)
     if item is None:
         return None
     if not isinstance(item.value, str) or not item.value or "\0" in item.value:
-        raise BusMistakesError(
+        raise node_keys.BusMistakesError(
             [FileMistake(item.place, f"options.tickrig.urdf: {item} is no file")]
         )
     file = bus.path.parent / item.value
@@ -422,4 +417,4 @@ def _robot(bus: BusFile, urdf: Path | None) -> Urdf | None:
         return read_urdf(file)
     except OSError as error:
         text = f"options.tickrig.urdf: {file}: {error.strerror}"
-        raise BusMistakesError([FileMistake(item.place, text)]) from None
+        raise node_keys.BusMistakesError([FileMistake(item.place, text)]) from None

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.serial.emulator import LineSettings
+from tickrig.emulators.testing.bench import tasks
 from tickrig.emulators.testing.bench.bench_rig import BenchDescription, Parts
 from tickrig.emulators.testing.bench.build import BenchedDevice, mounts_of, name_of
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
@@ -19,14 +20,6 @@ from tickrig.emulators.testing.bench.journal import text_of
 from tickrig.emulators.testing.bench.modes.mode import BenchMode
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of
-from tickrig.emulators.testing.bench.tasks import (
-    Condition,
-    LineTrigger,
-    Task,
-    Wait,
-    check_condition,
-    run_body,
-)
 from tickrig.emulators.testing.rig_file.plan import RigPlan, Tolerances
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.links.link import Closing
@@ -119,7 +112,7 @@ class BenchDevice:
         self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
 
     def fault(
-        self, spec: str, *, when: Condition | None = None, for_: Duration | None = None
+        self, spec: str, *, when: tasks.Condition | None = None, for_: Duration | None = None
     ) -> None:
         """Let a fault come: now, at a time, or as soon as something is so.
 
@@ -135,7 +128,7 @@ class BenchDevice:
         wanted = parse_fault_spec(spec, partial(self._mode.check_fault, self.name))
         for_us = None if for_ is None else us_of(for_)
         if when is not None:
-            check_condition(when)
+            tasks.check_condition(when)
             if "@" in spec:
                 raise ValueError(f"{spec}: it waits for something, so it has no time; see for_")
         self._mode.fault(self.name, wanted, when, for_us)
@@ -180,7 +173,7 @@ class BenchDevice:
         """
         self._mode.perform(self.name, text, do)
 
-    def observe(self, text: str, seen: Condition, within: Duration = SOON) -> bool:
+    def observe(self, text: str, seen: tasks.Condition, within: Duration = SOON) -> bool:
         """Look whether something is seen at the device: in an emulator, or by who sits there.
 
         Args:
@@ -190,7 +183,7 @@ class BenchDevice:
         """
         return self._mode.observe(self.name, text, seen, us_of(within))
 
-    def on_line(self, pattern: str, nth: int = 1) -> LineTrigger:
+    def on_line(self, pattern: str, nth: int = 1) -> tasks.LineTrigger:
         """Return what is true as soon as a line, or a frame in candump's notation, has passed.
 
         Args:
@@ -199,7 +192,7 @@ class BenchDevice:
             nth: the how manieth from now on, from 1.
         """
         source = self._mode.wire_of(self.name) if self.name else ""
-        trigger = LineTrigger(pattern, nth, source)
+        trigger = tasks.LineTrigger(pattern, nth, source)
         self._mode.hear(trigger.hear)
         return trigger
 
@@ -318,7 +311,7 @@ class Bench(BenchDevice, Closing):
 
     def _start(self, mode: BenchMode) -> None:
         super().__init__(mode)
-        self._tasks: list[Task[Any]] = []
+        self._tasks: list[tasks.Task[Any]] = []
         self._devices = {name: BenchDevice(mode, name) for name in mode.devices}
 
     @classmethod
@@ -394,7 +387,7 @@ class Bench(BenchDevice, Closing):
         Returns:
             False if the time was over first.
         """
-        check_condition(done)
+        tasks.check_condition(done)
         return self._mode.wait_until(done, us_of(within))
 
     async def sleep(self, duration: Duration) -> None:
@@ -403,9 +396,9 @@ class Bench(BenchDevice, Closing):
         Args:
             duration: microseconds, or a text as `"100ms"`.
         """
-        await Wait(_never, self.now_us + us_of(duration))
+        await tasks.Wait(_never, self.now_us + us_of(duration))
 
-    async def until(self, done: Condition, within: Duration | None = None) -> bool:
+    async def until(self, done: tasks.Condition, within: Duration | None = None) -> bool:
         """Wait in an async body until something is so.
 
         Args:
@@ -415,7 +408,7 @@ class Bench(BenchDevice, Closing):
         Returns:
             False if the time was over first.
         """
-        return await Wait(done, NEVER if within is None else self.now_us + us_of(within))
+        return await tasks.Wait(done, NEVER if within is None else self.now_us + us_of(within))
 
     async def edge(self, name: str, within: Duration | None = None) -> Setting:
         """Wait in an async body until an input or output changes.
@@ -431,7 +424,7 @@ class Bench(BenchDevice, Closing):
         await self.until(lambda: self.get(name) != before, within)
         return self.get(name)
 
-    def start(self, body: Coroutine[Any, Any, T]) -> Task[T]:
+    def start(self, body: Coroutine[Any, Any, T]) -> tasks.Task[T]:
         """Let an async body run beside the test from now on, whoever makes time pass.
 
         Args:
@@ -444,7 +437,7 @@ class Bench(BenchDevice, Closing):
             NotOnThisBench: real devices; `run` runs a body alone.
         """
         try:
-            task = self._mode.act(lambda rig: Task(rig, body))
+            task = self._mode.act(lambda rig: tasks.Task(rig, body))
         except NotOnThisBench:
             body.close()
             raise
@@ -475,7 +468,7 @@ class Bench(BenchDevice, Closing):
         ...     bench.run(body(bench))
         'Standby'
         """
-        return run_body(self._mode, body)
+        return tasks.run_body(self._mode, body)
 
     def meanwhile(self, host: Callable[[int], object]) -> None:
         """Let a host go on while a human takes his time, so that no watchdog bites.

@@ -18,17 +18,8 @@ from tickrig.emulators.can.emulator import CanEmulator
 from tickrig.emulators.can.outside.bridge import CountingPort
 from tickrig.emulators.can.outside.bus_port import port_on
 from tickrig.emulators.can.wire import CanWire
+from tickrig.emulators.canopen import build
 from tickrig.emulators.canopen.body import BodyPlan
-from tickrig.emulators.canopen.build import (
-    Described,
-    describe,
-    describe_device,
-    describe_nodes,
-    make_bench,
-    make_nodes,
-    read_bus_file,
-    store_keeper,
-)
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.eds import EdsCache, profile_name
 from tickrig.emulators.canopen.node import Nodes
@@ -108,7 +99,7 @@ class RigNodes(NamedTuple):
         body: what they move, None if nothing.
     """
 
-    nodes: tuple[Described, ...] = ()
+    nodes: tuple[build.Described, ...] = ()
     body: BodyPlan | None = None
 
 
@@ -146,7 +137,7 @@ class CanopenRun(EmulatorRun):
     def __init__(self, options: CanopenOptions) -> None:
         super().__init__(options, in_real_time=options.in_real_time)
         self._options = options
-        self._described: list[Described] = []
+        self._described: list[build.Described] = []
         self._channel = _VIRTUAL_CHANNEL
 
     def _make(self) -> tuple[Operator, ScenarioParser]:
@@ -159,17 +150,17 @@ class CanopenRun(EmulatorRun):
         show_findings(odd for item in self._described for odd in item.description.warnings)
         self._wire, body = self._make_wire(), self._options.rig.body
         self._store = self._open_store()
-        self._nodes = make_nodes(self._described, self._wire, self._store, self._options.sdo)
+        self._nodes = build.make_nodes(self._described, self._wire, self._store, self._options.sdo)
         self._bodies = [body.put_on(self._nodes)] if body else []
         device = Nodes(self._nodes, self._bodies)
         operator = Operator(device.inputs, device.tick_us, EventQueue(), self._wire.faults)
         return operator, ScenarioParser(device, operator, senders={"send": parse_send})
 
-    def _describe(self) -> list[Described]:
+    def _describe(self) -> list[build.Described]:
         """Read the files of the nodes; ValueError with all that is wrong."""
         options, (file, urdf) = self._options, self._options.bus_yml
         if file is None:
-            given = describe_nodes(options.specs, options.profile)
+            given = build.describe_nodes(options.specs, options.profile)
             taken = {item.node_id: item for item in given if item.node_id != UNCONFIGURED}
             for item in options.rig.nodes:
                 if first := taken.get(item.node_id):
@@ -177,11 +168,12 @@ class CanopenRun(EmulatorRun):
                         f"node {item.node_id} is there twice: {first.description.file}, {item.name}"
                     )
             return [*given, *options.rig.nodes]
-        bus = read_bus_file(file, urdf, EdsCache(), options.profile)
+        bus = build.read_bus_file(file, urdf, EdsCache(), options.profile)
         for remark in bus.remarks:
             say(remark)
         return [
-            Described(node.name, node.node_id, node.description, node.about) for node in bus.nodes
+            build.Described(node.name, node.node_id, node.description, node.about)
+            for node in bus.nodes
         ]
 
     def _make_wire(self) -> CanWire:
@@ -198,7 +190,7 @@ class CanopenRun(EmulatorRun):
             outside, link, self._channel = open_bus(self._options.bus, stack)
         wire = self._wire
         trace = self._open_trace(wire)
-        bench = make_bench(
+        bench = build.make_bench(
             wire,
             self._nodes,
             self._bodies,
@@ -208,7 +200,7 @@ class CanopenRun(EmulatorRun):
             clock=self._clock if outside else None,
         )
         if self._store:
-            bench.after_step.append(store_keeper(self._store))
+            bench.after_step.append(build.store_keeper(self._store))
         if self._options.scenario or self._options.verbose > 1:
             wire.observers.append(lambda at, x: click.echo(str(LogLine(at, self._channel, x))))
         return bench
@@ -346,13 +338,13 @@ def _beyond_nodes(plan: RigPlan) -> str:
     return "signals" if plan.signals else "faults" if plan.faults else ""
 
 
-def _described(device: DevicePlan) -> Described:
+def _described(device: DevicePlan) -> build.Described:
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
-    found = describe(eds_cache(), kind, device.profile or AUTO)
+    found = build.describe(eds_cache(), kind, device.profile or AUTO)
     node_id = device.node_id if device.node_id is not None else found.node_id
     assert node_id is not None  # the reader wants one
     start = {key: value for key, value in device.start.items() if not isinstance(value, SignalSpec)}
-    return Described(device.name, node_id, replace(found, start=start))
+    return build.Described(device.name, node_id, replace(found, start=start))
 
 
 def _check_bus_yml(file: Path | None, urdf: Path | None, others: Mapping[str, object]) -> None:
@@ -370,7 +362,7 @@ def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
     if not (model or rtc):
         raise Refused("--write-eds belongs to --model or --rtc")
     try:
-        description = describe_device(model or rtc or "")
+        description = build.describe_device(model or rtc or "")
     except ValueError as error:
         raise Refused(str(error)) from None
     text = format_eds(description.template.description, description.info)

@@ -19,14 +19,8 @@ from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.node_spec import parse_node
 from tickrig.emulators.commands.device_type import DEVICES, ConfiguredDevice, configure
 from tickrig.emulators.commands.run import mistakes_in
+from tickrig.emulators.record import replay
 from tickrig.emulators.record.comparison import Pair, Said, Tolerance, compare, parse_number_rule
-from tickrig.emulators.record.replay import (
-    BenchRecording,
-    do,
-    play_device,
-    read_bench_recording,
-    traffic_of,
-)
 from tickrig.emulators.record.wire_log import Splitter, WireLine, line_splitter
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
@@ -64,7 +58,7 @@ class ComparedRun:
 
 
 def compare_ticks(
-    recording: BenchRecording, name: str, configured: ConfiguredDevice
+    recording: replay.BenchRecording, name: str, configured: ConfiguredDevice
 ) -> ComparedRun:
     """Feed the emulator tick by tick, as the recorded device was.
 
@@ -74,15 +68,15 @@ def compare_ticks(
         configured: a fresh one.
     """
     split = configured.type.line.splitter or line_splitter
-    said = traffic_of(recording.of(name), Mark.FROM_DEVICE)
-    played = ((at, data, 0) for at, data in play_device(recording, name, configured.device))
+    said = replay.traffic_of(recording.of(name), Mark.FROM_DEVICE)
+    played = ((at, data, 0) for at, data in replay.play_device(recording, name, configured.device))
     return ComparedRun(
         list(cut(split(Mark.FROM_DEVICE), said)), list(cut(split(Mark.FROM_DEVICE), played))
     )
 
 
 def compare_port(
-    recording: BenchRecording,
+    recording: replay.BenchRecording,
     name: str,
     make: Callable[[], ConfiguredDevice],
     tolerance: Tolerance,
@@ -103,7 +97,7 @@ def compare_port(
     records, device = recording.of(name), make().device
     until_us = recording.until_us + tolerance.allowed_us(recording.until_us)
     split = make().type.line.splitter or line_splitter
-    recorded = list(cut(split(Mark.FROM_DEVICE), traffic_of(records, Mark.FROM_DEVICE)))
+    recorded = list(cut(split(Mark.FROM_DEVICE), replay.traffic_of(records, Mark.FROM_DEVICE)))
 
     def run(begin_us: int) -> ComparedRun:
         emulated = _play(make(), records, begin_us, begin_us + until_us)
@@ -176,7 +170,7 @@ def _act(emulator: Emulator, record: BenchRecord, now_us: int) -> None:
     if isinstance(record.traffic, bytes) and record.mark is Mark.TO_DEVICE:
         emulator.send(now_us, record.traffic)
     else:
-        do(emulator.device, record)
+        replay.do(emulator.device, record)
 
 
 def cut(split: Splitter, traffic: Iterable[tuple[int, object, int]]) -> Iterator[Said]:
@@ -199,7 +193,7 @@ _UNUSED: Final = 1 << 31
 _CAN_ID: Final = 0x1FFF_FFFF
 
 
-def compare_node_ticks(recording: BenchRecording, name: str, node: Node) -> ComparedRun:
+def compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) -> ComparedRun:
     """Feed a node tick by tick, as the recorded one was.
 
     Args:
@@ -209,19 +203,19 @@ def compare_node_ticks(recording: BenchRecording, name: str, node: Node) -> Comp
     """
     recorded = [
         Said(at_us, str(frame), line)
-        for at_us, frames, line in traffic_of(recording.of(name), Mark.FROM_DEVICE)
+        for at_us, frames, line in replay.traffic_of(recording.of(name), Mark.FROM_DEVICE)
         for frame in frames
     ]
     emulated = [
         Said(at_us, str(frame))
-        for at_us, frames in play_device(recording, name, node)
+        for at_us, frames in replay.play_device(recording, name, node)
         for frame in frames
     ]
     return ComparedRun(recorded, emulated)
 
 
 def compare_bus(
-    recording: BenchRecording,
+    recording: replay.BenchRecording,
     make: Callable[[CanWire], Sequence[Node]],
     tolerance: Tolerance,
     settle_us: int,
@@ -302,7 +296,7 @@ class _Bus:
         node = self._nodes.get(prefix) if slash else next(iter(self._nodes.values()))
         if node is None:
             raise ValueError(f"line {record.line}: no node {prefix!r:.60}")
-        do(node, record._replace(text=text if slash else record.text))
+        replay.do(node, record._replace(text=text if slash else record.text))
 
     def _hear(self, at_us: int, passed: CanFrame | ErrorFrame) -> None:
         if self.owns(passed):
@@ -420,7 +414,7 @@ def run_compare(file: Path, *, verbose: bool, **options: Any) -> int:
     """Compare as the command line asks, and return the exit status."""
     tolerance = _read_tolerance(options)
     try:
-        recording = read_bench_recording(file.read_bytes())
+        recording = replay.read_bench_recording(file.read_bytes())
         mine = [*user_code(recording.header.devices.values()), *_given_code(options)]
         with mistakes_in(mine):
             runs = dict(_runs(file, recording, tolerance, options))
@@ -454,7 +448,7 @@ def _read_tolerance(options: Mapping[str, Any]) -> Tolerance:
 
 
 def _runs(
-    file: Path, recording: BenchRecording, tolerance: Tolerance, options: Mapping[str, Any]
+    file: Path, recording: replay.BenchRecording, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> Iterator[tuple[str, ComparedRun]]:
     """Give the two runs of each device, of a recorded bus those of all nodes together."""
     for name in recording.header.devices:
@@ -467,7 +461,7 @@ def _runs(
 
 
 def _ticked(
-    file: Path, recording: BenchRecording, name: str, options: Mapping[str, Any]
+    file: Path, recording: replay.BenchRecording, name: str, options: Mapping[str, Any]
 ) -> ComparedRun:
     """Compare tick by tick."""
     header = recording.header
@@ -482,7 +476,7 @@ def _ticked(
 
 
 def _on_line(
-    recording: BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
+    recording: replay.BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> ComparedRun:
     """Compare what passed a serial port."""
     recorded = recording.header.devices[name].type
@@ -496,7 +490,7 @@ def _on_line(
 
 
 def _on_bus(
-    recording: BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
+    recording: replay.BenchRecording, name: str, tolerance: Tolerance, options: Mapping[str, Any]
 ) -> ComparedRun:
     """Compare what passed a bus."""
     try:

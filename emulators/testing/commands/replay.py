@@ -10,14 +10,7 @@ import click
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.commands.device_type import build_recorded
 from tickrig.emulators.commands.run import mistakes_in
-from tickrig.emulators.record.replay import (
-    BenchRecording,
-    ReplayDifference,
-    read_bench_recording,
-    read_recording,
-    replay,
-    replay_device,
-)
+from tickrig.emulators.record import replay
 from tickrig.emulators.testing.bench.recorded_device import make_recorded
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.text.bench_header import PREFIX
@@ -87,21 +80,21 @@ class _Played(NamedTuple):
     name: str
     type: str
     ticks: int
-    difference: ReplayDifference[Any] | None
+    difference: replay.ReplayDifference[Any] | None
 
 
 def _replay(file: Path, data: bytes, run_code: bool) -> list[_Played]:
     """Replay a trace of one device on a serial line."""
-    recording = read_recording(data)
+    recording = replay.read_recording(data)
     with mistakes_in(recording.header.config.values()):
-        difference = replay(recording, build_recorded(recording.header, run_code=run_code))
+        difference = replay.replay(recording, build_recorded(recording.header, run_code=run_code))
     _warn(file, ended=recording.ended)
     return [_Played("", recording.header.device, recording.ticks, difference)]
 
 
 def _replay_bench(file: Path, data: bytes, run_code: bool) -> list[_Played]:
     """Replay each device of a bench."""
-    recording = read_bench_recording(data)
+    recording = replay.read_bench_recording(data)
     if recording.at_port:
         raise ValueError("it was recorded at a host's port, without ticks: use tickrig compare")
     found = _differences(file, recording, run_code)
@@ -115,8 +108,8 @@ def _replay_bench(file: Path, data: bytes, run_code: bool) -> list[_Played]:
 
 
 def _differences(
-    file: Path, recording: BenchRecording, run_code: bool
-) -> list[tuple[str, ReplayDifference[Any] | None]]:
+    file: Path, recording: replay.BenchRecording, run_code: bool
+) -> list[tuple[str, replay.ReplayDifference[Any] | None]]:
     header, cache = recording.header, EdsCache()
     devices = header.devices
     typed = {name: entry for name, entry in devices.items() if entry.type}
@@ -128,7 +121,7 @@ def _differences(
     made = {
         name: make_recorded(header, name, file.parent, cache, run_code=run_code) for name in typed
     }
-    return [(name, replay_device(recording, name, device)) for name, device in made.items()]
+    return [(name, replay.replay_device(recording, name, device)) for name, device in made.items()]
 
 
 def _warn(file: Path, *, ended: bool) -> None:
@@ -136,7 +129,7 @@ def _warn(file: Path, *, ended: bool) -> None:
         click.echo(f"{file}: no end line (killed?); its last tick is left out", err=True)
 
 
-def _describe(name: str, difference: ReplayDifference[Any], file: Path) -> str:
+def _describe(name: str, difference: replay.ReplayDifference[Any], file: Path) -> str:
     place = f" ({file}:{difference.line})" if difference.line else ""
     then, now = _text(difference.recorded), _text(difference.replayed)
     at = format_time(difference.at_us)

@@ -14,21 +14,7 @@ from types import FrameType
 from typing import Any, Final
 
 from tickrig.emulators.rig.sim_waits import LOOK_US, Passing, SimTime
-from tickrig.emulators.testing.host_clock.host_code import (
-    HostTimeError,
-    UnpatchedTimeError,
-    is_installed,
-    line_of,
-    package_of,
-)
-from tickrig.emulators.testing.host_clock.patches import (
-    KEEPABLE,
-    LOOKS,
-    Acts,
-    Patch,
-    Patches,
-    root_of,
-)
+from tickrig.emulators.testing.host_clock import host_code, patches
 
 # What hosts find in place of functions that tell the time, and that wait.
 
@@ -85,7 +71,7 @@ def _check_clock() -> None:
     """
     for package, (module, stacks) in _OTHER_CLOCKS.items():
         if (found := sys.modules.get(module)) and any(getattr(found, s, None) for s in stacks):
-            raise HostTimeError(
+            raise host_code.HostTimeError(
                 f"{package} has replaced the clock, and so does bench_time (bench.patched_time):"
                 " use one of them; bench_time begins at 2000-01-01 and moves datetime not at all"
             )
@@ -109,10 +95,10 @@ class ClockWaits:
         self._owner = threading.get_ident()
         self._others = {thread.ident for thread in threading.enumerate()} - {self._owner}
 
-    def acts(self) -> Acts:
+    def acts(self) -> patches.Acts:
         """Return them all."""
         return {
-            **{(time, name): self._look(name) for name in LOOKS},
+            **{(time, name): self._look(name) for name in patches.LOOKS},
             (time, "sleep"): self._waiting("time.sleep", self._sleep),
             (select, "select"): self._waiting("select.select", self._select),
             (threading.Event, "wait"): self._waiting("Event.wait", self._wait_event),
@@ -139,14 +125,16 @@ class ClockWaits:
                 return original(*args, **kwargs)
             try:
                 if thread != self._owner:
-                    raise HostTimeError(_other_thread())
+                    raise host_code.HostTimeError(_other_thread())
                 _check_clock()
                 return wait(original, *args, **kwargs)
             except _ForEver as error:
-                raise HostTimeError(f"{line_of(frame)}: {name} {error}") from None
-            except HostTimeError as error:
-                self.refusals.append(f"{line_of(frame)}: {name}: {error}")
-                raise HostTimeError(self.refusals[-1]) from None
+                raise host_code.HostTimeError(
+                    f"{host_code.line_of(frame)}: {name} {error}"
+                ) from None
+            except host_code.HostTimeError as error:
+                self.refusals.append(f"{host_code.line_of(frame)}: {name}: {error}")
+                raise host_code.HostTimeError(self.refusals[-1]) from None
 
         return act
 
@@ -287,10 +275,10 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
     _check_clock()
     clock = SimTime(passing)
     waits = ClockWaits(passing, clock)
-    with Patches(waits.acts()), _loops(passing):
+    with patches.Patches(waits.acts()), _loops(passing):
         yield clock
     if waits.refusals:
-        raise HostTimeError(waits.refusals[0])
+        raise host_code.HostTimeError(waits.refusals[0])
 
 
 def _loops(passing: Passing) -> AbstractContextManager[None]:
@@ -346,23 +334,27 @@ def unpatched_time_fails(
         name: str, original: Callable[..., Any], frame: FrameType, *args: Any, **kwargs: Any
     ) -> Any:
         __tracebackhide__ = True
-        if isinstance(original, Patch) and original.on:  # of `patched_time`, around this
+        if isinstance(original, patches.Patch) and original.on:  # of `patched_time`, around this
             return original.act(original.original, frame, *args, **kwargs)
-        stamped = name in _STAMPS and is_installed(frame.f_code.co_filename)
-        if stamped or package_of(frame) in allowed or threading.get_ident() in spared:
+        stamped = name in _STAMPS and host_code.is_installed(frame.f_code.co_filename)
+        if stamped or host_code.package_of(frame) in allowed or threading.get_ident() in spared:
             return original(*args, **kwargs)
         alone = threading.get_ident() == owner
         told = f"is called, but {_WHAT_TO_DO}" if alone else _IN_A_THREAD
-        refusals.append(f"{line_of(frame)}: time.{name} {told}")
-        raise UnpatchedTimeError(refusals[-1])
+        refusals.append(f"{host_code.line_of(frame)}: time.{name} {told}")
+        raise host_code.UnpatchedTimeError(refusals[-1])
 
-    own = [name for name in (*_WAITS, *_STAMPS) if id(root_of(vars(time)[name])) in KEEPABLE]
-    with Patches({(time, name): partial(refuse, name) for name in own}):
+    own = [
+        name
+        for name in (*_WAITS, *_STAMPS)
+        if id(patches.root_of(vars(time)[name])) in patches.KEEPABLE
+    ]
+    with patches.Patches({(time, name): partial(refuse, name) for name in own}):
         try:
             yield
         except BaseException as error:  # it may come of what the host has swallowed
-            if refusals and not isinstance(error, UnpatchedTimeError):
+            if refusals and not isinstance(error, host_code.UnpatchedTimeError):
                 error.add_note(refusals[0])
             raise
     if refusals:
-        raise UnpatchedTimeError(refusals[0])
+        raise host_code.UnpatchedTimeError(refusals[0])

@@ -15,13 +15,7 @@ from tickrig.emulators.testing.bench.bench import HARDWARE, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.journal_text import decoded, fault_names, names_of
-from tickrig.emulators.testing.report.bench_report import (
-    JournalLine,
-    PlannedFault,
-    Point,
-    SignalSeries,
-    thinned,
-)
+from tickrig.emulators.testing.report import bench_report
 from tickrig.host.text.page_text import seconds
 from tickrig.host.text.trace import Mark
 
@@ -45,8 +39,8 @@ class SignalSampler:
         self, device: HasSignals, names: Iterable[str], prefix: str = "", most: int = _MOST
     ) -> None:
         self._device, self._prefix, self._most = device, prefix, most
-        self._points: dict[str, list[Point]] = {name: [] for name in names}
-        self._latest: dict[str, Point] = {}
+        self._points: dict[str, list[bench_report.Point]] = {name: [] for name in names}
+        self._latest: dict[str, bench_report.Point] = {}
         for name in self._points:
             self._find(name)
 
@@ -64,20 +58,20 @@ class SignalSampler:
                     points.append(before)  # a line goes on from here, not from the last change
                 points.append((now_us, value))
                 if len(points) > 2 * self._most:
-                    points[:] = thinned(points, self._most)
+                    points[:] = bench_report.thinned(points, self._most)
             self._latest[name] = now_us, value
 
-    def series(self) -> tuple[SignalSeries, ...]:
+    def series(self) -> tuple[bench_report.SignalSeries, ...]:
         """Return what was taken: numbers with a fraction as lines, all else as steps."""
         return tuple(self._series_of(name, points) for name, points in self._points.items())
 
-    def _series_of(self, name: str, points: list[Point]) -> SignalSeries:
+    def _series_of(self, name: str, points: list[bench_report.Point]) -> bench_report.SignalSeries:
         kept = list(points)
         if kept and kept[-1] != self._latest[name]:
             kept.append(self._latest[name])
-        kept = thinned(kept, self._most)
+        kept = bench_report.thinned(kept, self._most)
         steps = not any(isinstance(value, float) for _, value in kept)
-        return SignalSeries(self._prefix + name, self._find(name), tuple(kept), steps)
+        return bench_report.SignalSeries(self._prefix + name, self._find(name), tuple(kept), steps)
 
     def _find(self, name: str) -> str:
         """Return the unit of a signal."""
@@ -115,12 +109,14 @@ class OrderedFaults:
             self._hear(line)
         self._mode.hear(self._hear)
 
-    def faults(self) -> tuple[PlannedFault, ...]:
+    def faults(self) -> tuple[bench_report.PlannedFault, ...]:
         """Return what was ordered and what came, in the order in which that began."""
-        left, outcomes = list(self._effects), list[PlannedFault]()
+        left, outcomes = list(self._effects), list[bench_report.PlannedFault]()
         for order in reversed(self._mode.orders):  # of two for one time the last one holds
             outcomes.insert(0, self._outcome_of(order, self._take(order, left)))
-        outcomes += [PlannedFault(self._name(one), one.from_us, one.to_us) for one in left]
+        outcomes += [
+            bench_report.PlannedFault(self._name(one), one.from_us, one.to_us) for one in left
+        ]
         return tuple(sorted(outcomes, key=_begun_us))
 
     def _hear(self, line: WireLine) -> None:
@@ -155,21 +151,25 @@ class OrderedFaults:
         """Whether an operator makes faults, who is never there to the microsecond."""
         return self._mode.name == HARDWARE
 
-    def _outcome_of(self, order: FaultOrder, effect: _Effect | None) -> PlannedFault:
+    def _outcome_of(self, order: FaultOrder, effect: _Effect | None) -> bench_report.PlannedFault:
         if effect is None:
             rate = "" if order.spec.rate is None else f"={order.spec.rate:g}"
             when = order.when or f"{seconds(order.spec.from_us)} s"
-            return PlannedFault(order.spec.name + rate, None, None, when, order.ordered_us)
+            return bench_report.PlannedFault(
+                order.spec.name + rate, None, None, when, order.ordered_us
+            )
         from_us, to_us = max(effect.from_us, order.spec.from_us), effect.to_us
         if to_us is None and order.to_us <= self._mode.now_us:  # by an operator
             to_us = order.to_us
-        return PlannedFault(self._name(effect), from_us, to_us, order.when, order.ordered_us)
+        return bench_report.PlannedFault(
+            self._name(effect), from_us, to_us, order.when, order.ordered_us
+        )
 
     def _name(self, effect: _Effect) -> str:
         return effect.names[len(self._mode.devices) > 1] + effect.rate
 
 
-def _begun_us(fault: PlannedFault) -> int:
+def _begun_us(fault: bench_report.PlannedFault) -> int:
     times: Iterator[int | None] = iter((fault.ordered_us, fault.from_us, 0))
     return next(at_us for at_us in times if at_us is not None)
 
@@ -194,10 +194,10 @@ class BenchEvidence(NamedTuple):
 
     mode: str
     now_us: int
-    journal: tuple[JournalLine, ...]
+    journal: tuple[bench_report.JournalLine, ...]
     left_out: int
-    faults: tuple[PlannedFault, ...]
-    series: tuple[SignalSeries, ...] = ()
+    faults: tuple[bench_report.PlannedFault, ...]
+    series: tuple[bench_report.SignalSeries, ...] = ()
     trace: str = ""
 
 
@@ -223,7 +223,10 @@ class BenchWitness:
         evidence = BenchEvidence(
             mode.name,
             mode.now_us,
-            tuple(JournalLine(line.at_us, line.source, line.mark, text) for line, text in shown),
+            tuple(
+                bench_report.JournalLine(line.at_us, line.source, line.mark, text)
+                for line, text in shown
+            ),
             max(0, lines[-1].number - _JOURNAL_LINES) if lines else 0,
             self._plan.faults(),
         )

@@ -15,14 +15,7 @@ from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.host_clock.host_code import UnpatchedTimeError
-from tickrig.emulators.testing.plugin.bench_source import (
-    BenchSource,
-    WantedBench,
-    allowed_of,
-    check_mode,
-    check_needs,
-    needs_of,
-)
+from tickrig.emulators.testing.plugin import bench_source
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
 from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
 from tickrig.emulators.testing.plugin.health import Health, SafeState, check_safe, unsafe, with_plan
@@ -80,7 +73,11 @@ class BenchedTest(TestWithBench):
     """
 
     def __init__(
-        self, item: pytest.Function, wanted: WantedBench, safe: SafeState, warm_up: WarmUp = None
+        self,
+        item: pytest.Function,
+        wanted: bench_source.WantedBench,
+        safe: SafeState,
+        warm_up: WarmUp = None,
     ) -> None:
         super().__init__(item, wanted)
         self._safe, self._warm_up = safe, warm_up
@@ -100,12 +97,12 @@ class BenchedTest(TestWithBench):
             NotOnThisBench: it has not what the test needs.
             ValueError: the test asks for what nobody has.
         """
-        needs, self._allowed = needs_of(self.item), allowed_of(self.item)
-        check_mode(needs, self.wanted.mode)
+        needs, self._allowed = bench_source.needs_of(self.item), bench_source.allowed_of(self.item)
+        bench_source.check_mode(needs, self.wanted.mode)
         self._listen()
         self.wanted = self.wanted.settled(self.item)
         bench = self.bench = warmed(self.item, self.wanted.open(), self._warm_up)
-        check_needs(needs, bench)
+        bench_source.check_needs(needs, bench)
         self._safe = with_plan(self._safe, self.wanted.safe, bench)
         check_safe(bench, self._safe)
         _offer(bench)
@@ -224,7 +221,7 @@ class BenchedTest(TestWithBench):
 @contextmanager
 def benched(
     request: pytest.FixtureRequest,
-    source: BenchSource,
+    source: bench_source.BenchSource,
     mode: str,
     safe: SafeState,
     warm_up: WarmUp = None,
@@ -233,7 +230,7 @@ def benched(
     settings = request.config.stash[SETTINGS]
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
-    wanted = WantedBench(source, mode, settings.seed, request.path.parent)
+    wanted = bench_source.WantedBench(source, mode, settings.seed, request.path.parent)
     test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe, warm_up)
     try:
         yield _opened(test)

@@ -16,15 +16,8 @@ import pytest
 from tickrig.emulators.testing.plugin.failure_report import outcome_of, repeat_command
 from tickrig.emulators.testing.plugin.settings import PluginSettings
 from tickrig.emulators.testing.plugin.stash import BENCHED
+from tickrig.emulators.testing.report import overview
 from tickrig.emulators.testing.report.bench_report import BenchReport, RunEnvironment, TestRecord
-from tickrig.emulators.testing.report.overview import (
-    UNWELL,
-    OverallVerdict,
-    natural,
-    read_requirements,
-    reported,
-    requirement_rows,
-)
 from tickrig.emulators.testing.report.report_file import from_data, to_data, write_report
 from tickrig.host.text.values import counted
 
@@ -55,7 +48,7 @@ class ReportPlugin:
     def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
         self._config, self._settings = config, settings
         path = settings.requirements
-        self._requirements = read_requirements(path) if path else ()
+        self._requirements = overview.read_requirements(path) if path else ()
         self._records: dict[str, tuple[_Place, TestRecord]] = {}
         self._begun = datetime.now().astimezone()
         self._error = ""
@@ -105,9 +98,9 @@ class ReportPlugin:
         """Yield what the tests show of what they have to, for people."""
         if not self._requirements:
             return
-        rows = requirement_rows(self._report(), reported(self._tests()))
+        rows = overview.requirement_rows(self._report(), overview.reported(self._tests()))
         listed = [row for row in rows if row.listed]
-        shown = sum(row.verdict is OverallVerdict.SHOWN for row in listed)
+        shown = sum(row.verdict is overview.OverallVerdict.SHOWN for row in listed)
         yield f"{shown} of {counted(len(listed), 'requirement')} shown"
         if untested := [row.name for row in listed if not row.tests]:
             yield f"no test names {', '.join(untested)}"
@@ -138,7 +131,7 @@ class ReportPlugin:
 def _place(report: pytest.TestReport) -> _Place:
     """Return where a test stands: its file, its line, its name with numbers in their order."""
     nodeid = str(report.nodeid)
-    return nodeid.partition("::")[0], report.location[1] or 0, natural(nodeid)
+    return nodeid.partition("::")[0], report.location[1] or 0, overview.natural(nodeid)
 
 
 def _statement(item: pytest.Item, error: pytest.ExceptionInfo[BaseException]) -> str:
@@ -170,7 +163,7 @@ def _record_of(item: pytest.Item, reports: list[pytest.TestReport]) -> TestRecor
         requirements=tuple(str(value) for name, value in item.user_properties if name == "req"),
         markers=tuple(dict.fromkeys(m.name for m in item.iter_markers() if m.name not in _OWN)),
         reason=reason,
-        expected=item.stash.get(_EXPECTED, "") if outcome in UNWELL else "",
+        expected=item.stash.get(_EXPECTED, "") if outcome in overview.UNWELL else "",
         longrepr=longrepr,
         command=repeat_command(item),
     )

@@ -15,18 +15,8 @@ from tickrig.emulators.record.recorder import TraceFile
 from tickrig.emulators.record.replay import read_recording, replay
 from tickrig.emulators.rig.station import next_tick_us
 from tickrig.emulators.serial.rs485_line import Rs485Line
+from tickrig.emulators.testing.properties import device_bench
 from tickrig.emulators.testing.properties.contract import check_acts, must
-from tickrig.emulators.testing.properties.device_bench import (
-    DeviceBench,
-    Observation,
-    TicksDifferError,
-    difference,
-    drive,
-    due_text,
-    in_ms,
-    outputs_of,
-    shorten,
-)
 from tickrig.emulators.testing.properties.strategies import Session, Word
 from tickrig.host.text.trace import Header
 
@@ -69,7 +59,7 @@ _TICKS: Final = 20
 """So many ticks an answer is waited for."""
 
 
-def _check_pauses(played: DeviceBench, session: Session) -> None:
+def _check_pauses(played: device_bench.DeviceBench, session: Session) -> None:
     """Let words come in two ticks, each half in its own.
 
     The word counts when its end is there, so it must be answered as if all of it came with the
@@ -99,7 +89,7 @@ def _check_pauses(played: DeviceBench, session: Session) -> None:
             must(same, _message(word, at, wanted, answer))
 
 
-def _answer(played: DeviceBench, first: bytes, rest: bytes) -> _Answer:
+def _answer(played: device_bench.DeviceBench, first: bytes, rest: bytes) -> _Answer:
     """Return what a copy of the device answers to two halves, and what is seen then."""
     device = twin(played.device)
     if hasattr(device, "horizon"):
@@ -109,13 +99,14 @@ def _answer(played: DeviceBench, first: bytes, rest: bytes) -> _Answer:
     for rx in [first, rest, *[b""] * _TICKS]:
         now_us += device.tick_us
         sent.append(device.tick(now_us, rx))
-    return b"".join(sent), outputs_of(device)
+    return b"".join(sent), device_bench.outputs_of(device)
 
 
 def _message(word: Word, at: int, wanted: _Answer, got: _Answer) -> str:
     what = f"{bytes(word[:at])!r}, and {bytes(word[at:])!r} in the next tick"
-    told = f"a pause in a word makes a difference: after {what} it sends {shorten(got[0])}, "
-    told += f"after {bytes(word)!r} at once {shorten(wanted[0])}"
+    late, once = device_bench.shorten(got[0]), device_bench.shorten(wanted[0])
+    told = f"a pause in a word makes a difference: after {what} it sends {late}, "
+    told += f"after {bytes(word)!r} at once {once}"
     if got[1] != wanted[1]:
         told += f"; its outputs are {got[1]!r} and {wanted[1]!r}"
     return f"{told}. Where a pause ends what is sent, as in Modbus RTU: check_device(pauses=False)"
@@ -138,7 +129,7 @@ _SETTLES: Final = 50
 """In so many ticks a device comes to rest after an input has changed, or is not looked at."""
 
 
-def _check_due_us(bench: Callable[..., DeviceBench], session: Session) -> None:
+def _check_due_us(bench: Callable[..., device_bench.DeviceBench], session: Session) -> None:
     """Tick copies of a device before it is due, at the end of each wait of a session.
 
     Timers of hours are found so, without ticks of hours. At the end of the session it is also
@@ -171,7 +162,7 @@ def _some_inputs(device: Any, number: int) -> list[InputSignal]:
     return items[number % parts :: parts]
 
 
-def _changed_input(played: DeviceBench, item: InputSignal) -> tuple[Any, int]:
+def _changed_input(played: device_bench.DeviceBench, item: InputSignal) -> tuple[Any, int]:
     """Change an input of a copy, and let it come to rest.
 
     Returns:
@@ -188,7 +179,7 @@ def _changed_input(played: DeviceBench, item: InputSignal) -> tuple[Any, int]:
     return device, now_us
 
 
-def _probe_after(played: DeviceBench, item: InputSignal) -> None:
+def _probe_after(played: device_bench.DeviceBench, item: InputSignal) -> None:
     """Look whether a copy is due in time after a change of an input."""
     device, now_us = _changed_input(played, item)
     try:
@@ -220,7 +211,7 @@ class _Probe:
         if self._last_us < self._first_us:
             return
         copied = _copy(self._device)
-        before = outputs_of(copied)
+        before = device_bench.outputs_of(copied)
         for at_us in self._times():
             if self._changes(copied, at_us, before):
                 self._refuse(at_us, before)
@@ -231,7 +222,7 @@ class _Probe:
 
     def _changes(self, copied: Any, at_us: int, before: list[Any]) -> bool:
         sent = copied.tick(at_us, self._nothing)
-        return bool(sent) or outputs_of(copied) != before
+        return bool(sent) or device_bench.outputs_of(copied) != before
 
     def _refuse(self, late_us: int, before: list[Any]) -> None:
         """Look for the first tick that changes something, and raise."""
@@ -244,10 +235,12 @@ class _Probe:
                 low = middle + 1
         at_us = self._first_us + high * self._tick_us
         copied = _copy(self._device)
-        now = (at_us, copied.tick(at_us, self._nothing), *outputs_of(copied))
-        then: Observation = (at_us, self._nothing, *before)
-        text = difference(copied, [now], [then], "after a tick there", "without it")
-        said = f"{in_ms(self._now_us)} due_us said {due_text(self._due_us)}"
+        now = (at_us, copied.tick(at_us, self._nothing), *device_bench.outputs_of(copied))
+        then: device_bench.Observation = (at_us, self._nothing, *before)
+        text = device_bench.difference(copied, [now], [then], "after a tick there", "without it")
+        said = (
+            f"{device_bench.in_ms(self._now_us)} due_us said {device_bench.due_text(self._due_us)}"
+        )
         raise AssertionError(
             f"a tick that is not due changes something: {text or 'it, after others'}; "
             f"at {said}, it must be at most {at_us}"
@@ -262,15 +255,17 @@ class _Probe:
             ticked.tick(self._last_us, self._nothing)
             at_us = self._last_us + self._tick_us
             one, two = (
-                [(at_us, each.tick(at_us, word), *outputs_of(each))] for each in (ticked, other)
+                [(at_us, each.tick(at_us, word), *device_bench.outputs_of(each))]
+                for each in (ticked, other)
             )
-            text = difference(other, one, two, "after a tick before", "without it")
-            said = f"{in_ms(self._now_us)} due_us said {due_text(self._due_us)}"
+            text = device_bench.difference(other, one, two, "after a tick before", "without it")
+            due = device_bench.due_text(self._due_us)
+            said = f"{device_bench.in_ms(self._now_us)} due_us said {due}"
             told = f"a tick that is not due changes what follows {word!r}: {text}; at {said}"
             must(not text, told)
 
 
-_Benches = Callable[..., DeviceBench]
+_Benches = Callable[..., device_bench.DeviceBench]
 
 _FRESH: Final = (
     "two fresh devices that met the same differ (chance, the machine's clock, or state that they"
@@ -301,14 +296,14 @@ class DeviceChecks:
         again = bench().play(session)
         _same(played, wanted, again, _FRESH, "of one", "of the other")
         dense = bench(dense=True).play(session)
-        if text := difference(played.device, dense, wanted, "dense", "sparse"):
-            raise TicksDifferError(f"dense and sparse ticks differ: {text}", session)
+        if text := device_bench.difference(played.device, dense, wanted, "dense", "sparse"):
+            raise device_bench.TicksDifferError(f"dense and sparse ticks differ: {text}", session)
         self._check_pieces(session, wanted)
         _check_due_us(bench, session)
         if self._pauses and played.nothing == b"":
             _check_pauses(played, session)
 
-    def _check_pieces(self, session: Session, wanted: list[Observation]) -> None:
+    def _check_pieces(self, session: Session, wanted: list[device_bench.Observation]) -> None:
         pieces = self._bench(pieces=True)
         if isinstance(pieces.joined, Rs485Line):
             return  # where each piece ends on a whole microsecond
@@ -334,7 +329,7 @@ class DeviceChecks:
             device, _ = _changed_input(played, item)
             self._check_fresh(played, device, ())
 
-    def _check_fresh(self, once: DeviceBench, device: Any, after: Session) -> None:
+    def _check_fresh(self, once: device_bench.DeviceBench, device: Any, after: Session) -> None:
         """A device that was reset is as one that was made now, or at 0, with the same inputs."""
         was_reset, now_us = twin(device), once.rig.now_us
         now_us += (_SETTLES + 1) * device.tick_us  # it may have been ticked so often since then
@@ -344,7 +339,7 @@ class DeviceChecks:
             for each in devices:  # all know that something was set
                 each.inputs.set(name, device.inputs[name])
         times = (now_us, now_us, 0)
-        one, *others = map(drive, devices, times, [after] * 3, [once.nothing] * 3)
+        one, *others = map(device_bench.drive, devices, times, [after] * 3, [once.nothing] * 3)
         if one not in others:
             _same(once, one, others[-1], _KEEPS, "after a reset", "of a fresh one")
 
@@ -382,20 +377,20 @@ class DeviceChecks:
         snapshot.restore()
         what = "what a snapshot has put back goes on otherwise"
         _same(original, original.play(after), wanted, what, "put back", "before")
-        one, other = (drive(each, now_us, after, original.nothing) for each in alone)
+        one, other = (device_bench.drive(each, now_us, after, original.nothing) for each in alone)
         what = "a copy by pickle goes on otherwise"
         _same(original, other, one, what, "of that", "of one by copy.deepcopy")
 
 
 def _same(  # noqa: PLR0913, PLR0917 - in the order of its text
-    bench: DeviceBench,
-    one: list[Observation],
-    other: list[Observation],
+    bench: device_bench.DeviceBench,
+    one: list[device_bench.Observation],
+    other: list[device_bench.Observation],
     what: str,
     first: str,
     second: str,
 ) -> None:
-    text = difference(bench.device, one, other, first, second)
+    text = device_bench.difference(bench.device, one, other, first, second)
     must(not text, f"{what}: {text}")
 
 

@@ -10,20 +10,12 @@ from typing import Final
 
 from markupsafe import escape
 
+from tickrig.emulators.testing.report import overview
 from tickrig.emulators.testing.report.bench_report import (
     BenchReport,
     JournalLine,
     Outcome,
     TestRecord,
-)
-from tickrig.emulators.testing.report.overview import (
-    UNWELL,
-    ReportedTest,
-    by_file,
-    counts,
-    reported,
-    requirement_rows,
-    slowest,
 )
 from tickrig.emulators.testing.report.timeline import Timeline, timeline_of
 from tickrig.host.text import page_text
@@ -133,7 +125,7 @@ class TestOnPage:
         opened: it is unfolded when the page opens.
     """
 
-    place: ReportedTest
+    place: overview.ReportedTest
     timeline: Timeline | None
     longrepr: str
     journal: tuple[JournalLine, ...]
@@ -150,17 +142,17 @@ def html_page(report: BenchReport, room_bytes: int = _PAGE_BYTES) -> str:
         report: what is shown.
         room_bytes: how much tests may bring to the page; what has no room is named on it.
     """
-    places = reported(report.tests)
-    unwell = [place for place in places if place.record.outcome in UNWELL]
+    places = overview.reported(report.tests)
+    unwell = [place for place in places if place.record.outcome in overview.UNWELL]
     return _template().render(
         report=report,
         tests=places,
         shown={test.place.anchor: test for test in _on_page(places, room_bytes)},
-        counts=counts(report.tests),
-        unwell=sorted(unwell, key=lambda place: UNWELL.index(place.record.outcome)),
-        requirements=requirement_rows(report, places),
-        slowest=slowest(places),
-        files=by_file(places),
+        counts=overview.counts(report.tests),
+        unwell=sorted(unwell, key=lambda place: overview.UNWELL.index(place.record.outcome)),
+        requirements=overview.requirement_rows(report, places),
+        slowest=overview.slowest(places),
+        files=overview.by_file(places),
     )
 
 
@@ -170,19 +162,19 @@ def _template() -> PageTemplate:
     return PageTemplate(__package__, {"Outcome": Outcome}, script="page.js")
 
 
-def _on_page(places: Sequence[ReportedTest], room_bytes: int) -> Iterator[TestOnPage]:
+def _on_page(places: Sequence[overview.ReportedTest], room_bytes: int) -> Iterator[TestOnPage]:
     tests = [place.record for place in places]
     timelines = [timeline_of(test) for test in tests]
     admitted = PageRoom(tests, timelines, room_bytes).admitted
-    unwell = sum(test.outcome in UNWELL for test in tests)
+    unwell = sum(test.outcome in overview.UNWELL for test in tests)
     for number, place in enumerate(places):
         parts = {part for part in PagePart if (number, part) in admitted}
-        opened = place.record.outcome in UNWELL and unwell <= _MOST_OPEN
+        opened = place.record.outcome in overview.UNWELL and unwell <= _MOST_OPEN
         yield _test_on_page(place, timelines[number], parts, opened)
 
 
 def _test_on_page(
-    place: ReportedTest, timeline: Timeline | None, parts: set[PagePart], opened: bool
+    place: overview.ReportedTest, timeline: Timeline | None, parts: set[PagePart], opened: bool
 ) -> TestOnPage:
     test = place.record
     lines = test.journal[-_JOURNAL_LINES:]

@@ -7,15 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final, NamedTuple
 
-from tickrig.emulators.testing.report.bench_report import (
-    JournalLine,
-    PlannedFault,
-    Point,
-    SignalSeries,
-    TestRecord,
-    Value,
-    thinned,
-)
+from tickrig.emulators.testing.report import bench_report
 from tickrig.host.canmon.model.graph.chart import ticks, widened
 from tickrig.host.text.page_text import DASH
 from tickrig.host.text.values import counted
@@ -123,7 +115,7 @@ class Lane:
         return SWITCH_PX if self.scale == _SWITCH else CURVE_PX
 
 
-def _lane_of(series: SignalSeries, axis: TimeAxis) -> Lane:
+def _lane_of(series: bench_report.SignalSeries, axis: TimeAxis) -> Lane:
     """Return how a signal with samples is drawn on an axis."""
     values = [value for _, value in series.points if value is not None]
     numbers = [value for value in values if not isinstance(value, str)]
@@ -140,7 +132,7 @@ def _lane_of(series: SignalSeries, axis: TimeAxis) -> Lane:
     return Lane(series.name, series.unit, path, (), least, greatest, (low, high), zero, rows)
 
 
-def _constant(series: SignalSeries, axis: TimeAxis) -> Lane:
+def _constant(series: bench_report.SignalSeries, axis: TimeAxis) -> Lane:
     """Return a lane that says a number once."""
     value = series.points[0][1]
     text = f"{_text_of(value)} {series.unit}".rstrip()
@@ -150,34 +142,36 @@ def _constant(series: SignalSeries, axis: TimeAxis) -> Lane:
     return Lane(series.name, series.unit, "", words, "", "", (0, 0), None, row)
 
 
-def _row(points: Sequence[Point], numbers: Sequence[float]) -> tuple[str, ...]:
+def _row(points: Sequence[bench_report.Point], numbers: Sequence[float]) -> tuple[str, ...]:
     ends = (min(numbers), max(numbers)) if numbers else (None, None)
     cells = points[0][1], *ends, points[-1][1]
     return (*map(_text_of, cells), f"{len(points)}")
 
 
-def _text_of(value: Value) -> str:
+def _text_of(value: bench_report.Value) -> str:
     """Write a value for people."""
     if isinstance(value, float):
         return f"{value:.6g}"
     return DASH if value is None else str(value)[:_WORD_CHARACTERS]
 
 
-def _words(points: Sequence[Point], axis: TimeAxis) -> Iterator[TimeSpan]:
+def _words(points: Sequence[bench_report.Point], axis: TimeAxis) -> Iterator[TimeSpan]:
     """Yield one span for each value that stays for a while."""
     changes = [points[0]]
     changes += [now for before, now in pairwise(points) if now[1] != before[1]]
-    changes = thinned(changes, _MOST_WORDS)
+    changes = bench_report.thinned(changes, _MOST_WORDS)
     for (at_us, value), (until_us, _) in pairwise([*changes, (axis.to_us, None)]):
         left = axis.part(at_us)
         if value is not None:
             yield TimeSpan(left, round(axis.part(until_us) - left, 2), _text_of(value))
 
 
-def _path(points: Sequence[Point], axis: TimeAxis, scale: tuple[float, float], steps: bool) -> str:
+def _path(
+    points: Sequence[bench_report.Point], axis: TimeAxis, scale: tuple[float, float], steps: bool
+) -> str:
     parts: list[str] = []
     before = ""
-    for at_us, value in thinned(points, _MOST_POINTS):
+    for at_us, value in bench_report.thinned(points, _MOST_POINTS):
         x = f"{axis.part(at_us) * _WIDTH / 100:g}"
         y = f"{_height(value, scale):.4g}" if isinstance(value, int | float) else ""
         if not before:
@@ -246,7 +240,7 @@ class Timeline:
         return lanes + bands + 300 * (len(self.events) + len(self.faults))
 
 
-def timeline_of(test: TestRecord) -> Timeline | None:
+def timeline_of(test: bench_report.TestRecord) -> Timeline | None:
     """Return the time line of a test, None if there is nothing on it."""
     if not (test.series or test.faults):
         return None
@@ -263,7 +257,7 @@ def timeline_of(test: TestRecord) -> Timeline | None:
     )
 
 
-def _axis_of(test: TestRecord) -> TimeAxis:
+def _axis_of(test: bench_report.TestRecord) -> TimeAxis:
     times = [at_us for series in test.series for at_us, _ in series.points]
     for fault in test.faults:
         times += [at_us for at_us in (fault.from_us, fault.to_us) if at_us is not None]
@@ -275,13 +269,13 @@ def _axis_of(test: TestRecord) -> TimeAxis:
     return TimeAxis(from_us, max(to_us, from_us + 1))
 
 
-def _fault_span(fault: PlannedFault, axis: TimeAxis) -> TimeSpan:
+def _fault_span(fault: bench_report.PlannedFault, axis: TimeAxis) -> TimeSpan:
     left = axis.part(fault.from_us or 0)
     right = 100.0 if fault.to_us is None else axis.part(fault.to_us)
     return TimeSpan(left, round(right - left, 2), fault.name[:_WORD_CHARACTERS])
 
 
-def _events(journal: Sequence[JournalLine], axis: TimeAxis) -> Iterator[TimelineEvent]:
+def _events(journal: Sequence[bench_report.JournalLine], axis: TimeAxis) -> Iterator[TimelineEvent]:
     seen = [line for line in journal if line.mark in (_ACTION, _MISS)][-_MOST_EVENTS:]
     for line in seen:
         yield TimelineEvent(

@@ -7,18 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tickrig.emulators.serial.network import parse_serve_url
-from tickrig.emulators.testing.rig_file.plan import (
-    BusPlan,
-    DevicePlan,
-    DoorPlan,
-    HardwarePlan,
-    PortPlan,
-    PowerPlan,
-    RealPlan,
-    Tolerances,
-    WirePlan,
-    WireType,
-)
+from tickrig.emulators.testing.rig_file import plan
 from tickrig.emulators.testing.rig_file.schema import (
     HARDWARE,
     HARDWARE_BUS,
@@ -47,16 +36,16 @@ class DoorReader:
 
     def __init__(
         self,
-        wires: Mapping[str, WirePlan | None],
-        devices: Mapping[str, DevicePlan | None],
+        wires: Mapping[str, plan.WirePlan | None],
+        devices: Mapping[str, plan.DevicePlan | None],
         folder: Path,
     ) -> None:
         self._wires, self._devices, self._folder = wires, devices, folder
 
-    def read_real(self, section: Section) -> RealPlan:
+    def read_real(self, section: Section) -> plan.RealPlan:
         """Read `[real]`."""
         values = section.read(REAL, *(key for key in section.values if key not in REAL))
-        doors: dict[str, DoorPlan] = {}
+        doors: dict[str, plan.DoorPlan] = {}
         for name, wire, table in self._tables(section, _CONTROL):
             if wire is None:
                 device = self._devices[name]
@@ -67,31 +56,31 @@ class DoorReader:
             else:
                 doors[wire.name] = self._door(wire, table)
         self._check_twice(section, doors)
-        return RealPlan(control=self._file(values.get(_CONTROL)), doors=doors)
+        return plan.RealPlan(control=self._file(values.get(_CONTROL)), doors=doors)
 
-    def read_hardware(self, section: Section) -> HardwarePlan:
+    def read_hardware(self, section: Section) -> plan.HardwarePlan:
         """Read `[hardware]`."""
         values = section.read(HARDWARE, *(key for key in section.values if key not in HARDWARE))
         control = {
             name: self._file(values[_CONTROL]) for name in self._devices if _CONTROL in values
         }
-        ports: dict[str, PortPlan] = {}
-        buses: dict[str, BusPlan] = {}
-        power: dict[str, PowerPlan] = {}
+        ports: dict[str, plan.PortPlan] = {}
+        buses: dict[str, plan.BusPlan] = {}
+        power: dict[str, plan.PowerPlan] = {}
         for name, wire, table in self._tables(section, _CONTROL, _TOLERANCE_TABLE):
             schema = _hardware_schema(wire, is_device=name in self._devices)
             found = table.read(schema)
             if wire is not None and "port" in found:
                 if wire.name in ports:
                     table.wrong(f"the port of wire {wire.name!r} is given twice", "port")
-                ports[wire.name] = PortPlan(port=found["port"], baud=found.get("baud"))
+                ports[wire.name] = plan.PortPlan(port=found["port"], baud=found.get("baud"))
             if wire is not None and "interface" in found:
                 buses[wire.name] = _bus(table, found)
             if name in self._devices and _CONTROL in found:
                 control[name] = self._file(found[_CONTROL])
             if switched := _power(table, found):
                 power[name] = switched
-        return HardwarePlan(
+        return plan.HardwarePlan(
             control={name: path for name, path in control.items() if path},
             ports=ports,
             buses=buses,
@@ -101,7 +90,7 @@ class DoorReader:
 
     def _tables(
         self, section: Section, *but: str
-    ) -> Iterator[tuple[str, WirePlan | None, Section]]:
+    ) -> Iterator[tuple[str, plan.WirePlan | None, Section]]:
         """Yield each table with the wire of its name, or that of a device alone on its line."""
         names = [*self._devices, *(name for name in self._wires if name not in self._devices)]
         for name in section.values:
@@ -119,20 +108,20 @@ class DoorReader:
                 shared = device is not None and wire is not None and not self._alone(wire)
                 yield name, None if shared else wire, table
 
-    def _alone(self, wire: WirePlan) -> bool:
+    def _alone(self, wire: plan.WirePlan) -> bool:
         """Return whether a wire is a line of one device."""
         sharing = [each for each in self._devices.values() if each and each.wire == wire.name]
-        return wire.type is not WireType.CAN and len(sharing) == 1
+        return wire.type is not plan.WireType.CAN and len(sharing) == 1
 
-    def _door(self, wire: WirePlan, section: Section) -> DoorPlan:
-        if wire.type is WireType.CAN:
+    def _door(self, wire: plan.WirePlan, section: Section) -> plan.DoorPlan:
+        if wire.type is plan.WireType.CAN:
             found = section.read(REAL_BUS)
-            return DoorPlan(bus=_bus(section, found) if "interface" in found else None)
+            return plan.DoorPlan(bus=_bus(section, found) if "interface" in found else None)
         found = section.read(REAL_LINE)
         serve = [url for url in found.get("serve", ()) if _is_url(section, url)]
-        return DoorPlan(link=self._file(found.get("link")), serve=tuple(serve))
+        return plan.DoorPlan(link=self._file(found.get("link")), serve=tuple(serve))
 
-    def _check_twice(self, section: Section, doors: Mapping[str, DoorPlan]) -> None:
+    def _check_twice(self, section: Section, doors: Mapping[str, plan.DoorPlan]) -> None:
         """Note links and addresses that two wires would have."""
         seen: dict[object, str] = {}
         for wire, door in doors.items():
@@ -158,24 +147,24 @@ def _is_url(section: Section, url: str) -> bool:
     return True
 
 
-def _hardware_schema(wire: WirePlan | None, *, is_device: bool) -> Schema:
+def _hardware_schema(wire: plan.WirePlan | None, *, is_device: bool) -> Schema:
     """Return the keys that a table of hardware can have."""
     of_device = HARDWARE_DEVICE if is_device else {}
     if wire is None:
         return of_device
-    if wire.type is WireType.CAN:
+    if wire.type is plan.WireType.CAN:
         return {**HARDWARE_BUS, **of_device}
     return {**HARDWARE_LINE, **of_device}
 
 
-def _bus(section: Section, found: Mapping[str, Any]) -> BusPlan:
+def _bus(section: Section, found: Mapping[str, Any]) -> plan.BusPlan:
     """Return a bus; a driver that is not here may be there on another machine."""
     from can import VALID_INTERFACES  # noqa: PLC0415 - slow
 
     name = found["interface"]
     if name not in VALID_INTERFACES and (meant := closest(name, sorted(VALID_INTERFACES))):
         section.wrong(f"no driver {name!r}; did you mean {meant[0]!r}?", "interface")
-    return BusPlan(
+    return plan.BusPlan(
         interface=found["interface"],
         channel=found.get("channel"),
         bit_rate=found.get("bitrate"),
@@ -183,20 +172,20 @@ def _bus(section: Section, found: Mapping[str, Any]) -> BusPlan:
     )
 
 
-def _power(section: Section, found: Mapping[str, Any]) -> PowerPlan | None:
+def _power(section: Section, found: Mapping[str, Any]) -> plan.PowerPlan | None:
     missing = [key for key in ("power_on", "power_off") if key not in section.values]
     if len(missing) == 1:
         section.wrong(f"no key {missing[0]!r}: power_on and power_off come together")
     if "power_on" in found and "power_off" in found:
-        return PowerPlan(on=found["power_on"], off=found["power_off"])
+        return plan.PowerPlan(on=found["power_on"], off=found["power_off"])
     return None
 
 
-def _tolerance(section: Section | None) -> Tolerances:
+def _tolerance(section: Section | None) -> plan.Tolerances:
     found = section.read(TOLERANCE) if section else {}
     given: dict[str, Any] = {}
     if "stick_pct" in found:
         given["stick_pct"] = found["stick_pct"]
     if "time_ms" in found:
         given["time_us"] = round(found["time_ms"] * 1_000)
-    return Tolerances(**given)
+    return plan.Tolerances(**given)

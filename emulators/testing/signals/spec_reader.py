@@ -18,6 +18,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Final
 
+from tickrig.emulators.testing.signals import sources
 from tickrig.emulators.testing.signals.fields import (
     Keys,
     SignalMistake,
@@ -30,16 +31,6 @@ from tickrig.emulators.testing.signals.fields import (
     spread,
     step,
     time,
-)
-from tickrig.emulators.testing.signals.sources import (
-    SHAPES,
-    Constant,
-    Integral,
-    Lag,
-    Noise,
-    RampSource,
-    SignalSpec,
-    Wave,
 )
 from tickrig.emulators.testing.signals.table import read_table
 from tickrig.host.text.names import near
@@ -80,18 +71,18 @@ class Form:
     every_us: int = 0
 
 
-def _ramp(folder: Path, fields: _Fields) -> RampSource:
+def _ramp(folder: Path, fields: _Fields) -> sources.RampSource:
     first, last = fields["ramp"]
-    return RampSource(first, last, fields["over"], fields.get("repeat", False))
+    return sources.RampSource(first, last, fields["over"], fields.get("repeat", False))
 
 
-def _wave(shape: str, folder: Path, fields: _Fields) -> Wave:
+def _wave(shape: str, folder: Path, fields: _Fields) -> sources.Wave:
     (first, second), period_us = fields[shape], fields["period"]
     phase_us = round(fields.get("phase_deg", 0) / 360 * period_us)
-    return Wave(shape, first, second, period_us, phase_us, fields.get("duty", 0.5))
+    return sources.Wave(shape, first, second, period_us, phase_us, fields.get("duty", 0.5))
 
 
-def _noise(folder: Path, fields: _Fields) -> Noise:
+def _noise(folder: Path, fields: _Fields) -> sources.Noise:
     given, mean = fields["noise"], fields.get("mean")
     if uniform := isinstance(given, tuple):
         if mean is not None:
@@ -99,19 +90,19 @@ def _noise(folder: Path, fields: _Fields) -> Noise:
         first, second = given
     else:
         first, second = mean or 0.0, given
-    return Noise(first, second, uniform, fields.get("every", _EVERY_US), fields.get("seed"))
+    return sources.Noise(first, second, uniform, fields.get("every", _EVERY_US), fields.get("seed"))
 
 
 def _formula(folder: Path, fields: _Fields) -> object:
     return fields["formula"]
 
 
-def _lag(folder: Path, fields: _Fields) -> Lag:
-    return Lag(fields["lag"], fields["tau"], fields.get("start"))
+def _lag(folder: Path, fields: _Fields) -> sources.Lag:
+    return sources.Lag(fields["lag"], fields["tau"], fields.get("start"))
 
 
-def _integral(folder: Path, fields: _Fields) -> Integral:
-    return Integral(fields["integral"], fields.get("start", 0.0))
+def _integral(folder: Path, fields: _Fields) -> sources.Integral:
+    return sources.Integral(fields["integral"], fields.get("start", 0.0))
 
 
 FORMS: Final[Mapping[str, Form]] = {
@@ -124,7 +115,7 @@ FORMS: Final[Mapping[str, Form]] = {
             partial(_wave, shape),
             ("period",),
         )
-        for shape in SHAPES
+        for shape in sources.SHAPES
     },
     "noise": Form(
         {"noise": spread, "mean": number, "seed": seed, **_FROM}, _noise, every_us=_EVERY_US
@@ -146,7 +137,7 @@ FORMS: Final[Mapping[str, Form]] = {
 
 def read_signal_spec(
     value: object, keys: Keys = (), folder: Path | None = None
-) -> SignalSpec | list[SignalMistake]:
+) -> sources.SignalSpec | list[SignalMistake]:
     """Read what TOML gives for a value that may change by itself.
 
     Whether the signals that a formula names are there is judged by `check_signals`.
@@ -161,7 +152,9 @@ def read_signal_spec(
     """
     if isinstance(value, bool | int | float | str):
         try:
-            return SignalSpec(Constant(value if isinstance(value, str) else number(value)))
+            return sources.SignalSpec(
+                sources.Constant(value if isinstance(value, str) else number(value))
+            )
         except ValueError as error:
             return [SignalMistake(keys, str(error))]
     names = [name for name in FORMS if isinstance(value, dict) and name in value]
@@ -172,7 +165,9 @@ def read_signal_spec(
     return _read(names[0], value, keys, folder or Path())
 
 
-def _read(name: str, table: _Fields, keys: Keys, folder: Path) -> SignalSpec | list[SignalMistake]:
+def _read(
+    name: str, table: _Fields, keys: Keys, folder: Path
+) -> sources.SignalSpec | list[SignalMistake]:
     form, fields = FORMS[name], dict[str, Any]()
     mistakes = [*_read_fields(name, table, keys, fields)]
     mistakes += [
@@ -180,7 +175,7 @@ def _read(name: str, table: _Fields, keys: Keys, folder: Path) -> SignalSpec | l
     ]
     if not mistakes:
         try:
-            return SignalSpec(
+            return sources.SignalSpec(
                 form.build(folder, fields),
                 fields.get("from", 0),
                 fields.get("every", form.every_us),

@@ -12,15 +12,8 @@ from typing import Final
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.running_emulator import keeping_time
+from tickrig.emulators.tkernel import node_manager
 from tickrig.emulators.tkernel.board import Board
-from tickrig.emulators.tkernel.node_manager import (
-    HOST,
-    BoardLines,
-    NodeLimits,
-    NodeManager,
-    add_position_detection,
-    add_range_finder,
-)
 from tickrig.emulators.tkernel.operated import Operated
 from tickrig.host.cli.control import serving_control, stopped_by_signals
 from tickrig.host.cli.engine_options import FORMAT, EngineOptions
@@ -40,7 +33,7 @@ from tickrig.host.rtc.ucode.http_source import HttpSource
 from tickrig.host.rtc.ucode.infrared_rays_reader import OPEN_SERIAL
 
 _JOIN_ENGINES: Final = "tickrig.host.rtc.engines.engines_joined:engines_joined"
-_NAMES: Final = f"{HOST}.host_cxt/%n.rtc"
+_NAMES: Final = f"{node_manager.HOST}.host_cxt/%n.rtc"
 """Where its components stand in a name server."""
 
 
@@ -54,7 +47,7 @@ class NodeOptions:
     service: str = ""
     control: Path | None = None
     board: Path | None = None
-    limits: NodeLimits
+    limits: node_manager.NodeLimits
     faults: tuple[str, ...] = ()
     engines: EngineOptions
 
@@ -109,7 +102,7 @@ class NodeRun:
         self._clock, schedule = ServingClock(), Schedule()
         self._clock.serve = self._serve
         self._runner = RealTime(schedule, self._clock)
-        lines = BoardLines(SerialLink, OPEN_SERIAL, HttpSource)
+        lines = node_manager.BoardLines(SerialLink, OPEN_SERIAL, HttpSource)
         self._lines, self._board = lines, Board(options.limits, self._start, lines)
         self._operated = Operated("tkernel-emu", self._board, self._runner.stop, self._lateness)
         with refused_at("--fault"):
@@ -140,7 +133,7 @@ class NodeRun:
                 raise Refused(f"the node cannot have this system: {error}") from None
         self._sum_up()
 
-    def _start(self, manager: NodeManager, stack: ExitStack) -> None:
+    def _start(self, manager: node_manager.NodeManager, stack: ExitStack) -> None:
         """Make the system of a board that has booted, and open its doors."""
         options = self._options
         for kind in EXAMPLES:
@@ -148,15 +141,17 @@ class NodeRun:
         manager.register(LrfCaptureUrg)
         restore(manager, self._system)
         if options.urg is not None:
-            add_range_finder(manager, self._lines, options.urg)
+            node_manager.add_range_finder(manager, self._lines, options.urg)
         if options.ucode is not None:
-            add_position_detection(manager, self._lines, options.ucode, options.service)
+            node_manager.add_position_detection(
+                manager, self._lines, options.ucode, options.service
+            )
         self._open_doors(manager, stack)
         names = ", ".join(component.instance_name for component in manager.components) or "nothing"
         say(f"The node is up: {names}.")
         stack.callback(say, "The node is off.")
 
-    def _open_doors(self, manager: NodeManager, stack: ExitStack) -> None:
+    def _open_doors(self, manager: node_manager.NodeManager, stack: ExitStack) -> None:
         """Serve the system's control socket and peers, as long as the board is up."""
         stack.callback(self._system_door.close)
         attach: Callable[[CallQueue], object] = self._attach_alone
@@ -173,7 +168,7 @@ class NodeRun:
         self._system_door.serve = calls.serve
 
     def _open_control(
-        self, path: Path, manager: NodeManager, stack: ExitStack
+        self, path: Path, manager: node_manager.NodeManager, stack: ExitStack
     ) -> Callable[[CallQueue], None]:
         boot = Boot(self._runner)
         control = SystemControl(manager, boot)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from tickrig.host.canmon.model import traffic
 from tickrig.host.canmon.model.frames import (
     ARROWS,
     Record,
@@ -17,15 +18,6 @@ from tickrig.host.canmon.model.frames import (
     ms_text,
     rate_text,
     s_text,
-)
-from tickrig.host.canmon.model.traffic import (
-    NO_RATES,
-    BitRates,
-    BitRow,
-    BusRow,
-    IdRow,
-    Traffic,
-    TrafficSnapshot,
 )
 from tickrig.host.text.page_text import in_cells
 from tickrig.wire.can import ErrorFrame
@@ -46,7 +38,7 @@ _HEAT: Final = "▁▂▃▄▅▆▇█"
 """From a bit that changes seldom to one that changes with each frame."""
 
 
-def _data_text(row: IdRow, styled: bool) -> str:
+def _data_text(row: traffic.IdRow, styled: bool) -> str:
     """Write the bytes of the latest frame; those that it changed are shown in reverse."""
     if row.frame.remote:
         return f"remote request for {row.frame.dlc}"
@@ -58,7 +50,7 @@ def _data_text(row: IdRow, styled: bool) -> str:
     return " ".join(cells)
 
 
-def _heat_text(row: IdRow, styled: bool) -> str:
+def _heat_text(row: traffic.IdRow, styled: bool) -> str:
     """Write a character for each bit, bit 7 of a byte first."""
     heats = _heats(row.changed, row.frames)
     latest = row.changed.latest & ~row.changed.notched
@@ -74,7 +66,7 @@ def _heat_text(row: IdRow, styled: bool) -> str:
     return " ".join(cells)
 
 
-def _heats(changed: BitRow, frames: int) -> list[str]:
+def _heats(changed: traffic.BitRow, frames: int) -> list[str]:
     shown = changed.changed
     return [
         _NOTCHED
@@ -108,10 +100,10 @@ class TopColumn(NamedTuple):
     title: str
     width: int
     rank: int
-    text: Callable[[IdRow, int], str]
+    text: Callable[[traffic.IdRow, int], str]
 
 
-def _gap(name: str) -> Callable[[IdRow, int], str]:
+def _gap(name: str) -> Callable[[traffic.IdRow, int], str]:
     return lambda row, now_us: ms_text(getattr(row.gaps, name, None))
 
 
@@ -143,7 +135,7 @@ class IdText(NamedTuple):
         """Characters in all."""
         return self.channel_width + (1 if self.channel_width else 0) + 9
 
-    def of(self, row: IdRow) -> str:
+    def of(self, row: traffic.IdRow) -> str:
         """Return what it says of a row."""
         return self._joined(row.channel, ident_text(row.ident))
 
@@ -282,7 +274,7 @@ class RowOrder(StrEnum):
     AGE = "age"
 
 
-_KEYS: Final[dict[RowOrder, Callable[[IdRow], float]]] = {
+_KEYS: Final[dict[RowOrder, Callable[[traffic.IdRow], float]]] = {
     RowOrder.ID: lambda row: 0,
     RowOrder.RATE: lambda row: -row.rate_hz,
     RowOrder.JITTER: lambda row: -row.gaps.jitter_us if row.gaps else 1,
@@ -314,12 +306,12 @@ class TableView:
     styled: bool = False
     bit_rate: int | None = None
     keys: bool = False
-    meaning: Callable[[IdRow], str] | None = None
+    meaning: Callable[[traffic.IdRow], str] | None = None
     unread: int = 0
 
 
 def render(
-    snapshot: TrafficSnapshot,
+    snapshot: traffic.TrafficSnapshot,
     view: TableView,
     lost: int = 0,
     width: int = UNBOUNDED,
@@ -343,7 +335,7 @@ def render(
     return (head + [table.line(row, snapshot.at_us) for row in rows])[:height]
 
 
-def _bus_line(bus: BusRow, bit_rate: int | None) -> str:
+def _bus_line(bus: traffic.BusRow, bit_rate: int | None) -> str:
     """Write what a bus did in one line."""
     load, errors = bus.load, bus.errors
     words = [
@@ -364,7 +356,7 @@ def _bus_line(bus: BusRow, bit_rate: int | None) -> str:
     return ", ".join(words)
 
 
-def _state_line(snapshot: TrafficSnapshot, view: TableView, lost: int) -> str:
+def _state_line(snapshot: traffic.TrafficSnapshot, view: TableView, lost: int) -> str:
     words = [f"lost {lost}", *[f"passed over {view.unread}"] * bool(view.unread)]
     words += [f"{len(snapshot.rows)} identifiers by {view.order}"]
     words += ["held"] * view.held
@@ -385,12 +377,12 @@ class _Table(NamedTuple):
 
     ids: IdText
     columns: tuple[TopColumn, ...]
-    payload: tuple[Callable[[IdRow, bool], str], str]
+    payload: tuple[Callable[[traffic.IdRow, bool], str], str]
     styled: bool
     width: int
 
     @classmethod
-    def of(cls, snapshot: TrafficSnapshot, view: TableView, width: int) -> _Table:
+    def of(cls, snapshot: traffic.TrafficSnapshot, view: TableView, width: int) -> _Table:
         """Choose the columns."""
         longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
         ids = IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
@@ -405,7 +397,7 @@ class _Table(NamedTuple):
         cells = [f"{column.title:>{column.width}}" for column in self.columns]
         return " ".join([self.ids.title(), *cells, self.payload[1]])[: self.width]
 
-    def line(self, row: IdRow, now_us: int) -> str:
+    def line(self, row: traffic.IdRow, now_us: int) -> str:
         """Return a row."""
         cells = [f"{column.text(row, now_us):>{column.width}}" for column in self.columns]
         line = " ".join([self.ids.of(row), *cells, self.payload[0](row, self.styled)])
@@ -418,7 +410,7 @@ def _payload_width(view: TableView) -> int:
     return _DATA_WIDTH if view.meaning is None else _MEANING_WIDTH
 
 
-def _payload(view: TableView) -> tuple[Callable[[IdRow, bool], str], str]:
+def _payload(view: TableView) -> tuple[Callable[[traffic.IdRow, bool], str], str]:
     meaning = view.meaning
     if view.bits:
         return _heat_text, "bits that change"
@@ -444,10 +436,10 @@ class TopModel:
         view: how it is shown.
     """
 
-    def __init__(self, rates: BitRates = NO_RATES) -> None:
-        self.traffic, self._serial, self.rates = Traffic(rates), LineTraffic(), rates
+    def __init__(self, rates: traffic.BitRates = traffic.NO_RATES) -> None:
+        self.traffic, self._serial, self.rates = traffic.Traffic(rates), LineTraffic(), rates
         self.view = TableView(styled=True, bit_rate=rates.nominal, keys=True)
-        self._held: tuple[TrafficSnapshot, tuple[LineRow, ...]] | None = None
+        self._held: tuple[traffic.TrafficSnapshot, tuple[LineRow, ...]] | None = None
         self._now_us = 0
         self._meanings: dict[tuple[str, int], Decoded] = {}
         self._acts: dict[str, Callable[[], None]] = {
@@ -492,7 +484,7 @@ class TopModel:
         view = replace(self.view, unread=unread)
         return render(snapshot, view, lost, width, height - len(below)) + below
 
-    def final(self, lost: int, snapshot: TrafficSnapshot | None = None) -> list[str]:
+    def final(self, lost: int, snapshot: traffic.TrafficSnapshot | None = None) -> list[str]:
         """Return the whole table of all that came, or of a snapshot, as plain text."""
         view = replace(self.view, held=False, top=0, styled=False, keys=False)
         rows = self._serial.rows()
@@ -501,11 +493,11 @@ class TopModel:
         below = line_table(rows, now_us, UNBOUNDED)
         return render(snapshot, view, lost, UNBOUNDED, UNBOUNDED) + below
 
-    def _meaning(self, row: IdRow) -> str:
+    def _meaning(self, row: traffic.IdRow) -> str:
         decoded = self._meanings.get((row.channel, row.ident))
         return _data_text(row, False) if decoded is None else meaning_text(decoded)
 
-    def _snapshot(self) -> tuple[TrafficSnapshot, tuple[LineRow, ...]]:
+    def _snapshot(self) -> tuple[traffic.TrafficSnapshot, tuple[LineRow, ...]]:
         return self.traffic.snapshot(self._now_us), self._serial.rows()
 
     def _clear(self) -> None:

@@ -1,8 +1,8 @@
 """The traffic of all buses: one row for each identifier, one for each bus.
 
 >>> traffic = Traffic()
->>> traffic.take(Record(0, "can0", CanFrame.parse("705#7F")))
->>> traffic.take(Record(100_000, "can0", CanFrame.parse("705#05")))
+>>> traffic.take(Record(0, "can0", can.CanFrame.parse("705#7F")))
+>>> traffic.take(Record(100_000, "can0", can.CanFrame.parse("705#05")))
 >>> row = traffic.snapshot().rows[0]
 >>> row.frames, row.gap_us, row.changed.latest == 0x7F ^ 0x05
 (2, 100000, True)
@@ -14,7 +14,7 @@ The times between frames of one identifier.
 
 The bit rates of a bus, and how long a CAN FD frame is at both of them.
 
->>> frame = FdFrame.parse("123##1AABB")
+>>> frame = can.FdFrame.parse("123##1AABB")
 >>> BitRates(500_000, 2_000_000).bits(frame), BitRates().bits(frame)
 (42, 78)
 """
@@ -27,20 +27,7 @@ from operator import or_
 from typing import Any, Final, NamedTuple
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record, fd_ident, ident_of
-from tickrig.wire.can import (
-    CONTROLLER_BYTE,
-    REC_BYTE,
-    TEC_BYTE,
-    CanFrame,
-    ControllerFlag,
-    ErrorClass,
-    ErrorFrame,
-    ErrorState,
-    FdFrame,
-    describe_error_frame,
-    fd_bits,
-    frame_bits,
-)
+from tickrig.wire import can
 
 SUB_BITS: Final = 6
 EXACT_US: Final = 1 << SUB_BITS + 1
@@ -289,7 +276,7 @@ class IdRow(NamedTuple):
     frames: int
     first_us: int
     last_us: int
-    frame: CanFrame | FdFrame
+    frame: can.CanFrame | can.FdFrame
     gap_us: int | None
     gaps: GapRow | None
     bits: int
@@ -323,7 +310,10 @@ class IdTally:
     )
 
     def __init__(
-        self, at_us: int, frame: CanFrame | FdFrame, measure: Callable[[Any], int] = frame_bits
+        self,
+        at_us: int,
+        frame: can.CanFrame | can.FdFrame,
+        measure: Callable[[Any], int] = can.frame_bits,
     ) -> None:
         self._first_us = self._last_us = at_us
         self._frame, self._gaps, self._measure = frame, Gaps(), measure
@@ -331,7 +321,7 @@ class IdTally:
         self._gap_us: int | None = None
         self.memory = BitMemory(int.from_bytes(frame.data, "little"))
 
-    def take(self, at_us: int, frame: CanFrame | FdFrame) -> None:
+    def take(self, at_us: int, frame: can.CanFrame | can.FdFrame) -> None:
         """Count a frame after the first."""
         gap_us = self._gap_us = max(0, at_us - self._last_us)
         self._last_us = at_us
@@ -370,16 +360,16 @@ class BitRates(NamedTuple):
     nominal: int | None = None
     fast: int | None = None
 
-    def tells(self, frame: FdFrame) -> bool:
+    def tells(self, frame: can.FdFrame) -> bool:
         """Say whether the rates of all parts of a frame are known."""
         return not frame.brs or bool(self.nominal and self.fast)
 
-    def bits(self, frame: FdFrame) -> int:
+    def bits(self, frame: can.FdFrame) -> int:
         """Return how long a frame takes, in bits of the nominal rate, rounded up.
 
         Fast bits count as nominal ones where a rate is not known: then it takes less.
         """
-        nominal, fast = fd_bits(frame)
+        nominal, fast = can.fd_bits(frame)
         if self.nominal and self.fast:
             return nominal - (-fast * self.nominal // self.fast)
         return nominal + fast
@@ -390,8 +380,8 @@ NO_RATES: Final = BitRates()
 
 # What error frames say about a bus and about our own controller.
 
-_OVERFLOW: Final = ControllerFlag.RECEIVE_OVERFLOW
-_PASSIVE: Final = ControllerFlag.RECEIVE_PASSIVE | ControllerFlag.TRANSMIT_PASSIVE
+_OVERFLOW: Final = can.ControllerFlag.RECEIVE_OVERFLOW
+_PASSIVE: Final = can.ControllerFlag.RECEIVE_PASSIVE | can.ControllerFlag.TRANSMIT_PASSIVE
 
 
 class ErrorRow(NamedTuple):
@@ -407,7 +397,7 @@ class ErrorRow(NamedTuple):
     """
 
     frames: int = 0
-    state: ErrorState | None = None
+    state: can.ErrorState | None = None
     tec: int | None = None
     rec: int | None = None
     overflows: int = 0
@@ -421,20 +411,20 @@ class ErrorStatistics:
 
     def __init__(self) -> None:
         self._frames = self._overflows = 0
-        self._state: ErrorState | None = None
+        self._state: can.ErrorState | None = None
         self._tec: int | None = None
         self._rec: int | None = None
         self._kinds: dict[str, int] = {}
 
-    def take(self, frame: ErrorFrame) -> None:
+    def take(self, frame: can.ErrorFrame) -> None:
         """Count an error frame."""
         self._frames += 1
-        kind = describe_error_frame(frame)
+        kind = can.describe_error_frame(frame)
         self._kinds[kind] = self._kinds.get(kind, 0) + 1
         state = _state_after(frame)
         self._state = self._state if state is None else state
-        if frame.error_class & ErrorClass.COUNTERS:
-            self._tec, self._rec = frame.data[TEC_BYTE], frame.data[REC_BYTE]
+        if frame.error_class & can.ErrorClass.COUNTERS:
+            self._tec, self._rec = frame.data[can.TEC_BYTE], frame.data[can.REC_BYTE]
         if _is_overflow(frame):
             self._overflows += 1
 
@@ -446,22 +436,23 @@ class ErrorStatistics:
         )
 
 
-def _is_overflow(frame: ErrorFrame) -> bool:
+def _is_overflow(frame: can.ErrorFrame) -> bool:
     """Say whether our controller lost frames."""
     return bool(
-        frame.error_class & ErrorClass.CONTROLLER and frame.data[CONTROLLER_BYTE] & _OVERFLOW
+        frame.error_class & can.ErrorClass.CONTROLLER
+        and frame.data[can.CONTROLLER_BYTE] & _OVERFLOW
     )
 
 
-def _state_after(frame: ErrorFrame) -> ErrorState | None:
+def _state_after(frame: can.ErrorFrame) -> can.ErrorState | None:
     """Return the state of our controller after an error frame; None if it does not say."""
-    if frame.error_class & ErrorClass.BUS_OFF:
-        return ErrorState.BUS_OFF
-    flags = frame.data[CONTROLLER_BYTE] if frame.error_class & ErrorClass.CONTROLLER else 0
+    if frame.error_class & can.ErrorClass.BUS_OFF:
+        return can.ErrorState.BUS_OFF
+    flags = frame.data[can.CONTROLLER_BYTE] if frame.error_class & can.ErrorClass.CONTROLLER else 0
     if flags & _PASSIVE:
-        return ErrorState.PASSIVE
-    if flags & ControllerFlag.ACTIVE or frame.error_class & ErrorClass.RESTARTED:
-        return ErrorState.ACTIVE
+        return can.ErrorState.PASSIVE
+    if flags & can.ControllerFlag.ACTIVE or frame.error_class & can.ErrorClass.RESTARTED:
+        return can.ErrorState.ACTIVE
     return None
 
 
@@ -612,10 +603,10 @@ class BusTally:
         if at_us < self._last_us:
             self._went_back += 1
         self._last_us = at_us
-        measure: Callable[[Any], int] = frame_bits
-        if isinstance(frame, CanFrame):
+        measure: Callable[[Any], int] = can.frame_bits
+        if isinstance(frame, can.CanFrame):
             ident = ident_of(frame)
-        elif isinstance(frame, ErrorFrame):
+        elif isinstance(frame, can.ErrorFrame):
             self._errors.take(frame)
             return
         else:

@@ -23,16 +23,9 @@ from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.text.names import near
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds import object_table
 from tickrig.wire.canopen.eds.eds_device import EdsDevice, read_device
 from tickrig.wire.canopen.eds.eds_file import EdsFile
-from tickrig.wire.canopen.eds.object_table import (
-    OFF,
-    CommunicationProfile,
-    EntryDescription,
-    ObjectCode,
-    ObjectTable,
-    add_communication,
-)
 from tickrig.wire.canopen.pdo import PdoDescription
 
 # Names of CiA 301 as an EDS writes them in full, for nodes of which there is none.
@@ -48,15 +41,15 @@ def _standard_names() -> Mapping[str, tuple[int, int]]:
     >>> _standard_names()["identity_object.product_code"] == (0x1018, 2)
     True
     """
-    table, pdos = ObjectTable(), [PdoDescription(OFF)] * _PDOS
-    profile = CommunicationProfile(
+    table, pdos = object_table.ObjectTable(), [PdoDescription(object_table.OFF)] * _PDOS
+    profile = object_table.CommunicationProfile(
         device_type=0, name="", hardware="", software="", product_code=0, rpdos=pdos, tpdos=pdos
     )
-    add_communication(table, profile)
+    object_table.add_communication(table, profile)
     found: dict[str, tuple[int, int]] = {}
     for row in table:
         head = table.objects[row.index]
-        whole = "" if head.code is ObjectCode.VAR else f"{slug(head.name)}."
+        whole = "" if head.code is object_table.ObjectCode.VAR else f"{slug(head.name)}."
         found[f"{whole}{slug(row.name)}"] = row.index, row.sub
     return found
 
@@ -101,7 +94,9 @@ class NamedObjects:
         eds = None if device is None else eds_objects(device, node_id, Path(name).stem)
         self._memory = NodeMemory(eds)
         entries = device.entries if device is not None else ()
-        self.rows: dict[Entry, EntryDescription] = {(one.index, one.sub): one for one in entries}
+        self.rows: dict[Entry, object_table.EntryDescription] = {
+            (one.index, one.sub): one for one in entries
+        }
 
     @property
     def is_drive(self) -> bool:

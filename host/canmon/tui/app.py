@@ -19,19 +19,13 @@ from textual.strip import Strip
 from textual.widget import Widget
 from textual.widgets import Input, TabbedContent, TabPane
 
+from tickrig.host.canmon import workspace
 from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import load_text
 from tickrig.host.canmon.model.recorder.recorder import Recorder, RecorderState
 from tickrig.host.canmon.output.recording import WORDS_METAVAR, read_recording
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.session import DecodedFrame, Session, Task
-from tickrig.host.canmon.workspace import (
-    MonitorSetup,
-    PanelSettings,
-    Workspace,
-    WorkspaceError,
-    text_of,
-)
 from tickrig.host.cli.messages import Refused
 from tickrig.host.text.values import counted
 from tickrig.host.tui import FramedApp, KeyFooter, Line
@@ -156,7 +150,7 @@ class RecorderTask(Task):
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take what was recorded last; SettingError if it is none."""
-        self.words = text_of(settings, "words", self.words)
+        self.words = workspace.text_of(settings, "words", self.words)
 
     def save(self) -> dict[str, Any]:
         """Return what was recorded last."""
@@ -301,15 +295,15 @@ class MonitorApp(FramedApp):
         self,
         session: Session,
         panels: Sequence[Panel],
-        panel_settings: PanelSettings | None = None,
+        panel_settings: workspace.PanelSettings | None = None,
         recorder: RecorderTask | None = None,
     ) -> None:
         super().__init__()
         self.recorder = recorder or RecorderTask(session)
         self.animation_level = "none"  # each picture goes over a line that may be slow
         self.session, self.panels = session, tuple(panels)
-        self.panel_settings = panel_settings or PanelSettings(
-            Workspace(), MonitorSetup(), [*panels, self.recorder]
+        self.panel_settings = panel_settings or workspace.PanelSettings(
+            workspace.Workspace(), workspace.MonitorSetup(), [*panels, self.recorder]
         )
 
     def compose(self) -> ComposeResult:
@@ -402,7 +396,7 @@ class MonitorApp(FramedApp):
         if name:
             try:
                 self.panel_settings.export(Path(name))
-            except WorkspaceError as error:
+            except workspace.WorkspaceError as error:
                 self.notify(str(error), severity="error")
                 return
             self.notify(f"settings are kept in {name}")

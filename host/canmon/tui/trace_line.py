@@ -18,17 +18,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Final
 
-from tickrig.host.canmon.model.frames import (
-    ARROWS,
-    Record,
-    Stamp,
-    any_ident,
-    bytes_text,
-    date_text,
-    ident_text,
-    ms_text,
-    seconds_text,
-)
+from tickrig.host.canmon.model import frames
 from tickrig.host.canmon.model.top_model import meaning_text
 from tickrig.host.canmon.model.trace import TraceRow
 from tickrig.host.tui import Line, line_text
@@ -53,7 +43,7 @@ _KIND_STYLES: Final = {
 }
 _BYTES_WIDTH: Final = len("[8] 00 11 22 33 44 55 66 77")
 _BITS_WIDTH: Final = len("[8]") + 8 * len(" 00000000")
-_STAMP_WIDTHS: Final = {Stamp.ABSOLUTE: 17, Stamp.DATE: 26}
+_STAMP_WIDTHS: Final = {frames.Stamp.ABSOLUTE: 17, frames.Stamp.DATE: 26}
 _STAMP_WIDTH: Final = 13
 
 
@@ -71,7 +61,7 @@ class TraceLines:
         gaps: the time since the frame before it with the same identifier.
     """
 
-    stamp: Stamp = Stamp.ZERO
+    stamp: frames.Stamp = frames.Stamp.ZERO
     origin_us: int = 0
     bits: bool = False
     meaning: bool = True
@@ -93,7 +83,7 @@ class TraceLines:
         record = row.record
         channel = f"{record.channel:<{self.channel_width}} " * bool(self.channel_width)
         counted = f"{count:>8} " * self.counts
-        gap = f"{ms_text(row.gap_us):>8} " * self.gaps
+        gap = f"{frames.ms_text(row.gap_us):>8} " * self.gaps
         begin = f"{self._stamp(row):>{self._stamp_width}} {gap}"
         pieces = [(begin, _DIM), (counted + channel, ""), _ident(row), *self._data(row)]
         if self.meaning and row.decoded is not None:
@@ -113,19 +103,19 @@ class TraceLines:
     def _stamp(self, row: TraceRow) -> str:
         at_us = row.record.at_us
         match self.stamp:
-            case Stamp.DELTA:
-                return seconds_text(row.since_us or 0, 1)
-            case Stamp.ABSOLUTE:
-                return seconds_text(at_us, 1)
-            case Stamp.DATE:
-                return date_text(at_us)
+            case frames.Stamp.DELTA:
+                return frames.seconds_text(row.since_us or 0, 1)
+            case frames.Stamp.ABSOLUTE:
+                return frames.seconds_text(at_us, 1)
+            case frames.Stamp.DATE:
+                return frames.date_text(at_us)
             case _:
-                return seconds_text(at_us - self.origin_us, 1)
+                return frames.seconds_text(at_us - self.origin_us, 1)
 
     def _data(self, row: TraceRow) -> Iterator[tuple[str, str]]:
         record = row.record
-        if not isinstance(record, Record):
-            yield bytes_text(record.data), ""
+        if not isinstance(record, frames.Record):
+            yield frames.bytes_text(record.data), ""
             return
         frame = record.frame
         if isinstance(frame, CanFrame) and frame.remote:
@@ -150,9 +140,9 @@ def _cells(data: bytes, changed: int, bits: bool) -> Iterator[tuple[str, bool]]:
 def _ident(row: TraceRow) -> tuple[str, str]:
     record = row.record
     style = _SENT if record.sent else _HEAD
-    if not isinstance(record, Record):
-        return f"{ARROWS[record.sent]:<9} ", style
+    if not isinstance(record, frames.Record):
+        return f"{frames.ARROWS[record.sent]:<9} ", style
     frame = record.frame
     if isinstance(frame, ErrorFrame):
         return f"{'error':<9} ", _ERROR
-    return f"{ident_text(any_ident(frame)):<9} ", style
+    return f"{frames.ident_text(frames.any_ident(frame)):<9} ", style

@@ -27,27 +27,11 @@ from tickrig.host.canmon.model.check.rules import (
     parse_rules,
 )
 from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
-from tickrig.host.canmon.output.listening import (
-    Stopwatch,
-    bit_rate_of,
-    bit_rates_of,
-    listen,
-    patience_us,
-    report,
-    span_option,
-    take_blocks,
-    until_interrupted,
-)
+from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import AnySource, Source
-from tickrig.host.canmon.verbs.decode_options import (
-    decode_options,
-    decoder_of,
-    read_eds_files,
-    reopen_option,
-    source_command,
-)
+from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import PATH, Decorator, add_options
@@ -246,10 +230,10 @@ _NAMES: Final = frozenset(BusOptions.__dataclass_fields__)
 _MOST_AROUND: Final = 1_000
 
 
-@source_command(
+@decode_options.source_command(
     _rule_options,
-    decode_options,
-    span_option,
+    decode_options.decode_options,
+    listening.span_option,
     click.option(
         "--around",
         type=click.IntRange(0, _MOST_AROUND),
@@ -266,7 +250,7 @@ _MOST_AROUND: Final = 1_000
         type=click.Choice([Stamp.ABSOLUTE.value, Stamp.ZERO.value, Stamp.DATE.value]),
         help="Time: (a)bsolute, (z)ero at the first frame, (A)bsolute with date.",
     ),
-    reopen_option,
+    decode_options.reopen_option,
 )
 def command(  # noqa: PLR0913 - options
     *,
@@ -300,8 +284,8 @@ def command(  # noqa: PLR0913 - options
     rules = _read_rules([Path(word) for word in source if word.endswith(_RULE_FILE)], options)
     bus = BusOptions(**{name: options[name] for name in _NAMES})
     bit_rate = _bit_rate(rules, words, bus)
-    objects = read_eds_files(eds)
-    decoder = decoder_of(objects, dbc) if rules.expressions else None
+    objects = decode_options.read_eds_files(eds)
+    decoder = decode_options.decoder_of(objects, dbc) if rules.expressions else None
     heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
     kept = bool(report_path or sarif_path)
     shown = Stamp(stamp) if stamp else None
@@ -314,7 +298,7 @@ def command(  # noqa: PLR0913 - options
         frames.reopen()
     try:
         if not isinstance(frames, BlockLog):
-            rates = bit_rates_of(words, bus)
+            rates = listening.bit_rates_of(words, bus)
             held = DecodedCheck(rules, rates, decoder, around, heartbeats)
             _one_by_one(frames, words, held, verdict, span_us)
     finally:
@@ -325,7 +309,9 @@ def command(  # noqa: PLR0913 - options
     _write("--junit", report_path, junit, judged)
     _write("--sarif", sarif_path, _sarif, judged)
     said = verdict.doubts() if verdict.counts or not unjudged else []
-    report(frames, strict, [*said, verdict.summary()] if verdict.counts or not why else said)
+    listening.report(
+        frames, strict, [*said, verdict.summary()] if verdict.counts or not why else said
+    )
     if verdict.counts:
         click.get_current_context().exit(_BROKEN)
     if unjudged:
@@ -346,7 +332,7 @@ def _no_frame(source: AnySource[object], words: Sequence[str]) -> str:
 
 def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
     """Return the bit rate; Refused if a rule needs it and nobody names it."""
-    bit_rate = bit_rate_of(words, bus)
+    bit_rate = listening.bit_rate_of(words, bus)
     try:
         rules.load(bit_rate)
     except ValueError as error:
@@ -365,7 +351,7 @@ def _in_blocks(
             verdict.count(len(block), int(block.at_us[0]))
         verdict.take(checker.take(block))
 
-    if take_blocks(log, take):
+    if listening.take_blocks(log, take):
         verdict.take(checker.end(log.losses(), log.errors()))
         verdict.unjudged = checker.unjudged(log.without_errors)
         return log
@@ -380,7 +366,7 @@ def _one_by_one(
     verdict: FindingPrinter,
     span_us: int | None,
 ) -> None:
-    watch, has_clock = Stopwatch(), source.live and list(words) != [_STDIN]
+    watch, has_clock = listening.Stopwatch(), source.live and list(words) != [_STDIN]
 
     def take(records: Sequence[Record]) -> None:
         watch.take(records)
@@ -390,8 +376,8 @@ def _one_by_one(
         if not records and verdict.frames:
             verdict.take(held.wait(watch.now_us, has_clock))
 
-    with until_interrupted():
-        listen(source, take, span_us or patience_us(source, words))
+    with listening.until_interrupted():
+        listening.listen(source, take, span_us or listening.patience_us(source, words))
     lost, latest_us = source.losses(), watch.latest_us
     end_us = watch.now_us if source.live else latest_us
     errors, judged_us = source.errors(), end_us if has_clock else latest_us

@@ -15,14 +15,7 @@ from tickrig.host.canmon.output.printer import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.recording import LogFile, whole_log
 from tickrig.host.canmon.sources.file_source import PieceLog, piece_log
 from tickrig.host.canmon.sources.opening import open_source
-from tickrig.host.canmon.verbs.decode_options import (
-    decode_options,
-    explained,
-    filter_option,
-    make_decoder,
-    read_filter,
-    strict_option,
-)
+from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import INTERRUPTED
@@ -35,9 +28,9 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("source", nargs=-1, required=True)
 @click.argument("log", type=PATH)
-@filter_option
-@decode_options
-@strict_option
+@decode_options.filter_option
+@decode_options.decode_options
+@decode_options.strict_option
 def command(  # noqa: PLR0913 - options
     *,
     source: Sequence[str],
@@ -60,8 +53,8 @@ def command(  # noqa: PLR0913 - options
 
     {source}
     """  # noqa: D301 - click wants the backspace
-    chosen = read_filter(wanted)
-    decoder = None if chosen is None else make_decoder(eds, dbc)
+    chosen = decode_options.read_filter(wanted)
+    decoder = None if chosen is None else decode_options.make_decoder(eds, dbc)
     meaning, pieces = (
         FilteredDecoder(decoder, chosen),
         piece_log(source) if chosen is None else None,
@@ -97,4 +90,4 @@ def _pass_pieces(
             take([(record, None) for record in records(piece)], log.lost, log.marks)
 
 
-explained(command)
+decode_options.explained(command)

@@ -17,15 +17,8 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model.frames import DumpLines, Stamp
+from tickrig.host.canmon.output import printer
 from tickrig.host.canmon.output.listening import bit_rate_of, report, say_marks, until_interrupted
-from tickrig.host.canmon.output.printer import (
-    BlockPrinter,
-    DecodedFrame,
-    DumpFormat,
-    FilteredDecoder,
-    StdoutWriter,
-    printer_of,
-)
 from tickrig.host.canmon.output.recording import (
     NAMES,
     RecordingOptions,
@@ -35,14 +28,7 @@ from tickrig.host.canmon.output.recording import (
 from tickrig.host.canmon.sources.file_source import PieceLog, piece_log
 from tickrig.host.canmon.sources.opening import open_any
 from tickrig.host.canmon.sources.source import AnySource, LineSpec, parse_source
-from tickrig.host.canmon.verbs.decode_options import (
-    decode_options,
-    filter_option,
-    make_decoder,
-    read_filter,
-    reopen_option,
-    source_command,
-)
+from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused
 from tickrig.host.cli.options import PATH, add_options
@@ -106,7 +92,7 @@ class TriggerKeys:
 
 _POLL_US: Final = 100_000
 
-_Take = Callable[[list[DecodedFrame], int, "Sequence[Mark]"], bool]
+_Take = Callable[[list[printer.DecodedFrame], int, "Sequence[Mark]"], bool]
 """Takes frames, how many were lost so far, and what happened behind them; says when to end."""
 
 _shown: Final = add_options(
@@ -127,7 +113,7 @@ _shown: Final = add_options(
     ),
 )
 _ending: Final = add_options(
-    reopen_option,
+    decode_options.reopen_option,
     click.option("-n", "count", type=click.IntRange(1), metavar="N", help="End after N frames."),
     click.option(
         "-T", "quiet_ms", type=click.IntRange(1), metavar="MS", help="End after MS without a frame."
@@ -135,11 +121,11 @@ _ending: Final = add_options(
 )
 
 
-@source_command(
+@decode_options.source_command(
     _shown,
     recording_options,
-    filter_option,
-    decode_options,
+    decode_options.filter_option,
+    decode_options.decode_options,
     _ending,
 )
 def command(  # noqa: PLR0913 - options
@@ -187,25 +173,31 @@ def command(  # noqa: PLR0913 - options
     given = {name: options.pop(name) for name in NAMES}
     if file is None and (named := next((name for name in NAMES if given[name]), "")):
         raise Refused(f"--{named.replace('_', '-')} goes with -l FILE")
-    if (file is not None or output == DumpFormat.LOG) and any(map(_is_line, source)):
+    if (file is not None or output == printer.DumpFormat.LOG) and any(map(_is_line, source)):
         raise Refused(
             "a log holds frames alone: a serial port is shown, or goes into --jsonl, --csv"
         )
-    chosen, form, bus = read_filter(wanted), DumpFormat(output or ""), BusOptions(**options)
+    chosen, form, bus = (
+        decode_options.read_filter(wanted),
+        printer.DumpFormat(output or ""),
+        BusOptions(**options),
+    )
     recording = None if file is None else RecordingOptions(file, given, bit_rate_of(source, bus))
     decodes = recording is not None and recording.decodes
-    plain = (raw or form is DumpFormat.LOG or file is not None) and not decodes
-    decoder = None if plain and chosen is None else make_decoder(eds, dbc)
+    plain = (raw or form is printer.DumpFormat.LOG or file is not None) and not decodes
+    decoder = None if plain and chosen is None else decode_options.make_decoder(eds, dbc)
     kept = None
     if recording is not None and recording.triggers and chosen is not None:
         kept, chosen = filter_trigger(wanted or "", chosen), None  # triggers see all frames
-    meaning = FilteredDecoder(decoder, chosen)
+    meaning = printer.FilteredDecoder(decoder, chosen)
     lines = DumpLines(Stamp(stamp or ""), extra)
-    writer = StdoutWriter(printer_of(form, lines, plain, errors), form)
+    writer = printer.StdoutWriter(printer.printer_of(form, lines, plain, errors), form)
     take: _Take = writer.take
-    alike = form in (DumpFormat.TEXT, DumpFormat.LOG) and file is None and not errors
+    alike = (
+        form in (printer.DumpFormat.TEXT, printer.DumpFormat.LOG) and file is None and not errors
+    )
     if alike and chosen is None and count is None and (pieces := piece_log(source)):
-        _pass_pieces(pieces, meaning, writer, BlockPrinter(form, lines, decoder))
+        _pass_pieces(pieces, meaning, writer, printer.BlockPrinter(form, lines, decoder))
         report(pieces, strict)
         return
     with ExitStack() as held:
@@ -227,7 +219,10 @@ def command(  # noqa: PLR0913 - options
 
 
 def _pass_pieces(
-    log: PieceLog, meaning: FilteredDecoder, writer: StdoutWriter, blocks: BlockPrinter
+    log: PieceLog,
+    meaning: printer.FilteredDecoder,
+    writer: printer.StdoutWriter,
+    blocks: printer.BlockPrinter,
 ) -> None:
     """Print a large log, of which all frames are wanted."""
     with closing(log), until_interrupted(), until_unread():
@@ -241,7 +236,7 @@ def _pass_pieces(
 def _with_keys(log: LogFile, keys: TriggerKeys) -> _Take:
     """Return what takes frames and looks for keys."""
 
-    def take(decoded_frames: list[DecodedFrame], lost: int, marks: Sequence[Mark]) -> bool:
+    def take(decoded_frames: list[printer.DecodedFrame], lost: int, marks: Sequence[Mark]) -> bool:
         ended = log.take(decoded_frames, lost, marks)
         if why := keys.pressed():
             log.trigger(why)
@@ -256,7 +251,7 @@ def _is_line(word: str) -> bool:
 
 def pass_on(
     source: AnySource[AnyRecord],
-    meaning: FilteredDecoder,
+    meaning: printer.FilteredDecoder,
     take: _Take,
     count: int | None = None,
     quiet_ms: int | None = None,

@@ -13,14 +13,7 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.errors import SourceFailed
-from tickrig.host.canmon.model.logs.log_file import (
-    COMPRESSED,
-    TEXT,
-    LogError,
-    LogFormat,
-    LogFormatError,
-    log_format,
-)
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_reader import LogLines, read_log
 from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.cli.messages import Refused
@@ -48,7 +41,7 @@ class LogHead:
         tally: what was no frame at the beginning.
     """
 
-    kind: LogFormat
+    kind: log_file.LogFormat
     compressed: bool
     size_bytes: int
     frames: int | None
@@ -77,15 +70,15 @@ def read_head(path: Path) -> LogHead:
         OSError: the file cannot be read.
         LogError: it is not what its name says.
     """
-    kind, compressed = log_format(path), path.suffix.lower() == COMPRESSED
+    kind, compressed = log_file.log_format(path), path.suffix.lower() == log_file.COMPRESSED
     reader = read_log(path)
     head = list(islice(reader, _HEAD_FRAMES))
     whole = len(head) < _HEAD_FRAMES
     last_us = head[-1].at_us if whole and head else None
-    if not whole and kind in TEXT and not compressed:
+    if not whole and kind in log_file.TEXT and not compressed:
         last_us = None if reader.tally.shifted_us else _last_us(path)
-    if kind is LogFormat.CSV and reader.tally.without_errors:
-        kind = LogFormat.GVRET
+    if kind is log_file.LogFormat.CSV and reader.tally.without_errors:
+        kind = log_file.LogFormat.GVRET
     return LogHead(
         kind,
         compressed,
@@ -132,9 +125,9 @@ def command(log: Sequence[Path], jsonl: bool) -> None:
 def _head(path: Path) -> LogHead:
     try:
         return read_head(path)
-    except LogFormatError as error:
+    except log_file.LogFormatError as error:
         raise Refused(str(error)) from None
-    except LogError as error:
+    except log_file.LogError as error:
         raise SourceFailed(str(error)) from None
     except OSError as error:
         raise SourceFailed(f"{path}: {error.strerror or error}") from None

@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
-from tickrig.host.canmon.model.transmit import (
-    FrameFields,
-    PdoFrames,
-    TransmitRow,
-    parse_checksum,
-    parse_counter,
-)
+from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
@@ -82,17 +76,18 @@ def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame | FdFrame
             texts[-1] += f" {word}"
         else:
             texts.append(word)
-    named = PdoFrames(read_eds_files(eds))
+    named = transmit.PdoFrames(read_eds_files(eds))
     try:
         return [parse_sent(text) if "#" in text else named.frame(text) for text in texts]
     except (ValueError, WireError) as error:
         raise Refused(str(error)) from None
 
 
-def _fields(counters: Sequence[str], checksums: Sequence[str]) -> FrameFields:
+def _fields(counters: Sequence[str], checksums: Sequence[str]) -> transmit.FrameFields:
     try:
-        return FrameFields(
-            tuple(map(parse_counter, counters)), tuple(map(parse_checksum, checksums))
+        return transmit.FrameFields(
+            tuple(map(transmit.parse_counter, counters)),
+            tuple(map(transmit.parse_checksum, checksums)),
         )
     except ValueError as error:
         raise Refused(str(error)) from None
@@ -113,15 +108,15 @@ def _period_us(every: str | None, count: int | None) -> int:
 
 
 def _cyclic(
-    frames: Sequence[CanFrame | FdFrame], period_us: int, count: int, fields: FrameFields
-) -> list[TransmitRow]:
+    frames: Sequence[CanFrame | FdFrame], period_us: int, count: int, fields: transmit.FrameFields
+) -> list[transmit.TransmitRow]:
     try:
-        return [TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]
+        return [transmit.TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]
     except ValueError as error:
         raise Refused(str(error)) from None
 
 
-def _run(cyclic: Sequence[TransmitRow], out: Transmitter, quiet: bool) -> None:
+def _run(cyclic: Sequence[transmit.TransmitRow], out: Transmitter, quiet: bool) -> None:
     pace = Pace()
     while (due_us := min(one.due_us for one in cyclic)) < NEVER:
         pace.wait_until(due_us)

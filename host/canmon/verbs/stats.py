@@ -8,24 +8,10 @@ from typing import Any
 import click
 
 from tickrig.host.canmon.errors import until_unread
+from tickrig.host.canmon.model import statistics
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.statistics import (
-    bus_json,
-    bus_lines,
-    by_id,
-    by_node,
-    id_json,
-    node_json,
-    node_rows,
-)
 from tickrig.host.canmon.model.traffic import BitRates, Traffic, TrafficSnapshot
-from tickrig.host.canmon.output.listening import (
-    bit_rates_of,
-    count_blocks,
-    follow,
-    report,
-    span_option,
-)
+from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import Source
@@ -37,7 +23,7 @@ from tickrig.host.cli.can_options import BusOptions
     click.option(
         "--by", type=click.Choice(["id", "node"]), default="id", help="A row each (default: id)."
     ),
-    span_option,
+    listening.span_option,
     click.option("--jsonl", is_flag=True, help="One JSON object a row."),
 )
 def command(
@@ -64,9 +50,9 @@ def command(
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    rates = bit_rates_of(source, bus)
+    rates = listening.bit_rates_of(source, bus)
     log = block_log(source)
-    snapshot = count_blocks(log)
+    snapshot = listening.count_blocks(log)
     frames = (log if snapshot else None) or open_source(source, bus)
     try:
         if not isinstance(frames, BlockLog):
@@ -77,7 +63,7 @@ def command(
     with until_unread():
         for line in (_jsonl if jsonl else _tables)(snapshot, by, rates.nominal):
             click.echo(line)
-    report(frames, strict)
+    listening.report(frames, strict)
 
 
 def _one_by_one(
@@ -89,17 +75,17 @@ def _one_by_one(
         for record in records:
             traffic.take(record)
 
-    follow(source, words, take, span_us)
+    listening.follow(source, words, take, span_us)
     return traffic.snapshot()
 
 
 def _tables(snapshot: TrafficSnapshot, by: str, bit_rate: int | None) -> list[str]:
-    lines = [line for bus in snapshot.buses for line in bus_lines(bus, bit_rate)]
-    return [*lines, "", *(by_id if by == "id" else by_node)(snapshot)]
+    lines = [line for bus in snapshot.buses for line in statistics.bus_lines(bus, bit_rate)]
+    return [*lines, "", *(statistics.by_id if by == "id" else statistics.by_node)(snapshot)]
 
 
 def _jsonl(snapshot: TrafficSnapshot, by: str, bit_rate: int | None) -> list[str]:
-    lines = [bus_json(bus, bit_rate) for bus in snapshot.buses]
+    lines = [statistics.bus_json(bus, bit_rate) for bus in snapshot.buses]
     if by == "id":
-        return lines + [id_json(row) for row in snapshot.rows]
-    return lines + [node_json(row) for row in node_rows(snapshot.rows)]
+        return lines + [statistics.id_json(row) for row in snapshot.rows]
+    return lines + [statistics.node_json(row) for row in statistics.node_rows(snapshot.rows)]

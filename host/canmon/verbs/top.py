@@ -10,24 +10,11 @@ import click
 
 from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model.top_model import TopModel
-from tickrig.host.canmon.output.listening import (
-    bit_rates_of,
-    count_blocks,
-    follow,
-    report,
-    span_option,
-)
+from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.output.printer import FilteredDecoder
 from tickrig.host.canmon.sources.file_source import BlockLog, block_log
 from tickrig.host.canmon.sources.opening import open_any
-from tickrig.host.canmon.verbs.decode_options import (
-    decode_options,
-    filter_option,
-    make_decoder,
-    read_filter,
-    reopen_option,
-    source_command,
-)
+from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
 
 if TYPE_CHECKING:
@@ -36,12 +23,12 @@ if TYPE_CHECKING:
 _Take = Callable[["Sequence[AnyRecord]"], None]
 
 
-@source_command(
+@decode_options.source_command(
     click.option("-d", "--decode", is_flag=True, help="Show what frames mean instead of bytes."),
-    filter_option,
-    decode_options,
-    span_option,
-    reopen_option,
+    decode_options.filter_option,
+    decode_options.decode_options,
+    listening.span_option,
+    decode_options.reopen_option,
 )
 def command(  # noqa: PLR0913 - options
     *,
@@ -74,14 +61,17 @@ def command(  # noqa: PLR0913 - options
     {source}
     """  # noqa: D301 - click wants the backspace
     bus = BusOptions(**options)
-    chosen, model = read_filter(wanted), TopModel(bit_rates_of(source, bus))
+    chosen, model = (
+        decode_options.read_filter(wanted),
+        TopModel(listening.bit_rates_of(source, bus)),
+    )
     plain = not (decode or chosen or eds or dbc)
-    meaning = FilteredDecoder(None if plain else make_decoder(eds, dbc), chosen)
+    meaning = FilteredDecoder(None if plain else decode_options.make_decoder(eds, dbc), chosen)
     take: _Take = model.take
     if not plain:
         take = lambda records: model.take_decoded(meaning.take(records))  # noqa: E731
     log = block_log(source) if plain else None
-    snapshot = count_blocks(log)
+    snapshot = listening.count_blocks(log)
     model.press("d" if decode else "")
     frames = (log if snapshot else None) or open_any(source, bus)
     if reopen:
@@ -95,9 +85,9 @@ def command(  # noqa: PLR0913 - options
 
     try:
         if not isinstance(frames, BlockLog):
-            follow(frames, source, take, span_us, lines, press=model.press)
+            listening.follow(frames, source, take, span_us, lines, press=model.press)
         with until_unread():
             click.echo("\n".join(model.final(frames.lost, snapshot)))
     finally:
         frames.close()
-    report(frames, strict, meaning.messages())
+    listening.report(frames, strict, meaning.messages())

@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tickrig.host.canmon.output.listening import bit_rates_of, report
-from tickrig.host.canmon.verbs.decode_options import (
-    decode_options,
-    eds_paths,
-    read_eds_paths,
-    refusing_dbc,
-    reopen_option,
-    source_command,
-)
+from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, say
@@ -28,12 +21,12 @@ if TYPE_CHECKING:
     from tickrig.host.canmon.tui.app import MonitorApp
 
 
-@source_command(
+@decode_options.source_command(
     click.option(
         "-w", "--workspace", "path", type=PATH, metavar="FILE", help="Settings, kept in this file."
     ),
-    decode_options,
-    reopen_option,
+    decode_options.decode_options,
+    decode_options.reopen_option,
 )
 def command(  # noqa: PLR0913 - options
     *,
@@ -64,7 +57,10 @@ def command(  # noqa: PLR0913 - options
     {source}
     """  # noqa: D301 - click wants the backspace
     said = MonitorSetup(
-        source=tuple(source), options=BusOptions(**options), eds=eds_paths(eds), dbc=tuple(dbc)
+        source=tuple(source),
+        options=BusOptions(**options),
+        eds=decode_options.eds_paths(eds),
+        dbc=tuple(dbc),
     )
     monitor = _monitor(path, said)
     if not sys.stdout.isatty():
@@ -94,8 +90,8 @@ def _monitor(path: Path | None, said: MonitorSetup) -> MonitorApp:
     try:
         workspace = Workspace() if path is None else Workspace.read(path)
         setup = MonitorSetup.read(workspace).under(said)
-        objects = read_eds_paths(setup.eds)
-        with refusing_dbc():
+        objects = decode_options.read_eds_paths(setup.eds)
+        with decode_options.refusing_dbc():
             model = Model(objects, setup.dbc, *bit_rates_of(setup.source, setup.options))
         session = open_session(setup.source, setup.options, model)
         try:

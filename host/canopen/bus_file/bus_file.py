@@ -27,14 +27,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canopen.bus_file.bus_checks import (
-    check_cob_ids,
-    check_container,
-    check_defaults,
-    check_node_ids,
-    check_settings,
-    has_drivers,
-)
+from tickrig.host.canopen.bus_file import bus_checks
 from tickrig.host.canopen.bus_file.bus_values import BusDefaults, BusMaster, BusSlave, Identity
 from tickrig.host.canopen.bus_file.known_keys import MASTER, OPTIONS, check_keys
 from tickrig.host.canopen.bus_file.layout import Layout, read_layout
@@ -300,7 +293,7 @@ class _Reader:
         """Read them all."""
         master = None
         if self._layout.master is None:
-            rule = "no-master" if has_drivers(self._layout) else "slaves-only"
+            rule = "no-master" if bus_checks.has_drivers(self._layout) else "slaves-only"
             self._notes.note(rule, self._top, "", "it has no section master")
         else:
             master = _read_master(self._layout.master, self._options)
@@ -308,10 +301,10 @@ class _Reader:
         for name, node in self._layout.slaves.items():
             if (slave := self._slave(name, node, master)) is not None:
                 slaves[name] = slave
-        check_node_ids(self._layout, master, slaves)
-        check_cob_ids(self._notes, master, slaves)
-        check_container(self._notes, self._layout, slaves)
-        check_settings(self._layout, slaves)
+        bus_checks.check_node_ids(self._layout, master, slaves)
+        bus_checks.check_cob_ids(self._notes, master, slaves)
+        bus_checks.check_container(self._notes, self._layout, slaves)
+        bus_checks.check_settings(self._layout, slaves)
         return BusFile(self._path, self._options, master, slaves, self._notes.all)
 
     def _slave(self, name: str, node: BusFileSection, master: BusMaster | None) -> BusSlave | None:
@@ -326,7 +319,7 @@ class _Reader:
         count = len(self._notes)
         reader = SlaveReader(name, node, sheet, self._options, self._cob_ids)
         slave = reader.read()
-        check_defaults(self._layout, node, self._notes.since(count))
+        bus_checks.check_defaults(self._layout, node, self._notes.since(count))
         if master is not None:
             _watch_master(node, sheet, reader.writes, master)
         pdos = pdos_after(sheet, reader.writes)

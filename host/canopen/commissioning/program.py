@@ -9,29 +9,10 @@ from typing import Final, NoReturn, TypeVar
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.host.canopen.dialogue import Script, SdoFrame, SdoRequest
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
-from tickrig.host.canopen.master.boot_slave import (
-    BUSY,
-    CONTROL,
-    DATA,
-    FLASH_STATUS,
-    IDENTIFICATION,
-    LOOK_US,
-    STOP,
-)
+from tickrig.host.canopen.master import boot_slave
 from tickrig.host.canopen.sdo_transfer import download
+from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.sdo import Abort
-from tickrig.wire.canopen.sdo_frame import (
-    MAX_BLOCK_SIZE,
-    SEGMENT_BYTES,
-    AbortCode,
-    BlockAcknowledge,
-    BlockDownloadInitiateRequest,
-    BlockDownloadInitiateResponse,
-    BlockEnd,
-    BlockEnded,
-    BlockSegment,
-    crc16,
-)
 
 # SDO block download as a script (CiA 301, SDO block download).
 
@@ -61,35 +42,44 @@ def download_blocks(index: int, sub: int, data: bytes, on_progress: _OnProgress)
             one that does no block transfer.
         SdoTimeout: it does not answer.
     """
-    request = BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
+    request = sdo_frame.BlockDownloadInitiateRequest(index, sub, crc=True, size=len(data)).encode()
     first = SdoRequest(request, index, sub)
-    begun = yield from _request(first, BlockDownloadInitiateResponse)
-    block_size, total, taken, idle = begun.block_size, max(1, -(-len(data) // SEGMENT_BYTES)), 0, 0
+    begun = yield from _request(first, sdo_frame.BlockDownloadInitiateResponse)
+    block_size, total, taken, idle = (
+        begun.block_size,
+        max(1, -(-len(data) // sdo_frame.SEGMENT_BYTES)),
+        0,
+        0,
+    )
     while taken < total:
-        if not 1 <= block_size <= MAX_BLOCK_SIZE:
-            yield from _abort(index, sub, AbortCode.BLOCK_SIZE)
+        if not 1 <= block_size <= sdo_frame.MAX_BLOCK_SIZE:
+            yield from _abort(index, sub, sdo_frame.AbortCode.BLOCK_SIZE)
         count = min(block_size, total - taken)
         receipt = yield from _send_block(index, sub, data, taken, count)
         idle = 0 if receipt.ackseq else idle + 1
         if receipt.ackseq > count or idle == _MOST_IDLE:
-            yield from _abort(index, sub, AbortCode.SEQUENCE_NUMBER)
+            yield from _abort(index, sub, sdo_frame.AbortCode.SEQUENCE_NUMBER)
         taken, block_size = taken + receipt.ackseq, receipt.block_size
-        on_progress(min(taken * SEGMENT_BYTES, len(data)))
-    end = BlockEnd(total * SEGMENT_BYTES - len(data), crc16(data) if begun.crc else 0)
-    yield from _request(SdoRequest(end.encode(), index, sub, goes_on=True), BlockEnded)
+        on_progress(min(taken * sdo_frame.SEGMENT_BYTES, len(data)))
+    end = sdo_frame.BlockEnd(
+        total * sdo_frame.SEGMENT_BYTES - len(data), sdo_frame.crc16(data) if begun.crc else 0
+    )
+    yield from _request(SdoRequest(end.encode(), index, sub, goes_on=True), sdo_frame.BlockEnded)
 
 
 def _send_block(
     index: int, sub: int, data: bytes, first: int, count: int
-) -> Script[BlockAcknowledge]:
+) -> Script[sdo_frame.BlockAcknowledge]:
     """Send segments; return the receipt of the last of them."""
-    at = first * SEGMENT_BYTES
+    at = first * sdo_frame.SEGMENT_BYTES
     for seqno in range(1, count):
-        yield SdoFrame(bytes((seqno,)) + data[at : at + SEGMENT_BYTES])
-        at += SEGMENT_BYTES
-    last = BlockSegment(count, data[at : at + SEGMENT_BYTES], at + SEGMENT_BYTES >= len(data))
+        yield SdoFrame(bytes((seqno,)) + data[at : at + sdo_frame.SEGMENT_BYTES])
+        at += sdo_frame.SEGMENT_BYTES
+    last = sdo_frame.BlockSegment(
+        count, data[at : at + sdo_frame.SEGMENT_BYTES], at + sdo_frame.SEGMENT_BYTES >= len(data)
+    )
     request = SdoRequest(last.encode(), index, sub, goes_on=True)
-    return (yield from _request(request, BlockAcknowledge))
+    return (yield from _request(request, sdo_frame.BlockAcknowledge))
 
 
 def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
@@ -99,10 +89,10 @@ def _request(request: SdoRequest, kind: type[Answer]) -> Script[Answer]:
         return answer
     if isinstance(answer, Abort):
         raise SdoAborted(request.index, request.sub, answer.code)
-    return (yield from _abort(request.index, request.sub, AbortCode.COMMAND_SPECIFIER))
+    return (yield from _abort(request.index, request.sub, sdo_frame.AbortCode.COMMAND_SPECIFIER))
 
 
-def _abort(index: int, sub: int, code: AbortCode) -> Script[NoReturn]:
+def _abort(index: int, sub: int, code: sdo_frame.AbortCode) -> Script[NoReturn]:
     """End the transfer: the server has said what it may not."""
     yield SdoFrame(Abort(index, sub, code).encode())
     raise SdoAborted(index, sub, code)
@@ -134,7 +124,11 @@ _ERRORS: Final = {
 }
 """Of 1F57h, bits 1 to 7."""
 
-_AGAIN: Final = (AbortCode.CRC, AbortCode.SEQUENCE_NUMBER, AbortCode.TIMEOUT)
+_AGAIN: Final = (
+    sdo_frame.AbortCode.CRC,
+    sdo_frame.AbortCode.SEQUENCE_NUMBER,
+    sdo_frame.AbortCode.TIMEOUT,
+)
 """Aborts by which a transfer was disturbed, and not refused."""
 
 _Say = Callable[[str], object]
@@ -181,8 +175,12 @@ class Program:
 
     def status(self) -> ProgramStatus:
         """Read what the node says; SdoFailed if it has no 1F51h."""
-        control = self._read(CONTROL)
-        return ProgramStatus(control, self._optional(IDENTIFICATION), self._optional(FLASH_STATUS))
+        control = self._read(boot_slave.CONTROL)
+        return ProgramStatus(
+            control,
+            self._optional(boot_slave.IDENTIFICATION),
+            self._optional(boot_slave.FLASH_STATUS),
+        )
 
     def command(self, command: int) -> None:
         """Write program control; who stops or starts may reset before it has answered.
@@ -191,18 +189,18 @@ class Program:
             SdoAborted: the node refuses.
         """
         try:
-            self._write(CONTROL, bytes((command,)))
+            self._write(boot_slave.CONTROL, bytes((command,)))
         except SdoTimeout:
             if command == COMMANDS["clear"]:
                 raise
 
     def stop(self) -> None:
         """Stop it, unless it is; wait until it is."""
-        if self._read(CONTROL) == STOP:
+        if self._read(boot_slave.CONTROL) == boot_slave.STOP:
             self._say("it is stopped already")
             return
-        self.command(STOP)
-        self.await_control(STOP)
+        self.command(boot_slave.STOP)
+        self.await_control(boot_slave.STOP)
         self._say("stopped: the boot loader runs")
 
     def clear(self) -> None:
@@ -253,7 +251,7 @@ class Program:
         """Say whether the node answers at all; a frame or two may be lost."""
         for _ in range(_LOOKS):
             try:
-                self._read(CONTROL)
+                self._read(boot_slave.CONTROL)
             except SdoTimeout:
                 continue
             except SdoAborted:
@@ -262,11 +260,11 @@ class Program:
         return False
 
     def _transfer(self, data: bytes, on_progress: _OnProgress) -> None:
-        at = (DATA, self._number)
+        at = (boot_slave.DATA, self._number)
         try:
             self._bus.run(self._node_id, download_blocks(*at, data, on_progress), _ANSWER_US)
         except SdoAborted as error:
-            if error.code != AbortCode.COMMAND_SPECIFIER:
+            if error.code != sdo_frame.AbortCode.COMMAND_SPECIFIER:
                 raise
             self._say("the node does no block transfer: in segments")
             self._bus.run(self._node_id, download(*at, data), _ANSWER_US)
@@ -275,22 +273,24 @@ class Program:
     def await_control(self, wanted: int) -> None:
         """Wait until program control reads so; a node that resets does not answer meanwhile."""
         until_us = self._bus.now_us + _PATIENCE_US
-        while (control := self._optional(CONTROL)) != wanted:
+        while (control := self._optional(boot_slave.CONTROL)) != wanted:
             if self._bus.now_us >= until_us:
                 found = "not told" if control is None else _STATES.get(control, f"{control}")
                 raise ProgramFailed(
                     f"the program is not {_STATES[wanted]} after {_PATIENCE_US // 1_000_000} s:"
                     f" 1F51h:{self._number:02X} is {found}"
                 )
-            self._bus.gather(LOOK_US)
+            self._bus.gather(boot_slave.LOOK_US)
 
     def _await_flash(self, allowed: tuple[int, ...]) -> None:
         """Wait until the flash is ready; an error that is not allowed is raised."""
         until_us = self._bus.now_us + _PATIENCE_US
-        while (status := self._optional(FLASH_STATUS)) is not None and status & BUSY:
+        while (
+            status := self._optional(boot_slave.FLASH_STATUS)
+        ) is not None and status & boot_slave.BUSY:
             if self._bus.now_us >= until_us:
                 raise ProgramFailed(f"the flash is busy after {_PATIENCE_US // 1_000_000} s")
-            self._bus.gather(LOOK_US)
+            self._bus.gather(boot_slave.LOOK_US)
         if status is not None and status >> 1 & 0x7F not in allowed:
             raise ProgramFailed(f"1F57h:{self._number:02X} flash status: {_flash_text(status)}")
 
@@ -313,7 +313,7 @@ def _flash_text(status: int) -> str:
     >>> _flash_text(0), _flash_text(1), _flash_text(0x0A)
     ('no error', 'busy', 'flash write error')
     """
-    if status & BUSY:
+    if status & boot_slave.BUSY:
         return "busy"
     error = status >> 1 & 0x7F
     return _ERRORS.get(error, f"error {error}")

@@ -7,16 +7,7 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Final
 
-from tickrig.host.canopen.conform.check import (
-    Action,
-    Check,
-    Hold,
-    Level,
-    RefuseRead,
-    RefuseRewrite,
-    RefuseWrite,
-    Step,
-)
+from tickrig.host.canopen.conform import check
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
 from tickrig.wire.canopen.eds.eds_entry import COUNTS
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
@@ -55,7 +46,7 @@ _DRIVE_OBJECTS: Final = (0x6040, 0x6041)
 """Controlword and statusword: every drive has them."""
 
 
-def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[Check]:
+def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[check.Check]:
     """Give the check of 1000h, if the EDS says what it holds.
 
     Args:
@@ -72,8 +63,8 @@ def _profile_checks(device: EdsDevice, node_id: int) -> Iterator[Check]:
         names = ", ".join(f"{index:04X}h" for index in wanted)
         title = f"1000h: has the objects of the profile that it names: {names}"
         clause, steps = f"CiA 301 v4.2.0, 7.5.2.1; {source}", tuple(_reads(entries, wanted))
-        level = Level.READ_ONLY
-        yield Check("OD-1000.00-profile", "OD", title, clause, level, frozenset(), steps)
+        level = check.Level.READ_ONLY
+        yield check.Check("OD-1000.00-profile", "OD", title, clause, level, frozenset(), steps)
 
 
 def _wanted(number: int, present: set[int]) -> tuple[tuple[int, ...], str]:
@@ -90,11 +81,11 @@ def _wanted(number: int, present: set[int]) -> tuple[tuple[int, ...], str]:
 
 def _reads(
     entries: Mapping[tuple[int, int], EntryDescription], indices: Iterable[int]
-) -> Iterator[Step]:
+) -> Iterator[check.Step]:
     for index in indices:
         entry = entries.get((index, 0))
         kind = "UNSIGNED8" if index not in _DRIVE_OBJECTS else "UNSIGNED16"
-        yield Step(Hold((index, 0), entry.data_type.name if entry else kind))
+        yield check.Step(check.Hold((index, 0), entry.data_type.name if entry else kind))
 
 
 # Checks of every object that an EDS describes: readable and refused as it is declared.
@@ -141,7 +132,7 @@ class _Maker:
     def __init__(self, node_id: int, allow: Collection[int], never: Collection[int]) -> None:
         self._node_id, self._allow, self._never = node_id, allow, never
 
-    def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[Check]:
+    def of_entry(self, entry: EntryDescription, counts: bool) -> Iterator[check.Check]:
         """Make the checks of one entry; `counts` says whether it is the sub-index 0 of a record."""
         if entry.readable:
             constant = self._power_on(entry) if _is_constant(entry, counts) else None
@@ -158,7 +149,7 @@ class _Maker:
             if entry.writable and entry.data_type.is_integer:
                 yield from _of_limits(entry)
 
-    def _default(self, entry: EntryDescription) -> Iterator[Check]:
+    def _default(self, entry: EntryDescription) -> Iterator[check.Check]:
         """Compare what the bus may change with its default, in the communication area."""
         value = self._power_on(entry)
         if value is None or not entry.writable or entry.index not in _COMMUNICATION_AREA:
@@ -185,7 +176,7 @@ def object_checks(
     allow: Collection[int] = (),
     never: Collection[int] = (),
     may_choose: Callable[[str, str], bool] = lambda group, place: True,
-) -> tuple[Check, ...]:
+) -> tuple[check.Check, ...]:
     """Make the checks of all objects, sorted by index and sub-index.
 
     What is not described is read too: in every object the sub-indices between and behind
@@ -200,7 +191,7 @@ def object_checks(
         may_choose: whether a check of this group whose id goes on so is wanted; others may be left
             out, and the rest is the same.
     """
-    maker, checks = _Maker(node_id, allow, never), list[Check]()
+    maker, checks = _Maker(node_id, allow, never), list[check.Check]()
     entries = sorted(device.entries, key=attrgetter("key"))
     objects = [(index, list(rows)) for index, rows in groupby(entries, attrgetter("index"))]
     for number, (index, rows) in enumerate(objects):
@@ -223,19 +214,19 @@ def _check(  # noqa: PLR0913, PLR0917 - a check, by its parts
     suffix: str,
     title: str,
     source: str,
-    action: Action,
-    level: Level = Level.READ_ONLY,
+    action: check.Action,
+    level: check.Level = check.Level.READ_ONLY,
     choice: str = "",
-) -> Check:
+) -> check.Check:
     where = f"{entry.index:04X}.{entry.sub:02X}"
     name = f"{entry.index:04X}h:{entry.sub:02X} {entry.name}"
-    return Check(
+    return check.Check(
         *(f"OD-{where}-{suffix}", _GROUP, f"{name}: {title}", source, level),
-        *(frozenset(), (Step(action),), choice),
+        *(frozenset(), (check.Step(action),), choice),
     )
 
 
-def _holds(entry: EntryDescription, constant: str | None) -> Check:
+def _holds(entry: EntryDescription, constant: str | None) -> check.Check:
     """Make the check of what an entry holds."""
     action = _hold(entry, constant)
     title = f"holds {entry.data_type.name}"
@@ -244,29 +235,29 @@ def _holds(entry: EntryDescription, constant: str | None) -> Check:
     return _check(entry, "type", f"{title}, its DefaultValue", f"{_TYPES}; {_DEFAULTS}", action)
 
 
-def _hold(entry: EntryDescription, value: str | None) -> Hold:
+def _hold(entry: EntryDescription, value: str | None) -> check.Hold:
     """Make the step that reads an entry; a value is hexadecimal."""
     codes = _NO_VALUE_YET if _may_have_none(entry) else ()
     at, kind = (entry.index, entry.sub), entry.data_type.name
-    return Hold(at, kind, entry.low, entry.high, value, codes)
+    return check.Hold(at, kind, entry.low, entry.high, value, codes)
 
 
 def _refused(
     entry: EntryDescription, suffix: str, title: str, grow: int, codes: Sequence[str]
-) -> Check:
+) -> check.Check:
     """Make a check that writes what it has read, so many bytes longer: it must be refused."""
-    action = RefuseRewrite((entry.index, entry.sub), grow, _codes(entry, codes))
-    return _check(entry, suffix, title, _ABORTS, action, Level.COMMUNICATION)
+    action = check.RefuseRewrite((entry.index, entry.sub), grow, _codes(entry, codes))
+    return _check(entry, suffix, title, _ABORTS, action, check.Level.COMMUNICATION)
 
 
-def _of_sizes(entry: EntryDescription) -> Iterator[Check]:
+def _of_sizes(entry: EntryDescription) -> Iterator[check.Check]:
     if entry.size:
         yield _refused(entry, "long", "a byte too long: refused", 1, _TOO_LONG)
     if entry.size > 1:
         yield _refused(entry, "short", "a byte too short: refused", -1, _TOO_SHORT)
 
 
-def _of_limits(entry: EntryDescription) -> Iterator[Check]:
+def _of_limits(entry: EntryDescription) -> Iterator[check.Check]:
     """Write the numbers just outside of the limits, as far as the data type has them."""
     lowest, highest = entry.data_type.limits
     for suffix, limit, beyond, codes in (
@@ -277,8 +268,8 @@ def _of_limits(entry: EntryDescription) -> Iterator[Check]:
             data = (limit + beyond).to_bytes(entry.size, "little", signed=entry.signed)
             title = f"{limit + beyond} is beyond its limit {limit}: refused"
             at, refused = (entry.index, entry.sub), _codes(entry, codes)
-            action = RefuseWrite(at, data.hex().upper(), refused)
-            yield _check(entry, suffix, title, _ABORTS, action, Level.COMMUNICATION)
+            action = check.RefuseWrite(at, data.hex().upper(), refused)
+            yield _check(entry, suffix, title, _ABORTS, action, check.Level.COMMUNICATION)
 
 
 def _codes(entry: EntryDescription, codes: Sequence[str]) -> tuple[str, ...]:
@@ -286,35 +277,41 @@ def _codes(entry: EntryDescription, codes: Sequence[str]) -> tuple[str, ...]:
     return (*dict.fromkeys([*codes, *(_KEPT if entry.index in _IN_USE else ())]),)
 
 
-def _refuse_read(entry: EntryDescription) -> RefuseRead:
-    return RefuseRead((entry.index, entry.sub), _WRITE_ONLY)
+def _refuse_read(entry: EntryDescription) -> check.RefuseRead:
+    return check.RefuseRead((entry.index, entry.sub), _WRITE_ONLY)
 
 
-def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int]) -> Check:
+def _absent_subs(index: int, rows: list[EntryDescription], share: Collection[int]) -> check.Check:
     """Read sub-indices that are not described."""
     known = {row.sub for row in rows}
     behind = max(known) + 1
     asked = {*range(behind + 1), _HIGHEST_SUB - 1, *share} - known
     steps = [
-        Step(RefuseRead((index, sub), _ABSENT_SUB)) for sub in sorted(asked) if sub < _HIGHEST_SUB
+        check.Step(check.RefuseRead((index, sub), _ABSENT_SUB))
+        for sub in sorted(asked)
+        if sub < _HIGHEST_SUB
     ]
     if _HIGHEST_SUB not in known:
-        structure = Hold((index, _HIGHEST_SUB), "UNSIGNED32", codes=_ABSENT_SUB)
-        steps.append(Step(structure))
+        structure = check.Hold((index, _HIGHEST_SUB), "UNSIGNED32", codes=_ABSENT_SUB)
+        steps.append(check.Step(structure))
     name = rows[0].name if len(rows) == 1 else "its sub-indices"
     title = f"{index:04X}h {name}: has no sub-index that is not described"
-    level, source = Level.READ_ONLY, _ABORTS
-    return Check(f"OD-{index:04X}-subs", _GROUP, title, source, level, frozenset(), tuple(steps))
+    level, source = check.Level.READ_ONLY, _ABORTS
+    return check.Check(
+        f"OD-{index:04X}-subs", _GROUP, title, source, level, frozenset(), tuple(steps)
+    )
 
 
-def _absent_objects(indices: Collection[int]) -> Check:
+def _absent_objects(indices: Collection[int]) -> check.Check:
     """Read what is behind each row of objects, and in each area the last."""
     ends = (0x1FFF, 0x5FFF, 0x9FFF, 0xFFFF)
     behind = {index + 1 for index in indices if index < 0xFFFF} | set(ends)
     asked = sorted(behind - set(indices) - set(_DATA_TYPES))
-    steps = tuple(Step(RefuseRead((index, 0), _ABSENT_OBJECT)) for index in asked)
+    steps = tuple(check.Step(check.RefuseRead((index, 0), _ABSENT_OBJECT)) for index in asked)
     title = "objects that are not described are not there"
-    return Check("OD-absent", _GROUP, title, _ABORTS, Level.READ_ONLY, frozenset(), steps)
+    return check.Check(
+        "OD-absent", _GROUP, title, _ABORTS, check.Level.READ_ONLY, frozenset(), steps
+    )
 
 
 def _is_constant(entry: EntryDescription, counts: bool) -> bool:

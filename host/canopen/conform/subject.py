@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.host.canopen.conform import check
 from tickrig.host.canopen.conform.binding.binding import (
     Binding,
     Bound,
@@ -17,15 +18,6 @@ from tickrig.host.canopen.conform.binding.binding import (
 from tickrig.host.canopen.conform.binding.capabilities import EdsClaims, NodeFeatures, find_features
 from tickrig.host.canopen.conform.binding.pdo_binding import CARRIED, RPDOS, BoundPdo
 from tickrig.host.canopen.conform.bus.sdo import SdoClient, SizeOf, multiplexer
-from tickrig.host.canopen.conform.check import (
-    Address,
-    ConformancePlan,
-    Level,
-    Macro,
-    RefuseWrite,
-    Step,
-    Write,
-)
 from tickrig.host.canopen.conform.notation import MAP, BoundCheck, Unbound, written_by
 from tickrig.host.canopen.conform.permission import MANUFACTURER, PROFILE, PROGRAMS, STORAGE
 from tickrig.host.canopen.errors import SdoFailed
@@ -205,7 +197,7 @@ class NodeNames:
             raise Unbound(name, f"nothing is there that has a {attribute}")
         return _sample_value(name, attribute, bound)
 
-    def address(self, name: str) -> Address:
+    def address(self, name: str) -> check.Address:
         """Return index and sub-index of an object."""
         if name in self._texts:
             raise Unbound(name, "is a number, not an object")
@@ -348,9 +340,9 @@ class Subject:
     features: NodeFeatures
     names: NodeNames
     about: dict[str, str]
-    has: frozenset[Address]
-    values: frozenset[Address]
-    refused: frozenset[Address]
+    has: frozenset[check.Address]
+    values: frozenset[check.Address]
+    refused: frozenset[check.Address]
 
     def missing(self, bound: BoundCheck) -> str | None:
         """Return why not all that a check uses can be used: what is not there; None if all is.
@@ -365,7 +357,7 @@ class Subject:
                 return f"{self._where(at[0])} {where}"
         return None
 
-    def fixed(self, steps: Collection[Step]) -> str | None:
+    def fixed(self, steps: Collection[check.Step]) -> str | None:
         """Return why not all that is written takes its value: CiA 301 lets it be constant.
 
         None if all does.
@@ -375,7 +367,7 @@ class Subject:
                 entry = self.entries.get(at)
                 if entry is not None and not entry.writable:
                     return f"{at[0]:04X}h:{at[1]:02X} is read-only"
-            if not isinstance(step.action, Write):
+            if not isinstance(step.action, check.Write):
                 continue
             entry = self.entries.get(step.action.address)
             if entry is not None and not _within(entry, bytes.fromhex(step.action.data)):
@@ -384,7 +376,7 @@ class Subject:
         return None
 
     @property
-    def entries(self) -> Mapping[Address, EntryDescription]:
+    def entries(self) -> Mapping[check.Address, EntryDescription]:
         """The descriptions of its objects."""
         return self.binding.entries
 
@@ -395,9 +387,9 @@ class Subject:
         asked = _COMMUNICATION <= index < MANUFACTURER
         return "the node has no" if asked else "without an EDS nobody knows of any"
 
-    def restorable(self, level: Level) -> Iterator[Address]:
+    def restorable(self, level: check.Level) -> Iterator[check.Address]:
         """Yield objects that a run may change, be it by a reset: read before, written after."""
-        highest = PROFILE if level is Level.INTRUSIVE else MANUFACTURER
+        highest = PROFILE if level is check.Level.INTRUSIVE else MANUFACTURER
         for entry in self.binding.device.entries:
             inside = _COMMUNICATION <= entry.index < highest and entry.index not in PROGRAMS
             value = entry.data_type is not DataType.DOMAIN and entry.index not in STORAGE
@@ -405,14 +397,14 @@ class Subject:
                 yield entry.index, entry.sub
 
 
-def _takes(step: Step) -> Iterator[Address]:
+def _takes(step: check.Step) -> Iterator[check.Address]:
     """Yield what a step writes, and the node shall take, or refuse for what it is."""
     match step.action:
-        case Write() as action:
+        case check.Write() as action:
             yield action.address
-        case RefuseWrite(_, _, codes) as action if _READ_ONLY not in codes:
+        case check.RefuseWrite(_, _, codes) as action if _READ_ONLY not in codes:
             yield action.address  # another reason is asked for
-        case Macro(name, words) if name == MAP:
+        case check.Macro(name, words) if name == MAP:
             yield from written_by(name, *words)
 
 
@@ -427,7 +419,7 @@ def _within(entry: EntryDescription, data: bytes) -> bool:
 def examine(  # noqa: PLR0913, PLR0917 - all that is known
     client: SdoClient,
     node_id: int,
-    plan: ConformancePlan,
+    plan: check.ConformancePlan,
     device: EdsDevice | None,
     claims: EdsClaims | None,
     others: Collection[int],

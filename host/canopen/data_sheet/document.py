@@ -8,15 +8,8 @@ from functools import cached_property
 from typing import Final
 
 from tickrig.host.canopen.data_sheet.rule import RULES, Edit, EditPlace, RuleFinding
+from tickrig.wire.canopen.eds import eds_file
 from tickrig.wire.canopen.eds.eds_device import read_device
-from tickrig.wire.canopen.eds.eds_file import (
-    CODE_PAGES,
-    UTF_8_MARK,
-    EdsFile,
-    decode_text,
-    encoding_of,
-    shorten,
-)
 from tickrig.wire.canopen.eds.eds_value import EdsLine
 from tickrig.wire.canopen.eds.object_table import EntryDescription
 
@@ -46,14 +39,14 @@ class Document:
     """
 
     def __init__(self, name: str, data: bytes, encoding: str = "") -> None:
-        coded = data.removeprefix(UTF_8_MARK)
+        coded = data.removeprefix(eds_file.UTF_8_MARK)
         self.name, self.data = name, data
-        self.encoding = encoding or encoding_of(coded)
+        self.encoding = encoding or eds_file.encoding_of(coded)
         text = coded.decode(self.encoding, self._lossless)
         self.has_bom = coded != data or text.startswith(_BOM)
         parts = _END.split(text.removeprefix(_BOM))
         self.texts, self.ends = parts[::2], [*parts[1::2], ""]
-        self.file = EdsFile(name, decode_text(data, self.encoding))
+        self.file = eds_file.EdsFile(name, eds_file.decode_text(data, self.encoding))
         self.device = read_device(self.file)
         self.rows = {(row.index, row.sub): row for row in self.device.entries}
         self._entries: dict[int, list[EntryDescription]] = {}
@@ -78,13 +71,13 @@ class Document:
     @property
     def is_unicode(self) -> bool:
         """Whether it is UTF-8, of which ASCII is a part, or UTF-16."""
-        return encoding_of(self.data) not in CODE_PAGES
+        return eds_file.encoding_of(self.data) not in eds_file.CODE_PAGES
 
     def letters(self, line: int) -> str:
         """Say what the first byte beyond ASCII of a line is in the encodings that it may have."""
         byte = next(letter for letter in self.texts[line - 1] if not letter.isascii())
         coded = byte.encode(self.encoding, "surrogateescape")
-        pages = dict.fromkeys((self.encoding, *CODE_PAGES))
+        pages = dict.fromkeys((self.encoding, *eds_file.CODE_PAGES))
         said = (f"{coded.decode(page, 'replace')!r} in {page}" for page in pages)
         return f"byte {coded.hex().upper()}h is {', '.join(said)}"
 
@@ -114,7 +107,7 @@ class Document:
         """
         number = line if isinstance(line, int) else self.file.line(section, line)
         kept = () if self.file.is_xml else edits
-        return RuleFinding(RULES[rule], self.name, number, shorten(section), text, kept)
+        return RuleFinding(RULES[rule], self.name, number, eds_file.shorten(section), text, kept)
 
     def changes(self, edits: Sequence[Edit]) -> bool:
         """Return whether edits would leave another file, in letters that its encoding has."""

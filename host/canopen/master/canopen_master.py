@@ -10,13 +10,7 @@ from typing import Any, Final, TypeVar, cast
 from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
 from tickrig.host.canopen.master.assignment import MasterPlan
 from tickrig.host.canopen.master.boot_slave import BootStep, state_text
-from tickrig.host.canopen.master.cia402.drive_driver import (
-    DriveDriver,
-    DriveNode,
-    axes_of,
-    is_drive,
-    period_us_of,
-)
+from tickrig.host.canopen.master.cia402 import drive_driver
 from tickrig.host.canopen.master.from_bus_file import plan_of
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.nmt_master import NmtMaster, ProcessData
@@ -73,7 +67,7 @@ class CanopenMaster(Closing):
             raise TypeError(f"a master needs a CAN bus, got {type(link).__name__}")
         self._link = cast(StampedLink, link)  # what has receive_stamped is one
         self.nmt = NmtMaster(plan)
-        self.joints = Named[DriveDriver]("joint", {})
+        self.joints = Named[drive_driver.DriveDriver]("joint", {})
         slaves = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
         self._by_name = Named("slave", slaves)
 
@@ -267,14 +261,14 @@ def _master_of(
     slaves = bus.slaves.values()
     images = {slave.node_id: ProcessImage(slave.pdos, master.nmt.send) for slave in slaves}
     drives = tuple(
-        DriveNode(
+        drive_driver.DriveNode(
             master.nmt.slaves[slave.node_id],
             images[slave.node_id],
-            axes_of(slave),
-            period_us_of(slave),
+            drive_driver.axes_of(slave),
+            drive_driver.period_us_of(slave),
         )
         for slave in slaves
-        if is_drive(slave)
+        if drive_driver.is_drive(slave)
     )
     master.attach(ProcessData(images, drives))
     return master

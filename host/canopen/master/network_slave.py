@@ -6,14 +6,8 @@ from collections.abc import Callable
 from typing import Final
 
 from tickrig.host.canopen.dialogue import QueuedScript, Send
+from tickrig.host.canopen.master import boot_slave
 from tickrig.host.canopen.master.assignment import MasterPlan, SlaveAssignment
-from tickrig.host.canopen.master.boot_slave import (
-    BootOutcome,
-    BootStatus,
-    BootStep,
-    SlaveBoot,
-    state_text,
-)
 from tickrig.host.canopen.network import ErrorControl, NodeSession
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID, NmtState
@@ -61,10 +55,10 @@ class NetworkSlave:
             request=lambda: guard(ERROR_CONTROL_COB_ID + assignment.node_id),
         )
         self._boot_time_us = plan.boot_time_us
-        self.outcome: BootOutcome | None = None
-        self.steps: list[tuple[int, BootStep]] = []
+        self.outcome: boot_slave.BootOutcome | None = None
+        self.steps: list[tuple[int, boot_slave.BootStep]] = []
         self.emergencies: list[int] = []
-        self.events: list[tuple[int, BootStep]] = []
+        self.events: list[tuple[int, boot_slave.BootStep]] = []
         self.booting, self.lost = False, 0
         self._now_us = self.began_us = 0
         self._again_us = NEVER
@@ -101,7 +95,7 @@ class NetworkSlave:
         state = self.state
         self.forget()
         self._now_us, self.session.state, self.booting, self.steps = now_us, state, True, []
-        script = SlaveBoot(self.assignment, self._note).script()
+        script = boot_slave.SlaveBoot(self.assignment, self._note).script()
         self.dialogue.start(now_us, QueuedScript("boot-up", script, self._end, self._never))
 
     def expect(self, state: NmtState) -> None:
@@ -147,20 +141,20 @@ class NetworkSlave:
             self._happened("boot-up", "heard", "booted anew")
         else:
             self._happened(
-                "heartbeat", state_text(state), "heard again, but not booted: no boot-up"
+                "heartbeat", boot_slave.state_text(state), "heard again, but not booted: no boot-up"
             )
 
     def _happened(self, request: str, answer: str, meaning: str) -> None:
-        self.events.append((self._now_us, BootStep(request, answer, meaning)))
+        self.events.append((self._now_us, boot_slave.BootStep(request, answer, meaning)))
 
-    def _note(self, step: BootStep) -> None:
+    def _note(self, step: boot_slave.BootStep) -> None:
         self.steps.append((self._now_us, step))
 
     def _never(self, failure: Exception) -> None:
         raise AssertionError("a boot-up says in its outcome what went wrong") from failure
 
-    def _end(self, outcome: BootOutcome) -> None:
-        if outcome.status is BootStatus.NO_ANSWER and self._may_try_again():
+    def _end(self, outcome: boot_slave.BootOutcome) -> None:
+        if outcome.status is boot_slave.BootStatus.NO_ANSWER and self._may_try_again():
             self._again_us = self._now_us + _AGAIN_US
             return
         self.booting, self.outcome = False, outcome

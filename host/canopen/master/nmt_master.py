@@ -14,13 +14,7 @@ from tickrig.host.canopen.network import state_of
 from tickrig.host.canopen.periodic_timer import PeriodicTimer
 from tickrig.host.links.link import StampedFrames
 from tickrig.wire.can import CanFrame, Frames, data_frame
-from tickrig.wire.canopen.nmt import (
-    ALL_NODES,
-    ERROR_CONTROL_COB_ID,
-    NMT_COB_ID,
-    NmtCommand,
-    NmtState,
-)
+from tickrig.wire.canopen import nmt
 from tickrig.wire.canopen.sdo_frame import RESPONSE_COB_ID
 from tickrig.wire.instant import NEVER
 
@@ -79,9 +73,9 @@ _FUNCTION: Final = 0x780
 """The bits of a CAN-ID that are no node-ID."""
 
 _COMMANDED: Final = {
-    NmtCommand.START: NmtState.OPERATIONAL,
-    NmtCommand.STOP: NmtState.STOPPED,
-    NmtCommand.ENTER_PRE_OPERATIONAL: NmtState.PRE_OPERATIONAL,
+    nmt.NmtCommand.START: nmt.NmtState.OPERATIONAL,
+    nmt.NmtCommand.STOP: nmt.NmtState.STOPPED,
+    nmt.NmtCommand.ENTER_PRE_OPERATIONAL: nmt.NmtState.PRE_OPERATIONAL,
 }
 
 
@@ -107,7 +101,7 @@ class NmtMaster:
     def __init__(self, plan: MasterPlan) -> None:
         self.plan, self._out = plan, list[CanFrame]()
         self.slaves = {slave.node_id: self._slave(slave) for slave in plan.slaves}
-        self.state, self.halted = NmtState.INITIALISING, False
+        self.state, self.halted = nmt.NmtState.INITIALISING, False
         self.strangers: list[int] = []
         self.process_data = ProcessData({})
         self._heartbeat, self._sync = PeriodicTimer(plan.heartbeat_us), PeriodicTimer(plan.sync_us)
@@ -119,7 +113,7 @@ class NmtMaster:
     @property
     def due_us(self) -> int:
         """When `tick` has something to do."""
-        if self._out or self.state is NmtState.INITIALISING:
+        if self._out or self.state is nmt.NmtState.INITIALISING:
             return self.now_us
         slaves = min((slave.due_us for slave in self.slaves.values()), default=NEVER)
         return min(slaves, self._heartbeat.due_us, self._sync.due_us, self.process_data.due_us)
@@ -127,7 +121,7 @@ class NmtMaster:
     def tick(self, now_us: int, rx: StampedFrames, /) -> Frames:
         """Take what was on the bus by now, do what is due; return what is to be sent."""
         self.now_us = now_us
-        if self.state is NmtState.INITIALISING:
+        if self.state is nmt.NmtState.INITIALISING:
             self._start_up()
         for at_us, frame in rx:
             self._hear(at_us, frame)
@@ -142,11 +136,11 @@ class NmtMaster:
         """Send a frame with this tick."""
         self._out.append(data_frame(can_id, data))
 
-    def command(self, command: NmtCommand, node_id: int = ALL_NODES) -> None:
+    def command(self, command: nmt.NmtCommand, node_id: int = nmt.ALL_NODES) -> None:
         """Send an NMT command, and expect of the slaves what it commands."""
-        self.send(NMT_COB_ID, bytes((command, node_id)))
+        self.send(nmt.NMT_COB_ID, bytes((command, node_id)))
         for slave in self.slaves.values():
-            if node_id in (ALL_NODES, slave.assignment.node_id) and command in _COMMANDED:
+            if node_id in (nmt.ALL_NODES, slave.assignment.node_id) and command in _COMMANDED:
                 slave.expect(_COMMANDED[command])
 
     def _guard(self, can_id: int) -> None:
@@ -154,8 +148,8 @@ class NmtMaster:
 
     def _start_up(self) -> None:
         """Boot oneself, reset the slaves, boot those that are not waited for."""
-        self.send(ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((NmtState.INITIALISING,)))
-        self.state = NmtState.PRE_OPERATIONAL
+        self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((nmt.NmtState.INITIALISING,)))
+        self.state = nmt.NmtState.PRE_OPERATIONAL
         self._heartbeat.start(self.now_us)
         self._sync.start(self.now_us)
         self._reset_slaves()
@@ -170,21 +164,21 @@ class NmtMaster:
         slaves = self.plan.slaves
         kept = {slave.node_id for slave in slaves if not slave.reset_communication}
         if not kept:
-            self.command(NmtCommand.RESET_COMMUNICATION)
+            self.command(nmt.NmtCommand.RESET_COMMUNICATION)
             return
         for node_id in _NODE_IDS:
             if node_id not in kept and node_id != self.plan.node_id:
-                self.command(NmtCommand.RESET_COMMUNICATION, node_id)
+                self.command(nmt.NmtCommand.RESET_COMMUNICATION, node_id)
 
     def _hear(self, at_us: int, frame: CanFrame) -> None:
         if frame.extended or frame.remote:
             return
         function, node_id = frame.can_id & _FUNCTION, frame.can_id & ~_FUNCTION
         slave = self.slaves.get(node_id)
-        if slave is not None and function in (ERROR_CONTROL_COB_ID, RESPONSE_COB_ID):
+        if slave is not None and function in (nmt.ERROR_CONTROL_COB_ID, RESPONSE_COB_ID):
             slave.receive(at_us, frame)
-        elif function == ERROR_CONTROL_COB_ID:
-            if node_id != self.plan.node_id and state_of(frame) is NmtState.INITIALISING:
+        elif function == nmt.ERROR_CONTROL_COB_ID:
+            if node_id != self.plan.node_id and state_of(frame) is nmt.NmtState.INITIALISING:
                 self.strangers.append(node_id)
         elif function == _EMCY_COB_ID and slave is not None:
             slave.emergencies.append(int.from_bytes(frame.data[:2], "little"))
@@ -195,19 +189,19 @@ class NmtMaster:
         """Start a slave that has booted, and go on if it was waited for."""
         assignment, outcome, plan = slave.assignment, slave.outcome, self.plan
         assert outcome is not None
-        alone = not plan.starts_all or self.state is NmtState.OPERATIONAL
+        alone = not plan.starts_all or self.state is nmt.NmtState.OPERATIONAL
         if outcome.status is BootStatus.BOOTED and assignment.boots and plan.starts_nodes and alone:
-            self.command(NmtCommand.START, assignment.node_id)
+            self.command(nmt.NmtCommand.START, assignment.node_id)
         self.halted |= assignment.mandatory and not outcome.status.good
         self._go_on()
 
     def _go_on(self) -> None:
         """Become Operational when no mandatory slave is waited for any more."""
         waits = any(slave.booting and slave.assignment.mandatory for slave in self._slaves())
-        if self.halted or waits or self.state is not NmtState.PRE_OPERATIONAL:
+        if self.halted or waits or self.state is not nmt.NmtState.PRE_OPERATIONAL:
             return
         if self.plan.starts:
-            self.state = NmtState.OPERATIONAL
+            self.state = nmt.NmtState.OPERATIONAL
             if self.plan.starts_all and self.plan.starts_nodes:
                 self._start_all()
 
@@ -215,34 +209,38 @@ class NmtMaster:
         """Start all at once if none has to be booted, else each that has booted, as Lely does."""
         slaves = self._slaves()
         if all(slave.good and not slave.assignment.boots for slave in slaves):
-            self.command(NmtCommand.START)
+            self.command(nmt.NmtCommand.START)
             return
         for slave in slaves:
-            if slave.assignment.boots and slave.good and slave.state is not NmtState.OPERATIONAL:
-                self.command(NmtCommand.START, slave.assignment.node_id)
+            if (
+                slave.assignment.boots
+                and slave.good
+                and slave.state is not nmt.NmtState.OPERATIONAL
+            ):
+                self.command(nmt.NmtCommand.START, slave.assignment.node_id)
 
     def _lose(self, slave: NetworkSlave) -> None:
         """Act on the loss of a slave as 1F80h says (CiA 302-2, error handling)."""
         mandatory = slave.assignment.mandatory
         if mandatory and self.plan.stops_all:
             slave.note_loss("all nodes are stopped")
-            self.command(NmtCommand.STOP)
-            self.state = NmtState.STOPPED
+            self.command(nmt.NmtCommand.STOP)
+            self.state = nmt.NmtState.STOPPED
         elif mandatory and self.plan.resets_all:
             slave.note_loss("all nodes are reset")
-            self.command(NmtCommand.RESET_NODE)
-            self.state, self.halted = NmtState.INITIALISING, False
+            self.command(nmt.NmtCommand.RESET_NODE)
+            self.state, self.halted = nmt.NmtState.INITIALISING, False
         else:
             slave.note_loss("reset node is sent, once")
-            self.command(NmtCommand.RESET_NODE, slave.assignment.node_id)
+            self.command(nmt.NmtCommand.RESET_NODE, slave.assignment.node_id)
 
     def _produce(self) -> bool:
         """Send heartbeat and SYNC when they are due, after a pause once; True after a SYNC."""
         if self._heartbeat.advance(self.now_us):
-            self.send(ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
+            self.send(nmt.ERROR_CONTROL_COB_ID + self.plan.node_id, bytes((self.state,)))
         if self._sync.advance(self.now_us):
             self.send(_SYNC_COB_ID, self._count())
-            if self.state is NmtState.OPERATIONAL:
+            if self.state is nmt.NmtState.OPERATIONAL:
                 self.process_data.sync()
             return True
         return False

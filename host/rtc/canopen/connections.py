@@ -5,14 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from tickrig.host.canopen.dialogue import Failure, QueuedScript
+from tickrig.host.rtc.canopen import definition
 from tickrig.host.rtc.canopen.boot import set_pdo
-from tickrig.host.rtc.canopen.definition import (
-    PdoEntry,
-    PdoLink,
-    PdoName,
-    RtConnection,
-    ServerRefused,
-)
 from tickrig.host.rtc.canopen.events import Notify, ServerEventType
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc.canopen.served_node import NodePhase, ServedNode
@@ -34,13 +28,15 @@ class PortConnections:
         wanted: those that have not been made.
     """
 
-    def __init__(self, manager: Manager, wanted: tuple[RtConnection, ...], notify: Notify) -> None:
+    def __init__(
+        self, manager: Manager, wanted: tuple[definition.RtConnection, ...], notify: Notify
+    ) -> None:
         self._manager, self._notify = manager, notify
         self.wanted = list(wanted)
         self._refused = set[str]()
 
     @property
-    def all(self) -> tuple[RtConnection, ...]:
+    def all(self) -> tuple[definition.RtConnection, ...]:
         """Those that are made, then those that are wanted."""
         made = (_entry(profile) for profile in self._manager.connectors)
         return (*made, *self.wanted)
@@ -80,7 +76,7 @@ class PortConnections:
             self._refused.add(text)
             self._notify(ServerEventType.CONNECTION_REFUSED, 0, text)
 
-    def _connect(self, entry: RtConnection) -> None:
+    def _connect(self, entry: definition.RtConnection) -> None:
         ends = f"{entry.source} to {entry.target}"
         try:
             self._manager.connect(entry.source, entry.target, entry.properties)
@@ -90,7 +86,7 @@ class PortConnections:
             self._notify(ServerEventType.CONNECTED, 0, ends)
 
 
-def are_there(manager: Manager, entry: RtConnection) -> bool:
+def are_there(manager: Manager, entry: definition.RtConnection) -> bool:
     """Say whether both components are there; RtcRefused if one that is has no such port."""
     names = {component.instance_name for component in manager.components}
     ends = [end for end in (entry.source, entry.target) if end.rpartition(".")[0] in names]
@@ -99,9 +95,9 @@ def are_there(manager: Manager, entry: RtConnection) -> bool:
     return len(ends) == 2
 
 
-def _entry(profile: ConnectorProfile) -> RtConnection:
+def _entry(profile: ConnectorProfile) -> definition.RtConnection:
     source, target = profile.ports
-    return RtConnection(source, target, dict(profile.properties))
+    return definition.RtConnection(source, target, dict(profile.properties))
 
 
 class PdoLinks:
@@ -117,25 +113,25 @@ class PdoLinks:
     """
 
     def __init__(
-        self, nodes: Mapping[int, ServedNode], links: tuple[PdoLink, ...], notify: Notify
+        self, nodes: Mapping[int, ServedNode], links: tuple[definition.PdoLink, ...], notify: Notify
     ) -> None:
         self._nodes, self._notify = nodes, notify
         self.links = list(links)
-        self._made: dict[PdoLink, int] = {}  # by which CAN-ID
+        self._made: dict[definition.PdoLink, int] = {}  # by which CAN-ID
 
-    def add(self, now_us: int, link: PdoLink) -> None:
+    def add(self, now_us: int, link: definition.PdoLink) -> None:
         """Want a link, and make it; ServerRefused if it cannot be now."""
         for other in self.links:
             if other.target == link.target:
-                raise ServerRefused(f"{other.source} and {other.target} are linked")
+                raise definition.ServerRefused(f"{other.source} and {other.target} are linked")
         self._check(link)
         self.links.append(link)
         self._make(now_us, link)
 
-    def remove(self, now_us: int, link: PdoLink) -> None:
+    def remove(self, now_us: int, link: definition.PdoLink) -> None:
         """Give the RPDO its own COB-ID again; ServerRefused if there is no such link."""
         if link not in self.links:
-            raise ServerRefused(f"{link.source} and {link.target} are not linked")
+            raise definition.ServerRefused(f"{link.source} and {link.target} are not linked")
         own = self.layout(link.target).cob_id
         self.links.remove(link)
         self._made.pop(link, None)
@@ -150,30 +146,30 @@ class PdoLinks:
             if node_id in ends and all(self._ready(end) for end in ends):
                 try:
                     self._check(link)
-                except ServerRefused as error:
+                except definition.ServerRefused as error:
                     self._notify(ServerEventType.LINK_REFUSED, link.target.node, str(error))
                 else:
                     self._make(now_us, link)
 
-    def layout(self, name: PdoName) -> PdoLayout:
+    def layout(self, name: definition.PdoName) -> PdoLayout:
         """Return a PDO of a node that is ready; ServerRefused if it has none."""
         if name.node not in self._nodes or not self._ready(name.node):
-            raise ServerRefused(f"node {name.node} is not ready")
+            raise definition.ServerRefused(f"node {name.node} is not ready")
         return find_layout(name, self._nodes[name.node].layouts)
 
     def _ready(self, node_id: int) -> bool:
         return self._nodes[node_id].phase is NodePhase.READY
 
-    def _check(self, link: PdoLink) -> None:
+    def _check(self, link: definition.PdoLink) -> None:
         check_lengths(link, self.layout(link.source), self.layout(link.target))
 
-    def _make(self, now_us: int, link: PdoLink) -> None:
+    def _make(self, now_us: int, link: definition.PdoLink) -> None:
         """Give the RPDO the COB-ID of the TPDO."""
         cob_id = self.layout(link.source).cob_id
         if self._made.get(link) != cob_id:
             self._write(now_us, link, cob_id, linked=True)
 
-    def _write(self, now_us: int, link: PdoLink, cob_id: int, *, linked: bool) -> None:
+    def _write(self, now_us: int, link: definition.PdoLink, cob_id: int, *, linked: bool) -> None:
         node, text = self._nodes[link.target.node], f"{link.source} to {link.target}"
 
         def done(_: None) -> None:
@@ -188,24 +184,24 @@ class PdoLinks:
         def failed(failure: Failure) -> None:
             self._notify(ServerEventType.LINK_REFUSED, node.entry.id, f"{text}: {failure}")
 
-        script = set_pdo(link.target.index, PdoEntry(cob_id=cob_id))
+        script = set_pdo(link.target.index, definition.PdoEntry(cob_id=cob_id))
         node.run(now_us, QueuedScript("link", script, done, failed, moves=False))
 
 
-def find_layout(name: PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
+def find_layout(name: definition.PdoName, layouts: Iterable[PdoLayout]) -> PdoLayout:
     """Return that of a PDO; ServerRefused if it is off."""
     for layout in layouts:
         if layout.index == name.index:
             return layout
-    raise ServerRefused(f"{name} is off, or not there")
+    raise definition.ServerRefused(f"{name} is off, or not there")
 
 
-def check_lengths(link: PdoLink, source: PdoLayout, target: PdoLayout) -> None:
+def check_lengths(link: definition.PdoLink, source: PdoLayout, target: PdoLayout) -> None:
     """Raise ServerRefused if the frame of one is not as long as that of the other.
 
     Dummy bits fill up an RPDO, and nothing the TPDO of the same Booleans.
     """
     if source.size != target.size:
-        raise ServerRefused(
+        raise definition.ServerRefused(
             f"{link.source} has {source.bits} bits, {link.target} has {target.bits}"
         )

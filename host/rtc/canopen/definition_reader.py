@@ -15,22 +15,7 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
-from tickrig.host.rtc.canopen.definition import (
-    PDO_COUNT,
-    BusEntry,
-    DefinitionError,
-    MasterEntry,
-    NodeEntry,
-    PdoEntry,
-    PdoLink,
-    PdoName,
-    Role,
-    RtConnection,
-    SdoEntry,
-    SdoPortEntry,
-    StartEntry,
-    SystemDefinition,
-)
+from tickrig.host.rtc.canopen import definition
 from tickrig.host.text.document import FilePlace, Item
 from tickrig.host.text.yaml_reader import read_yaml
 from tickrig.wire.canopen.pdo import MAX_PDO_BITS, MappedObject
@@ -45,16 +30,16 @@ def _compose(text: str) -> Item:
     tree, wrong = read_yaml(text, "")
     for one in wrong:
         if one.rule not in _OF_BUS_FILES:
-            raise DefinitionError(one.text, one.place.line)
+            raise definition.DefinitionError(one.text, one.place.line)
     if tree is None:
-        raise DefinitionError("the file is empty", 1)
+        raise definition.DefinitionError("the file is empty", 1)
     return tree
 
 
 def _refuse(where: Item | FilePlace, message: str) -> NoReturn:
     """Raise a DefinitionError with the line of a value, or of a key."""
     place = where.place if isinstance(where, Item) else where
-    raise DefinitionError(message, place.line)
+    raise definition.DefinitionError(message, place.line)
 
 
 def _read_table(
@@ -208,7 +193,7 @@ _NODE_PDO: Final = re.compile(r"([1-9][0-9]{0,2})\.([tr]pdo[1-9][0-9]{0,2})", re
 _PORT: Final = re.compile(r"[A-Za-z_]\w*\.\w+", re.ASCII)
 
 
-def read_definition(path: Path) -> SystemDefinition:
+def read_definition(path: Path) -> definition.SystemDefinition:
     """Read a System Definition.
 
     Raises:
@@ -218,12 +203,12 @@ def read_definition(path: Path) -> SystemDefinition:
     try:
         return parse_definition(path.read_text("utf-8"))
     except UnicodeDecodeError as error:
-        raise DefinitionError(f"{path}: byte {error.start} is not UTF-8") from error
+        raise definition.DefinitionError(f"{path}: byte {error.start} is not UTF-8") from error
     except ValueError as error:
-        raise DefinitionError(f"{path}: {error}") from error
+        raise definition.DefinitionError(f"{path}: {error}") from error
 
 
-def parse_definition(content: str) -> SystemDefinition:
+def parse_definition(content: str) -> definition.SystemDefinition:
     """Read a System Definition.
 
     Raises:
@@ -231,12 +216,12 @@ def parse_definition(content: str) -> SystemDefinition:
     """
     root = _compose(content)
     known = _children(root, "the file")
-    ids: dict[int, NodeEntry] = {}
+    ids: dict[int, definition.NodeEntry] = {}
     if "nodes" in known:  # first: the rest refers to them
         for node in _read_nodes(known["nodes"][1]):
             ids[node.id] = node
     values = _read_table(root, "the file", _fields(ids), ("nodes",))
-    return SystemDefinition(**{**values, "nodes": tuple(ids.values())})
+    return definition.SystemDefinition(**{**values, "nodes": tuple(ids.values())})
 
 
 def _fields(ids: Collection[int]) -> dict[str, _Reader]:
@@ -254,12 +239,12 @@ def _fields(ids: Collection[int]) -> dict[str, _Reader]:
     }
 
 
-def _bus(node: Item, place: str) -> BusEntry:
+def _bus(node: Item, place: str) -> definition.BusEntry:
     fields = {"channel": text, "interface": text, "bitrate": whole(1, 1_000_000)}
-    return BusEntry(**_read_table(node, place, fields))
+    return definition.BusEntry(**_read_table(node, place, fields))
 
 
-def _master(node: Item, place: str, ids: Collection[int]) -> MasterEntry:
+def _master(node: Item, place: str, ids: Collection[int]) -> definition.MasterEntry:
     fields: dict[str, _Reader] = {
         "node": _NODE_ID,
         "heartbeat_ms": _U16,
@@ -272,16 +257,16 @@ def _master(node: Item, place: str, ids: Collection[int]) -> MasterEntry:
     values = _read_table(node, place, fields)
     if "remove_ms" in values:
         values["remove_after_ms"] = values.pop("remove_ms")
-    master = MasterEntry(**values)
+    master = definition.MasterEntry(**values)
     if master.node in ids:
         _refuse(node, f"{place}: node {master.node} is one of the nodes")
     return master
 
 
-def _read_nodes(node: Item) -> tuple[NodeEntry, ...]:
+def _read_nodes(node: Item) -> tuple[definition.NodeEntry, ...]:
     seen: set[int | str] = set()
 
-    def read(node: Item, place: str) -> NodeEntry:
+    def read(node: Item, place: str) -> definition.NodeEntry:
         entry = _node(node, "a node")
         for word in (entry.id, entry.name):
             if word in seen:
@@ -289,17 +274,17 @@ def _read_nodes(node: Item) -> tuple[NodeEntry, ...]:
             seen.add(word)
         return entry
 
-    entries: tuple[NodeEntry, ...] = many(read)(node, "nodes")
+    entries: tuple[definition.NodeEntry, ...] = many(read)(node, "nodes")
     return entries
 
 
-def _node(node: Item, place: str) -> NodeEntry:
+def _node(node: Item, place: str) -> definition.NodeEntry:
     pdo = _matching(_PDO, "tpdo2")
     fields: dict[str, _Reader] = {
         "id": _NODE_ID,
         "name": _matching(_NAME, "Palette0"),
         "eds": text,
-        "role": _one_of(*Role),
+        "role": _one_of(*definition.Role),
         "heartbeat_ms": whole(1, 0xFFFF),
         "restart": _U16,
         "ports": _ports,
@@ -308,13 +293,13 @@ def _node(node: Item, place: str) -> NodeEntry:
     }
     values = _read_table(node, place, fields, ("id", "name", "eds"))
     if "role" in values:
-        values["role"] = Role(values["role"])
+        values["role"] = definition.Role(values["role"])
     for name in values.get("sdo_ports", ()):
         if name in values.get("ports", {}).values():
             _refuse(node, f"{place}: 2 ports are called {name}")
     for name in (*values.get("ports", ()), *values.get("pdos", ())):
         _check_number(node, place, name)
-    return NodeEntry(**values)
+    return definition.NodeEntry(**values)
 
 
 def _ports(node: Item, place: str) -> dict[str, str]:
@@ -325,7 +310,7 @@ def _ports(node: Item, place: str) -> dict[str, str]:
     return names
 
 
-def _pdo(node: Item, place: str) -> PdoEntry:
+def _pdo(node: Item, place: str) -> definition.PdoEntry:
     fields: dict[str, _Reader] = {
         "mapping": _mapping,
         "cob_id": whole(0x181, 0x6DF),
@@ -333,17 +318,17 @@ def _pdo(node: Item, place: str) -> PdoEntry:
         "inhibit_100us": _U16,
         "event_ms": _U16,
     }
-    return PdoEntry(**_read_table(node, place, fields))
+    return definition.PdoEntry(**_read_table(node, place, fields))
 
 
-def _sdo_port(node: Item, place: str) -> SdoPortEntry:
+def _sdo_port(node: Item, place: str) -> definition.SdoPortEntry:
     fields: dict[str, _Reader] = {
         "index": whole(0x1000, 0xFFFF),
         "direction": _one_of(*(item.value for item in PortDirection)),
         "type": _one_of(*PORT_TYPES),
     }
     values = _read_table(node, place, fields, ("index", "direction"))
-    return SdoPortEntry(**{**values, "direction": PortDirection(values["direction"])})
+    return definition.SdoPortEntry(**{**values, "direction": PortDirection(values["direction"])})
 
 
 def _mapping(node: Item, place: str) -> tuple[MappedObject, ...]:
@@ -354,7 +339,7 @@ def _mapping(node: Item, place: str) -> tuple[MappedObject, ...]:
     return mapped
 
 
-def _sdo(node: Item, place: str, ids: Collection[int]) -> SdoEntry:
+def _sdo(node: Item, place: str, ids: Collection[int]) -> definition.SdoEntry:
     fields: dict[str, _Reader] = {
         "node": _NODE_ID,
         "index": _U16,
@@ -362,7 +347,7 @@ def _sdo(node: Item, place: str, ids: Collection[int]) -> SdoEntry:
         "value": whole(-(1 << 63), (1 << 64) - 1),
         "size": whole(1, 8),
     }
-    entry = SdoEntry(**_read_table(node, place, fields, fields))
+    entry = definition.SdoEntry(**_read_table(node, place, fields, fields))
     _check_known(node, place, entry.node, ids)
     if entry.size not in _SIZES:
         _refuse(node, f"{place}: size {entry.size} is none of: 1, 2, 4, 8")
@@ -371,13 +356,13 @@ def _sdo(node: Item, place: str, ids: Collection[int]) -> SdoEntry:
     return entry
 
 
-def _link(node: Item, place: str, ids: Collection[int]) -> PdoLink:
-    def end(node: Item, place: str, kind: str) -> PdoName:
+def _link(node: Item, place: str, ids: Collection[int]) -> definition.PdoLink:
+    def end(node: Item, place: str, kind: str) -> definition.PdoName:
         match = _NODE_PDO.fullmatch(text(node, place))
         if match is None or match[2][:4] != kind:
             _refuse(node, f"{place}: {plain(node)!r} is not like 16.{kind}2")
         _check_number(node, place, match[2])
-        name = PdoName(int(match[1]), match[2])
+        name = definition.PdoName(int(match[1]), match[2])
         _check_known(node, place, name.node, ids)
         return name
 
@@ -386,30 +371,30 @@ def _link(node: Item, place: str, ids: Collection[int]) -> PdoLink:
         "to": lambda node, place: end(node, place, "rpdo"),
     }
     ends = _read_table(node, place, fields, fields)
-    return PdoLink(ends["from"], ends["to"])
+    return definition.PdoLink(ends["from"], ends["to"])
 
 
-def _rt_connection(node: Item, place: str) -> RtConnection:
+def _rt_connection(node: Item, place: str) -> definition.RtConnection:
     port = _matching(_PORT, "Palette0.ai")
     properties = mapping(text, text)
     fields: dict[str, _Reader] = {"from": port, "to": port, "properties": properties}
     values: dict[str, Any] = _read_table(node, place, fields, ("from", "to"))
-    return RtConnection(values["from"], values["to"], values.get("properties", {}))
+    return definition.RtConnection(values["from"], values["to"], values.get("properties", {}))
 
 
-def _start(node: Item, place: str, ids: Collection[int]) -> StartEntry:
+def _start(node: Item, place: str, ids: Collection[int]) -> definition.StartEntry:
     def known(node: Item, place: str) -> int:
         node_id: int = _NODE_ID(node, place)
         _check_known(node, place, node_id, ids)
         return node_id
 
     order = once(known, lambda node_id: f"node {node_id} is there")
-    return StartEntry(**table({"order": order, "autoactivate": _flag})(node, place))
+    return definition.StartEntry(**table({"order": order, "autoactivate": _flag})(node, place))
 
 
 def _check_number(node: Item, place: str, pdo: str) -> None:
-    if int(pdo[4:]) > PDO_COUNT:
-        _refuse(node, f"{place}: {pdo}, there are {PDO_COUNT} at most")
+    if int(pdo[4:]) > definition.PDO_COUNT:
+        _refuse(node, f"{place}: {pdo}, there are {definition.PDO_COUNT} at most")
 
 
 def _check_known(node: Item, place: str, node_id: int, ids: Collection[int]) -> None:

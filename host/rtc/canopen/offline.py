@@ -7,16 +7,9 @@ from collections.abc import Iterable, Iterator
 
 from tickrig.host.canopen.dialogue import SdoRequest, Step
 from tickrig.host.canopen.errors import SdoAborted
+from tickrig.host.rtc.canopen import definition
 from tickrig.host.rtc.canopen.boot import boot
 from tickrig.host.rtc.canopen.connections import are_there, check_lengths, find_layout
-from tickrig.host.rtc.canopen.definition import (
-    DeviceFile,
-    NodeEntry,
-    PdoLink,
-    PdoName,
-    SdoEntry,
-    ServerRefused,
-)
 from tickrig.host.rtc.canopen.pdo_layout import PdoLayout
 from tickrig.host.rtc.canopen.proxy import ProxyRtc, lay_out_sdo_ports
 from tickrig.host.rtc.canopen.server import RtcCanopenServer
@@ -24,24 +17,16 @@ from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.ports.data_port import InPort
 from tickrig.host.rtc.states import RtcRefused
 from tickrig.host.rtc.system.dot import Box, Edge, write_dot
+from tickrig.wire.canopen import sdo
 from tickrig.wire.canopen.nmt import CAN_ID_MASK
-from tickrig.wire.canopen.sdo import (
-    Abort,
-    DownloadInitiateRequest,
-    DownloadInitiateResponse,
-    DownloadSegmentResponse,
-    Response,
-    Segment,
-    UploadInitiateRequest,
-    UploadInitiateResponse,
-    parse_request,
-)
 from tickrig.wire.canopen.sdo_frame import AbortCode
 
 _Layouts = tuple[PdoLayout, ...]
 
 
-def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry]) -> _Layouts | None:
+def boot_offline(
+    entry: definition.NodeEntry, file: definition.DeviceFile, writes: Iterable[definition.SdoEntry]
+) -> _Layouts | None:
     """Return the PDOs that will be on, None where the EDS does not give the values."""
     values = dict(file.defaults)
     script = boot(entry, file, writes)
@@ -56,18 +41,18 @@ def boot_offline(entry: NodeEntry, file: DeviceFile, writes: Iterable[SdoEntry])
         return None
 
 
-def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> Response | None:
+def _answer(step: Step, values: dict[tuple[int, int], bytes]) -> sdo.Response | None:
     """Answer as a device that has these values, and takes any."""
-    match parse_request(step.request) if isinstance(step, SdoRequest) else None:
-        case UploadInitiateRequest(index=index, sub=sub):
+    match sdo.parse_request(step.request) if isinstance(step, SdoRequest) else None:
+        case sdo.UploadInitiateRequest(index=index, sub=sub):
             if (data := values.get((index, sub))) is None:
-                return Abort(index, sub, AbortCode.NO_OBJECT)
-            return UploadInitiateResponse(index, sub, data, len(data))
-        case DownloadInitiateRequest(index=index, sub=sub, data=data):
+                return sdo.Abort(index, sub, AbortCode.NO_OBJECT)
+            return sdo.UploadInitiateResponse(index, sub, data, len(data))
+        case sdo.DownloadInitiateRequest(index=index, sub=sub, data=data):
             values[index, sub] = data or b""
-            return DownloadInitiateResponse(index, sub)
-        case Segment(toggle=toggle):
-            return DownloadSegmentResponse(toggle)
+            return sdo.DownloadInitiateResponse(index, sub)
+        case sdo.Segment(toggle=toggle):
+            return sdo.DownloadSegmentResponse(toggle)
     return None
 
 
@@ -118,7 +103,7 @@ def _sent_twice(server: RtcCanopenServer, layouts: dict[int, _Layouts]) -> Itera
             yield f"pdos: {which} sent as {cob_id:03X}h; give each a cob_id of its own"
 
 
-def _link(link: PdoLink, layouts: dict[int, _Layouts]) -> Iterator[str]:
+def _link(link: definition.PdoLink, layouts: dict[int, _Layouts]) -> Iterator[str]:
     ends = [
         (name, layouts[name.node]) for name in (link.source, link.target) if name.node in layouts
     ]
@@ -126,7 +111,7 @@ def _link(link: PdoLink, layouts: dict[int, _Layouts]) -> Iterator[str]:
         found = [find_layout(name, on) for name, on in ends]
         if len(found) == 2:
             check_lengths(link, *found)
-    except ServerRefused as error:
+    except definition.ServerRefused as error:
         yield f"pdo_links: {error}"
 
 
@@ -148,7 +133,7 @@ def draw_graph(server: RtcCanopenServer) -> str:
     check_offline(server)
     entries = {node.id: node for node in server.definition.nodes}
 
-    def port(name: PdoName) -> str:
+    def port(name: definition.PdoName) -> str:
         entry = entries[name.node]
         return f"{entry.name}.{entry.ports.get(name.pdo, name.pdo)}"
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from tickrig.host.canopen import errors
 from tickrig.host.canopen.dialogue import (
     AwaitState,
     Dialogue,
@@ -14,13 +15,6 @@ from tickrig.host.canopen.dialogue import (
     Pause,
     QueuedScript,
     Script,
-)
-from tickrig.host.canopen.errors import (
-    SdoAborted,
-    SdoFailed,
-    SdoTimeout,
-    StateTimeout,
-    WrongIdentity,
 )
 from tickrig.host.canopen.sdo_transfer import download_number, upload_number
 from tickrig.host.rtc.canopen.definition import NodeEntry, Role
@@ -90,7 +84,7 @@ def _reset_drive(entry: NodeEntry) -> Script[None]:
         yield from download_number(_CONTROLWORD, 0, 0, 2)
         yield from download_number(_CONTROLWORD, 0, _FAULT_RESET, 2)
         yield Pause(_LOOK_US)
-    except (SdoFailed, StateTimeout):
+    except (errors.SdoFailed, errors.StateTimeout):
         pass
     yield from _reset_node(entry)
 
@@ -105,7 +99,9 @@ def _control(entry: NodeEntry, words: tuple[tuple[int, int], ...]) -> Script[Non
                 break
             yield Pause(_LOOK_US)
         else:
-            raise StateTimeout(f"statusword {statusword:04X}h after controlword {controlword:04X}h")
+            raise errors.StateTimeout(
+                f"statusword {statusword:04X}h after controlword {controlword:04X}h"
+            )
 
 
 _PLAIN: Final = LifeCycleScripts(_start, _enter_pre_operational, _reset_node)
@@ -347,11 +343,11 @@ class NodeOperations:
 def kind_of(failure: Failure) -> ServerEventType:
     """Return the event that a failure is."""
     match failure:
-        case WrongIdentity():
+        case errors.WrongIdentity():
             return ServerEventType.WRONG_IDENTITY
-        case SdoAborted():
+        case errors.SdoAborted():
             return ServerEventType.SDO_ABORTED
-        case SdoTimeout():
+        case errors.SdoTimeout():
             return ServerEventType.SDO_TIMEOUT
     return ServerEventType.NOT_CONFIRMED
 

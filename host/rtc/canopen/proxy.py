@@ -9,25 +9,13 @@ from typing import Any, Final, TypeVar
 
 from tickrig.host.canopen.dialogue import Script
 from tickrig.host.canopen.sdo_transfer import download, upload
+from tickrig.host.rtc.canopen import pdo_layout
 from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry
-from tickrig.host.rtc.canopen.pdo_layout import (
-    PORT_KINDS,
-    PdoField,
-    PdoLayout,
-    pdo_decoder,
-    sequence_of,
-)
 from tickrig.host.rtc.component import ExecutionContext, ModuleSpec, RtComponent
 from tickrig.host.rtc.ports.data_port import InPort, OutPort
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode
+from tickrig.wire import rtc_canopen
 from tickrig.wire.canopen.datatypes import DataType, Value
-from tickrig.wire.rtc_canopen import (
-    MOST_ELEMENTS,
-    WIDE_CHARACTER,
-    CanopenPortType,
-    PortDirection,
-    PortTransport,
-)
 from tickrig.wire.rtc_types.idl import Struct
 from tickrig.wire.rtc_types.rtc import Time
 
@@ -47,7 +35,7 @@ class PortShape:
         single: whether one port has all objects as a sequence.
     """
 
-    def __init__(self, layout: PdoLayout, name: str) -> None:
+    def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
         fields = layout.fields
         kinds = {field.type.one for field in fields}
         many = fields[0].type.many if len(kinds) == 1 and len(fields) > 1 else None
@@ -72,10 +60,10 @@ class PdoSource:
         ports: the OutPorts.
     """
 
-    def __init__(self, layout: PdoLayout, name: str) -> None:
+    def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
         shape = PortShape(layout, name)
         self.layout, self.size, self._single = layout, layout.size, shape.single
-        self._decode = pdo_decoder(layout)
+        self._decode = pdo_layout.pdo_decoder(layout)
         self.ports = tuple(
             OutPort[Any](port, kind) for port, kind in zip(shape.names, shape.types, strict=True)
         )
@@ -86,7 +74,7 @@ class PdoSource:
         if self._single:
             (port,) = self.ports
             if port.connectors:
-                port.write(sequence_of(port.data_type, tm, values))
+                port.write(pdo_layout.sequence_of(port.data_type, tm, values))
             return
         for port, value in zip(self.ports, values, strict=True):
             if port.connectors:
@@ -104,7 +92,7 @@ class PdoSink:
         linked: another device sends this PDO; nothing is sent from here.
     """
 
-    def __init__(self, layout: PdoLayout, name: str) -> None:
+    def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
         shape = PortShape(layout, name)
         self.layout, self._shape, self.linked = layout, shape, False
         self.ports = tuple(
@@ -146,7 +134,7 @@ class PdoSink:
         return encoded
 
 
-def _suffix(field: PdoField) -> str:
+def _suffix(field: pdo_layout.PdoField) -> str:
     return f"{field.mapped.index:04X}_{field.mapped.sub:02X}"
 
 
@@ -154,7 +142,7 @@ def _suffix(field: PdoField) -> str:
 
 T = TypeVar("T", bound=Struct)
 
-_TRANSPORT: Final = {"transport": PortTransport.SDO.value}
+_TRANSPORT: Final = {"transport": rtc_canopen.PortTransport.SDO.value}
 """What the profile of such a port says beside what all ports say."""
 
 
@@ -186,10 +174,10 @@ class SdoPortLayout:
     """
 
     name: str
-    direction: PortDirection
+    direction: rtc_canopen.PortDirection
     index: int
     subs: tuple[int, ...]
-    kind: CanopenPortType[Any]
+    kind: rtc_canopen.CanopenPortType[Any]
     struct: type[Struct]
 
     def read(self) -> Script[tuple[bytes, ...]]:
@@ -205,7 +193,7 @@ class SdoPortLayout:
         if not self.kind.element_bits:  # a string ends before the first 0, in C and in CORBA
             value = tuple(map(_text, value)) if self.kind.many else _text(value)
         kind: Any = self.struct
-        return sequence_of(kind, tm, value) if self.kind.many else kind(tm, value)
+        return pdo_layout.sequence_of(kind, tm, value) if self.kind.many else kind(tm, value)
 
     def write(self, elements: Sequence[bytes]) -> Script[None]:
         """Write all elements in their order; raises as `download`."""
@@ -279,14 +267,18 @@ def _lay_out(
 ) -> SdoPortLayout:
     subs: tuple[int, ...] = (0,)
     if (port.index, 1) in data_types:
-        subs = tuple(sub for sub in range(1, MOST_ELEMENTS + 1) if (port.index, sub) in data_types)
+        subs = tuple(
+            sub
+            for sub in range(1, rtc_canopen.MOST_ELEMENTS + 1)
+            if (port.index, sub) in data_types
+        )
     found = {data_types.get((port.index, sub)) for sub in subs}
     if found == {None}:
         raise ValueError(f"the EDS has no object {port.index:04X}h")
     data_type = found.pop()
     if found or data_type is None:
         raise ValueError(f"the elements of {port.index:04X}h have several data types")
-    for row, one, many in PORT_KINDS:
+    for row, one, many in pdo_layout.PORT_KINDS:
         if row.data_type == data_type and (port.type or _usual(row)) == row.name:
             if len(subs) == 1 and subs == (0,):
                 return SdoPortLayout(name, port.direction, port.index, subs, row, one)
@@ -296,9 +288,9 @@ def _lay_out(
     raise ValueError(f"{port.index:04X}h is {DataType(data_type).name} in the EDS, not {wanted}")
 
 
-def _usual(row: CanopenPortType[Any]) -> str:
+def _usual(row: rtc_canopen.CanopenPortType[Any]) -> str:
     """Return the name of a row that counts without `type`: a Unicode string is a text."""
-    return "" if row is WIDE_CHARACTER else row.name
+    return "" if row is rtc_canopen.WIDE_CHARACTER else row.name
 
 
 def _text(value: str) -> str:
@@ -352,7 +344,7 @@ class ProxyRtc(RtComponent):
     def __init__(
         self,
         entry: NodeEntry,
-        layouts: tuple[PdoLayout, ...],
+        layouts: tuple[pdo_layout.PdoLayout, ...],
         sdo_layouts: tuple[SdoPortLayout, ...] = (),
     ) -> None:
         super().__init__(entry.name)
@@ -368,7 +360,9 @@ class ProxyRtc(RtComponent):
         for sink in self.sinks:
             for in_ in sink.ports:
                 self.add_port(in_)
-        outs = [layout for layout in sdo_layouts if layout.direction is PortDirection.OUT]
+        outs = [
+            layout for layout in sdo_layouts if layout.direction is rtc_canopen.PortDirection.OUT
+        ]
         self.sdo_sources = tuple(map(SdoSource, outs))
         self.sdo_sinks = tuple(SdoSink(layout) for layout in sdo_layouts if layout not in outs)
         for read in self.sdo_sources:

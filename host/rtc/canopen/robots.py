@@ -10,14 +10,7 @@ from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, Retu
 from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, moved, wheel_speeds
 from tickrig.host.rtc.motion.ports import plausible, read_all, read_newest, to_pose_2d
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_types.rtc import (
-    Time,
-    TimedLong,
-    TimedPose2D,
-    TimedShort,
-    TimedVelocity2D,
-    Velocity2D,
-)
+from tickrig.wire.rtc_types import rtc
 
 # A joystick as an RT component.
 
@@ -38,7 +31,7 @@ class Joystick(RtComponent):
         bind = self.configuration.bind
         self.full_v = bind("full_v", 0.5, "x>0", unit="m/s")
         self.full_w = bind("full_w", 1.0, "x>0", unit="rad/s")
-        self.velocity = self.add_port(OutPort("velocity", TimedVelocity2D))
+        self.velocity = self.add_port(OutPort("velocity", rtc.TimedVelocity2D))
         self._forward_pct = self._left_pct = 0.0
 
     def tilt(self, forward_pct: float, left_pct: float = 0.0) -> None:
@@ -60,7 +53,9 @@ class Joystick(RtComponent):
         """Write where the stick is."""
         v = self._forward_pct / _FULL_PCT * self.full_v.value
         w = self._left_pct / _FULL_PCT * self.full_w.value
-        self.velocity.write(TimedVelocity2D(Time.from_us(ec.now_us), Velocity2D(v, 0.0, w)))
+        self.velocity.write(
+            rtc.TimedVelocity2D(rtc.Time.from_us(ec.now_us), rtc.Velocity2D(v, 0.0, w))
+        )
         return ReturnCode.RTC_OK
 
 
@@ -98,8 +93,8 @@ class WheeledBase(RtComponent, ABC):
         self.radius = bind("wheel_radius", radius_m, "x>0", unit="m")
         self.tread = bind("tread", tread_m, "x>0", unit="m")
         self.timeout = bind("timeout", 0.5, "x>0", unit="s")
-        self.velocity = self.add_port(InPort("velocity", TimedVelocity2D))
-        self.position = self.add_port(OutPort("pose", TimedPose2D))
+        self.velocity = self.add_port(InPort("velocity", rtc.TimedVelocity2D))
+        self.position = self.add_port(OutPort("pose", rtc.TimedPose2D))
         self.refused, self.pose, self._twist = 0, Pose(), Twist()
         self._received_us = self._executed_us = 0
 
@@ -109,7 +104,7 @@ class WheeledBase(RtComponent, ABC):
         """The speed that a wheel can be told, rad/s."""
 
     @abstractmethod
-    def command(self, tm: Time, left: float, right: float) -> None:
+    def command(self, tm: rtc.Time, left: float, right: float) -> None:
         """Tell the drives how fast the wheels of each side are to turn, rad/s."""
 
     @abstractmethod
@@ -129,7 +124,7 @@ class WheeledBase(RtComponent, ABC):
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
         """Stop the wheels."""
-        self.command(Time.from_us(ec.now_us), 0.0, 0.0)
+        self.command(rtc.Time.from_us(ec.now_us), 0.0, 0.0)
         return _OK
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
@@ -138,17 +133,17 @@ class WheeledBase(RtComponent, ABC):
             self._take(ec.now_us, message)
         if ec.now_us - self._received_us > 1e6 * self.timeout.value:
             self._twist = Twist()
-        tm, radius = Time.from_us(ec.now_us), self.radius.value
+        tm, radius = rtc.Time.from_us(ec.now_us), self.radius.value
         speeds = wheel_speeds(self._twist, self.tread.value, radius, radius)
         share = min(1.0, self.fastest / max(1e-9, *map(abs, speeds)))
         self.command(tm, speeds[0] * share, speeds[1] * share)
         left, right = self.turned((ec.now_us - self._executed_us) / 1e6)
         self._executed_us = ec.now_us
         self.pose = moved(self.pose, left * radius, right * radius, self.tread.value)
-        self.position.write(TimedPose2D(tm, to_pose_2d(self.pose)))
+        self.position.write(rtc.TimedPose2D(tm, to_pose_2d(self.pose)))
         return _OK
 
-    def _take(self, now_us: int, message: TimedVelocity2D) -> None:
+    def _take(self, now_us: int, message: rtc.TimedVelocity2D) -> None:
         vx, vy, va = message.data.vx, message.data.vy, message.data.va
         if vy == 0 and plausible(vx, va):
             self._twist, self._received_us = Twist(vx, va), now_us
@@ -183,10 +178,10 @@ class Beego(WheeledBase):
         self.gear = self.configuration.bind("gear", 51.0, "x>0")
         self.counts = self.configuration.bind("counts", 2_000, "x>0")  # a turn of the motor
         self.speeds = tuple(
-            self.add_port(OutPort(f"{side}_speed", TimedLong)) for side in ("left", "right")
+            self.add_port(OutPort(f"{side}_speed", rtc.TimedLong)) for side in ("left", "right")
         )
         self.positions = tuple(
-            self.add_port(InPort(f"{side}_position", TimedLong)) for side in ("left", "right")
+            self.add_port(InPort(f"{side}_position", rtc.TimedLong)) for side in ("left", "right")
         )
         self._counts: list[int | None] = [None, None]
 
@@ -202,10 +197,10 @@ class Beego(WheeledBase):
             port.clear()
         return super().on_activated(ec)
 
-    def command(self, tm: Time, left: float, right: float) -> None:
+    def command(self, tm: rtc.Time, left: float, right: float) -> None:
         """Write the speeds in rpm."""
         for port, speed in zip(self.speeds, (left, right), strict=True):
-            port.write(TimedLong(tm, round(speed * self.gear.value * 60 / tau)))
+            port.write(rtc.TimedLong(tm, round(speed * self.gear.value * 60 / tau)))
 
     def turned(self, since_s: float) -> tuple[float, float]:
         """Return how far the positions have moved."""
@@ -247,9 +242,11 @@ class FourX(WheeledBase):
         super().__init__(instance_name, radius_m=0.1, tread_m=0.4)
         self.full_scale = self.configuration.bind("full_scale", 360.0, "x>0", unit="deg/s")
         self.references = tuple(
-            self.add_port(OutPort(f"{wheel}_reference", TimedShort)) for wheel in WHEELS
+            self.add_port(OutPort(f"{wheel}_reference", rtc.TimedShort)) for wheel in WHEELS
         )
-        self.speeds = tuple(self.add_port(InPort(f"{wheel}_speed", TimedShort)) for wheel in WHEELS)
+        self.speeds = tuple(
+            self.add_port(InPort(f"{wheel}_speed", rtc.TimedShort)) for wheel in WHEELS
+        )
         self._latest = [0.0] * len(WHEELS)
 
     @property
@@ -264,10 +261,10 @@ class FourX(WheeledBase):
             port.clear()
         return super().on_activated(ec)
 
-    def command(self, tm: Time, left: float, right: float) -> None:
+    def command(self, tm: rtc.Time, left: float, right: float) -> None:
         """Write the references."""
         for port, speed in zip(self.references, (left, left, right, right), strict=True):
-            port.write(TimedShort(tm, round(speed / self.fastest * _FULL)))
+            port.write(rtc.TimedShort(tm, round(speed / self.fastest * _FULL)))
 
     def turned(self, since_s: float) -> tuple[float, float]:
         """Return how far the wheels turned at the speeds that were measured last, in the mean."""

@@ -54,23 +54,8 @@ from tickrig.host.rtc.component import ExecutionContext
 from tickrig.host.rtc.states import LifeCycleState, ReturnCode, RtcRefused
 from tickrig.host.rtc.system.manager import Manager
 from tickrig.wire.can import CanFrame, ErrorState, Frames
+from tickrig.wire.canopen import nmt, sdo
 from tickrig.wire.canopen.emcy import Emcy, EmcyCode, describe
-from tickrig.wire.canopen.nmt import (
-    ALL_NODES,
-    ERROR_CONTROL_COB_ID,
-    FLAG_30,
-    NMT_COB_ID,
-    NmtCommand,
-    NmtState,
-)
-from tickrig.wire.canopen.sdo import (
-    Abort,
-    DownloadInitiateRequest,
-    Request,
-    UploadInitiateRequest,
-    UploadInitiateResponse,
-    parse_request,
-)
 from tickrig.wire.canopen.sdo_frame import REQUEST_COB_ID, RESPONSE_COB_ID, AbortCode
 from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
@@ -119,7 +104,7 @@ class ServerObjects:
         self._table: Table = {
             (0x1000, 0): _u32(_DEVICE_TYPE),
             (0x1001, 0): bytes(1),
-            (0x1005, 0): _u32(_SYNC_COB_ID | bool(sync_ms) * FLAG_30),
+            (0x1005, 0): _u32(_SYNC_COB_ID | bool(sync_ms) * nmt.FLAG_30),
             (0x1006, 0): _u32(1_000 * sync_ms),
             **_array(0x1016, map(_u32, consumed)),
             (0x1017, 0): definition.master.heartbeat_ms.to_bytes(2, "little"),
@@ -130,25 +115,25 @@ class ServerObjects:
     def answer(self, data: bytes) -> bytes | None:
         """Return the answer to a request; None to an abort, and to what is no request."""
         try:
-            request = parse_request(data)
+            request = sdo.parse_request(data)
         except WireError:
             return None
-        return None if isinstance(request, Abort) else self._answer(request)
+        return None if isinstance(request, sdo.Abort) else self._answer(request)
 
-    def _answer(self, request: Request) -> bytes:
+    def _answer(self, request: sdo.Request) -> bytes:
         match request:
-            case UploadInitiateRequest(index=index, sub=sub):
+            case sdo.UploadInitiateRequest(index=index, sub=sub):
                 return self._upload(index, sub)
-            case DownloadInitiateRequest(index=index, sub=sub):
+            case sdo.DownloadInitiateRequest(index=index, sub=sub):
                 code = self._missing(index, sub) or AbortCode.READ_ONLY
-                return Abort(index, sub, code).encode()
-        return Abort(0, 0, AbortCode.COMMAND_SPECIFIER).encode()
+                return sdo.Abort(index, sub, code).encode()
+        return sdo.Abort(0, 0, AbortCode.COMMAND_SPECIFIER).encode()
 
     def _upload(self, index: int, sub: int) -> bytes:
         if (code := self._missing(index, sub)) is not None:
-            return Abort(index, sub, code).encode()
+            return sdo.Abort(index, sub, code).encode()
         value = self._table[index, sub]
-        return UploadInitiateResponse(index, sub, value, len(value)).encode()
+        return sdo.UploadInitiateResponse(index, sub, value, len(value)).encode()
 
     def _missing(self, index: int, sub: int) -> AbortCode | None:
         if index not in self._indices:
@@ -192,18 +177,18 @@ class FrameDispatcher:
         self._notify, self._send = server.notify, server.send
         self._objects = ServerObjects(definition)
         self._foreign_us: int | None = None
-        of_master = {ERROR_CONTROL_COB_ID + self._master_id, REQUEST_COB_ID + self._master_id}
+        of_master = {nmt.ERROR_CONTROL_COB_ID + self._master_id, REQUEST_COB_ID + self._master_id}
         of_nodes = {ids[n] for ids in (_EMERGENCY, _SDO_RESPONSES, _ERROR_CONTROL) for n in nodes}
-        self._accepted = frozenset({NMT_COB_ID} | of_master | of_nodes)
+        self._accepted = frozenset({nmt.NMT_COB_ID} | of_master | of_nodes)
 
     def receive(self, now_us: int, at_us: int, frame: CanFrame) -> None:
         """Take a data frame that was on the bus at a time."""
         can_id = frame.can_id
         if can_id not in self._accepted:
             return
-        if can_id == NMT_COB_ID:
+        if can_id == nmt.NMT_COB_ID:
             self._on_nmt_command(at_us, frame.data)
-        elif can_id == ERROR_CONTROL_COB_ID + self._master_id:
+        elif can_id == nmt.ERROR_CONTROL_COB_ID + self._master_id:
             self._on_master_heartbeat(at_us)
         elif can_id == REQUEST_COB_ID + self._master_id:
             self._on_sdo_request(frame.data)
@@ -222,13 +207,13 @@ class FrameDispatcher:
         if len(data) != 2:
             return
         command, node_id = data
-        known = command in tuple(NmtCommand)
-        text = NmtCommand(command).name if known else f"{command:02X}h"
+        known = command in tuple(nmt.NmtCommand)
+        text = nmt.NmtCommand(command).name if known else f"{command:02X}h"
         self._notify(
             ServerEventType.FOREIGN_COMMAND, node_id, text if node_id else f"{text} to all"
         )
         for node in self._nodes.values():
-            if node_id in (ALL_NODES, node.entry.id):
+            if node_id in (nmt.ALL_NODES, node.entry.id):
                 node.on_foreign_command(at_us, command)
 
     def _on_master_heartbeat(self, at_us: int) -> None:
@@ -333,7 +318,7 @@ class RtcCanopenServer:
         if self._sync.advance(now_us):
             self.send(_SYNC_COB_ID, b"")
         if self._heartbeat.advance(now_us):
-            self._error_control(NmtState.OPERATIONAL)
+            self._error_control(nmt.NmtState.OPERATIONAL)
         timers_us = min(self._heartbeat.due_us, self._sync.due_us)
         self.due_us = min(self._nodes_due_us, self.manager.due_us, timers_us)
         out, self._out = tuple(self._out), []
@@ -345,9 +330,9 @@ class RtcCanopenServer:
         for node in self.nodes.values():
             node.dialogue.clear()
             self.gone(node)
-            self._command(NmtCommand.RESET_COMMUNICATION, node.entry.id)
+            self._command(nmt.NmtCommand.RESET_COMMUNICATION, node.entry.id)
             if self.definition.master.leave == "stopped":
-                self._command(NmtCommand.STOP, node.entry.id)
+                self._command(nmt.NmtCommand.STOP, node.entry.id)
         out, self._out = tuple(self._out), []
         return out
 
@@ -420,7 +405,7 @@ class RtcCanopenServer:
         self.manager.tick(self.now_us)
         self.manager.add_context(self._context)
         self._context.start()
-        self._error_control(NmtState.INITIALISING)
+        self._error_control(nmt.NmtState.INITIALISING)
         self._heartbeat.start(self.now_us)
         self._sync.start(self.now_us)
         for node in self.nodes.values():
@@ -495,8 +480,8 @@ class RtcCanopenServer:
         if state is not LifeCycleState.ERROR:
             proxy.ready = False
 
-    def _error_control(self, state: NmtState) -> None:
-        self.send(ERROR_CONTROL_COB_ID + self.definition.master.node, bytes((state,)))
+    def _error_control(self, state: nmt.NmtState) -> None:
+        self.send(nmt.ERROR_CONTROL_COB_ID + self.definition.master.node, bytes((state,)))
 
-    def _command(self, command: NmtCommand, node_id: int) -> None:
-        self.send(NMT_COB_ID, bytes((command, node_id)))
+    def _command(self, command: nmt.NmtCommand, node_id: int) -> None:
+        self.send(nmt.NMT_COB_ID, bytes((command, node_id)))

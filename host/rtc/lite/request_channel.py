@@ -10,13 +10,7 @@ from typing import Final, Protocol
 from tickrig.host.links.link import Link, LinkError
 from tickrig.host.rtc.lite.events import PingMonitor
 from tickrig.host.text.log import log_of
-from tickrig.wire.rtc_lite.codes import (
-    FAULT_COMMANDS,
-    LiteCommand,
-    LiteLinkFault,
-    LiteState,
-    LiteStatus,
-)
+from tickrig.wire.rtc_lite import codes, messages
 from tickrig.wire.rtc_lite.frame import (
     REPLIES,
     WITH_STATE,
@@ -24,14 +18,6 @@ from tickrig.wire.rtc_lite.frame import (
     Framing,
     LiteDecoder,
     LiteFrame,
-)
-from tickrig.wire.rtc_lite.messages import (
-    LitePortData,
-    LitePortProfile,
-    LiteReply,
-    parse_port_data,
-    parse_port_profile,
-    parse_reply,
 )
 from tickrig.wire.rtc_lite.rtno import LETTERS, RtnoReplies, encode_request
 
@@ -108,7 +94,7 @@ class ReplyDecoder(Protocol):
     def clear(self) -> None:
         """Look for a header again."""
 
-    def push(self, data: bytes, /) -> list[LiteFrame | LiteLinkFault]:
+    def push(self, data: bytes, /) -> list[LiteFrame | codes.LiteLinkFault]:
         """Take bytes in; give frames and faults out."""
         ...
 
@@ -193,16 +179,16 @@ class RtnoLink(FrameLink):
 
     def send(self, frame: LiteFrame) -> None:
         """Send a request, or what stands for it."""
-        self._aborts = frame.command is LiteCommand.ABORT
-        if frame.command is LiteCommand.PING:
+        self._aborts = frame.command is codes.LiteCommand.ABORT
+        if frame.command is codes.LiteCommand.PING:
             self._ping = frame.data
-            super().send(LiteFrame(LiteCommand.STATE))
+            super().send(LiteFrame(codes.LiteCommand.STATE))
         elif self._aborts:
-            super().send(LiteFrame(LiteCommand.DEACTIVATE))
+            super().send(LiteFrame(codes.LiteCommand.DEACTIVATE))
         elif frame.command in LETTERS:
             super().send(frame)
         else:
-            self._made_up.append(LiteFrame(frame.command, bytes([LiteStatus.UNSUPPORTED])))
+            self._made_up.append(LiteFrame(frame.command, bytes([codes.LiteStatus.UNSUPPORTED])))
 
     def receive(self, timeout_us: int) -> list[LiteFrame] | None:
         """Wait for bytes, and return the frames that they complete; None if the line is gone."""
@@ -215,11 +201,11 @@ class RtnoLink(FrameLink):
         return made_up
 
     def _translate(self, frame: LiteFrame) -> list[LiteFrame]:
-        if frame.command is LiteCommand.STATE and self._ping:
+        if frame.command is codes.LiteCommand.STATE and self._ping:
             number, self._ping = self._ping, b""
-            return [frame, LiteFrame(LiteCommand.PING, bytes([LiteStatus.OK]) + number)]
-        if frame.command is LiteCommand.DEACTIVATE and self._aborts:
-            return [LiteFrame(LiteCommand.ABORT, frame.data)]
+            return [frame, LiteFrame(codes.LiteCommand.PING, bytes([codes.LiteStatus.OK]) + number)]
+        if frame.command is codes.LiteCommand.DEACTIVATE and self._aborts:
+            return [LiteFrame(codes.LiteCommand.ABORT, frame.data)]
         return [frame]
 
 
@@ -229,22 +215,22 @@ POLL_US: Final = 1_000
 _PROFILE_US: Final = 10_000_000
 """How long all frames of a profile may take (RTnoProxy)."""
 
-_FAULTS: Final = frozenset(FAULT_COMMANDS)
+_FAULTS: Final = frozenset(codes.FAULT_COMMANDS)
 """What stands in the place of a status when a device could not read a request."""
 
 RETRIES: Final = 3
 """For requests that may be repeated (DECISION L13)."""
 
 _MEANINGS: Final[Mapping[int, str]] = {
-    LiteStatus.ERROR: "x: a callback failed",
-    LiteStatus.WRONG_STATE: "H: wrong state",
-    LiteStatus.NO_IN_PORT: "F: no such in-port",
-    LiteStatus.NO_OUT_PORT: "D: no such out-port",
-    LiteStatus.EMPTY: "I: nothing new",
-    LiteStatus.UNSUPPORTED: "!: not supported",
-    LiteLinkFault.TIMEOUT: "FK: broken off",
-    LiteLinkFault.CHECKSUM: "FH: wrong checksum",
-    LiteLinkFault.UNKNOWN: "FU: unknown",
+    codes.LiteStatus.ERROR: "x: a callback failed",
+    codes.LiteStatus.WRONG_STATE: "H: wrong state",
+    codes.LiteStatus.NO_IN_PORT: "F: no such in-port",
+    codes.LiteStatus.NO_OUT_PORT: "D: no such out-port",
+    codes.LiteStatus.EMPTY: "I: nothing new",
+    codes.LiteStatus.UNSUPPORTED: "!: not supported",
+    codes.LiteLinkFault.TIMEOUT: "FK: broken off",
+    codes.LiteLinkFault.CHECKSUM: "FH: wrong checksum",
+    codes.LiteLinkFault.UNKNOWN: "FU: unknown",
 }
 
 _LOG: Final = log_of(__name__)
@@ -275,13 +261,13 @@ class RequestChannel:
     def __init__(self, link: Link[bytes], settings: ProxySettings) -> None:
         self._line, self._settings = _frames_over(link, settings), settings
         self.ping_monitor = PingMonitor(settings.ping_period_us, settings.reply_us, settings.pings)
-        self.state: LiteState | None = None
-        self.pushed: list[tuple[int, LitePortData]] = []
-        self.in_ports: list[LitePortProfile] = []
-        self.out_ports: list[LitePortProfile] = []
+        self.state: codes.LiteState | None = None
+        self.pushed: list[tuple[int, messages.LitePortData]] = []
+        self.in_ports: list[messages.LitePortProfile] = []
+        self.out_ports: list[messages.LitePortProfile] = []
         self.trouble = ""
-        self._reply: LiteReply | None = None
-        self._awaited: LiteCommand | None = None
+        self._reply: messages.LiteReply | None = None
+        self._awaited: codes.LiteCommand | None = None
         self._polled_us = self._deadline_us = link.now_us
 
     @property
@@ -311,7 +297,7 @@ class RequestChannel:
         if (number := self.ping_monitor.tick(now_us)) is not None:
             self._ping(number)
 
-    def request(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
+    def request(self, command: codes.LiteCommand, data: bytes = b"") -> messages.LiteReply | None:
         """Send a request and wait for its reply; None without one, or if nothing may be sent.
 
         A PING that has fallen due goes first.
@@ -327,7 +313,7 @@ class RequestChannel:
             self.ping_monitor.replied()
         return reply
 
-    def request_again(self, command: LiteCommand) -> LiteReply | None:
+    def request_again(self, command: codes.LiteCommand) -> messages.LiteReply | None:
         """Send a request until it is answered, 4 times at most; a missing reply has no effect.
 
         A fault is no answer: what was on the line before has spoilt the request.
@@ -341,7 +327,7 @@ class RequestChannel:
             reply = self._exchange(command)
         return reply
 
-    def send(self, command: LiteCommand, data: bytes = b"") -> None:
+    def send(self, command: codes.LiteCommand, data: bytes = b"") -> None:
         """Send a request and wait for nothing."""
         self._line.send(LiteFrame(command, data))
 
@@ -367,7 +353,7 @@ class RequestChannel:
         ping_monitor.let_go()
         return not (ping_monitor.awaiting or ping_monitor.doubted or ping_monitor.lost)
 
-    def _exchange(self, command: LiteCommand, data: bytes = b"") -> LiteReply | None:
+    def _exchange(self, command: codes.LiteCommand, data: bytes = b"") -> messages.LiteReply | None:
         """Send a request and wait for its reply."""
         self.poll()  # what nobody waits for any more
         self._awaited, self._reply = command, None
@@ -379,7 +365,7 @@ class RequestChannel:
         self._awaited = None
         return reply
 
-    def _await_reply(self) -> LiteReply | None:
+    def _await_reply(self) -> messages.LiteReply | None:
         limit_us = self.now_us + _PROFILE_US
         self._deadline_us = self.now_us + self._settings.reply_us
         while self._reply is None and self.now_us < min(self._deadline_us, limit_us):
@@ -389,14 +375,14 @@ class RequestChannel:
             self._receive(0)  # it may have come while this process was stopped
         return self._reply
 
-    def _trouble(self, command: LiteCommand, reply: LiteReply | None) -> str:
+    def _trouble(self, command: codes.LiteCommand, reply: messages.LiteReply | None) -> str:
         name = command.value.decode()
         if reply is None:
             return f"no reply to {name} within {self._settings.reply_us // 1_000} ms"
         return "" if reply.ok else f"{name} was answered {_MEANINGS.get(reply.status, reply)}"
 
     def _ping(self, number: int) -> None:
-        self.send(LiteCommand.PING, bytes([number]))
+        self.send(codes.LiteCommand.PING, bytes([number]))
 
     def _receive(self, timeout_us: int) -> bool:
         """Wait for bytes and take them; False if the line is gone."""
@@ -408,25 +394,27 @@ class RequestChannel:
     def _take(self, frame: LiteFrame) -> None:
         """Note what a frame says."""
         match frame.command:
-            case LiteCommand.DATA:
-                self.pushed.append((self.now_us, parse_port_data(frame.data)))
-            case LiteCommand.IN_PROFILE | LiteCommand.OUT_PROFILE:
+            case codes.LiteCommand.DATA:
+                self.pushed.append((self.now_us, messages.parse_port_data(frame.data)))
+            case codes.LiteCommand.IN_PROFILE | codes.LiteCommand.OUT_PROFILE:
                 self._take_profile(frame)
-            case command if command in FAULT_COMMANDS.values():
+            case command if command in codes.FAULT_COMMANDS.values():
                 if self._awaited is not None:
-                    self._reply = LiteReply(frame.data[0])  # no status, so nothing that is OK
+                    self._reply = messages.LiteReply(
+                        frame.data[0]
+                    )  # no status, so nothing that is OK
             case command:
-                self._take_reply(command, parse_reply(frame))
+                self._take_reply(command, messages.parse_reply(frame))
 
     def _take_profile(self, frame: LiteFrame) -> None:
-        if frame.data[0] and self._awaited is LiteCommand.PROFILE:
-            is_in = frame.command is LiteCommand.IN_PROFILE
+        if frame.data[0] and self._awaited is codes.LiteCommand.PROFILE:
+            is_in = frame.command is codes.LiteCommand.IN_PROFILE
             ports = self.in_ports if is_in else self.out_ports
-            ports.append(parse_port_profile(frame.data))
+            ports.append(messages.parse_port_profile(frame.data))
             self._deadline_us = self.now_us + self._settings.reply_us
 
-    def _take_reply(self, command: LiteCommand, reply: LiteReply) -> None:
-        if command is LiteCommand.PING and reply.ok:
+    def _take_reply(self, command: codes.LiteCommand, reply: messages.LiteReply) -> None:
+        if command is codes.LiteCommand.PING and reply.ok:
             self.ping_monitor.answered(reply.fields[0], self.now_us)
         if command in WITH_STATE and reply.fields:
             self.state = _state(reply.fields[0])
@@ -441,8 +429,8 @@ def _frames_over(link: Link[bytes], settings: ProxySettings) -> FrameLink:
     return FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))
 
 
-def _state(code: int) -> LiteState | None:
+def _state(code: int) -> codes.LiteState | None:
     try:
-        return LiteState(code)
+        return codes.LiteState(code)
     except ValueError:
         return None

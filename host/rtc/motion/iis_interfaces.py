@@ -7,16 +7,8 @@ from math import copysign, cos, pi, sin, sqrt
 from typing import ClassVar, Final, Generic, NamedTuple, TypeVar, get_args
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion import ports
 from tickrig.host.rtc.motion.geometry import Pose, positive, wrap
-from tickrig.host.rtc.motion.ports import (
-    RunMode,
-    plausible,
-    read_all,
-    read_newest,
-    read_newest_pose,
-    to_pose,
-    to_pose_2d,
-)
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis, rtc
 from tickrig.wire.rtc_types.idl import Struct
@@ -49,7 +41,7 @@ class Adapter(RtComponent, Generic[S, T]):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Convert what arrived."""
-        for value in read_all(self.arriving):
+        for value in ports.read_all(self.arriving):
             if (converted := self.convert(value)) is not None:
                 self.leaving.write(converted)
         return ReturnCode.RTC_OK
@@ -104,10 +96,10 @@ class Position2To3(Adapter[iis.TimedPosition, iis.TimedPose2D]):
 
     def convert(self, value: iis.TimedPosition) -> iis.TimedPose2D | None:
         """Return the same pose, heading in 0..2 pi; None if a number is none."""
-        if not plausible(value.x, value.y, value.theta):
+        if not ports.plausible(value.x, value.y, value.theta):
             return None
         pose = Pose(value.x, value.y, positive(value.theta))
-        return iis.TimedPose2D(value.tm, value.id, to_pose_2d(pose), value.error)
+        return iis.TimedPose2D(value.tm, value.id, ports.to_pose_2d(pose), value.error)
 
 
 class Position3To2(Adapter[iis.TimedPose2D, iis.TimedPosition]):
@@ -117,7 +109,7 @@ class Position3To2(Adapter[iis.TimedPose2D, iis.TimedPosition]):
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPosition | None:
         """Return the same pose, heading in 0..2 pi; None if a number is none."""
-        if (pose := to_pose(value.data)) is None:
+        if (pose := ports.to_pose(value.data)) is None:
             return None
         numbers = (pose.x, pose.y, positive(pose.heading))
         return iis.TimedPosition(value.tm, value.id, *numbers, value.error)
@@ -130,9 +122,9 @@ class PositiveHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPose2D | None:
         """Return the pose with its heading in 0..2 pi; None if a number is none."""
-        if (pose := to_pose(value.data)) is None:
+        if (pose := ports.to_pose(value.data)) is None:
             return None
-        data = to_pose_2d(pose._replace(heading=positive(pose.heading)))
+        data = ports.to_pose_2d(pose._replace(heading=positive(pose.heading)))
         return iis.TimedPose2D(value.tm, value.id, data, value.error)
 
 
@@ -148,8 +140,8 @@ class WrappedHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):
 
 def with_wrapped_heading(value: iis.TimedPose2D) -> iis.TimedPose2D | None:
     """Return a pose with its heading in -pi..pi; None if a number is none."""
-    pose = to_pose(value.data)
-    return pose and iis.TimedPose2D(value.tm, value.id, to_pose_2d(pose), value.error)
+    pose = ports.to_pose(value.data)
+    return pose and iis.TimedPose2D(value.tm, value.id, ports.to_pose_2d(pose), value.error)
 
 
 # The goal interface of IIS in front of the planner of RH3, and its running information.
@@ -194,8 +186,8 @@ class RunningInformation(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take new poses, write the velocity."""
-        for sample in read_all(self.position):
-            if (pose := to_pose(sample.data)) is not None:
+        for sample in ports.read_all(self.position):
+            if (pose := ports.to_pose(sample.data)) is not None:
                 self._take(sample.tm, pose)
                 self._received_us = ec.now_us
         if ec.now_us - self._received_us > self.timeout.value * 1e6:
@@ -234,7 +226,7 @@ class GoalInterface(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Pass the newest goal on."""
-        if (goal := read_newest(self.goal)) is None:
+        if (goal := ports.read_newest(self.goal)) is None:
             return ReturnCode.RTC_OK
         now = Time.from_us(ec.now_us)
         if not goal.data:
@@ -320,9 +312,9 @@ class PathInterface(RtComponent):
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take the newest list, and judge a new pose."""
         now = Time.from_us(ec.now_us)
-        if (path := read_newest(self.path)) is not None:
+        if (path := ports.read_newest(self.path)) is not None:
             self._take(now, path)
-        if (pose := read_newest_pose(self.position)) is not None:
+        if (pose := ports.read_newest_pose(self.position)) is not None:
             self._judge(now, pose)
         if self._order is not None:
             self.target_path.write(self._order)
@@ -330,16 +322,16 @@ class PathInterface(RtComponent):
         return ReturnCode.RTC_OK
 
     def _take(self, now: Time, path: iis.TimedPath2DSeq) -> None:
-        poses = [pose for data in path.pose if (pose := to_pose(data)) is not None]
+        poses = [pose for data in path.pose if (pose := ports.to_pose(data)) is not None]
         speeds = [velocity.vx for velocity in path.velocity][: len(poses)]
-        if len(poses) < len(path.pose) or not plausible(*speeds):
+        if len(poses) < len(path.pose) or not ports.plausible(*speeds):
             return
         speeds += [0.0] * (len(poses) - len(speeds))
         self._forget()
         self._points = [WayPoint(*pair) for pair in zip(poses, speeds, strict=True)]
         self._fresh = len(poses) > 1
         if not self._fresh:
-            self._command(now, RunMode.STOP, Pose())
+            self._command(now, ports.RunMode.STOP, Pose())
         for pose in poses[:1]:
             self._report(now, pose, PASSED if self._fresh else STOPPED)
 
@@ -375,7 +367,7 @@ class PathInterface(RtComponent):
 
     def _turn(self, now: Time, stage: PathStage, line: Pose) -> None:
         self._stage, self._line, self._speed = stage, line, 0.0
-        self._command(now, RunMode.SPIN, line, w=1.0)
+        self._command(now, ports.RunMode.SPIN, line, w=1.0)
 
     def _drive(self, now: Time, pose: Pose) -> None:
         """Drive on, no faster than the cart can brake before the way point."""
@@ -384,27 +376,27 @@ class PathInterface(RtComponent):
         way = copysign(1.0, wanted) if wanted else 1.0
         left = -way * self._line.along(pose) - self.goal_distance.value
         if left < 0:
-            self._command(now, RunMode.STOP, Pose())
+            self._command(now, ports.RunMode.STOP, Pose())
             self._report(now, self._points[self._at].pose, PASSED)
             self._next(now, pose)
             return
         can = sqrt(2 * self.braking.value * max(0.0, left - self._speed * self.latency.value))
         self._speed = min(most, max(can, self.creep_vel.value))
-        self._command(now, RunMode.LINEFOLLOW, self._line, v=way * self._speed)
+        self._command(now, ports.RunMode.LINEFOLLOW, self._line, v=way * self._speed)
 
     def _finish(self, now: Time) -> None:
         self._stage = PathStage.IDLE
-        self._command(now, RunMode.STOP, Pose())
+        self._command(now, ports.RunMode.STOP, Pose())
         self._report(now, self._points[-1].pose, STOPPED)
 
     def _command(
-        self, now: Time, mode: RunMode, line: Pose, v: float = 0.0, w: float = 0.0
+        self, now: Time, mode: ports.RunMode, line: Pose, v: float = 0.0, w: float = 0.0
     ) -> None:
         """Command the follower; it takes one message a period, so the last one counts."""
         self._order = Path(mode, 0, line.x, line.y, line.heading, v, w, tm=now)
 
     def _report(self, now: Time, point: Pose, flag: int) -> None:
-        data = to_pose_2d(point._replace(heading=positive(point.heading)))
+        data = ports.to_pose_2d(point._replace(heading=positive(point.heading)))
         self.running_state.write(iis.TimedPose2D(now, (flag,), data))
 
 

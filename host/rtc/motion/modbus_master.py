@@ -7,22 +7,13 @@ from dataclasses import dataclass
 from typing import Final
 
 from tickrig.host.links.link import Link
+from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
-from tickrig.wire.modbus import (
-    ERROR_BIT,
-    MAX_FRAME_BYTES,
-    ExceptionCode,
-    Request,
-    encode_frame,
-    encode_request,
-    encode_response,
-    parse_frame,
-)
 
 TIMEOUT_US: Final = 20_000
 """How long an answer may take (rh3-control, drive protocol)."""
 
-_CODES: Final = {code.value: code for code in ExceptionCode}
+_CODES: Final = {code.value: code for code in modbus.ExceptionCode}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +26,9 @@ class ModbusAnswer:
         refusal: why it did not do it, if it did not.
     """
 
-    request: Request
+    request: modbus.Request
     values: tuple[int, ...] = ()
-    refusal: ExceptionCode | int | None = None
+    refusal: modbus.ExceptionCode | int | None = None
 
 
 class ModbusMaster:
@@ -66,12 +57,12 @@ class ModbusMaster:
     ) -> None:
         self._link, self._address = link, address
         self._timeout_us, self._retries = timeout_us, retries
-        self.pending: Request | None = None
+        self.pending: modbus.Request | None = None
         self.misses = self.lost = 0
         self._sent = self._received = b""
         self._tries = self._until_us = 0
 
-    def begin(self, request: Request) -> None:
+    def begin(self, request: modbus.Request) -> None:
         """Make a request; what was on its way is given up.
 
         Raises:
@@ -89,7 +80,7 @@ class ModbusMaster:
         received = self._link.receive(0)
         if (request := self.pending) is None:
             return None
-        self._received = (self._received + received)[-MAX_FRAME_BYTES:]
+        self._received = (self._received + received)[-modbus.MAX_FRAME_BYTES :]
         answer = self._parse(request)
         if answer is not None:
             self.pending, self.misses = None, 0
@@ -101,14 +92,14 @@ class ModbusMaster:
         """Give the line back."""
         self._link.close()
 
-    def _send(self, request: Request) -> None:
+    def _send(self, request: modbus.Request) -> None:
         self._link.receive(0)
         self._received = b""
-        self._sent = encode_frame(self._address, encode_request(request))
+        self._sent = modbus.encode_frame(self._address, modbus.encode_request(request))
         self._link.send(self._sent)
         self._until_us = self._link.now_us + self._timeout_us
 
-    def _miss(self, request: Request) -> None:
+    def _miss(self, request: modbus.Request) -> None:
         self.lost += 1
         if self._tries < self._retries:
             self._tries += 1
@@ -117,25 +108,25 @@ class ModbusMaster:
             self.pending = None
             self.misses += 1
 
-    def _parse(self, request: Request) -> ModbusAnswer | None:
+    def _parse(self, request: modbus.Request) -> ModbusAnswer | None:
         frame = self._received
         if len(frame) > len(self._sent) and frame.startswith(self._sent):
             frame = frame[len(self._sent) :]  # the adapter hears what it says
         try:
-            address, message = parse_frame(frame)
+            address, message = modbus.parse_frame(frame)
         except WireError:
             return None
-        if address != self._address or message[0] & ~ERROR_BIT != request.function:
+        if address != self._address or message[0] & ~modbus.ERROR_BIT != request.function:
             return None
-        if message[0] & ERROR_BIT:
+        if message[0] & modbus.ERROR_BIT:
             return ModbusAnswer(request, refusal=_code(message[1]))
         if request.read is None:
-            return ModbusAnswer(request) if message == encode_response(request) else None
+            return ModbusAnswer(request) if message == modbus.encode_response(request) else None
         count = request.read[1]
         if len(message) != 2 + 2 * count:
             return None
         return ModbusAnswer(request, struct.unpack_from(f">{count}H", message, 2))
 
 
-def _code(number: int) -> ExceptionCode | int:
+def _code(number: int) -> modbus.ExceptionCode | int:
     return _CODES.get(number, number)

@@ -7,15 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Generic, TypeVar
 
+from tickrig.host.rtc.ports import ring_buffer
 from tickrig.host.rtc.ports.port import AnyPort, ConnectorBase, ConnectorProfile
-from tickrig.host.rtc.ports.ring_buffer import (
-    DEFAULT_LENGTH,
-    BufferOptions,
-    EmptyPolicy,
-    FullPolicy,
-    ReadPolicy,
-    RingBuffer,
-)
 from tickrig.host.rtc.states import MAX_RATE_HZ, MIN_RATE_HZ, PortStatus, RtcRefused
 from tickrig.wire.errors import FieldError
 from tickrig.wire.instant import NEVER
@@ -70,8 +63,8 @@ class ConnectorOptions:
     skip_count: int
     push_rate_hz: float
     endian: Endian
-    inport: BufferOptions
-    outport: BufferOptions
+    inport: ring_buffer.BufferOptions
+    outport: ring_buffer.BufferOptions
 
     @property
     def stated(self) -> Mapping[str, str]:
@@ -143,14 +136,14 @@ class _Reader:
     def count(self, key: str, default: int) -> int:
         return self.value(key, default, _count, "0 and more")
 
-    def buffer(self) -> BufferOptions:
-        length = self.count("buffer.length", DEFAULT_LENGTH)
-        full = self.word("buffer.write.full_policy", FullPolicy.OVERWRITE)
-        empty = self.word("buffer.read.empty_policy", EmptyPolicy.READBACK)
-        read = self.word("buffer.read.policy", ReadPolicy.FIFO)
+    def buffer(self) -> ring_buffer.BufferOptions:
+        length = self.count("buffer.length", ring_buffer.DEFAULT_LENGTH)
+        full = self.word("buffer.write.full_policy", ring_buffer.FullPolicy.OVERWRITE)
+        empty = self.word("buffer.read.empty_policy", ring_buffer.EmptyPolicy.READBACK)
+        read = self.word("buffer.read.policy", ring_buffer.ReadPolicy.FIFO)
         skip_count = self.count("buffer.read.skip_count", 0)
         try:
-            return BufferOptions(length, full, empty, read, skip_count)
+            return ring_buffer.BufferOptions(length, full, empty, read, skip_count)
         except ValueError as error:
             raise RtcRefused(f"dataport.{self.end}buffer: {error}") from error
 
@@ -189,7 +182,7 @@ class Publisher(Generic[T]):
     __slots__ = ("_period_us", "_planned_us", "_policy", "_skipped", "_stride", "_values")
 
     def __init__(self, options: ConnectorOptions) -> None:
-        self._values = RingBuffer[T](options.outport)
+        self._values = ring_buffer.RingBuffer[T](options.outport)
         self._policy, self._stride = options.push_policy, options.skip_count + 1
         self._period_us, self._skipped, self._planned_us = 1, 0, NEVER
         if options.subscription is SubscriptionType.PERIODIC:
@@ -259,7 +252,7 @@ class Connector(ConnectorBase, Generic[T]):
         super().__init__(profile, ports)
         pulled = options.dataflow is DataflowType.PULL
         at_once = pulled or options.subscription is SubscriptionType.FLUSH
-        self.buffer = RingBuffer[T](options.outport if pulled else options.inport)
+        self.buffer = ring_buffer.RingBuffer[T](options.outport if pulled else options.inport)
         self._publisher = None if at_once else Publisher[T](options)
         self._encodes, self._endian = options.interface is InterfaceType.CORBA_CDR, options.endian
 

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Generic, TypeVar
 
-from tickrig.host.rtc.ports.port import (
-    AnyPort,
-    ConnectorBase,
-    ConnectorProfile,
-    InterfaceProfile,
-    Port,
-)
+from tickrig.host.rtc.ports import port
 from tickrig.host.rtc.states import ReturnCode, RtcRefused
 
 T = TypeVar("T")  # an interface: a Protocol
@@ -27,7 +21,7 @@ class Provider(Generic[T]):
 
     def __init__(self, instance_name: str, type_name: str, servant: T) -> None:
         self.servant = servant
-        self.profile = InterfaceProfile(instance_name, type_name, "PROVIDED")
+        self.profile = port.InterfaceProfile(instance_name, type_name, "PROVIDED")
 
 
 class Consumer(Generic[T]):
@@ -38,7 +32,7 @@ class Consumer(Generic[T]):
     """
 
     def __init__(self, instance_name: str, type_name: str) -> None:
-        self.profile = InterfaceProfile(instance_name, type_name, "REQUIRED")
+        self.profile = port.InterfaceProfile(instance_name, type_name, "REQUIRED")
         self._provider: Provider[T] | None = None
 
     @property
@@ -62,7 +56,7 @@ class Consumer(Generic[T]):
 _Interface = Provider[Any] | Consumer[Any]
 
 
-class ServicePort(Port["ServiceConnector"]):
+class ServicePort(port.Port["ServiceConnector"]):
     """A port with interfaces, each provided or required."""
 
     port_type = "CorbaPort"
@@ -82,18 +76,18 @@ class ServicePort(Port["ServiceConnector"]):
         self.consumers.append(consumer)
         return consumer
 
-    def _interfaces(self) -> tuple[InterfaceProfile, ...]:
+    def _interfaces(self) -> tuple[port.InterfaceProfile, ...]:
         interfaces: list[_Interface] = [*self.providers, *self.consumers]
         return tuple(interface.profile for interface in interfaces)
 
 
-class ServiceConnector(ConnectorBase):
+class ServiceConnector(port.ConnectorBase):
     """Gives the consumers of each port the providers of the other."""
 
     def __init__(
         self,
-        profile: ConnectorProfile,
-        ports: tuple[AnyPort, AnyPort],
+        profile: port.ConnectorProfile,
+        ports: tuple[port.AnyPort, port.AnyPort],
         pairs: tuple[tuple[Consumer[Any], Provider[Any]], ...],
     ) -> None:
         super().__init__(profile, ports)

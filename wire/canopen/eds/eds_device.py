@@ -8,14 +8,7 @@ from itertools import islice
 from typing import Final, NamedTuple
 
 from tickrig.wire.canopen.datatypes import DataType
-from tickrig.wire.canopen.eds.eds_entry import (
-    HIGHEST_SUB,
-    count_of,
-    object_kind,
-    read_entry,
-    read_object,
-    read_value_beside,
-)
+from tickrig.wire.canopen.eds import eds_entry
 from tickrig.wire.canopen.eds.eds_file import EdsFile, shorten
 from tickrig.wire.canopen.eds.eds_value import parse_number, plain_numbers
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
@@ -138,7 +131,7 @@ def _mapping(file: EdsFile, way: Way, number: int) -> _Implied:
 def _entry(  # noqa: PLR0913, PLR0917 - a row of an object table
     file: EdsFile, index: int, sub: int, name: str, kind: DataType, access: Access
 ) -> EntryDescription:
-    default, relative = read_value_beside(file, index, sub, kind)
+    default, relative = eds_entry.read_value_beside(file, index, sub, kind)
     return EntryDescription(index, sub, name, kind, access, default=default, relative=relative)
 
 
@@ -240,8 +233,10 @@ def _fixed(file: EdsFile, modules: list[int]) -> Iterator[_Added]:
             seen.add(index)
             subs = [(f"{head}sub{sub:X}", sub) for sub in range(0x100)]
             subs = [each for each in subs if each[0] in file.sections]
-            kind = object_kind(file, head, bool(subs))
-            rows = [] if kind is None else list(read_object(file, head, index, kind, subs))
+            kind = eds_entry.object_kind(file, head, bool(subs))
+            rows = (
+                [] if kind is None else list(eds_entry.read_object(file, head, index, kind, subs))
+            )
             if kind is not None and rows:
                 yield ObjectDescription(file.value(head, "ParameterName"), kind), rows
 
@@ -268,13 +263,13 @@ def _extended(
     free_bits = 0
     for section in sections:
         count, bits = _count(file, section)
-        width = max(read_entry(file, section, index, 1, "").data_type.bits, 1)
+        width = max(eds_entry.read_entry(file, section, index, 1, "").data_type.bits, 1)
         if bits:
             count = max(-((free_bits - bits) // width), 0)
             free_bits += count * width - bits
-        last = min(file.number(section, "ObjExtend"), HIGHEST_SUB)
+        last = min(file.number(section, "ObjExtend"), eds_entry.HIGHEST_SUB)
         for _ in range(count):
-            if len(rows) >= (last or HIGHEST_SUB):
+            if len(rows) >= (last or eds_entry.HIGHEST_SUB):
                 if not last or index >= _HIGHEST_INDEX or index + 1 in objects:
                     reason = f"{index:04X}h has no sub-index free: what it adds is left out"
                     file.warn(section, reason, "modules")
@@ -283,7 +278,7 @@ def _extended(
                 index, rows = index + 1, []
             sub = len(rows) + 1
             name = f"{file.value(section, 'ParameterName')}{sub}"
-            rows.append(read_entry(file, section, index, sub, name))
+            rows.append(eds_entry.read_entry(file, section, index, sub, name))
     yield _object(file, index, rows, objects, sections[0])
 
 
@@ -291,7 +286,7 @@ def _object(
     file: EdsFile, index: int, rows: list[EntryDescription], objects: _Objects, section: str
 ) -> _Added:
     usual = ObjectDescription(file.value(section, "ParameterName"), ObjectCode.ARRAY)
-    return objects.get(index, usual), [count_of(index, rows), *rows]
+    return objects.get(index, usual), [eds_entry.count_of(index, rows), *rows]
 
 
 def _count(file: EdsFile, section: str) -> tuple[int, int]:
@@ -301,11 +296,17 @@ def _count(file: EdsFile, section: str) -> tuple[int, int]:
     try:
         count = parse_number(plain_numbers(whole.strip()))
         part = 0 if count else parse_number(plain_numbers(bits.strip()))
-        if 0 <= count <= HIGHEST_SUB and 0 <= part <= HIGHEST_SUB and (count or part):
+        if (
+            0 <= count <= eds_entry.HIGHEST_SUB
+            and 0 <= part <= eds_entry.HIGHEST_SUB
+            and (count or part)
+        ):
             return count, part
     except ValueError:
         pass
-    reason = f"Count={shorten(text)} is not N, or 0;BITS, of at most {HIGHEST_SUB}: 1 is taken"
+    reason = (
+        f"Count={shorten(text)} is not N, or 0;BITS, of at most {eds_entry.HIGHEST_SUB}: 1 is taken"
+    )
     file.warn(section, reason, "no-number", "Count")
     return 1, 0
 
@@ -414,7 +415,7 @@ def _kinds(file: EdsFile) -> _Kinds:
     kinds = {}
     with_subs = {index for _, index, sub in file.objects() if sub is not None}
     for section, index, sub in file.objects():
-        if sub is None and (kind := object_kind(file, section, index in with_subs)):
+        if sub is None and (kind := eds_entry.object_kind(file, section, index in with_subs)):
             kinds[index] = kind
     return kinds
 
@@ -430,4 +431,4 @@ def _entries(file: EdsFile, kinds: _Kinds) -> Iterator[EntryDescription]:
             file.warn(subs[index][0][0], reason, "sub-orphan")
             kinds[index] = ObjectCode.RECORD
     for index, kind in kinds.items():
-        yield from read_object(file, f"{index:04X}", index, kind, subs.get(index, []))
+        yield from eds_entry.read_object(file, f"{index:04X}", index, kind, subs.get(index, []))

@@ -8,25 +8,9 @@ from operator import attrgetter
 from typing import Final, NamedTuple
 
 from tickrig.wire.canopen.datatypes import DataType, Value
+from tickrig.wire.canopen.eds import eds_value, object_table
 from tickrig.wire.canopen.eds.eds_file import EdsFile, shorten
-from tickrig.wire.canopen.eds.eds_value import (
-    BYTES,
-    FLOATS,
-    TIMES,
-    is_hex_bytes,
-    parse_limit,
-    parse_sum,
-    parse_value,
-)
 from tickrig.wire.canopen.eds.eds_writer import VARIABLES
-from tickrig.wire.canopen.eds.object_table import (
-    MAX_VARIABLE_BYTES,
-    RO,
-    RW,
-    Access,
-    EntryDescription,
-    ObjectCode,
-)
 
 # The objects of the communication area: their kind, types and access (CiA 301, CiA 302).
 
@@ -125,17 +109,17 @@ def _standard_type(index: int, sub: int, *, composed: bool) -> DataType | None:
 
 
 _SIMPLE_TYPES: Final = range(0x1C)
-_NUMBERS: Final = (*FLOATS, *TIMES)
+_NUMBERS: Final = (*eds_value.FLOATS, *eds_value.TIMES)
 """Data types of numbers that are no integers."""
 _ASCII_TEXTS: Final = (DataType.VISIBLE_STRING, DataType.VISIBLE_CHAR)
 _TRUTH: Final = (0, 1)
 _TRUTH_WORDS: Final = {"yes": 1, "true": 1, "no": 0, "false": 0}
 _TYPE_WORDS: Final = {kind.name.lower(): int(kind) for kind in DataType}
-_KIND_WORDS: Final = {code.name.lower(): int(code) for code in ObjectCode}
+_KIND_WORDS: Final = {code.name.lower(): int(code) for code in object_table.ObjectCode}
 HIGHEST_SUB: Final = 254
-_NO_DATA: Final = (0, ObjectCode.DEFTYPE, ObjectCode.DEFSTRUCT)
+_NO_DATA: Final = (0, object_table.ObjectCode.DEFTYPE, object_table.ObjectCode.DEFSTRUCT)
 """Kinds of objects that hold nothing: NULL, and definitions of data types."""
-_DESCRIBED: Final = (*VARIABLES, ObjectCode.ARRAY, ObjectCode.RECORD)
+_DESCRIBED: Final = (*VARIABLES, object_table.ObjectCode.ARRAY, object_table.ObjectCode.RECORD)
 _ERROR_FIELD: Final = 0x1003
 COUNTS: Final = (_ERROR_FIELD, *range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
 """Objects whose sub-index 0 counts what is in use, not what is there."""
@@ -150,7 +134,7 @@ _MISSING: Final = {
 
 def read_entry(
     file: EdsFile, section: str, index: int, sub: int, name: str | None = None
-) -> EntryDescription:
+) -> object_table.EntryDescription:
     """Read an entry; what it lacks is noted, and what stands for it.
 
     Args:
@@ -166,7 +150,7 @@ def read_entry(
     kind, access = derived.kind, _access(file, section)
     default, relative = _default(file, section, index, sub, derived)
     low, high = _limits(file, section, kind)
-    return EntryDescription(
+    return object_table.EntryDescription(
         *(index, sub, name, kind, access),
         default=default,
         low=derived.low if low is None else low,
@@ -194,11 +178,14 @@ class _Type(NamedTuple):
     is_said: bool = True
     low: int | float | None = None
     high: int | float | None = None
-    max_bytes: int = MAX_VARIABLE_BYTES
+    max_bytes: int = object_table.MAX_VARIABLE_BYTES
 
 
 def _data_type(file: EdsFile, section: str, index: int, sub: int) -> _Type:
-    if file.number(section, "ObjectType", ObjectCode.VAR, words=_KIND_WORDS) == ObjectCode.DOMAIN:
+    if (
+        file.number(section, "ObjectType", object_table.ObjectCode.VAR, words=_KIND_WORDS)
+        == object_table.ObjectCode.DOMAIN
+    ):
         return _Type(DataType.DOMAIN)
     usual = _usual_type(section, index, sub)
     _required(file, section, "DataType", usual.name)
@@ -225,13 +212,13 @@ def _derived(file: EdsFile, section: str, number: int, own: tuple[str, str, str]
     """
     said = file.number(own[0], "DefaultValue", DataType.DOMAIN)
     kind = _known_type(file, section if said == number else own[0], said)
-    low, high, length = None, None, MAX_VARIABLE_BYTES
+    low, high, length = None, None, object_table.MAX_VARIABLE_BYTES
     if kind.size:
         low, high = (_limit(file, bound, "DefaultValue", kind) for bound in own[1:])
     else:
         length = file.number(own[1], "DefaultValue", length)
     bounds = "" if low is None and high is None else f" of {low} to {high}"
-    most = "" if length == MAX_VARIABLE_BYTES else f" of at most {length} bytes"
+    most = "" if length == object_table.MAX_VARIABLE_BYTES else f" of at most {length} bytes"
     if kind is not DataType.DOMAIN:
         taken = f"{kind.name}{bounds}{most}"
         reason = f"DataType=0x{number:04X} is derived in [{own[0]}]: {taken} is taken"
@@ -258,15 +245,15 @@ def _known_type(
         return usual
 
 
-def _access(file: EdsFile, section: str) -> Access:
+def _access(file: EdsFile, section: str) -> object_table.Access:
     _required(file, section, "AccessType", "rw")
     text = file.word(section, "AccessType") if file.has(section, "AccessType") else "rw"
     known = LONE_LETTERS.get(text.lower(), text or "rw")
     mappable = bool(file.number(section, "PDOMapping", words=_TRUTH_WORDS))
     try:
-        access = Access.from_eds(known, mappable=mappable)
+        access = object_table.Access.from_eds(known, mappable=mappable)
     except ValueError:
-        known, access = "rw", Access.from_eds("rw", mappable=mappable)
+        known, access = "rw", object_table.Access.from_eds("rw", mappable=mappable)
     if known != text:
         what = f"AccessType={shorten(text)} is none of CiA 306" if text else "AccessType is empty"
         file.warn(section, f"{what}: {known} is taken", "access-form", "AccessType")
@@ -339,7 +326,7 @@ def _value(
     try:
         if kind in _ASCII_TEXTS and not text.isascii():
             return _foreign_text(file, section, key, kind), False
-        value, relative = parse_value(kind, text)
+        value, relative = eds_value.parse_value(kind, text)
         if kind is DataType.BOOLEAN and value not in _TRUTH:
             reason = f"{key}={shorten(text)} is no BOOLEAN: 1 is taken"
             file.warn(section, reason, "boolean-value", key)
@@ -355,13 +342,13 @@ def _check_form(  # noqa: PLR0913, PLR0917 - a place, its text and what it is
     file: EdsFile, section: str, key: str, kind: DataType, text: str, value: Value
 ) -> None:
     """Warn of a value that has one meaning, and is not written as CiA 306 has it."""
-    if kind in BYTES and isinstance(value, bytes) and not is_hex_bytes(text):
+    if kind in eds_value.BYTES and isinstance(value, bytes) and not eds_value.is_hex_bytes(text):
         what = "its text" if value == text.encode() else value.hex(" ").upper()
         reason = f"{key}={shorten(text)} is no hexadecimal bytes: {what} is taken"
         file.warn(section, reason, "byte-form", key)
     elif kind.is_integer and kind is not DataType.BOOLEAN and isinstance(value, int):
         may_differ = (value < 0) is not ("-" in text)
-        number = parse_sum(text)[0] if may_differ else value
+        number = eds_value.parse_sum(text)[0] if may_differ else value
         if number != value and number >> kind.bits:
             taken = str(value) if kind.signed else f"0x{value:0{2 * kind.size}X}"
             reason = f"{key}={shorten(text)} is no {kind.name}: {taken} is taken"
@@ -395,7 +382,7 @@ def _limits(
 def _limit(file: EdsFile, section: str, key: str, kind: DataType) -> int | float | None:
     text = _text(file, section, key, kind)
     try:
-        limit = parse_limit(kind, text, upper=key != "LowLimit") if text else None
+        limit = eds_value.parse_limit(kind, text, upper=key != "LowLimit") if text else None
     except (ValueError, OverflowError):
         reason = f"{key}={shorten(text)} is no {kind.name}: no limit is taken"
         file.warn(section, reason, "limit-value", key)
@@ -422,9 +409,9 @@ def _factor(file: EdsFile, section: str) -> float:
     return 1
 
 
-def object_kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | None:
+def object_kind(file: EdsFile, section: str, with_subs: bool) -> object_table.ObjectCode | None:
     """Return the kind of an object; what has sub-indices is no variable, whatever the file says."""
-    usual = ObjectCode.RECORD if with_subs else ObjectCode.VAR
+    usual = object_table.ObjectCode.RECORD if with_subs else object_table.ObjectCode.VAR
     number = file.number(section, "ObjectType", usual, words=_KIND_WORDS)
     if number in _NO_DATA:
         return None
@@ -433,14 +420,14 @@ def object_kind(file: EdsFile, section: str, with_subs: bool) -> ObjectCode | No
     elif with_subs and number in VARIABLES:
         reason = f"ObjectType={number} has no sub-indices, and there are: RECORD is taken"
     else:
-        return ObjectCode(number)
+        return object_table.ObjectCode(number)
     file.warn(section, reason, "object-type", "ObjectType")
     return usual
 
 
 def read_object(
-    file: EdsFile, head: str, index: int, kind: ObjectCode, subs: list[tuple[str, int]]
-) -> Iterator[EntryDescription]:
+    file: EdsFile, head: str, index: int, kind: object_table.ObjectCode, subs: list[tuple[str, int]]
+) -> Iterator[object_table.EntryDescription]:
     """Read the entries of one object; those that are described beside a compact one replace its.
 
     Args:
@@ -461,7 +448,7 @@ def read_object(
         reason = f"ParameterValue belongs to a sub-index of the {kind.name}: it is skipped"
         file.warn(head, reason, "value-place", "ParameterValue")
     if count:
-        if kind is ObjectCode.RECORD:
+        if kind is object_table.ObjectCode.RECORD:
             reason = "CompactSubObj in a RECORD: its entries are taken to be alike"
             file.warn(head, reason, "compact-record", "CompactSubObj")
         known = {row.sub for row in described}
@@ -469,7 +456,9 @@ def read_object(
     yield from sorted(described, key=attrgetter("sub"))
 
 
-def _compact(file: EdsFile, head: str, index: int, count: int) -> Iterator[EntryDescription]:
+def _compact(
+    file: EdsFile, head: str, index: int, count: int
+) -> Iterator[object_table.EntryDescription]:
     """Read an object that is described by one of its elements."""
     title = file.value(head, "ParameterName")
     elements = []
@@ -480,13 +469,21 @@ def _compact(file: EdsFile, head: str, index: int, count: int) -> Iterator[Entry
     yield from elements
 
 
-def count_of(index: int, elements: list[EntryDescription]) -> EntryDescription:
+def count_of(
+    index: int, elements: list[object_table.EntryDescription]
+) -> object_table.EntryDescription:
     """Make the sub-index 0 of a compact object."""
     u8 = DataType.UNSIGNED8
     if index == _ERROR_FIELD:
-        return EntryDescription(index, 0, "Number of errors", u8, RW, default=0)
-    used, access = len(elements), RO
+        return object_table.EntryDescription(
+            index, 0, "Number of errors", u8, object_table.RW, default=0
+        )
+    used, access = len(elements), object_table.RO
     if index in COUNTS:
         used = sum(any(element.default) for element in elements)
-        access = RW if any(Access.WRITE in element.access for element in elements) else RO
-    return EntryDescription(index, 0, "Number of entries", u8, access, default=used)
+        access = (
+            object_table.RW
+            if any(object_table.Access.WRITE in element.access for element in elements)
+            else object_table.RO
+        )
+    return object_table.EntryDescription(index, 0, "Number of entries", u8, access, default=used)

@@ -7,17 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, NamedTuple
 
 from tickrig._compiled import mypyc_attr
-from tickrig.wire.canopen.eds.eds_value import (
-    KNOWN_SECTIONS,
-    EdsLine,
-    describes_device,
-    is_plain_number,
-    object_section,
-    parse_number,
-    plain_numbers,
-    read_lines,
-    without_comment,
-)
+from tickrig.wire.canopen.eds import eds_value
 from tickrig.wire.canopen.eds.xdd import XddError, is_xml, xdd_lines
 
 # Theory of operation
@@ -139,14 +129,14 @@ class EdsFile:
         self.name = name
         self.sections: dict[str, _Section] = {}
         self.is_xml = is_xml(text)
-        self.lines: list[EdsLine] = []
+        self.lines: list[eds_value.EdsLine] = []
         self._places: dict[tuple[str, str], int] = {}
         self._objects: list[tuple[str, int, int | None]] = []  # each rule goes through them
         self._errors: dict[Finding, None] = {}
         self._warnings: dict[Finding, None] = {}
         self._has_long_titles = False
         try:
-            self.lines = xdd_lines(text) if self.is_xml else read_lines(text)
+            self.lines = xdd_lines(text) if self.is_xml else eds_value.read_lines(text)
         except XddError as error:
             self._errors[Finding(name, "", str(error), error.line, "xml")] = None
         self._parse()
@@ -198,7 +188,7 @@ class EdsFile:
         cannot mean anything else there, as they can in a text.
         """
         text = self.value(section, key)
-        said = without_comment(text)
+        said = eds_value.without_comment(text)
         if said != text:
             what = "the comment behind a number or an access type is skipped"
             self.warn(section, what, "inline-comment", key)
@@ -207,10 +197,10 @@ class EdsFile:
     def numeric(self, section: str, key: str) -> str:
         """Return the text of a number as CiA 306 writes it; a warning if the file does not."""
         text = self.value(section, key)
-        if is_plain_number(text):
+        if eds_value.is_plain_number(text):
             return text
         text = self.word(section, key)
-        plain = plain_numbers(text)
+        plain = eds_value.plain_numbers(text)
         if plain != text:
             what = f"{key}={shorten(text)} is no number of CiA 306: {shorten(plain)} is taken"
             self.warn(section, what, "number-form", key)
@@ -241,7 +231,7 @@ class EdsFile:
             self.warn(section, f"{said} is not a number: {word} is taken", "number-word", key)
             return word
         try:
-            number = parse_number(text)
+            number = eds_value.parse_number(text)
         except ValueError:
             reason = f"{said} is not a number: {default} is taken"
             self.warn(section, reason, "no-number", key)
@@ -263,10 +253,10 @@ class EdsFile:
                 section = self._begin(line)
             elif line.is_keyword:
                 self._add(section, line)
-            elif line.content and describes_device(line.section):
+            elif line.content and eds_value.describes_device(line.section):
                 self._skip(line)
         self._take_comments()
-        places = ((section, object_section(section)) for section in self.sections)
+        places = ((section, eds_value.object_section(section)) for section in self.sections)
         self._objects = [(section, *place) for section, place in places if place]
 
     def _take_comments(self) -> None:
@@ -276,46 +266,50 @@ class EdsFile:
                 key, section, value = match.groups()
                 self.sections.get(section, {}).setdefault(key.lower(), value)
 
-    def _begin(self, line: EdsLine) -> _Section:
+    def _begin(self, line: eds_value.EdsLine) -> _Section:
         """Begin a section, or go on with one that is there already."""
         title = line.section
-        if self.is_xml and title not in KNOWN_SECTIONS.values() and object_section(title) is None:
+        if (
+            self.is_xml
+            and title not in eds_value.KNOWN_SECTIONS.values()
+            and eds_value.object_section(title) is None
+        ):
             reason = "is no index of four, or sub-index of two hexadecimal digits: it is lost"
             self._errors[Finding(self.name, title, reason, line.number, "object-index")] = None
         is_long = self.is_xml and len(line.title) > _LONGEST_TITLE
-        if is_long and not self._has_long_titles and object_section(title) is not None:
+        if is_long and not self._has_long_titles and eds_value.object_section(title) is not None:
             self._has_long_titles = True  # some editors write all of them so
             reason = "subIndex has more than two digits, taken for one number; others may follow"
             self._warn_at(line, reason, "section-form")
-        if title in self.sections and describes_device(title):
+        if title in self.sections and eds_value.describes_device(title):
             reason = "is there twice: of each keyword the first is taken"
             self._warn_at(line, reason, "doubled-section")
         self._places.setdefault((title, ""), line.number)
         return self.sections.setdefault(title, {})
 
-    def _add(self, section: _Section, line: EdsLine) -> None:
+    def _add(self, section: _Section, line: eds_value.EdsLine) -> None:
         key = line.key.lower()
         # `[OptionalObjects] 01=0x1005`: some tools fill the numbers of a list up with
         # zeros.
         if key[:1] == "0" and key.isascii() and key.isdigit():
             key = key.lstrip("0") or "0"  # a number of a list
         if not key:
-            if describes_device(line.section):
+            if eds_value.describes_device(line.section):
                 self._skip(line)
         elif key not in section:
             section[key] = line.value
             self._places[line.section, key] = line.number
-        elif line.section and describes_device(line.section):
+        elif line.section and eds_value.describes_device(line.section):
             reason = f"{shorten(line.key)} is there twice: {shorten(section[key])} is taken"
             self._warn_at(line, reason, "doubled-key")
 
-    def _skip(self, line: EdsLine) -> None:
+    def _skip(self, line: eds_value.EdsLine) -> None:
         """Note the first such line before the sections, and each one in them."""
         if line.section or not self._warnings:
             reason = f"{shorten(line.content)!r} is no keyword with a value: it is skipped"
             self._warn_at(line, reason, "no-keyword")
 
-    def _warn_at(self, line: EdsLine, reason: str, rule: str) -> None:
+    def _warn_at(self, line: eds_value.EdsLine, reason: str, rule: str) -> None:
         self._warnings[Finding(self.name, line.section, reason, line.number, rule)] = None
 
 

@@ -9,16 +9,8 @@ from itertools import groupby
 from operator import attrgetter
 from typing import Final, Protocol
 
+from tickrig.wire.canopen.eds import object_table
 from tickrig.wire.canopen.eds.eds_value import format_limit, format_value, parse_value
-from tickrig.wire.canopen.eds.object_table import (
-    BIT_RATES_KBIT,
-    MAX_VARIABLE_BYTES,
-    Access,
-    DeviceInfo,
-    EntryDescription,
-    ObjectCode,
-    ObjectDescription,
-)
 
 _MANDATORY: Final = (0x1000, 0x1001, 0x1018)
 _MANUFACTURER: Final = range(0x2000, 0x6000)
@@ -27,16 +19,16 @@ _SERIAL_NUMBER: Final = 4
 _LSS_ADDRESS: Final = frozenset({1, 2, 3, _SERIAL_NUMBER})
 """Sub-indices of 1018h by which LSS selects a node (CiA 305)."""
 _DUMMY_TYPES: Final = range(1, 8)
-VARIABLES: Final = (ObjectCode.VAR, ObjectCode.DOMAIN)
-_MAPPABLE: Final = Access.TPDO | Access.RPDO
+VARIABLES: Final = (object_table.ObjectCode.VAR, object_table.ObjectCode.DOMAIN)
+_MAPPABLE: Final = object_table.Access.TPDO | object_table.Access.RPDO
 _ACCESS_TYPES: Final = {
-    Access.READ: "ro",
-    Access.WRITE: "wo",
-    Access.READ | Access.WRITE: "rw",
-    Access.READ | Access.CONST: "const",
+    object_table.Access.READ: "ro",
+    object_table.Access.WRITE: "wo",
+    object_table.Access.READ | object_table.Access.WRITE: "rw",
+    object_table.Access.READ | object_table.Access.CONST: "const",
 }
 
-_NO_INFO: Final = DeviceInfo()
+_NO_INFO: Final = object_table.DeviceInfo()
 
 _NO_WORD: Final = re.compile(r"[^a-z0-9]+")
 
@@ -45,16 +37,16 @@ class Table(Protocol):
     """EntryDescription objects: an `ObjectTable`, or what the dictionaries of slaves share."""
 
     @property
-    def objects(self) -> Mapping[int, ObjectDescription]:
+    def objects(self) -> Mapping[int, object_table.ObjectDescription]:
         """Names and kinds by index, sorted."""
         ...
 
-    def __iter__(self) -> Iterator[EntryDescription]:
+    def __iter__(self) -> Iterator[object_table.EntryDescription]:
         """Give all entries, sorted by index and sub-index."""
         ...
 
 
-def write_eds(table: Table, info: DeviceInfo = _NO_INFO) -> str:
+def write_eds(table: Table, info: object_table.DeviceInfo = _NO_INFO) -> str:
     """Write the objects with their default values.
 
     What CiA 306 has no keyword for stands in its comments, where it is needed:
@@ -78,7 +70,7 @@ def write_dcf(
     node_id: int,
     bit_rate: int,
     values: Mapping[int, bytes],
-    info: DeviceInfo = _NO_INFO,
+    info: object_table.DeviceInfo = _NO_INFO,
 ) -> str:
     """Write the objects with default and present values, for one node.
 
@@ -101,7 +93,7 @@ def write_dcf(
     return "\n".join([*_head(table, info, ".dcf"), *commissioning, *objects])
 
 
-def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
+def _head(table: Table, info: object_table.DeviceInfo, ending: str) -> Iterator[str]:
     yield from ("[FileInfo]", *_file_info(info, ending), "", "[DeviceInfo]")
     for key, text in (
         ("VendorName", info.vendor_name),
@@ -112,7 +104,7 @@ def _head(table: Table, info: DeviceInfo, ending: str) -> Iterator[str]:
     numbers = _identity(table)
     for sub, key in _IDENTITY:
         yield f"{key}=0x{numbers.get(sub, 0):08X}"
-    for kbit in BIT_RATES_KBIT:
+    for kbit in object_table.BIT_RATES_KBIT:
         yield f"BaudRate_{kbit}={int(1_000 * kbit in info.bit_rates)}"
     for key, area in (("NrOfRXPDO", range(0x1400, 0x1600)), ("NrOfTXPDO", range(0x1800, 0x1A00))):
         yield f"{key}={sum(index in area for index in table.objects)}"
@@ -131,7 +123,7 @@ def _identity(table: Table) -> dict[int, int]:
     return {row.sub: int.from_bytes(row.default, "little") for row in table if row.index == 0x1018}
 
 
-def _file_info(info: DeviceInfo, ending: str) -> Iterator[str]:
+def _file_info(info: object_table.DeviceInfo, ending: str) -> Iterator[str]:
     name = _NO_WORD.sub("-", info.product_name.lower()).strip("-") or "device"
     yield from (f"FileName={name}{ending}", "FileVersion=1", "FileRevision=1")
     if ending == ".dcf":
@@ -146,7 +138,7 @@ def _comments(table: Table) -> Iterator[str]:
     """Give what CiA 306 has no keyword for; `EdsFile` reads it."""
     for info, entries in _grouped(table):
         for entry, title in zip(entries, _titles(info, entries), strict=True):
-            if entry.max_bytes != MAX_VARIABLE_BYTES:
+            if entry.max_bytes != object_table.MAX_VARIABLE_BYTES:
                 yield f"MaxBytes of {title} is {entry.max_bytes}"
             if _default(entry) is None:
                 yield f"DefaultBytes of {title} is {entry.default.hex().upper()}"
@@ -168,12 +160,16 @@ def _objects(table: Table, values: Mapping[int, bytes] | None = None) -> Iterato
         yield from _object(info, entries, values)
 
 
-def _grouped(table: Table) -> Iterator[tuple[ObjectDescription, list[EntryDescription]]]:
+def _grouped(
+    table: Table,
+) -> Iterator[tuple[object_table.ObjectDescription, list[object_table.EntryDescription]]]:
     for index, entries in groupby(table, attrgetter("index")):
         yield table.objects[index], list(entries)
 
 
-def _titles(info: ObjectDescription, entries: list[EntryDescription]) -> list[str]:
+def _titles(
+    info: object_table.ObjectDescription, entries: list[object_table.EntryDescription]
+) -> list[str]:
     """Return the names of the sections of an object's entries."""
     head = f"{entries[0].index:04X}"
     if len(entries) == 1 and entries[0].sub == 0 and info.code in VARIABLES:
@@ -182,37 +178,40 @@ def _titles(info: ObjectDescription, entries: list[EntryDescription]) -> list[st
 
 
 def _object(
-    info: ObjectDescription,
-    entries: list[EntryDescription],
+    info: object_table.ObjectDescription,
+    entries: list[object_table.EntryDescription],
     values: Mapping[int, bytes] | None,
 ) -> Iterator[str]:
     head, titles = f"{entries[0].index:04X}", _titles(info, entries)
     if titles == [head]:
         yield from _variable(head, info.code, entries[0], values)
         return
-    code = ObjectCode.RECORD if info.code in VARIABLES else info.code
+    code = object_table.ObjectCode.RECORD if info.code in VARIABLES else info.code
     yield from (f"[{head}]", f"ParameterName={_name(info.name)}")
     yield from (f"ObjectType=0x{code:X}", f"SubNumber={len(entries)}", "")
     for entry, title in zip(entries, titles, strict=True):
-        yield from _variable(title, ObjectCode.VAR, entry, values)
+        yield from _variable(title, object_table.ObjectCode.VAR, entry, values)
 
 
-def entry_lines(entry: EntryDescription) -> list[str]:
+def entry_lines(entry: object_table.EntryDescription) -> list[str]:
     """Return the section of one sub-index.
 
     Raises:
         ValueError: a name or an access that an EDS cannot hold.
 
     >>> from tickrig.wire.canopen.eds.object_table import RO, DataType
-    >>> entry_lines(EntryDescription(0x2000, 1, "x", DataType.UNSIGNED8, RO))[:2]
+    >>> entry_lines(object_table.EntryDescription(0x2000, 1, "x", DataType.UNSIGNED8, RO))[:2]
     ['[2000sub1]', 'ParameterName=x']
     """
     title = f"{entry.index:04X}sub{entry.sub:X}"
-    return list(_variable(title, ObjectCode.VAR, entry, None))[:-1]
+    return list(_variable(title, object_table.ObjectCode.VAR, entry, None))[:-1]
 
 
 def _variable(
-    title: str, code: ObjectCode, entry: EntryDescription, values: Mapping[int, bytes] | None
+    title: str,
+    code: object_table.ObjectCode,
+    entry: object_table.EntryDescription,
+    values: Mapping[int, bytes] | None,
 ) -> Iterator[str]:
     kind = entry.data_type
     yield from (f"[{title}]", f"ParameterName={_name(entry.name)}", f"ObjectType=0x{code:X}")
@@ -229,33 +228,33 @@ def _variable(
     yield ""
 
 
-def access_type(entry: EntryDescription) -> str:
+def access_type(entry: object_table.EntryDescription) -> str:
     """Return the AccessType of an entry.
 
     Raises:
         ValueError: no word of CiA 306 says it.
 
-    >>> from tickrig.wire.canopen.eds.object_table import RWW, DataType
+    >>> from tickrig.wire.canopen.eds.object_table import RWW, DataType, EntryDescription
     >>> access_type(EntryDescription(0x6040, 0, "Controlword", DataType.UNSIGNED16, RWW))
     'rww'
     """
     mappable = entry.access & _MAPPABLE
     name = _ACCESS_TYPES.get(entry.access & ~_MAPPABLE, "")
-    if name == "rw" and mappable in (Access.TPDO, Access.RPDO):
-        name = "rwr" if mappable is Access.TPDO else "rww"
-    if not name or Access.from_eds(name, mappable=bool(mappable)) != entry.access:
+    if name == "rw" and mappable in (object_table.Access.TPDO, object_table.Access.RPDO):
+        name = "rwr" if mappable is object_table.Access.TPDO else "rww"
+    if not name or object_table.Access.from_eds(name, mappable=bool(mappable)) != entry.access:
         what = f"{entry.index:04X}h:{entry.sub:02X} {entry.name}"
         raise ValueError(f"an EDS cannot express the access of {what}: {entry.access}")
     return name
 
 
-def _default(entry: EntryDescription) -> str | None:
+def _default(entry: object_table.EntryDescription) -> str | None:
     """Return the text of a default, None if no text comes back exactly."""
     text = format_value(entry.data_type, entry.default, relative=entry.relative)
     return text if _reads_as(entry, text) else None
 
 
-def _reads_as(entry: EntryDescription, text: str) -> bool:
+def _reads_as(entry: object_table.EntryDescription, text: str) -> bool:
     """Return whether a default comes back exactly."""
     if not text:
         return not any(entry.default) and len(entry.default) == entry.data_type.size

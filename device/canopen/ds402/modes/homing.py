@@ -5,18 +5,10 @@ from __future__ import annotations
 from enum import Enum, IntFlag, auto
 from typing import Final, NamedTuple
 
-from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402 import indices, trapezoid
 from tickrig.device.canopen.ds402.automaton import Statusword
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode
 from tickrig.device.canopen.ds402.modes.profile_position import SLOWEST, STEEPEST
-from tickrig.device.canopen.ds402.trapezoid import (
-    Path,
-    PathFollower,
-    PathLimits,
-    began_us,
-    to_position,
-    to_velocity,
-)
 from tickrig.device.twin import Part
 
 # The search for home: the methods as a table, and which way to go by the switches (CiA 402-2).
@@ -220,7 +212,7 @@ class Homing(Mode):
 
     def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
-        self._path = PathFollower(self.reference)
+        self._path = trapezoid.PathFollower(self.reference)
         self._stage = Stage.ATTAINED if self.axis.homed else Stage.IDLE
         self._search: HomingSearch | None = None
         self._counts, self._velocity = self.axis.motor.counts, 0.0
@@ -251,9 +243,9 @@ class Homing(Mode):
         if self._search is not None:
             self._watch_switches(self._search)
         if self._search is not None:
-            self._steer(self._search, began_us(now_us))
+            self._steer(self._search, trapezoid.began_us(now_us))
         elif not self._path.kept:
-            self._path.begin(self._last_path(began_us(now_us)))
+            self._path.begin(self._last_path(trapezoid.began_us(now_us)))
         ended = self._path.follow(now_us) and self._search is None
         self.flags = _FLAGS[self._stage]
         if ended and self.axis.stands:
@@ -290,12 +282,12 @@ class Homing(Mode):
         wanted = search.direction * self.axis.forward * speed
         if wanted != self._velocity or not self._path.kept:
             self._velocity = wanted
-            self._path.begin(to_velocity(now_us, self._path.motion, wanted, self._limits))
+            self._path.begin(trapezoid.to_velocity(now_us, self._path.motion, wanted, self._limits))
 
-    def _last_path(self, now_us: int) -> Path:
+    def _last_path(self, now_us: int) -> trapezoid.Path:
         if self._home is None:
-            return to_velocity(now_us, self._path.motion, 0.0, self._limits)
-        return to_position(now_us, self._path.motion, self._home, self._limits)
+            return trapezoid.to_velocity(now_us, self._path.motion, 0.0, self._limits)
+        return trapezoid.to_position(now_us, self._path.motion, self._home, self._limits)
 
     @property
     def _switches(self) -> Switch:
@@ -309,9 +301,9 @@ class Homing(Mode):
         return min(settings.max_velocity, fast), min(settings.max_velocity, slow)
 
     @property
-    def _limits(self) -> PathLimits:
+    def _limits(self) -> trapezoid.PathLimits:
         acceleration = min(STEEPEST, self.settings.homing_acceleration)
-        return PathLimits(max(SLOWEST, self._speeds[0]), acceleration, acceleration)
+        return trapezoid.PathLimits(max(SLOWEST, self._speeds[0]), acceleration, acceleration)
 
 
 def index_pulse(before: int, after: int, per_turn: int) -> int | None:

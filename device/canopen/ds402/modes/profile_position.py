@@ -5,19 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Final
 
-from tickrig.device.canopen.ds402 import indices
+from tickrig.device.canopen.ds402 import indices, trapezoid
 from tickrig.device.canopen.ds402.automaton import Controlword, Statusword
 from tickrig.device.canopen.ds402.modes.mode import DriveView, Mode, Window
 from tickrig.device.canopen.ds402.settings import Settings
-from tickrig.device.canopen.ds402.trapezoid import (
-    Path,
-    PathFollower,
-    PathLimits,
-    RampShape,
-    began_us,
-    to_position,
-    to_velocity,
-)
 from tickrig.device.twin import Immutable
 
 SLOWEST: Final = 1.0
@@ -39,7 +30,7 @@ class SetPoint(Immutable):
     """
 
     target: float
-    limits: PathLimits
+    limits: trapezoid.PathLimits
     end_velocity: float
     cut: bool
 
@@ -62,7 +53,7 @@ class ProfilePosition(Mode):
 
     def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
-        self._path, self._near = PathFollower(self.reference), Window()
+        self._path, self._near = trapezoid.PathFollower(self.reference), Window()
         self._present: SetPoint | None = None
         self._waiting: SetPoint | None = None
         self._last = self.reference.position
@@ -86,7 +77,7 @@ class ProfilePosition(Mode):
     def run(self, now_us: int) -> bool:
         """Follow the path; at its end take the next set-point."""
         if not self._path.kept:
-            self._path.begin(self._plan(began_us(now_us)))
+            self._path.begin(self._plan(trapezoid.began_us(now_us)))
         if self._path.follow(now_us):
             if self._waiting is None:
                 self._arrived = True
@@ -121,15 +112,19 @@ class ProfilePosition(Mode):
             target = self.axis.counts_of(position)
         self._last, cut = self.drive.limits.position(target)
         number = self.number(indices.MOTION_PROFILE)
-        shape = RampShape.SIN2 if number == RampShape.SIN2 else RampShape.LINEAR
+        shape = (
+            trapezoid.RampShape.SIN2
+            if number == trapezoid.RampShape.SIN2
+            else trapezoid.RampShape.LINEAR
+        )
         limits = _profile_limits(settings, shape)
         return SetPoint(self._last, limits, settings.end_velocity, cut)
 
-    def _plan(self, now_us: int) -> Path:
+    def _plan(self, now_us: int) -> trapezoid.Path:
         start, point = self._path.motion, self._present
         if point is None:
-            return to_velocity(now_us, start, 0.0, _profile_limits(self.settings))
-        return to_position(now_us, start, point.target, point.limits, point.end_velocity)
+            return trapezoid.to_velocity(now_us, start, 0.0, _profile_limits(self.settings))
+        return trapezoid.to_position(now_us, start, point.target, point.limits, point.end_velocity)
 
     def _show(self, now_us: int) -> None:
         settings, point = self.settings, self._present
@@ -149,9 +144,11 @@ class ProfilePosition(Mode):
             self.flags |= Statusword.MODE_12
 
 
-def _profile_limits(settings: Settings, shape: RampShape = RampShape.LINEAR) -> PathLimits:
+def _profile_limits(
+    settings: Settings, shape: trapezoid.RampShape = trapezoid.RampShape.LINEAR
+) -> trapezoid.PathLimits:
     """Return what 6081h, 6083h and 6084h allow; a profile velocity of 0 is the slowest one."""
-    return PathLimits(
+    return trapezoid.PathLimits(
         max(SLOWEST, settings.profile_velocity),
         min(STEEPEST, settings.acceleration),
         min(STEEPEST, settings.deceleration),

@@ -14,14 +14,7 @@ import serial
 from tickrig.emulators.testing.bench.errors import PortGone
 from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
-from tickrig.host.links.can_link import (
-    GONE,
-    BusReceiver,
-    bus_reason,
-    prepare_bus,
-    to_error_frame,
-    to_frame,
-)
+from tickrig.host.links import can_link
 from tickrig.host.links.link import first_line
 from tickrig.host.links.ready import let_wait
 from tickrig.host.links.serial_link import explain_open_error
@@ -39,7 +32,7 @@ class _Watched(can.BusABC):
     """What a watched bus does beside what its class does."""
 
     _watch: DoorWatch
-    _reads: BusReceiver
+    _reads: can_link.BusReceiver
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         self._watch.used()
@@ -49,7 +42,7 @@ class _Watched(can.BusABC):
             while message is None and timeout is None:
                 message = self._reads.receive(timeout)
         if message is not None:
-            error = to_error_frame(message)
+            error = can_link.to_error_frame(message)
             self._pass_on(Mark.FROM_DEVICE, _frames_of(message) if error is None else (error,))
         elif timeout is not None:
             self._watch.waited(round(timeout * 1e6), (monotonic_ns() - begun_ns) // 1_000)
@@ -67,7 +60,7 @@ class _Watched(can.BusABC):
             yield
         except (can.CanOperationError, OSError) as error:
             code = error.error_code if isinstance(error, can.CanError) else error.errno
-            if code not in GONE:
+            if code not in can_link.GONE:
                 raise
             raise BusGone(f"{self.channel_info}: {first_line(error)}", code) from error
 
@@ -77,7 +70,7 @@ class _Watched(can.BusABC):
 
 
 def _frames_of(message: can.Message) -> Frames:
-    frame = to_frame(message)
+    frame = can_link.to_frame(message)
     return (frame,) if frame else ()
 
 
@@ -95,8 +88,8 @@ def open_bus(plan: BusPlan, options: dict[str, Any]) -> can.BusABC:
     try:
         bus = can.Bus(plan.channel, plan.interface, **{**rate, **dict(plan.options), **options})
     except (can.CanError, OSError, ValueError, ImportError, AttributeError) as error:
-        raise BusGone(f"cannot open {name_of(plan)}: {bus_reason(error)}") from None
-    prepare_bus(bus, plan.interface)
+        raise BusGone(f"cannot open {name_of(plan)}: {can_link.bus_reason(error)}") from None
+    can_link.prepare_bus(bus, plan.interface)
     return bus
 
 
@@ -104,7 +97,7 @@ def open_watched_bus(plan: BusPlan, watch: DoorWatch, options: dict[str, Any]) -
     """Open a bus with a watch at it; see `open_bus`."""
     bus = open_bus(plan, options)
     kind = type(bus)
-    reads = BusReceiver(
+    reads = can_link.BusReceiver(
         bus,
         name_of(plan),
         gone=BusGone,

@@ -8,17 +8,9 @@ from typing import Final
 
 from tickrig.host.canmon.model.check.demands import RuleDemand, RuleEvent
 from tickrig.host.canmon.model.check.rule import ONE_TIME, CheckedTraffic, TrafficFinding
+from tickrig.host.canmon.model.decode import filter_terms
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.filter import FilterParser
-from tickrig.host.canmon.model.decode.filter_terms import (
-    COMPARISONS,
-    KINDS,
-    MissingSignals,
-    Test,
-    number,
-    signal_place,
-    signal_test,
-)
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.graph.signal_spec import EXTENDED, FrameSlice, parse_slice
 from tickrig.host.text.names import closest
@@ -104,18 +96,18 @@ class SliceParser(FilterParser):
         super().__init__(text)
         self._slices: dict[str, FrameSlice] = {}
 
-    def _plain_term(self) -> Test:
+    def _plain_term(self) -> filter_terms.Test:
         if not self._is_slice():
             return super()._plain_term()
         name = self._slice()
         self._signals.add(name)
-        if self._next.text not in COMPARISONS:
-            return signal_test(name)
+        if self._next.text not in filter_terms.COMPARISONS:
+            return filter_terms.signal_test(name)
         sign, value = self._comparison(name)
-        if number(value) is None:
+        if filter_terms.number(value) is None:
             raise self._error(f"{value!r} is no number")
         del self._tokens[0]
-        return signal_test(name, sign, value)
+        return filter_terms.signal_test(name, sign, value)
 
     def _is_slice(self) -> bool:
         word, column = self._next
@@ -187,7 +179,7 @@ class ExpressionRule:
         name: str,
         demand: RuleDemand,
         scopes: Sequence[RuleScope],
-        missing: MissingSignals,
+        missing: filter_terms.MissingSignals,
         slices: Sequence[Slice],
         *,
         mapped: bool,
@@ -272,6 +264,6 @@ class ExpressionRule:
             self._names.update(signal.name for signal in decoded.signals)
 
     def _near(self, path: str) -> str:
-        _, name, _ = signal_place(path)
-        near = closest(name, [*KINDS, *sorted(self._names)])
+        _, name, _ = filter_terms.signal_place(path)
+        near = closest(name, [*filter_terms.KINDS, *sorted(self._names)])
         return f"; did you mean {near[0]}?" if near and near[0] != name else ""

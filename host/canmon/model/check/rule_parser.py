@@ -23,6 +23,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from tickrig.host.canmon.model.check import expression_rule
 from tickrig.host.canmon.model.check.demands import (
     EVERY,
     MOST_COUNTED,
@@ -44,25 +45,9 @@ from tickrig.host.canmon.model.check.demands import (
     Truth,
     Values,
 )
-from tickrig.host.canmon.model.check.expression_rule import (
-    After,
-    Before,
-    ExpressionRule,
-    RuleScope,
-    Slice,
-    SliceParser,
-    While,
-)
+from tickrig.host.canmon.model.decode import filter_terms
 from tickrig.host.canmon.model.decode.decoded import Decoded, Signal
 from tickrig.host.canmon.model.decode.filter import FilterError, Token
-from tickrig.host.canmon.model.decode.filter_terms import (
-    COMPARISONS,
-    NMT_STATES,
-    MissingSignals,
-    Test,
-    comparison,
-    number,
-)
 from tickrig.host.text.names import closest
 from tickrig.host.text.values import parse_time_us
 
@@ -104,12 +89,15 @@ def _values_of(parts: Sequence[tuple[str, ...]]) -> Callable[[Signal], bool]:
     >>> [holds(Signal("speed", value)) for value in (5, 6, 7)]
     [True, False, True]
     """
-    tests = [comparison("=", part[0]) if len(part) == 1 else _within(*part) for part in parts]
+    tests = [
+        filter_terms.comparison("=", part[0]) if len(part) == 1 else _within(*part)
+        for part in parts
+    ]
     return lambda signal: any(test(signal) for test in tests)
 
 
 def _within(low: str, high: str) -> Callable[[Signal], bool]:
-    least, most = number(low or "-inf"), number(high or "inf")
+    least, most = filter_terms.number(low or "-inf"), filter_terms.number(high or "inf")
     for text, end in ((low, least), (high, most)):
         if end is None or end != end:  # noqa: PLR0124 - what is no number
             raise ValueError(f"{text!r} is no number, as an end of a range is")
@@ -141,7 +129,7 @@ _UNITS: Final = ("s", "ms", "us", "%")
 _COUNT: Final = re.compile(r"[0-9]{1,9}")
 
 
-class QuantityParser(SliceParser):
+class QuantityParser(expression_rule.SliceParser):
     """Takes quantities from the words of a rule.
 
     Args:
@@ -157,7 +145,7 @@ class QuantityParser(SliceParser):
         return int(self._tokens.pop(0).text)
 
     def _number(self) -> float:
-        found = number(self._next.text)
+        found = filter_terms.number(self._next.text)
         if found is None or found != found:  # noqa: PLR0124 - what is no number
             raise self._error(f"{self._came()} is no number")
         del self._tokens[0]
@@ -179,7 +167,7 @@ class QuantityParser(SliceParser):
     def _blank(self) -> str:
         """Say so where a blank stands between a number and its unit."""
         value, unit = self._tokens[0].text, self._tokens[1:2]
-        if number(value) is None or not unit or unit[0].text not in _UNITS:
+        if filter_terms.number(value) is None or not unit or unit[0].text not in _UNITS:
             return ""
         return f"; without a blank, as {value}{unit[0].text}"
 
@@ -258,7 +246,9 @@ EMCY: Final = "emcy"
 _OTHERS: Final = frozenset(["not", "!", "!="])
 
 
-def errors_alone(test: Test, tokens: Iterable[Token], signals: Collection[str]) -> Test:
+def errors_alone(
+    test: filter_terms.Test, tokens: Iterable[Token], signals: Collection[str]
+) -> filter_terms.Test:
     """Return the test of frames as events: an EMCY of code 0000h is none.
 
     It stays one where the filter does not name `emcy`, has a `not`, or names a signal, as
@@ -283,10 +273,10 @@ DEMANDS: Final = (
     *("never", "always", "once", "at most", "at least", "in", "every", "within", "to"),
     *("answered", "dlc", "toggle", "counts", "steps", "changes"),
 )
-_SCOPE: Final[dict[str, Callable[[RuleEvent], RuleScope]]] = {
-    "after": After,
-    "before": Before,
-    "while": While,
+_SCOPE: Final[dict[str, Callable[[RuleEvent], expression_rule.RuleScope]]] = {
+    "after": expression_rule.After,
+    "before": expression_rule.Before,
+    "while": expression_rule.While,
 }
 _PLAIN: Final[dict[str, Callable[[RuleEvent], RuleDemand]]] = {
     "once": lambda event: Count(event, 1, 1),
@@ -297,7 +287,7 @@ BEHIND: Final = {
     "after": "the demand, as tpdo1 of 3 within 2ms after sync",
     "before": "the demand, as emcy never before sync",
     "while": "the demand, as emcy never while node 3 stopped",
-    **dict.fromkeys(NMT_STATES, "a node, as node 3 stopped"),
+    **dict.fromkeys(filter_terms.NMT_STATES, "a node, as node 3 stopped"),
 }
 """Words that are no demand, and what they stand behind."""
 
@@ -316,7 +306,9 @@ class RuleParser(QuantityParser):
         text: the rule.
     """
 
-    def rule(self) -> tuple[RuleDemand, list[RuleScope], set[str], list[Slice]]:
+    def rule(
+        self,
+    ) -> tuple[RuleDemand, list[expression_rule.RuleScope], set[str], list[expression_rule.Slice]]:
         """Return demand, scopes, signals and slices that are named; RuleError if it is no rule."""
         self._named: set[str] = set()
         demand = self._demand(self._subject())
@@ -330,7 +322,7 @@ class RuleParser(QuantityParser):
         return demand, scopes, self._named, list(self._slices.items())
 
     def _subject(self) -> RuleEvent:
-        if self._next.text != "dlc" or self._tokens[1].text in COMPARISONS:
+        if self._next.text != "dlc" or self._tokens[1].text in filter_terms.COMPARISONS:
             return self._event()
         if self._tokens[1].text != "of":
             return EVERY
@@ -436,7 +428,7 @@ class RuleParser(QuantityParser):
         word = self._next.text
         if word in BEHIND:
             return f"it stands behind {BEHIND[word]}"
-        near = closest(word, [*DEMANDS, *SCOPES, *NMT_STATES]) if word else []
+        near = closest(word, [*DEMANDS, *SCOPES, *filter_terms.NMT_STATES]) if word else []
         meant = f"; did you mean {near[0]!r}?" if near else ""
         return f"wanted {', '.join(DEMANDS)}, or 'and', 'or'{meant}"
 
@@ -453,17 +445,17 @@ class Expression:
     name: str
     texts: tuple[str, ...]
 
-    def make(self) -> list[ExpressionRule]:
+    def make(self) -> list[expression_rule.ExpressionRule]:
         """Return new rules that have seen nothing yet."""
         return [_made(self.name, text) for text in self.texts]
 
 
-def _made(name: str, text: str) -> ExpressionRule:
+def _made(name: str, text: str) -> expression_rule.ExpressionRule:
     parser = RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
-    missing = MissingSignals(paths, parser.words)
-    return ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
+    missing = filter_terms.MissingSignals(paths, parser.words)
+    return expression_rule.ExpressionRule(name, demand, scopes, missing, slices, mapped=mapped)
 
 
 def parse_rule(text: str, name: str = "") -> Expression:

@@ -9,13 +9,7 @@ import numpy.typing as npt
 
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Rows
 from tickrig.host.canmon.model.frames import EXTENDED, REMOTE
-from tickrig.host.canmon.model.logs.can_log import (
-    BLF_FRAMES,
-    BLF_NOTES,
-    OBJECT_BYTES,
-    BlfBlock,
-    channel_name,
-)
+from tickrig.host.canmon.model.logs import can_log
 from tickrig.host.canmon.model.logs.log_file import END_S
 from tickrig.wire.can import EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 
@@ -49,7 +43,11 @@ _EXACT: Final = 1 << 53
 _PLAIN, _FRAME, _NOTE, _ODD = range(4)
 _KINDS: Final = np.full(256, _PLAIN, np.uint8)
 """What an object is, by its type; the last entry is of all beyond."""
-_KINDS[list(_FRAMES)], _KINDS[list(BLF_NOTES)], _KINDS[list(BLF_FRAMES)] = _FRAME, _NOTE, _ODD
+_KINDS[list(_FRAMES)], _KINDS[list(can_log.BLF_NOTES)], _KINDS[list(can_log.BLF_FRAMES)] = (
+    _FRAME,
+    _NOTE,
+    _ODD,
+)
 
 _Places = npt.NDArray[np.int64]
 
@@ -90,7 +88,7 @@ class BlfBlocks:
     def __init__(self, channels: ChannelNames) -> None:
         self._channels = channels
 
-    def __call__(self, data: bytes, start_s: float) -> BlfBlock | None:
+    def __call__(self, data: bytes, start_s: float) -> can_log.BlfBlock | None:
         """Return the frames; None where they are to be read one by one."""
         found = _alike(data) or _aligned(data) or _anywhere(data)
         if found is None:
@@ -111,7 +109,7 @@ class BlfBlocks:
         if rows is None:
             return None
         noted = [(*one, kind) for one, kind in zip(told, types, strict=True)]
-        return BlfBlock(rows, len(rows.known), noted, end)
+        return can_log.BlfBlock(rows, len(rows.known), noted, end)
 
     def _rows(self, frames: _Objects, start_s: float) -> Rows | None:
         """Return a row for each frame; None where one is not as usual."""
@@ -141,7 +139,7 @@ class BlfBlocks:
         rows.payload[remote] = 0
         numbers = frames.field("<u2", body)
         for number in np.flatnonzero(np.bincount(numbers)).tolist():
-            rows.channel[numbers == number] = self._channels.place(channel_name(number - 1))
+            rows.channel[numbers == number] = self._channels.place(can_log.channel_name(number - 1))
         return rows
 
 
@@ -151,10 +149,10 @@ _MASKS: Final = np.array([(1 << 8 * count) - 1 for count in range(9)], np.uint64
 
 def _alike(data: bytes) -> _Objects | None:
     """Return the objects where all have the size of the first, as python-can writes them."""
-    if len(data) < 2 * OBJECT_BYTES:
+    if len(data) < 2 * can_log.OBJECT_BYTES:
         return None
     size = int.from_bytes(data[8:12], "little")
-    if size < OBJECT_BYTES or len(data) < size:
+    if size < can_log.OBJECT_BYTES or len(data) < size:
         return None
     count, rest = divmod(len(data), size)
     found = _Objects(data, np.arange(count) * size, size)
@@ -162,9 +160,9 @@ def _alike(data: bytes) -> _Objects | None:
         return None
     if rest < _SEARCHED:
         return found
-    head = data[count * size : count * size + OBJECT_BYTES]
+    head = data[count * size : count * size + can_log.OBJECT_BYTES]
     cut = head[:4] == b"LOBJ" and int.from_bytes(head[8:12], "little") > rest
-    return found if cut and len(head) == OBJECT_BYTES else None
+    return found if cut and len(head) == can_log.OBJECT_BYTES else None
 
 
 def _aligned(data: bytes) -> _Objects | None:
@@ -179,7 +177,7 @@ def _aligned(data: bytes) -> _Objects | None:
 
 def _anywhere(data: bytes) -> _Objects | None:
     """Return the objects with the padding that python-can passes over."""
-    if len(data) < OBJECT_BYTES:
+    if len(data) < can_log.OBJECT_BYTES:
         return None
     words = np.ndarray((len(data) - 3,), "<u4", data, 0, (1,))
     places = np.flatnonzero(words == _SIGNATURE)
@@ -194,7 +192,7 @@ def _whole(data: bytes, places: _Places, padded: int) -> _Objects | None:
         places: of all signatures, the first one being that of an object.
         padded: bytes that may be between two objects.
     """
-    places = places[places <= len(data) - OBJECT_BYTES]
+    places = places[places <= len(data) - can_log.OBJECT_BYTES]
     ends = places + _Objects(data, places).field("<u4", 8)
     rows = _chain(places, ends, len(data), padded)
     return None if rows is None else _Objects(data, places[rows])
@@ -209,7 +207,7 @@ def _chain(places: _Places, ends: _Places, length: int, padded: int) -> _Places 
         length: of the data.
         padded: bytes that may be between two objects.
     """
-    if not len(places) or (ends - places < OBJECT_BYTES).any():
+    if not len(places) or (ends - places < can_log.OBJECT_BYTES).any():
         return None
     behind = np.searchsorted(places, ends)
     count = len(places)

@@ -9,18 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tickrig.host.canmon.model.frames import REMOTE
-from tickrig.wire.can import (
-    EXTENDED_BITS,
-    EXTENDED_FLAGS,
-    EXTENDED_MAX,
-    MAX_DATA_BYTES,
-    NEXT,
-    STANDARD_BITS,
-    START_EXTENDED,
-    START_STANDARD,
-    STUFFED,
-    crc16,
-)
+from tickrig.wire import can
 
 _BLOCK: Final = 1 << 14
 """Frames at a time: what is computed of them stays in the cache."""
@@ -30,8 +19,8 @@ _HEAD_BYTES: Final = (3, 5)
 
 _Ints = npt.NDArray[np.int64]
 
-_NEXT: Final = np.array(NEXT, np.int64)
-_STUFFED: Final = np.array(STUFFED, np.int64)
+_NEXT: Final = np.array(can.NEXT, np.int64)
+_STUFFED: Final = np.array(can.STUFFED, np.int64)
 
 
 def column_bits(
@@ -53,10 +42,10 @@ def column_bits(
 
 def _block(ident: _Ints, dlc: _Ints, payload: npt.NDArray[np.uint64]) -> _Ints:
     lengths = np.where(ident & REMOTE, 0, dlc)
-    forms = (ident >> 31) * (MAX_DATA_BYTES + 1) + lengths
+    forms = (ident >> 31) * (can.MAX_DATA_BYTES + 1) + lengths
     out = np.empty(len(ident), np.int64)
     for form in np.flatnonzero(np.bincount(forms)):
-        extended, length = divmod(int(form), MAX_DATA_BYTES + 1)
+        extended, length = divmod(int(form), can.MAX_DATA_BYTES + 1)
         rows = np.flatnonzero(forms == form)
         heads = _heads(ident[rows], dlc[rows], bool(extended))
         out[rows] = _same_form(heads, payload[rows], bool(extended), length)
@@ -65,9 +54,9 @@ def _block(ident: _Ints, dlc: _Ints, payload: npt.NDArray[np.uint64]) -> _Ints:
 
 def _heads(ident: _Ints, dlc: _Ints, extended: bool) -> _Ints:
     control = (ident & REMOTE) >> 24 | dlc
-    can_id = ident & EXTENDED_MAX
+    can_id = ident & can.EXTENDED_MAX
     if extended:
-        can_id = (can_id >> 18) << 20 | EXTENDED_FLAGS << 18 | can_id & 0x3_FFFF
+        can_id = (can_id >> 18) << 20 | can.EXTENDED_FLAGS << 18 | can_id & 0x3_FFFF
     return can_id << 7 | control
 
 
@@ -85,8 +74,8 @@ def _same_form(heads: _Ints, payload: npt.NDArray[np.uint64], extended: bool, le
 
 def _feed(columns: list[_Ints], extended: bool) -> _Ints:
     """Run the stuffing automaton over each frame."""
-    state = np.full(len(columns[0]), (START_EXTENDED if extended else START_STANDARD) << 8)
-    bits = np.full(len(columns[0]), EXTENDED_BITS if extended else STANDARD_BITS)
+    state = np.full(len(columns[0]), (can.START_EXTENDED if extended else can.START_STANDARD) << 8)
+    bits = np.full(len(columns[0]), can.EXTENDED_BITS if extended else can.STANDARD_BITS)
     for column in columns:
         state += column
         bits += _STUFFED[state]
@@ -98,6 +87,6 @@ def _feed(columns: list[_Ints], extended: bool) -> _Ints:
 def _crc_tables(length: int) -> tuple[_Ints, ...]:
     """Return a table for each byte of a stream; the CRC is linear, so what they give is xored."""
     return tuple(
-        np.array([crc16(bytes([byte]) + bytes(behind)) for byte in range(256)], np.int64)
+        np.array([can.crc16(bytes([byte]) + bytes(behind)) for byte in range(256)], np.int64)
         for behind in reversed(range(length))
     )

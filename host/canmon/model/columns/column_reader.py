@@ -18,25 +18,8 @@ import numpy.typing as npt
 
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, Rows
 from tickrig.host.canmon.model.frames import EXTENDED, Record
-from tickrig.host.canmon.model.logs.log_file import (
-    LogError,
-    LogFormat,
-    log_format,
-    open_log,
-    read_blocks,
-)
+from tickrig.host.canmon.model.logs import log_file, log_reader
 from tickrig.host.canmon.model.logs.log_reader import BLOCK_BYTES as PIECE
-from tickrig.host.canmon.model.logs.log_reader import (
-    Item,
-    LogLines,
-    LogReader,
-    WholeLines,
-    among,
-    holds_frame,
-    is_usual,
-    parse_log_line,
-    read_log,
-)
 from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.model.logs.screen_line import HEAD, ScreenClock
 from tickrig.wire.can import EXTENDED_MAX, STANDARD_MAX
@@ -231,7 +214,7 @@ def read_columns(path: Path) -> ColumnReader:
     Raises:
         LogFormatError: the file's name tells no format.
     """
-    return ColumnReader(path, log_format(path))
+    return ColumnReader(path, log_file.log_format(path))
 
 
 class ColumnReader:
@@ -248,44 +231,46 @@ class ColumnReader:
         NoColumnsError: there is a frame of CAN FD, likewise.
     """
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, LogTally()
         self._channels = ChannelNames()
 
     def __iter__(self) -> Iterator[Columns]:
         """Read the file."""
-        candump = self._kind is LogFormat.CANDUMP
+        candump = self._kind is log_file.LogFormat.CANDUMP
         for rows in self._of_lines() if candump else self._of_frames():
             yield rows.columns(self._channels)
 
-    def pieces(self) -> Iterator[Columns | Sequence[Item]]:
+    def pieces(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
         """Read the file, with the marks among its frames: these pieces come as frames.
 
         So do those with frames of CAN FD, and formats that have no columns.
         """
-        if self._kind is LogFormat.CANDUMP:
+        if self._kind is log_file.LogFormat.CANDUMP:
             yield from self._pieces_of_lines()
-        elif self._kind is LogFormat.BLF:
+        elif self._kind is log_file.LogFormat.BLF:
             yield from self._pieces_of_blocks()
         else:
-            reader = read_log(self._path)
+            reader = log_reader.read_log(self._path)
             items = reader.items()
             while batch := list(islice(items, _ITEMS)):
                 self.tally = reader.tally
                 yield batch
             self.tally = reader.tally
 
-    def _pieces_of_lines(self) -> Iterator[Columns | Sequence[Item]]:
-        lines, whole = LogLines(), WholeLines()
+    def _pieces_of_lines(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
+        lines, whole = log_reader.LogLines(), log_reader.WholeLines()
         lines.tally = self.tally
-        with open_log(self._path) as file:
-            for data in read_blocks(file, self._path, BLOCK_BYTES):
+        with log_file.open_log(self._path) as file:
+            for data in log_file.read_blocks(file, self._path, BLOCK_BYTES):
                 if text := whole.push(data):
                     yield from self._piece(text, lines, len(text) - data.rfind(b"\n") - 1)
         if rest := whole.finish():
             yield from self._piece(rest + b"\n", lines, len(rest))
 
-    def _piece(self, text: bytes, lines: LogLines, held: int) -> Iterator[Columns | Sequence[Item]]:
+    def _piece(
+        self, text: bytes, lines: log_reader.LogLines, held: int
+    ) -> Iterator[Columns | Sequence[log_reader.Item]]:
         """Give the frames of some lines: as columns, where no line holds anything else.
 
         Args:
@@ -298,24 +283,24 @@ class ColumnReader:
         block.take(rows, self._channels)
         strange = (~rows.known).nonzero()[0].tolist()
         if len(strange) > len(rows.known) // 8 or not all(
-            map(holds_frame, map(block.line, strange))
+            map(log_reader.holds_frame, map(block.line, strange))
         ):
             for begin, end in pairwise((0, *range(held + PIECE, len(text), PIECE), len(text))):
                 records = lines.push(text[begin:end])
-                yield among(records, lines.marks)
+                yield log_reader.among(records, lines.marks)
             return
         for row in strange:
-            record = parse_log_line(block.line(row), lines.number + row + 1, self.tally)
+            record = log_reader.parse_log_line(block.line(row), lines.number + row + 1, self.tally)
             if record is not None:
                 rows.put(row, record, self._channels.place(record.channel))
         columns = rows.columns(self._channels)
-        unusual = any(not is_usual(block.line(row)) for row in strange)
+        unusual = any(not log_reader.is_usual(block.line(row)) for row in strange)
         lines.skip(len(rows.known), int(columns.at_us[-1]) if len(columns) else None, unusual)
         yield columns
 
-    def _pieces_of_blocks(self) -> Iterator[Columns | Sequence[Item]]:
-        reader = read_log(self._path)
-        singles = list[Item]()
+    def _pieces_of_blocks(self) -> Iterator[Columns | Sequence[log_reader.Item]]:
+        reader = log_reader.read_log(self._path)
+        singles = list[log_reader.Item]()
         failed = None
         frames = self._frames(reader)
         while failed is None:
@@ -323,7 +308,7 @@ class ColumnReader:
                 found = next(frames)
             except StopIteration:
                 break
-            except (LogError, OSError) as error:  # all that was read before it counts
+            except (log_file.LogError, OSError) as error:  # all that was read before it counts
                 failed = error
                 break
             self.tally = reader.tally
@@ -344,7 +329,7 @@ class ColumnReader:
 
     def _of_frames(self) -> Iterator[Rows]:
         """Read frames, or many of them together where the format has columns, in pieces."""
-        reader, failed = read_log(self._path), None
+        reader, failed = log_reader.read_log(self._path), None
         frames, rows, singles = self._frames(reader), list[Rows](), list[Record]()
         more = True
         while more:
@@ -363,7 +348,7 @@ class ColumnReader:
                     if held >= _BATCH:
                         more = True
                         break
-            except (LogError, OSError) as error:  # all that was read before it counts
+            except (log_file.LogError, OSError) as error:  # all that was read before it counts
                 failed = error
             self.tally = reader.tally
             rows += [Rows.of(singles, self._channels)] if singles else []
@@ -373,8 +358,8 @@ class ColumnReader:
         if failed is not None:
             raise failed
 
-    def _frames(self, reader: LogReader) -> Iterator[Record | Rows]:
-        if self._kind is not LogFormat.BLF:
+    def _frames(self, reader: log_reader.LogReader) -> Iterator[Record | Rows]:
+        if self._kind is not log_file.LogFormat.BLF:
             return iter(reader)
         # python-can is slow to import
         from tickrig.host.canmon.model.columns.blf_block import BlfBlocks  # noqa: PLC0415
@@ -385,9 +370,9 @@ class ColumnReader:
         return (one if isinstance(one, Record) else one.rows for one in found)
 
     def _of_lines(self) -> Iterator[Rows]:
-        whole, number, clock = WholeLines(), 0, None
-        with open_log(self._path) as file:
-            for data in read_blocks(file, self._path, BLOCK_BYTES):
+        whole, number, clock = log_reader.WholeLines(), 0, None
+        with log_file.open_log(self._path) as file:
+            for data in log_file.read_blocks(file, self._path, BLOCK_BYTES):
                 if lines := whole.push(data):
                     clock = clock or _clock_of(lines)
                     rows = self._take_apart(lines, number, clock)
@@ -402,7 +387,7 @@ class ColumnReader:
         rows = Rows(len(block.starts))
         block.take(rows, self._channels)
         for row in (~rows.known).nonzero()[0].tolist():
-            record = parse_log_line(block.line(row), number + row + 1, self.tally, clock)
+            record = log_reader.parse_log_line(block.line(row), number + row + 1, self.tally, clock)
             if record is not None:
                 rows.put(row, record, self._channels.place(record.channel))
         return rows

@@ -9,16 +9,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from tickrig.host.canmon.model import frames
 from tickrig.host.canmon.model.columns.columns import Columns, Ints
-from tickrig.host.canmon.model.frames import (
-    DATA_WIDTH,
-    ERROR,
-    EXTENDED,
-    REMOTE,
-    DumpLines,
-    Stamp,
-    date_text,
-)
 from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_MAX
 
 # The lines of a block are a matrix of bytes: a row for each frame, and in it a place for each
@@ -110,7 +102,7 @@ def _octets(columns: Columns, table: npt.NDArray[Any], remote: npt.NDArray[np.bo
 
 def _idents(ident: npt.NDArray[np.uint32]) -> tuple[Cells, npt.NDArray[np.bool_]]:
     """Write identifiers of three or eight digits, and say which have eight."""
-    long = ident & np.uint32(EXTENDED | ERROR) != 0
+    long = ident & np.uint32(frames.EXTENDED | frames.ERROR) != 0
     short = _cells(_STANDARD[ident & STANDARD_MAX])
     if not long.any():
         return short, long
@@ -124,7 +116,7 @@ def _idents(ident: npt.NDArray[np.uint32]) -> tuple[Cells, npt.NDArray[np.bool_]
 
 def log_lines(columns: Columns) -> str:
     """Write frames as `log_line` does, each line with its end."""
-    ident, remote = columns.ident, columns.ident & np.uint32(REMOTE) != 0
+    ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
     sharp: list[bytes | Cells] = [b"#"]
     if remote.any():
         lengths = np.where(remote, columns.dlc, 0)
@@ -153,7 +145,7 @@ class ScreenText:
         lines: writes single frames.
     """
 
-    def __init__(self, lines: DumpLines) -> None:
+    def __init__(self, lines: frames.DumpLines) -> None:
         self._lines = lines
 
     def text(self, columns: Columns, meanings: Sequence[str] | None = None) -> str:
@@ -164,7 +156,7 @@ class ScreenText:
             meanings: what stands behind each, empty where nothing does; None for none at all.
         """
         lines = self._lines
-        ident, remote = columns.ident, columns.ident & np.uint32(REMOTE) != 0
+        ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
         cells, long = _idents(ident)
         escape: Callable[[str], str] = str if meanings is None else _escaped
         parts = [*self._stamps(columns.at_us), b"  ", _channels(columns, escape)]
@@ -173,7 +165,7 @@ class ScreenText:
         parts += [b"  ", *self._indents(long), cells, b"  "]
         told = _cells(_THREE[columns.dlc])[:, 2:3]
         data: list[bytes | Cells] = [b" [", told, b"] ", _octets(columns, _SPACED, remote)]
-        errors = ident & np.uint32(ERROR) != 0
+        errors = ident & np.uint32(frames.ERROR) != 0
         if remote.any():
             data.append(_where(remote, b" remote request"))
         if errors.any():
@@ -181,7 +173,7 @@ class ScreenText:
         if meanings is None:
             return _lines(len(columns), [*parts, *data, b"\n"])
         said = np.fromiter(map(bool, meanings), np.bool_, len(meanings))
-        blanks = DATA_WIDTH + 1 - len(b" [8] ") - 3 * np.where(remote, 5, columns.dlc)
+        blanks = frames.DATA_WIDTH + 1 - len(b" [8] ") - 3 * np.where(remote, 5, columns.dlc)
         blanks = np.where(said, 3 + np.where(errors, 0, blanks), 0)
         data += [_of_values(blanks, lambda count: " " * count), b"%s\n"]
         return _lines(len(columns), [*parts, *data]) % tuple(meanings)
@@ -198,16 +190,16 @@ class ScreenText:
 
     def _stamps(self, at_us: Ints) -> list[bytes | Cells]:
         lines = self._lines
-        if lines.form is Stamp.NONE:
+        if lines.form is frames.Stamp.NONE:
             return []
         if lines.first_us is None:
             lines.first_us = lines.last_us = int(at_us[0])
-        if lines.form is Stamp.DATE:
-            told = _seconds(at_us, lambda seconds: date_text(seconds * 1_000_000)[:-7])
-        elif lines.form is Stamp.ABSOLUTE:
+        if lines.form is frames.Stamp.DATE:
+            told = _seconds(at_us, lambda seconds: frames.date_text(seconds * 1_000_000)[:-7])
+        elif lines.form is frames.Stamp.ABSOLUTE:
             told = _seconds(at_us, lambda seconds: f"{seconds:010d}")
         else:
-            zero = lines.form is Stamp.ZERO
+            zero = lines.form is frames.Stamp.ZERO
             spans = at_us - lines.first_us if zero else np.diff(at_us, prepend=lines.last_us)
             told = [
                 _where(spans < 0, b"-"),
@@ -228,7 +220,7 @@ class ColumnText:
         self._columns, at_us = columns, columns.at_us
         self.first_us, self.last_us = int(at_us[0]), int(at_us[-1])
         self.earliest_us, self.latest_us = int(at_us.min()), int(at_us.max())
-        self.errors = bool((columns.ident & np.uint32(ERROR)).any())
+        self.errors = bool((columns.ident & np.uint32(frames.ERROR)).any())
 
     def __len__(self) -> int:
         """Return how many frames there are."""
@@ -251,13 +243,13 @@ def asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) -> 
         begin_us: of the log.
         number: tells the number of a bus, from 0.
     """
-    ident, remote = columns.ident, columns.ident & np.uint32(REMOTE) != 0
+    ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
     numbers, firsts = np.zeros(len(columns.channels), np.int64), np.unique(columns.channel, True)[1]
     for place in columns.channel[np.sort(firsts)].tolist():  # numbered as they appear
         numbers[place] = number(columns.channels[place])
-    extended = ident & np.uint32(EXTENDED) != 0
+    extended = ident & np.uint32(frames.EXTENDED) != 0
     if extended.any():
-        idents = _of_values(ident & np.uint32(EXTENDED | EXTENDED_MAX), _asc_ident)
+        idents = _of_values(ident & np.uint32(frames.EXTENDED | EXTENDED_MAX), _asc_ident)
     else:
         idents = _cells(_asc_standard()[ident & STANDARD_MAX, np.newaxis])
     return _lines(

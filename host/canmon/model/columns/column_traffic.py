@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from tickrig.host.canmon.model import traffic
 from tickrig.host.canmon.model.columns.column_bits import column_bits
 from tickrig.host.canmon.model.columns.column_gaps import ColumnGaps
 from tickrig.host.canmon.model.columns.columns import (
@@ -21,15 +22,6 @@ from tickrig.host.canmon.model.columns.columns import (
     split_errors,
 )
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.traffic import (
-    PAYLOAD_BITS,
-    BitRow,
-    BusRow,
-    ErrorStatistics,
-    Gaps,
-    IdRow,
-    TrafficSnapshot,
-)
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 # How often each payload bit changes, block after block, as in `BitMemory`; needs numpy.
@@ -59,7 +51,7 @@ class ColumnChanges:
 
     def __init__(self) -> None:
         self.payload, self._latest = np.empty(0, np.uint64), np.empty(0, np.uint64)
-        self._counts = np.empty((0, PAYLOAD_BITS), np.int64)
+        self._counts = np.empty((0, traffic.PAYLOAD_BITS), np.int64)
 
     def take(self, runs: Runs, payload: _Payloads, count: int) -> None:
         """Compare the payloads of a block; there are `count` identifiers now."""
@@ -73,10 +65,10 @@ class ColumnChanges:
         self._latest[runs.numbers] = changes[runs.ends - 1]
         self._add(runs, changes)
 
-    def rows(self) -> list[BitRow]:
+    def rows(self) -> list[traffic.BitRow]:
         """Return what changed in each identifier."""
         planes, latest = _planes(self._counts), self._latest.tolist()
-        return [BitRow(*row) for row in zip(latest, planes, strict=True)]
+        return [traffic.BitRow(*row) for row in zip(latest, planes, strict=True)]
 
     def _add(self, runs: Runs, changes: _Payloads) -> None:
         """Add up each byte's bits side by side: as many rows at once as a byte can count."""
@@ -128,11 +120,13 @@ class ColumnTraffic:
             self._buses[channel].take(frames)
             self._last_us = int(columns.at_us[-1])
 
-    def snapshot(self) -> TrafficSnapshot:
+    def snapshot(self) -> traffic.TrafficSnapshot:
         """Return all rows, at the time of the latest frame."""
         buses = [self._buses[channel] for channel in sorted(self._buses)]
         rows = tuple(row for bus in buses for row in bus.id_rows())
-        return TrafficSnapshot(self._last_us, tuple(bus.row(self._last_us) for bus in buses), rows)
+        return traffic.TrafficSnapshot(
+            self._last_us, tuple(bus.row(self._last_us) for bus in buses), rows
+        )
 
 
 class ColumnBus:
@@ -146,7 +140,7 @@ class ColumnBus:
     def __init__(self, channel: str, first_us: int) -> None:
         self._channel, self._first_us, self._last_us = channel, first_us, first_us
         self._frames = self._went_back = 0
-        self._load, self._errors = ColumnLoad(first_us), ErrorStatistics()
+        self._load, self._errors = ColumnLoad(first_us), traffic.ErrorStatistics()
         self._idents, self._gaps, self._changes = Identifiers(), ColumnGaps(), ColumnChanges()
         self._bits, self._dlc = np.empty(0, np.int64), np.empty(0, np.uint8)
 
@@ -173,9 +167,9 @@ class ColumnBus:
         self._bits[runs.numbers] += runs.sums(bits[runs.order])
         self._dlc[runs.numbers] = frames.dlc[runs.order[runs.ends - 1]]
 
-    def row(self, now_us: int) -> BusRow:
+    def row(self, now_us: int) -> traffic.BusRow:
         """Return what the bus did."""
-        return BusRow(
+        return traffic.BusRow(
             self._channel,
             self._frames,
             self._first_us,
@@ -185,7 +179,7 @@ class ColumnBus:
             self._went_back,
         )
 
-    def id_rows(self) -> list[IdRow]:
+    def id_rows(self) -> list[traffic.IdRow]:
         """Return what its identifiers did, in their order."""
         values = zip(
             self._idents.idents.tolist(),
@@ -213,12 +207,12 @@ def _id_row(  # noqa: PLR0913, PLR0917 - a value of each column
     first_us: int,
     latest: Record,
     gap_us: int,
-    gaps: Gaps,
+    gaps: traffic.Gaps,
     bits: int,
-    changed: BitRow,
-) -> IdRow:
+    changed: traffic.BitRow,
+) -> traffic.IdRow:
     frame = latest.frame
     assert isinstance(frame, CanFrame)
     known_us = gap_us if gaps.count else None
     times = (gaps.count + 1, first_us, latest.at_us)
-    return IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)
+    return traffic.IdRow(channel, ident, *times, frame, known_us, gaps.row(), bits, changed)

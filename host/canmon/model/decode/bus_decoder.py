@@ -8,6 +8,7 @@ from enum import IntEnum
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
+from tickrig.host.canmon.model.decode import services
 from tickrig.host.canmon.model.decode.decoded import (
     Decoded,
     Signal,
@@ -28,13 +29,6 @@ from tickrig.host.canmon.model.decode.pdos import (
     PdoDecoder,
     PdoTable,
     pdos_of,
-)
-from tickrig.host.canmon.model.decode.services import (
-    decode_emcy,
-    decode_error_control,
-    decode_nmt,
-    decode_sync,
-    decode_time,
 )
 from tickrig.host.canmon.model.frames import sender_of
 from tickrig.wire.can import CanFrame
@@ -96,9 +90,9 @@ COB_ID_SYNC, COB_ID_TIME, COB_ID_EMCY = 0x1005, 0x1012, 0x1014
 _SDO_SERVERS: Final = range(0x1201, 0x1280)
 _LSS_IDS: Final = (LSS_MASTER_COB_ID, LSS_SLAVE_COB_ID)
 _PRE_DEFINED: Final[dict[int, Route]] = {
-    NMT_COB_ID: decode_nmt,
-    _SYNC_ID: decode_sync,
-    _TIME_ID: decode_time,
+    NMT_COB_ID: services.decode_nmt,
+    _SYNC_ID: services.decode_sync,
+    _TIME_ID: services.decode_time,
 }
 
 
@@ -159,7 +153,7 @@ class BusDecoder:
         # its node.
         if isinstance(layout, PdoDecoder):
             return Effect.LATEST if layout.kind.startswith("tpdo") else Effect.NONE
-        return Effect.NONE if layout is None and route is not decode_nmt else Effect.EACH
+        return Effect.NONE if layout is None and route is not services.decode_nmt else Effect.EACH
 
     def lasting(self, can_id: int) -> Route | None:
         """Return what decodes a CAN-ID by the frame alone until `changes` grows; None for others.
@@ -168,7 +162,14 @@ class BusDecoder:
         """
         route = self._routes.get(can_id) or self._route(can_id)
         told = route.func if isinstance(route, partial) else route
-        by_frame = told in (_unmapped, _emcy, _raw, decode_nmt, decode_sync, decode_time)
+        by_frame = told in (
+            _unmapped,
+            _emcy,
+            _raw,
+            services.decode_nmt,
+            services.decode_sync,
+            services.decode_time,
+        )
         alone = by_frame or (can_id in _LSS_IDS and told is _lss_route())
         return route if alone or isinstance(getattr(route, "__self__", None), PdoDecoder) else None
 
@@ -219,7 +220,7 @@ class BusDecoder:
         # A node with a producer heartbeat time answers no guarding (CiA 301, error
         # control).
         guarded = node in self._guarded and not self.memory(node).number(*HEARTBEAT_TIME)
-        decoded = decode_error_control(node, frame, guarded=guarded)
+        decoded = services.decode_error_control(node, frame, guarded=guarded)
         if frame.remote:
             self._guarded.add(node)
         else:
@@ -286,9 +287,9 @@ class BusDecoder:
             return
         match index:
             case 0x1005:
-                self._configure(can_id, decode_sync)
+                self._configure(can_id, services.decode_sync)
             case 0x1012:
-                self._configure(can_id, decode_time)
+                self._configure(can_id, services.decode_time)
             case 0x1014:
                 self._configure(can_id, partial(_emcy, node))
 
@@ -333,7 +334,7 @@ def _lss_route() -> Route:
 
 
 def _emcy(node: int, at_us: int, frame: CanFrame) -> Decoded:
-    return decode_emcy(node, frame)
+    return services.decode_emcy(node, frame)
 
 
 def _unmapped(node: int, at_us: int, frame: CanFrame) -> Decoded:

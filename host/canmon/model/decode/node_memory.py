@@ -8,13 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
-from tickrig.host.canmon.model.decode.decoded import (
-    EDS,
-    SEEN,
-    Transfer,
-    TransferDirection,
-    TransferOutcome,
-)
+from tickrig.host.canmon.model.decode import decoded
 from tickrig.host.canmon.model.decode.object_text import (
     ObjectText,
     describe_drive,
@@ -86,7 +80,7 @@ def _text(device: EdsDevice, row: EntryDescription) -> ObjectText:
     info = device.objects[row.index]
     if info.code not in VARIABLES:
         name = f"{slug(info.name)}.{name or row.sub}"
-    return ObjectText(name, row.data_type, row.unit, row.factor, EDS)
+    return ObjectText(name, row.data_type, row.unit, row.factor, decoded.EDS)
 
 
 _STORE: Final = 0x1010
@@ -145,18 +139,18 @@ class NodeMemory:
         elif entry == STATUSWORD and len(data) == _STATUSWORD_BYTES:
             self._has_statusword = True
 
-    def learn(self, transfer: Transfer) -> bool:
+    def learn(self, transfer: decoded.Transfer) -> bool:
         """Learn from a transfer that ended; return whether it tells anything."""
         entry, data = transfer.entry, transfer.data
         if (
             entry is None
             or data is None
             or transfer.flaws
-            or transfer.outcome is not TransferOutcome.DONE
+            or transfer.outcome is not decoded.TransferOutcome.DONE
         ):
             return False
         data = self.describe(*entry).fitted(data, sized=transfer.sized)
-        if transfer.direction is TransferDirection.UPLOAD:
+        if transfer.direction is decoded.TransferDirection.UPLOAD:
             self.read(entry, data)
         else:
             self.written(entry, data)
@@ -186,8 +180,8 @@ class NodeMemory:
         """Say where the values of an object come from: traffic, where it told any."""
         entries = [(index, sub) for sub in range(MAX_MAPPED_OBJECTS + 1)]
         if any(entry in self._now for entry in entries):
-            return SEEN
-        return EDS if any(entry in self.eds.values for entry in entries) else ""
+            return decoded.SEEN
+        return decoded.EDS if any(entry in self.eds.values for entry in entries) else ""
 
     def maps_statusword(self) -> None:
         """Learn that a PDO carries 16 bits of 6041h."""
@@ -275,9 +269,9 @@ class Heartbeats:
         self._booted = True
         self.last_us = self.since_us = at_us
 
-    def learn(self, at_us: int, transfer: Transfer) -> None:
+    def learn(self, at_us: int, transfer: decoded.Transfer) -> None:
         """Take a transfer of 1017h that the memory has learnt: a new period begins anew."""
-        if transfer.direction is TransferDirection.DOWNLOAD or self.since_us is None:
+        if transfer.direction is decoded.TransferDirection.DOWNLOAD or self.since_us is None:
             self.gaps.clear()
             self.since_us = at_us
 

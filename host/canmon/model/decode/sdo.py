@@ -13,35 +13,7 @@ from tickrig.host.canmon.model.decode.decoded import (
     TransferOutcome,
     write_entry,
 )
-from tickrig.wire.canopen.sdo import (
-    Abort,
-    DownloadInitiateRequest,
-    DownloadInitiateResponse,
-    DownloadSegmentResponse,
-    Request,
-    Response,
-    Segment,
-    UploadInitiateRequest,
-    UploadInitiateResponse,
-    UploadSegmentRequest,
-    parse_request,
-    parse_response,
-)
-from tickrig.wire.canopen.sdo_frame import (
-    BLOCK_END,
-    BLOCK_SEQNO,
-    FRAME_BYTES,
-    BlockAcknowledge,
-    BlockDownloadInitiateRequest,
-    BlockDownloadInitiateResponse,
-    BlockEnd,
-    BlockEnded,
-    BlockSegment,
-    BlockStart,
-    BlockUploadInitiateRequest,
-    BlockUploadInitiateResponse,
-    crc16,
-)
+from tickrig.wire.canopen import sdo, sdo_frame
 from tickrig.wire.errors import WireError
 
 # Theory of operation
@@ -129,7 +101,7 @@ class OpenTransfer:
     crc: bool = False
     data: bytearray = field(default_factory=bytearray)
     flaws: list[str] = field(default_factory=list)
-    sent: Segment | None = None
+    sent: sdo.Segment | None = None
     requested_toggle: bool | None = None
     taken: bool | None = None
     block_last: int | None = None
@@ -153,7 +125,7 @@ class OpenTransfer:
         heard = max(self._block, default=0)
         return heard in (self.block_last, self.block_size) and heard > 0
 
-    def take_block_segment(self, segment: BlockSegment) -> None:
+    def take_block_segment(self, segment: sdo_frame.BlockSegment) -> None:
         """Keep a segment until its receipt says that it counts."""
         self._block[segment.seqno] = segment.data
         if segment.last:
@@ -171,11 +143,11 @@ class OpenTransfer:
         self.block_last = None
         self._block.clear()
 
-    def end_block(self, end: BlockEnd) -> None:
+    def end_block(self, end: sdo_frame.BlockEnd) -> None:
         """Cut the fill of the last segment off, and compare the CRC."""
         if end.fill:
             del self.data[-end.fill :]
-        if self.crc and not self.flaws and crc16(bytes(self.data)) != end.crc:
+        if self.crc and not self.flaws and sdo_frame.crc16(bytes(self.data)) != end.crc:
             self.add_flaw("wrong CRC")
         self.phase = TransferPhase.BLOCK_ENDED
 
@@ -207,37 +179,37 @@ class OpenTransfer:
 # Frames of SDO transfers, initiation, segments and blocks, as a third party hears them.
 
 _Initiate = (
-    UploadInitiateRequest
-    | DownloadInitiateRequest
-    | BlockUploadInitiateRequest
-    | BlockDownloadInitiateRequest
+    sdo.UploadInitiateRequest
+    | sdo.DownloadInitiateRequest
+    | sdo_frame.BlockUploadInitiateRequest
+    | sdo_frame.BlockDownloadInitiateRequest
 )
-_Answer = UploadInitiateResponse | DownloadInitiateResponse
+_Answer = sdo.UploadInitiateResponse | sdo.DownloadInitiateResponse
 
 
 def begin(at_us: int, node: int, request: _Initiate, data: bytes) -> OpenTransfer:
     """Open a transfer with the request that began it."""
-    uploads = isinstance(request, UploadInitiateRequest | BlockUploadInitiateRequest)
+    uploads = isinstance(request, sdo.UploadInitiateRequest | sdo_frame.BlockUploadInitiateRequest)
     direction = TransferDirection.UPLOAD if uploads else TransferDirection.DOWNLOAD
     opened = OpenTransfer(
         at_us, node, direction, TransferMode.EXPEDITED, request.index, request.sub, data
     )
     match request:
-        case DownloadInitiateRequest(data=None, size=size):
+        case sdo.DownloadInitiateRequest(data=None, size=size):
             opened.mode, opened.size = TransferMode.SEGMENTED, size
-        case DownloadInitiateRequest(data=bytes(value), size=size):
+        case sdo.DownloadInitiateRequest(data=bytes(value), size=size):
             opened.data += value
             opened.sized = size is not None
-        case BlockUploadInitiateRequest(crc=crc):
+        case sdo_frame.BlockUploadInitiateRequest(crc=crc):
             opened.mode, opened.crc = TransferMode.BLOCK, crc
-        case BlockDownloadInitiateRequest(crc=crc, size=size):
+        case sdo_frame.BlockDownloadInitiateRequest(crc=crc, size=size):
             opened.mode, opened.crc, opened.size = TransferMode.BLOCK, crc, size
     return opened
 
 
 def answers(running: OpenTransfer, answer: _Answer) -> bool:
     """Say whether this is the answer to the request; block upload may be switched to another."""
-    upload = isinstance(answer, UploadInitiateResponse)
+    upload = isinstance(answer, sdo.UploadInitiateResponse)
     return (
         running.phase is TransferPhase.ASKED
         and running.entry == (answer.index, answer.sub)
@@ -251,7 +223,7 @@ def answers(running: OpenTransfer, answer: _Answer) -> bool:
 
 def _take_answer(running: OpenTransfer, answer: _Answer) -> str:
     """Take the answer: the value itself, or leave for segments."""
-    if isinstance(answer, DownloadInitiateResponse):
+    if isinstance(answer, sdo.DownloadInitiateResponse):
         running.done = running.mode is TransferMode.EXPEDITED and not running.partial
         running.phase = TransferPhase.SEGMENTS
         return (
@@ -273,21 +245,21 @@ def _take_answer(running: OpenTransfer, answer: _Answer) -> str:
 
 def _unheard(at_us: int, node: int, answer: _Answer) -> OpenTransfer:
     """Open a transfer whose request was not heard."""
-    upload = isinstance(answer, UploadInitiateResponse)
+    upload = isinstance(answer, sdo.UploadInitiateResponse)
     direction = TransferDirection.UPLOAD if upload else TransferDirection.DOWNLOAD
     opened = OpenTransfer(at_us, node, direction, TransferMode.SEGMENTED, answer.index, answer.sub)
     opened.partial = True
     return opened
 
 
-def _request_segment(running: OpenTransfer, request: UploadSegmentRequest) -> str:
+def _request_segment(running: OpenTransfer, request: sdo.UploadSegmentRequest) -> str:
     """Take what a client of an upload asks for."""
     running.retries += running.requested_toggle == request.toggle
     running.requested_toggle = request.toggle
     return f"asks for a segment, {running.progress} so far"
 
 
-def _take_segment(running: OpenTransfer, segment: Segment) -> str:
+def _take_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
     """Take a segment of an upload, unless it was sent twice or a toggle bit is wrong."""
     if segment.toggle != running.requested_toggle or segment.toggle == running.taken:
         return "segment with the wrong toggle bit, or sent again"
@@ -297,7 +269,7 @@ def _take_segment(running: OpenTransfer, segment: Segment) -> str:
     return f"segment, {running.progress}"
 
 
-def _send_segment(running: OpenTransfer, segment: Segment) -> str:
+def _send_segment(running: OpenTransfer, segment: sdo.Segment) -> str:
     """Take a segment of a download; it counts when the server has confirmed it."""
     again = running.sent is not None and running.sent.toggle == segment.toggle
     running.retries += again or segment.toggle == running.taken
@@ -305,7 +277,7 @@ def _send_segment(running: OpenTransfer, segment: Segment) -> str:
     return f"segment of {len(segment.data)} B, {running.progress} so far"
 
 
-def _confirm_segment(running: OpenTransfer, response: DownloadSegmentResponse) -> str:
+def _confirm_segment(running: OpenTransfer, response: sdo.DownloadSegmentResponse) -> str:
     """Take the receipt of a segment."""
     sent = running.sent
     if sent is None or sent.toggle != response.toggle or sent.toggle == running.taken:
@@ -325,39 +297,39 @@ def _is_block_segment(running: OpenTransfer, sender: TransferDirection, data: by
     """Tell a segment of a block from anything else: only the state can."""
     if running.phase is not TransferPhase.BLOCK or running.direction is not sender:
         return False
-    if len(data) != FRAME_BYTES or not data[0] & BLOCK_SEQNO:
+    if len(data) != sdo_frame.FRAME_BYTES or not data[0] & sdo_frame.BLOCK_SEQNO:
         return False  # 80h, an abort: no segment has the number 0
     # E3h: bits of an end without n, C1h | n << 2. Before the last segment such a byte is
     # segment 41h.
-    return running.block_last is None or data[0] & _END_MASK != BLOCK_END
+    return running.block_last is None or data[0] & _END_MASK != sdo_frame.BLOCK_END
 
 
 def _take_block_segment(running: OpenTransfer, data: bytes) -> str:
     """Keep a segment until its receipt."""
-    segment = BlockSegment.parse(data)
+    segment = sdo_frame.BlockSegment.parse(data)
     running.take_block_segment(segment)
     return f"segment {segment.seqno} of a block"
 
 
-def _take_block_frame(running: OpenTransfer, message: Request | Response) -> str:
+def _take_block_frame(running: OpenTransfer, message: sdo.Request | sdo.Response) -> str:
     """Take any other frame of a block transfer."""
     upload = running.direction is TransferDirection.UPLOAD
     match message, running.phase:
         case (
-            (BlockDownloadInitiateResponse() | BlockUploadInitiateResponse()),
+            (sdo_frame.BlockDownloadInitiateResponse() | sdo_frame.BlockUploadInitiateResponse()),
             TransferPhase.ASKED,
         ):
             return _answer(running, message)
-        case BlockStart(), TransferPhase.BLOCK_READY:
+        case sdo_frame.BlockStart(), TransferPhase.BLOCK_READY:
             running.phase = TransferPhase.BLOCK
             return "start of a block upload"
-        case BlockAcknowledge(ackseq=ackseq, block_size=block_size), TransferPhase.BLOCK:
+        case sdo_frame.BlockAcknowledge(ackseq=ackseq, block_size=block_size), TransferPhase.BLOCK:
             running.acknowledge_block(ackseq)
             running.block_size = block_size
             return f"segments to {ackseq} confirmed, {running.progress}"
-        case BlockEnd(), (TransferPhase.BLOCK | TransferPhase.BLOCK_ENDING):
+        case sdo_frame.BlockEnd(), (TransferPhase.BLOCK | TransferPhase.BLOCK_ENDING):
             return _end(running, message)
-        case BlockEnded(), TransferPhase.BLOCK_ENDED:
+        case sdo_frame.BlockEnded(), TransferPhase.BLOCK_ENDED:
             running.done = True
             return "end of a block upload confirmed" if upload else "block download confirmed"
         case _:
@@ -365,10 +337,11 @@ def _take_block_frame(running: OpenTransfer, message: Request | Response) -> str
 
 
 def _answer(
-    running: OpenTransfer, answer: BlockDownloadInitiateResponse | BlockUploadInitiateResponse
+    running: OpenTransfer,
+    answer: sdo_frame.BlockDownloadInitiateResponse | sdo_frame.BlockUploadInitiateResponse,
 ) -> str:
     running.crc = running.crc and answer.crc
-    if isinstance(answer, BlockUploadInitiateResponse):
+    if isinstance(answer, sdo_frame.BlockUploadInitiateResponse):
         running.size = answer.size
         running.phase = TransferPhase.BLOCK_READY
         return f"block upload of {'unknown size' if answer.size is None else f'{answer.size} B'}"
@@ -376,7 +349,7 @@ def _answer(
     return f"ready for blocks of {answer.block_size} segments"
 
 
-def _end(running: OpenTransfer, end: BlockEnd) -> str:
+def _end(running: OpenTransfer, end: sdo_frame.BlockEnd) -> str:
     if running.phase is TransferPhase.BLOCK:
         running.add_flaw("a receipt was not heard")
     running.end_block(end)
@@ -431,11 +404,11 @@ class SdoChannel:
             text = _take_block_segment(running, data)
             return SdoStep(text, running.entry, asks=running.is_block_over)
         try:
-            message = parse_request(data)
+            message = sdo.parse_request(data)
         except WireError as error:
             return SdoStep(str(error))
         step = self._step(at_us, self._take_request(at_us, message, data), message)
-        return step._replace(asks=not isinstance(message, Abort | BlockEnded))
+        return step._replace(asks=not isinstance(message, sdo.Abort | sdo_frame.BlockEnded))
 
     def response(self, at_us: int, data: bytes) -> SdoStep:
         """Take a frame of the server."""
@@ -443,12 +416,12 @@ class SdoChannel:
         if running and _is_block_segment(running, TransferDirection.UPLOAD, data):
             return SdoStep(_take_block_segment(running, data), running.entry)
         try:
-            message = parse_response(data)
+            message = sdo.parse_response(data)
         except WireError as error:
             return SdoStep(str(error))
         return self._step(at_us, self._take_response(at_us, message), message)
 
-    def _step(self, at_us: int, text: str, message: Request | Response) -> SdoStep:
+    def _step(self, at_us: int, text: str, message: sdo.Request | sdo.Response) -> SdoStep:
         """Close what is done, and tell what ended."""
         running = self._running
         if running and running.done:
@@ -465,36 +438,36 @@ class SdoChannel:
         self._latest, self._running = transfer, None
         self._ended.append(transfer)
 
-    def _take_request(self, at_us: int, message: Request, data: bytes) -> str:
+    def _take_request(self, at_us: int, message: sdo.Request, data: bytes) -> str:
         match message:
             case (
-                UploadInitiateRequest()
-                | DownloadInitiateRequest()
-                | BlockUploadInitiateRequest()
-                | BlockDownloadInitiateRequest()
+                sdo.UploadInitiateRequest()
+                | sdo.DownloadInitiateRequest()
+                | sdo_frame.BlockUploadInitiateRequest()
+                | sdo_frame.BlockDownloadInitiateRequest()
             ):
                 return self._begin(at_us, message, data)
-            case Abort():
+            case sdo.Abort():
                 return self._abort(at_us, message, by_client=True)
-            case UploadSegmentRequest():
+            case sdo.UploadSegmentRequest():
                 return _request_segment(self._segmented(at_us, TransferDirection.UPLOAD), message)
-            case Segment():
+            case sdo.Segment():
                 return _send_segment(self._segmented(at_us, TransferDirection.DOWNLOAD), message)
             case _:
                 return _take_block_frame(self._running, message) if self._running else _ORPHAN
 
-    def _take_response(self, at_us: int, message: Response) -> str:
+    def _take_response(self, at_us: int, message: sdo.Response) -> str:
         running = self._running
         match message:
-            case UploadInitiateResponse() | DownloadInitiateResponse():
+            case sdo.UploadInitiateResponse() | sdo.DownloadInitiateResponse():
                 return self._answer(at_us, message)
-            case Abort():
+            case sdo.Abort():
                 return self._abort(at_us, message, by_client=False)
             case _ if running is None:
                 return _ORPHAN
-            case Segment():
+            case sdo.Segment():
                 return _take_segment(running, message)
-            case DownloadSegmentResponse():
+            case sdo.DownloadSegmentResponse():
                 return _confirm_segment(running, message)
             case _:
                 return _take_block_frame(running, message)
@@ -537,7 +510,7 @@ class SdoChannel:
         opened.phase, opened.partial = TransferPhase.SEGMENTS, True
         return opened
 
-    def _abort(self, at_us: int, message: Abort, *, by_client: bool) -> str:
+    def _abort(self, at_us: int, message: sdo.Abort, *, by_client: bool) -> str:
         """End the transfer that runs; an abort of another object ends one that was not heard."""
         running, entry, code = self._running, _named(message), message.code
         if running and (entry is None or running.entry in (None, entry)):
@@ -554,12 +527,12 @@ class SdoChannel:
         return "aborted"
 
 
-def _named(message: Request | Response) -> tuple[int, int] | None:
+def _named(message: sdo.Request | sdo.Response) -> tuple[int, int] | None:
     """Return the index and sub-index that a frame names itself.
 
     Some clients name none with an abort: 0000h:00 is no object.
     """
-    if isinstance(message, Abort) and not (message.index or message.sub):
+    if isinstance(message, sdo.Abort) and not (message.index or message.sub):
         return None
     index, sub = getattr(message, "index", None), getattr(message, "sub", None)
     return None if index is None or sub is None else (index, sub)

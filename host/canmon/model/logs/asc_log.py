@@ -1,6 +1,6 @@
 """Vector's ASC logs: whatever header they have, with absolute and with relative times.
 
->>> lines, tally = AscLines(), LogTally()
+>>> lines, tally = AscLines(), mark.LogTally()
 >>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
 ...     record = lines.read(line, tally)
 >>> record.at_us, record.channel, str(record.frame)
@@ -14,27 +14,12 @@ from datetime import UTC, datetime
 from typing import Final
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record
+from tickrig.host.canmon.model.logs import mark
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
-from tickrig.host.canmon.model.logs.mark import (
-    BAD_FRAMES,
-    CAN_XL,
-    ERRORS_COUNTED,
-    OTHER_LINES,
-    LogTally,
-)
-from tickrig.wire.can import (
-    BRS,
-    ESI,
-    MAX_DATA_BYTES,
-    STANDARD_MAX,
-    CanFrame,
-    ErrorClass,
-    ErrorFrame,
-    FdFrame,
-)
+from tickrig.wire import can
 from tickrig.wire.errors import WireError
 
-_BUS_ERROR: Final = ErrorFrame(ErrorClass.BUS_ERROR)
+_BUS_ERROR: Final = can.ErrorFrame(can.ErrorClass.BUS_ERROR)
 """What `ErrorFrame` in a line says: it does not name the error as linux/can/error.h does."""
 
 _FDF: Final = 0x1000
@@ -111,7 +96,7 @@ class AscLines:
         self._header_us, self._block_us, self._pending = 0, 0, False
         self._now_us = 0
 
-    def read(self, line: str, tally: LogTally) -> Record | str | None:
+    def read(self, line: str, tally: mark.LogTally) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line."""
         timed = _TIMED.fullmatch(line)
         if timed is None:
@@ -122,12 +107,12 @@ class AscLines:
         try:
             return self._event(event, tally)
         except WireError:
-            tally.passed_over[BAD_FRAMES] += 1
-            return BAD_FRAMES
+            tally.passed_over[mark.BAD_FRAMES] += 1
+            return mark.BAD_FRAMES
         except (ValueError, LookupError):
             return None
 
-    def _head(self, text: str, tally: LogTally) -> str:
+    def _head(self, text: str, tally: mark.LogTally) -> str:
         """Take a line without a time: what it says of those that follow."""
         if base := _BASE.match(text):
             self._base, self._guessed = 10 if base[1].lower() == "dec" else 16, False
@@ -160,7 +145,7 @@ class AscLines:
                 self._block_us = self._header_us
         self._now_us = self._block_us + span_us
 
-    def _event(self, event: str, tally: LogTally) -> Record | str | None:
+    def _event(self, event: str, tally: mark.LogTally) -> Record | str | None:
         if classic := _CLASSIC.fullmatch(event):
             channel, ident, extended, direction, kind, length, rest = classic.groups()
             frame = self._classic(ident, bool(extended), kind.lower() == "r", length, rest)
@@ -172,13 +157,13 @@ class AscLines:
             fd = kind.upper() == "CANFD"
             frame_or_none = (self._fd if fd else self._xl)(words.split())
             if frame_or_none is None:
-                tally.passed_over[CAN_XL] += 1
-                return CAN_XL
+                tally.passed_over[mark.CAN_XL] += 1
+                return mark.CAN_XL
             return self._record(channel, direction, frame_or_none)
         if _FRAME.match(event):
             return None
         if not _QUIET_EVENT.match(event):
-            tally.passed_over[OTHER_LINES] += 1
+            tally.passed_over[mark.OTHER_LINES] += 1
             _note_errors(event, tally)
         return event
 
@@ -188,7 +173,7 @@ class AscLines:
 
     def _classic(
         self, ident: str, extended: bool, remote: bool, length: str | None, rest: str
-    ) -> CanFrame:
+    ) -> can.CanFrame:
         """Return a frame; of a length code above 8 it has 8 bytes."""
         words, size = rest.split(), 0 if length is None else self._length(length)
         # Three digits a byte: `007 255` is decimal, hexadecimal bytes have two.
@@ -196,21 +181,21 @@ class AscLines:
             self._base = 10  # BUSMASTER does not always write what the base is
         can_id, extended = self._can_id(ident, extended)
         if remote:
-            return CanFrame(can_id, b"", True, extended, size).checked()
+            return can.CanFrame(can_id, b"", True, extended, size).checked()
         if length is None:
             raise ValueError("a data frame without its length")
-        return CanFrame(can_id, self._data(words, size), False, extended).checked()
+        return can.CanFrame(can_id, self._data(words, size), False, extended).checked()
 
     def _length(self, text: str) -> int:
         """Read a length code, one hexadecimal digit or more of the base."""
         # `d 8`, `d f`: one digit is hexadecimal whatever the base, codes above 8 mean eight
         # bytes.
-        return min(MAX_DATA_BYTES, int(text, 16 if len(text) == 1 else self._base))
+        return min(can.MAX_DATA_BYTES, int(text, 16 if len(text) == 1 else self._base))
 
     def _can_id(self, digits: str, extended: bool) -> tuple[int, bool]:
         """Read an identifier; some programs leave out the x of one that has 29 bits."""
         can_id = int(digits, self._base)
-        return can_id, extended or can_id > STANDARD_MAX
+        return can_id, extended or can_id > can.STANDARD_MAX
 
     def _data(self, words: list[str], length: int) -> bytes:
         if len(words) < length:
@@ -225,7 +210,7 @@ class AscLines:
         data, flags = self._data(rest, length), _FDF
         if len(rest) > length + 2:  # behind the duration and the count of bits
             flags = int(rest[length + 2], 16)
-        switches = BRS * (brs == "1") | ESI * (esi == "1")
+        switches = can.BRS * (brs == "1") | can.ESI * (esi == "1")
         return self._flagged(ident, dlc, data, flags, switches)
 
     def _xl(self, words: list[str]) -> AnyFrame | None:
@@ -237,25 +222,25 @@ class AscLines:
         length = int(size)
         fd = kind.upper().startswith("F")
         flags = int(rest[length + 1 + fd], 16)  # behind the stuff count of CAN FD, and the CRC
-        switches = BRS * bool(flags & 2 * _FDF) | ESI * bool(flags & 4 * _FDF)
+        switches = can.BRS * bool(flags & 2 * _FDF) | can.ESI * bool(flags & 4 * _FDF)
         return self._flagged(ident, dlc, self._data(rest, length), flags, switches)
 
     def _flagged(self, ident: str, dlc: str, data: bytes, flags: int, switches: int) -> AnyFrame:
         """Return the frame that its flags say: classic frames stand in such lines, too."""
         can_id, extended = self._can_id(ident.rstrip("xX"), ident[-1:] in ("x", "X"))
-        if flags & _FDF or len(data) > MAX_DATA_BYTES:
-            return FdFrame(can_id, data, extended, switches).checked()
+        if flags & _FDF or len(data) > can.MAX_DATA_BYTES:
+            return can.FdFrame(can_id, data, extended, switches).checked()
         if flags & _RTR:
-            return CanFrame(can_id, b"", True, extended, self._length(dlc)).checked()
-        return CanFrame(can_id, data, False, extended).checked()
+            return can.CanFrame(can_id, b"", True, extended, self._length(dlc)).checked()
+        return can.CanFrame(can_id, data, False, extended).checked()
 
 
-def _note_errors(event: str, tally: LogTally) -> None:
+def _note_errors(event: str, tally: mark.LogTally) -> None:
     """Note what an event says of errors: no frame shows them."""
     if state := _STATE.match(event):
         tally.errors_told[_STATES[state[1].lower()]] += 1
     elif _STATISTIC.match(event):
-        tally.errors_told[ERRORS_COUNTED] += 1
+        tally.errors_told[mark.ERRORS_COUNTED] += 1
 
 
 def _date_us(text: str) -> int | None:

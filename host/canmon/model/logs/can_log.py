@@ -24,14 +24,7 @@ from can.io.blf import FILE_HEADER_SIZE, BLFParseError
 from can.util import channel2int, len2dlc
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.log_file import (
-    COMPRESSED,
-    NO_MF4,
-    LogError,
-    LogFormat,
-    open_log,
-    to_us,
-)
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.log_writer import BusNumbers, TextBlock
 from tickrig.host.canmon.model.logs.mark import (
     BAD_FRAMES,
@@ -53,7 +46,7 @@ from tickrig.wire.errors import WireError
 def to_record(message: can.Message, channel: str, tally: LogTally) -> Record | None:
     """Return what was heard; None for impossible frames and times, which are counted."""
     try:
-        at_us = to_us(message.timestamp)
+        at_us = log_file.to_us(message.timestamp)
     except ValueError:
         tally.passed_over[NO_TIME] += 1
         return None
@@ -94,7 +87,7 @@ _UNSAID: Final = logging.NullHandler()
 class CanLogReader:
     """A reader of a log that python-can understands."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, LogTally()
 
     def __iter__(self) -> Iterator[Record]:
@@ -122,17 +115,17 @@ class CanLogReader:
 
     def _messages(self, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
         logging.getLogger("can.io.blf").addHandler(_UNSAID)
-        with open_log(self._path) as file:
+        with log_file.open_log(self._path) as file:
             try:
-                if self._kind is LogFormat.BLF:
+                if self._kind is log_file.LogFormat.BLF:
                     yield from self._blf(BlfReader(file), apart)
                 else:
                     yield from self._mf4(file)
-            except LogError:
+            except log_file.LogError:
                 raise
             except _BROKEN as error:
                 reason = self._why(error)
-                raise LogError(f"{self._path} is no {self._kind} log: {reason}") from error
+                raise log_file.LogError(f"{self._path} is no {self._kind} log: {reason}") from error
 
     def _why(self, error: Exception) -> str:
         if not self._path.stat().st_size:
@@ -143,19 +136,21 @@ class CanLogReader:
         try:
             return can.MF4Reader(file)
         except NotImplementedError as error:
-            raise LogError(f"{self._path}: {NO_MF4}") from error
+            raise log_file.LogError(f"{self._path}: {log_file.NO_MF4}") from error
 
     def _blf(self, reader: BlfReader, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
         count, reader.tally, reader.apart = 0, self.tally, apart
         for message in cast("Iterator[can.Message | BlfBlock]", reader):
             count += 1 if isinstance(message, can.Message) else message.frames
             yield message
-        with open_log(self._path) as file:
+        with log_file.open_log(self._path) as file:
             ended = _has_end(file)
             if reader.object_count != count and (reason := _missing_end(file)):
-                raise LogError(f"{self._path}: {reason}")
+                raise log_file.LogError(f"{self._path}: {reason}")
         if count and not ended:
-            raise LogError(f"{self._path}: its recorder did not end it: it has {count} frames")
+            raise log_file.LogError(
+                f"{self._path}: its recorder did not end it: it has {count} frames"
+            )
         if reader.object_count > count:
             self.tally.passed_over[OTHER_OBJECTS] += reader.object_count - count
 
@@ -555,11 +550,14 @@ class Mf4Writer(can.MF4Writer):
         """There is nothing to give yet."""
 
 
-_TEXT: Final[dict[LogFormat, Any]] = {
-    LogFormat.ASC: AscWriter,
-    LogFormat.TRC: TrcWriter,
+_TEXT: Final[dict[log_file.LogFormat, Any]] = {
+    log_file.LogFormat.ASC: AscWriter,
+    log_file.LogFormat.TRC: TrcWriter,
 }
-_BINARY: Final[dict[LogFormat, Any]] = {LogFormat.BLF: BlfWriter, LogFormat.MF4: Mf4Writer}
+_BINARY: Final[dict[log_file.LogFormat, Any]] = {
+    log_file.LogFormat.BLF: BlfWriter,
+    log_file.LogFormat.MF4: Mf4Writer,
+}
 
 _END_US: Final = 16_725_225_600_000_000
 """The year 2500: dates of ASC and TRC go on to 9999, nanoseconds of BLF to 2554."""
@@ -578,13 +576,15 @@ class CanLogWriter:
         OSError: the file cannot be written.
     """
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
-        if kind in _BINARY and path.suffix.lower() == COMPRESSED:
-            raise LogError(f"{path}: {kind} is compressed by itself, it is not written with .gz")
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
+        if kind in _BINARY and path.suffix.lower() == log_file.COMPRESSED:
+            raise log_file.LogError(
+                f"{path}: {kind} is compressed by itself, it is not written with .gz"
+            )
         self._path, self._kind, self._closed = path, kind, False
         self._numbers = BusNumbers()
         self._passed_over: Counter[str] = Counter()
-        self._file: Any = open_log(path, "wb")
+        self._file: Any = log_file.open_log(path, "wb")
         if kind in _TEXT:
             self._file = _Text(self._file, str(path))
         try:
@@ -592,13 +592,13 @@ class CanLogWriter:
         except NotImplementedError as error:
             self._file.close()
             path.unlink()
-            raise LogError(f"{path}: {NO_MF4}") from error
+            raise log_file.LogError(f"{path}: {log_file.NO_MF4}") from error
 
     def write(self, record: Record, /) -> None:
         """Add a frame."""
         if what := _not_held(record, self._kind):
             self._passed_over[what] += 1
-            if self._kind is LogFormat.TRC or record.at_us >= _END_US:
+            if self._kind is log_file.LogFormat.TRC or record.at_us >= _END_US:
                 return
         self._writer.on_message_received(to_can(record, self._numbers.number(record.channel)))
 
@@ -609,7 +609,7 @@ class CanLogWriter:
 
     def mark(self, mark: Mark, /) -> None:
         """Add a comment or marker, or count it."""
-        if self._kind is LogFormat.MF4 or mark.at_us >= _END_US:
+        if self._kind is log_file.LogFormat.MF4 or mark.at_us >= _END_US:
             self._passed_over[_MARKS] += 1
         else:
             self._writer.mark(mark)
@@ -650,12 +650,13 @@ class _Text(io.TextIOWrapper):
         return self._name
 
 
-def _not_held(record: Record, kind: LogFormat) -> str:
+def _not_held(record: Record, kind: log_file.LogFormat) -> str:
     """Return what a format cannot hold; empty if it can."""
     if record.at_us >= _END_US:
         return "frames of the year 2500 and later"
     if isinstance(record.frame, ErrorFrame):
-        return {LogFormat.TRC: "error frames", LogFormat.ASC: "classes of error frames"}.get(
-            kind, ""
-        )
-    return "remote frames" if kind is LogFormat.TRC and record.frame.remote else ""
+        return {
+            log_file.LogFormat.TRC: "error frames",
+            log_file.LogFormat.ASC: "classes of error frames",
+        }.get(kind, "")
+    return "remote frames" if kind is log_file.LogFormat.TRC and record.frame.remote else ""

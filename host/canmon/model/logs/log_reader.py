@@ -23,13 +23,7 @@ from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.log_file import (
-    LogError,
-    LogFormat,
-    log_format,
-    open_log,
-    read_blocks,
-)
+from tickrig.host.canmon.model.logs import log_file
 from tickrig.host.canmon.model.logs.mark import (
     CAN_XL,
     DROP_COUNT,
@@ -281,17 +275,17 @@ _CAN_LOG: Final = "tickrig.host.canmon.model.logs.can_log"
 _CAPTURE: Final = "tickrig.host.canmon.model.logs.pcap"
 
 _READERS: Final = {
-    LogFormat.CANDUMP: (__name__, "TextLogReader"),
-    LogFormat.JSONL: (__name__, "TextLogReader"),
-    LogFormat.CSV: (__name__, "TextLogReader"),
-    LogFormat.GVRET: (__name__, "TextLogReader"),
-    LogFormat.ASC: ("tickrig.host.canmon.model.logs.asc_log", "AscLogReader"),
-    LogFormat.BLF: (_CAN_LOG, "CanLogReader"),
-    LogFormat.TRC: ("tickrig.host.canmon.model.logs.trc_log", "TrcLogReader"),
-    LogFormat.MF4: (_CAN_LOG, "CanLogReader"),
-    LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogReader"),
-    LogFormat.PCAPNG: (_CAPTURE, "PcapReader"),
-    LogFormat.PCAP: (_CAPTURE, "PcapReader"),
+    log_file.LogFormat.CANDUMP: (__name__, "TextLogReader"),
+    log_file.LogFormat.JSONL: (__name__, "TextLogReader"),
+    log_file.LogFormat.CSV: (__name__, "TextLogReader"),
+    log_file.LogFormat.GVRET: (__name__, "TextLogReader"),
+    log_file.LogFormat.ASC: ("tickrig.host.canmon.model.logs.asc_log", "AscLogReader"),
+    log_file.LogFormat.BLF: (_CAN_LOG, "CanLogReader"),
+    log_file.LogFormat.TRC: ("tickrig.host.canmon.model.logs.trc_log", "TrcLogReader"),
+    log_file.LogFormat.MF4: (_CAN_LOG, "CanLogReader"),
+    log_file.LogFormat.TRACE: ("tickrig.host.canmon.model.logs.trace_log", "TraceLogReader"),
+    log_file.LogFormat.PCAPNG: (_CAPTURE, "PcapReader"),
+    log_file.LogFormat.PCAP: (_CAPTURE, "PcapReader"),
 }
 """Module and class of the reader of each format."""
 
@@ -322,7 +316,7 @@ def read_log(path: Path) -> LogReader:
     Raises:
         LogFormatError: the file's name tells no format.
     """
-    kind = log_format(path)
+    kind = log_file.log_format(path)
     module, name = _READERS[kind]
     return cast("LogReader", getattr(import_module(module), name)(path, kind))
 
@@ -330,7 +324,7 @@ def read_log(path: Path) -> LogReader:
 class TextLogReader:
     """A reader of a log in text."""
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self.tally = path, LogTally()
 
     def __iter__(self) -> Iterator[Record]:
@@ -346,8 +340,8 @@ class TextLogReader:
     def _pieces(self) -> Iterator[tuple[list[Record], LogLines]]:
         lines = LogLines()
         self.tally = lines.tally
-        with open_log(self._path) as file:
-            for data in read_blocks(file, self._path, BLOCK_BYTES):
+        with log_file.open_log(self._path) as file:
+            for data in log_file.read_blocks(file, self._path, BLOCK_BYTES):
                 yield lines.push(data), lines
         yield lines.finish(), lines
 
@@ -379,7 +373,7 @@ class LineLogReader:
     comments: tuple[str, ...] = ()
     make_lines: Callable[[], LineParser]
 
-    def __init__(self, path: Path, kind: LogFormat) -> None:
+    def __init__(self, path: Path, kind: log_file.LogFormat) -> None:
         self._path, self._kind, self.tally = path, kind, LogTally()
 
     def __iter__(self) -> Iterator[Record]:
@@ -394,7 +388,7 @@ class LineLogReader:
             try:
                 found = lines.read(line, tally)
             except ValueError as error:
-                raise LogError(f"{self._path} is no {self._kind} log: {error}") from error
+                raise log_file.LogError(f"{self._path} is no {self._kind} log: {error}") from error
             if isinstance(found, Record):
                 at_us = found.at_us
                 if marks:
@@ -411,9 +405,9 @@ class LineLogReader:
     def _lines(self) -> Iterator[str]:
         """Give the lines: in UTF-8, or else in Latin-1."""
         whole = WholeLines()
-        with open_log(self._path) as file:
+        with log_file.open_log(self._path) as file:
             first = True
-            for data in read_blocks(file, self._path, BLOCK_BYTES):
+            for data in log_file.read_blocks(file, self._path, BLOCK_BYTES):
                 if lines := whole.push(data):
                     text = _text(lines[:-1])
                     yield from (text.removeprefix(_BOM) if first else text).split("\n")

@@ -10,15 +10,9 @@ from pathlib import Path
 from typing import Final, Protocol, cast
 
 from tickrig.host.canmon.model.frames import Record
+from tickrig.host.canmon.model.logs import notation
 from tickrig.host.canmon.model.logs.log_file import COMPRESSED, LogFormat, log_format, open_log
 from tickrig.host.canmon.model.logs.mark import Mark
-from tickrig.host.canmon.model.logs.notation import (
-    GVRET_HEADER,
-    LOG_HEADER,
-    csv_row,
-    gvret_row,
-    json_line,
-)
 from tickrig.wire.can import CanFrame, ErrorFrame
 
 _BLOCK_LINES: Final = 256
@@ -131,8 +125,8 @@ def log_line(record: Record) -> str:
 
 _LINES: Final = {
     LogFormat.CANDUMP: log_line,
-    LogFormat.JSONL: json_line,
-    LogFormat.CSV: csv_row,
+    LogFormat.JSONL: notation.json_line,
+    LogFormat.CSV: notation.csv_row,
 }
 
 
@@ -200,7 +194,7 @@ class CsvLogWriter(TextLogWriter):
     def __init__(self, path: Path, kind: LogFormat) -> None:
         super().__init__(path, kind)
         self._name, self._channels, self._marks = path.name, dict[str, None](), 0
-        self._lines.append(LOG_HEADER)
+        self._lines.append(notation.LOG_HEADER)
 
     def write(self, record: Record, /) -> None:
         """Add a row."""
@@ -254,7 +248,7 @@ class GvretLogWriter(TextLogWriter):
     def __init__(self, path: Path, kind: LogFormat) -> None:
         super().__init__(path, kind)
         self._name, self._numbers, self._left_out = path.name, BusNumbers(), Counter[str]()
-        self._lines.append(GVRET_HEADER)
+        self._lines.append(notation.GVRET_HEADER)
 
     def write(self, record: Record, /) -> None:
         """Add a row, or count what such a log does not hold."""
@@ -276,4 +270,4 @@ class GvretLogWriter(TextLogWriter):
         return said + self._numbers.messages(self._name)
 
     def _row(self, record: Record) -> str:
-        return gvret_row(record, self._numbers.number(record.channel))
+        return notation.gvret_row(record, self._numbers.number(record.channel))

@@ -1,6 +1,6 @@
 r"""Frames as lines of JSON and CSV, and in candump's compact notation.
 
->>> csv_row(Record(1_500_000, "can0", CanFrame(0x705, b"\x7f"), sent=True))
+>>> csv_row(Record(1_500_000, "can0", can.CanFrame(0x705, b"\x7f"), sent=True))
 '1.500000,0x705,0,0,0,1,fw==>'
 
 >>> str(parse_frame("123#0011223344556677_C")), str(parse_frame("20000080#01"))
@@ -23,18 +23,7 @@ from tickrig.host.canmon.model.logs.mark import (
     dropped,
     read_mark,
 )
-from tickrig.wire.can import (
-    BRS,
-    ERROR_CLASS_MASK,
-    ESI,
-    FD_LENGTHS,
-    MAX_DATA_BYTES,
-    STANDARD_MAX,
-    CanFrame,
-    ErrorFrame,
-    FdFrame,
-    parse_sent,
-)
+from tickrig.wire import can
 from tickrig.wire.errors import WireError
 
 _CODED: Final = re.compile(r"(.+#(?:[0-9A-Fa-f]{16}|R8))_[9A-Fa-f]")
@@ -49,9 +38,9 @@ def parse_frame(notation: str) -> AnyFrame:
     """
     if error := _ERROR.fullmatch(notation):
         data = bytes.fromhex(error[2]).ljust(8, b"\0")
-        return ErrorFrame(int(error[1], 16) & ERROR_CLASS_MASK, data)
+        return can.ErrorFrame(int(error[1], 16) & can.ERROR_CLASS_MASK, data)
     coded = _CODED.fullmatch(notation)
-    return parse_sent(coded[1] if coded else notation)
+    return can.parse_sent(coded[1] if coded else notation)
 
 
 LONGEST_NAME: Final = 32
@@ -71,13 +60,13 @@ def json_line(record: Record, more: str = "") -> str:
     `id`; one of CAN FD has `fd`: 1, with `brs`: 1 and `esi`: 1 where it has these.
     `{"v":1,"ev":"drop","n":12}` says what was lost; a line of a serial port is an event, too.
 
-    >>> json_line(Record(1_500_000, "can0", CanFrame(0x185, b"7")))
+    >>> json_line(Record(1_500_000, "can0", can.CanFrame(0x185, b"7")))
     '{"v":1,"t":1.500000,"ch":"can0","id":389,"x":0,"dir":"rx","data":"37"}'
     """
     at_us, channel, frame, sent = record
-    if isinstance(frame, ErrorFrame):
+    if isinstance(frame, can.ErrorFrame):
         what = f'"id":{frame.error_class},"x":0,"err":1'
-    elif isinstance(frame, FdFrame):
+    elif isinstance(frame, can.FdFrame):
         flags = ',"brs":1' * frame.brs + ',"esi":1' * frame.esi
         what = f'"id":{frame.can_id},"x":{frame.extended:d},"fd":1{flags}'
     else:
@@ -161,12 +150,14 @@ def _name(channel: object) -> str:
 def _frame(said: dict[str, Any]) -> AnyFrame:
     data = bytes.fromhex(said["data"])
     if said.get("err"):
-        return ErrorFrame(int(said["id"]) & 0x1FFF_FFFF, data[:8].ljust(8, b"\0"))
+        return can.ErrorFrame(int(said["id"]) & 0x1FFF_FFFF, data[:8].ljust(8, b"\0"))
     if said.get("fd"):
-        flags = BRS * bool(said.get("brs")) | ESI * bool(said.get("esi"))
-        return FdFrame(int(said["id"]), data, bool(said["x"]), flags).checked()
+        flags = can.BRS * bool(said.get("brs")) | can.ESI * bool(said.get("esi"))
+        return can.FdFrame(int(said["id"]), data, bool(said["x"]), flags).checked()
     remote = said.get("rtr")
-    frame = CanFrame(int(said["id"]), data, remote is not None, bool(said["x"]), int(remote or 0))
+    frame = can.CanFrame(
+        int(said["id"]), data, remote is not None, bool(said["x"]), int(remote or 0)
+    )
     return frame.checked()
 
 
@@ -218,9 +209,9 @@ def csv_row(record: Record) -> str:
     """
     at_us, _, frame, sent = record
     marks = _SENT * sent
-    if isinstance(frame, ErrorFrame):
+    if isinstance(frame, can.ErrorFrame):
         what = f"{frame.error_class:#x},0,0,1,{len(frame.data)}"
-    elif isinstance(frame, FdFrame):
+    elif isinstance(frame, can.FdFrame):
         what = f"{frame.can_id:#x},{frame.extended:d},0,0,{len(frame.data)}"
         marks = FD + FD_BRS * frame.brs + FD_ESI * frame.esi + marks
     else:
@@ -246,11 +237,11 @@ _GVRET: Final = re.compile(
 def gvret_row(record: Record, bus: int) -> str:
     """Write a data frame of at most 8 bytes below `GVRET_HEADER`.
 
-    >>> gvret_row(Record(1_500_000, "can0", CanFrame(0x705, b"7"), sent=True), 0)
+    >>> gvret_row(Record(1_500_000, "can0", can.CanFrame(0x705, b"7"), sent=True), 0)
     '1500000,00000705,false,Tx,0,1,37,00,00,00,00,00,00,00,'
     """
     frame = record.frame
-    assert isinstance(frame, CanFrame), "the log holds no others"
+    assert isinstance(frame, can.CanFrame), "the log holds no others"
     direction = "Tx" if record.sent else "Rx"
     cells = frame.data.ljust(_GVRET_BYTES, b"\0").hex(",").upper()
     extended = "true" if frame.extended else "false"
@@ -282,9 +273,9 @@ def _of_savvycan(match: re.Match[str], tally: LogTally, clock: Counting) -> Reco
     data = bytes(int(cell, 16) for cell in cells.split(",")[1 : size + 1])
     if len(data) != size:
         raise ValueError(f"{len(data)} bytes, {size} were announced")
-    long = extended.lower() == "true" or can_id > STANDARD_MAX
-    fd = size > MAX_DATA_BYTES
-    frame = FdFrame(can_id, data, long) if fd else CanFrame(can_id, data, False, long)
+    long = extended.lower() == "true" or can_id > can.STANDARD_MAX
+    fd = size > can.MAX_DATA_BYTES
+    frame = can.FdFrame(can_id, data, long) if fd else can.CanFrame(can_id, data, False, long)
     checked = frame.checked()
     tally.without_errors = _WITHOUT_ERRORS
     at_us = clock.counted_us(int(stamp))
@@ -305,12 +296,12 @@ def _logged(cells: list[str]) -> Record:
     data, can_id, length = a2b_base64(text), int(ident, 16), int(dlc)
     frame: AnyFrame
     if error == "1":
-        frame = ErrorFrame(can_id & ERROR_CLASS_MASK, data[:8].ljust(8, b"\0"))
+        frame = can.ErrorFrame(can_id & can.ERROR_CLASS_MASK, data[:8].ljust(8, b"\0"))
     elif remote == "1":
-        frame = CanFrame(can_id, b"", True, extended == "1", length).checked()
-    elif FD in text or (len(data) > MAX_DATA_BYTES and len(data) in FD_LENGTHS):
-        flags = BRS * (FD_BRS in text) | ESI * (FD_ESI in text)
-        frame = FdFrame(can_id, data, extended == "1", flags).checked()
+        frame = can.CanFrame(can_id, b"", True, extended == "1", length).checked()
+    elif FD in text or (len(data) > can.MAX_DATA_BYTES and len(data) in can.FD_LENGTHS):
+        flags = can.BRS * (FD_BRS in text) | can.ESI * (FD_ESI in text)
+        frame = can.FdFrame(can_id, data, extended == "1", flags).checked()
     else:
-        frame = CanFrame(can_id, data, False, extended == "1").checked()
+        frame = can.CanFrame(can_id, data, False, extended == "1").checked()
     return Record(to_us(float(stamp)), UNNAMED, frame, text.rstrip().endswith(_SENT))

@@ -9,9 +9,9 @@ Frames as packets of a capture, as LINKTYPE_CAN_SOCKETCAN has them (tcpdump.org)
 
 A packet is a struct can_frame or canfd_frame of Linux with the identifier in network byte order.
 
->>> packet(CanFrame.parse("705#7F")).hex()
+>>> packet(can.CanFrame.parse("705#7F")).hex()
 '00000705010000007f00000000000000'
->>> str(_parse_packet(packet(FdFrame.parse("00000123##1AABB"))))
+>>> str(_parse_packet(packet(can.FdFrame.parse("00000123##1AABB"))))
 '00000123##1AABB'
 """
 
@@ -39,19 +39,7 @@ from tickrig.host.canmon.model.logs.mark import (
     read_mark,
 )
 from tickrig.host.canmon.model.logs.notation import LONGEST_NAME, UNNAMED
-from tickrig.wire.can import (
-    BRS,
-    ERROR_CLASS_MASK,
-    ERROR_FLAG,
-    ESI,
-    EXTENDED_MAX,
-    MAX_DATA_BYTES,
-    MAX_FD_BYTES,
-    STANDARD_MAX,
-    CanFrame,
-    ErrorFrame,
-    FdFrame,
-)
+from tickrig.wire import can
 
 # A block: type (4), size (4), content, size again (4); each is a multiple of four bytes.
 # The type of a section is the same in both byte orders, and the magic behind its size tells
@@ -139,11 +127,11 @@ _DATA_AT: Final = 8
 
 def packet(frame: AnyFrame) -> bytes:
     """Return the packet of a frame: 16 bytes, of CAN FD 72."""
-    if isinstance(frame, FdFrame):
+    if isinstance(frame, can.FdFrame):
         flagged = frame.can_id | _EXTENDED * frame.extended
         return _FD.pack(flagged, len(frame.data), _FDF | frame.flags, frame.data)
-    if isinstance(frame, ErrorFrame):
-        return _CLASSIC.pack(ERROR_FLAG | frame.error_class, len(frame.data), frame.data)
+    if isinstance(frame, can.ErrorFrame):
+        return _CLASSIC.pack(can.ERROR_FLAG | frame.error_class, len(frame.data), frame.data)
     flagged = frame.can_id | _EXTENDED * frame.extended | _REMOTE * frame.remote
     return _CLASSIC.pack(flagged, frame.dlc, frame.data)
 
@@ -154,19 +142,19 @@ def _parse_packet(data: bytes) -> AnyFrame | str | None:
         return None if len(data) < _DATA_AT else CAN_XL
     flagged, length, flags = _HEAD.unpack_from(data)
     content = data[_DATA_AT : _DATA_AT + length]
-    if flagged & ERROR_FLAG:
-        return ErrorFrame(flagged & ERROR_CLASS_MASK, content[:8].ljust(8, b"\0"))
+    if flagged & can.ERROR_FLAG:
+        return can.ErrorFrame(flagged & can.ERROR_CLASS_MASK, content[:8].ljust(8, b"\0"))
     extended = bool(flagged & _EXTENDED)
-    can_id = flagged & (EXTENDED_MAX if extended else STANDARD_MAX)
+    can_id = flagged & (can.EXTENDED_MAX if extended else can.STANDARD_MAX)
     if flagged & _REMOTE:
-        return CanFrame(can_id, b"", True, extended, min(length, MAX_DATA_BYTES))
+        return can.CanFrame(can_id, b"", True, extended, min(length, can.MAX_DATA_BYTES))
     # Older captures leave the flags empty: then the size of the structure tells CAN FD.
     is_fd = flags & _FDF or len(data) == _FD_BYTES
-    if len(content) < length or length > (MAX_FD_BYTES if is_fd else MAX_DATA_BYTES):
+    if len(content) < length or length > (can.MAX_FD_BYTES if is_fd else can.MAX_DATA_BYTES):
         return None
     if is_fd:
-        return FdFrame(can_id, content, extended, flags & (BRS | ESI)).checked()
-    return CanFrame(can_id, content, False, extended)
+        return can.FdFrame(can_id, content, extended, flags & (can.BRS | can.ESI)).checked()
+    return can.CanFrame(can_id, content, False, extended)
 
 
 # The frames in a pcapng file (draft-ietf-opsawg-pcapng), in either byte order.
@@ -284,12 +272,12 @@ class PcapngReader:
             if head != usual_head or sizes != usual_sizes or tail != usual_tail or flags != none:
                 break
             known = idents.get(ident) or self._ident(ident)
-            if known is None or length > MAX_DATA_BYTES or number >= len(names):
+            if known is None or length > can.MAX_DATA_BYTES or number >= len(names):
                 break
             if high >= _END_HIGH:
                 break
             at_us = high << 32 | low
-            frame = new(CanFrame, (known[0], content[:length], False, known[1], 0))
+            frame = new(can.CanFrame, (known[0], content[:length], False, known[1], 0))
             add(new(Record, (at_us, names[number], frame, False)))
             at += _USUAL_BYTES
         self._blocks += (at - first) // _USUAL_BYTES
@@ -299,7 +287,7 @@ class PcapngReader:
     def _ident(self, ident: bytes) -> tuple[int, bool] | None:
         """Return the identifier of a data frame, and whether it is extended; None for others."""
         frame = _parse_packet(ident + bytes(12))
-        if not isinstance(frame, CanFrame) or frame.remote:
+        if not isinstance(frame, can.CanFrame) or frame.remote:
             return None
         known = self._idents[ident] = frame.can_id, frame.extended
         return known
@@ -534,7 +522,7 @@ class PcapngWriter:
         number = self._interfaces.get(channel)
         if number is None:
             number = self._begin(channel)
-        if isinstance(frame, CanFrame) and not (sent or self._comments or frame.remote):
+        if isinstance(frame, can.CanFrame) and not (sent or self._comments or frame.remote):
             # without the steps below: as quick as a line of candump
             size, length = _USUAL_BLOCK_BYTES, len(frame.data)
             ident = frame.can_id | _EXTENDED if frame.extended else frame.can_id

@@ -1,6 +1,6 @@
 """Lines that candump, `canmon dump` and python-can show on a screen, with or without time.
 
->>> tally, clock = LogTally(), ScreenClock()
+>>> tally, clock = mark.LogTally(), ScreenClock()
 >>> shown = "(000.000250)  can0  TX - -  705   [1]  7F   '.'"
 >>> record = parse_screen_line(shown, tally, clock)
 >>> record.at_us, record.channel, str(record.frame), record.sent
@@ -14,13 +14,7 @@ from itertools import pairwise
 from typing import Final
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.logs.mark import (
-    CAN_XL,
-    DROP_COUNT,
-    SERIAL_LINES,
-    LogTally,
-    lost_frames,
-)
+from tickrig.host.canmon.model.logs import mark
 from tickrig.host.canmon.model.logs.notation import UNNAMED, parse_frame
 from tickrig.wire.can import BRS, ERROR_FLAG, ESI, MAX_DATA_BYTES
 from tickrig.wire.errors import WireError
@@ -120,7 +114,7 @@ class ScreenClock:
         return max(0, count + self.shift_us)
 
 
-def parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
+def parse_screen_line(line: str, tally: mark.LogTally, clock: ScreenClock) -> Record | str | None:
     """Return a frame, what was counted or is no fault instead, or None for a bad line."""
     text = _COLOUR.sub("", line).strip() if "\x1b" in line else line.strip()
     match = _FRAME.fullmatch(text)
@@ -130,8 +124,8 @@ def parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record 
     ident, size, shown = data
     digits = size[1:-1]
     if len(digits) > len("08"):
-        tally.passed_over[CAN_XL] += 1
-        return CAN_XL
+        tally.passed_over[mark.CAN_XL] += 1
+        return mark.CAN_XL
     length = int(digits) if size.startswith("[") else min(int(digits, 16), MAX_DATA_BYTES)
     flags = f"#{BRS * (brs == 'B') | ESI * (esi == 'E')}" * (len(digits) == len("08"))
     try:
@@ -143,16 +137,16 @@ def parse_screen_line(line: str, tally: LogTally, clock: ScreenClock) -> Record 
     return Record(at_us, channel, frame, direction == "T")
 
 
-def _beside(line: str, text: str, tally: LogTally, clock: ScreenClock) -> Record | str | None:
+def _beside(line: str, text: str, tally: mark.LogTally, clock: ScreenClock) -> Record | str | None:
     """Return what other lines of a screen say.
 
     These are lines of serial ports, error frames in words, frames that candump says were dropped,
     and frames that python-can prints.
     """
     if _SERIAL.fullmatch(text):
-        tally.passed_over[SERIAL_LINES] += 1
-        return SERIAL_LINES
-    if text.startswith(DROP_COUNT) and (lost := lost_frames(text)):
+        tally.passed_over[mark.SERIAL_LINES] += 1
+        return mark.SERIAL_LINES
+    if text.startswith(mark.DROP_COUNT) and (lost := mark.lost_frames(text)):
         tally.lost += lost
         return text
     if match := _PRINTED.fullmatch(text):

@@ -13,14 +13,7 @@ from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError, LogFormat, open_log
 from tickrig.host.canmon.model.logs.mark import SERIAL_LINES, LogTally
 from tickrig.host.canmon.model.logs.mark import Mark as LogMark
-from tickrig.host.text.bench_header import (
-    BenchHeader,
-    DeviceEntry,
-    Place,
-    WireEntry,
-    WireType,
-    parse_bench_header,
-)
+from tickrig.host.text import bench_header
 from tickrig.host.text.bench_record import BenchParser, BenchRecord
 from tickrig.host.text.trace import Mark, TraceError
 from tickrig.wire.can import CanFrame, ErrorFrame
@@ -82,8 +75,12 @@ class TraceLogWriter:
     def _begin(self, record: Record) -> None:
         self._channel, self._began_us = record.channel, record.at_us
         name = _name(record.channel)
-        wires = {"bus": WireEntry(WireType.CAN)}
-        self._put(BenchHeader({name: DeviceEntry("bus")}, wires, place=Place.PORT).encode())
+        wires = {"bus": bench_header.WireEntry(bench_header.WireType.CAN)}
+        self._put(
+            bench_header.BenchHeader(
+                {name: bench_header.DeviceEntry("bus")}, wires, place=bench_header.Place.PORT
+            ).encode()
+        )
 
     def _put(self, line: str) -> None:
         self._file.write(f"{line}\n".encode("ascii"))
@@ -109,7 +106,9 @@ class TraceLogReader:
         self.tally = LogTally(without_errors=_WITHOUT_ERRORS)
         try:
             with open_log(self._path) as file:
-                header = parse_bench_header(file.readline().decode("ascii").rstrip("\n"))
+                header = bench_header.parse_bench_header(
+                    file.readline().decode("ascii").rstrip("\n")
+                )
                 passed = _Passed(header)
                 for record in BenchParser(header).parse(_whole_lines(file)):
                     if isinstance(record.traffic, CanFrame):
@@ -136,7 +135,7 @@ def _whole_lines(file: BinaryIO) -> Iterator[str]:
 class _Passed:
     """Tells what was on a bus by what its nodes sent and received."""
 
-    def __init__(self, header: BenchHeader) -> None:
+    def __init__(self, header: bench_header.BenchHeader) -> None:
         self._header = header
         self._at_us, self._of_host = 0, Counter[tuple[str, CanFrame]]()
         self._received: defaultdict[str, Counter[CanFrame]] = defaultdict(Counter)
@@ -146,7 +145,7 @@ class _Passed:
         """Give a frame, unless it was given before."""
         header, name = self._header, record.name
         wire = header.devices[name].wire
-        if header.place is Place.PORT:
+        if header.place is bench_header.Place.PORT:
             yield Record(record.at_us, name, frame, record.mark is Mark.TO_DEVICE)
         elif record.mark is Mark.FROM_DEVICE:
             for other, entry in header.devices.items():

@@ -1,6 +1,6 @@
 """PEAK's traces (TRC), of versions 1.0 to 3.0, with their error frames.
 
->>> lines, tally = TrcLines(), LogTally()
+>>> lines, tally = TrcLines(), mark.LogTally()
 >>> lines.read(";$FILEVERSION=1.1", tally)
 ';$FILEVERSION=1.1'
 >>> record = lines.read("     6)      1349.2  Error      0008  4  00 19 08 08", tally)
@@ -15,30 +15,10 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.frames import AnyFrame, Record
+from tickrig.host.canmon.model.logs import mark
 from tickrig.host.canmon.model.logs.log_file import END_S
 from tickrig.host.canmon.model.logs.log_reader import LineLogReader, bus_name
-from tickrig.host.canmon.model.logs.mark import (
-    BAD_FRAMES,
-    CAN_XL,
-    COUNTERS_TOLD,
-    NO_TIME,
-    OTHER_LINES,
-    LogTally,
-)
-from tickrig.wire.can import (
-    BRS,
-    ESI,
-    FD_LENGTHS,
-    MAX_DATA_BYTES,
-    PROTOCOL_BYTE,
-    REC_BYTE,
-    TEC_BYTE,
-    CanFrame,
-    ErrorClass,
-    ErrorFrame,
-    FdFrame,
-    ProtocolFlag,
-)
+from tickrig.wire import can
 from tickrig.wire.errors import WireError
 
 _VERSIONS: Final = {
@@ -50,7 +30,7 @@ _VERSIONS: Final = {
 """Columns by version: number, offset in ms, bus, type, CAN-ID, reserved, length, data, direction.
 From 2.0 on the file names them: `l` is a count of bytes, `L` a length code."""
 
-_FD_FLAGS: Final = {"FD": 0, "FB": BRS, "BI": ESI, "FE": BRS | ESI}
+_FD_FLAGS: Final = {"FD": 0, "FB": can.BRS, "BI": can.ESI, "FE": can.BRS | can.ESI}
 """Types of CAN FD frames."""
 
 ERROR: Final = "ERROR"
@@ -83,7 +63,7 @@ _STATUS: Final = {
 }
 """Bits of a status (PCAN-Basic, PCAN_ERROR_...), the worst first."""
 
-_KINDS: Final = {1: ProtocolFlag.BIT, 2: ProtocolFlag.FORM, 4: ProtocolFlag.STUFFING}
+_KINDS: Final = {1: can.ProtocolFlag.BIT, 2: can.ProtocolFlag.FORM, 4: can.ProtocolFlag.STUFFING}
 _ACK_SLOT: Final = 0x19
 _SEGMENT: Final = 0x1F
 """Place of an error in the frame, as the SJA1000 tells it, and Linux in byte 3."""
@@ -108,7 +88,7 @@ class TrcLines:
         self._version, self._start_us = "1.0", 0
         self._columns: Sequence[str] = _VERSIONS["1.0"]
 
-    def read(self, line: str, tally: LogTally) -> Record | str | None:
+    def read(self, line: str, tally: mark.LogTally) -> Record | str | None:
         """Return a frame, what the line is instead, or None for a bad line.
 
         Raises:
@@ -127,12 +107,12 @@ class TrcLines:
         try:
             return self._row(number, words, tally)
         except WireError:
-            tally.passed_over[BAD_FRAMES] += 1
-            return BAD_FRAMES
+            tally.passed_over[mark.BAD_FRAMES] += 1
+            return mark.BAD_FRAMES
         except (ValueError, LookupError):
             return None
 
-    def _head(self, word: str, value: str, tally: LogTally) -> None:
+    def _head(self, word: str, value: str, tally: mark.LogTally) -> None:
         """Take what the file says of itself."""
         match word:
             case "FILEVERSION":
@@ -144,10 +124,10 @@ class TrcLines:
                 tally.undated += start_us is None
                 self._start_us = start_us or 0
 
-    def _row(self, number: str, words: list[str], tally: LogTally) -> Record | str | None:
+    def _row(self, number: str, words: list[str], tally: mark.LogTally) -> Record | str | None:
         at_us, row = self._at_us(words[0]), self._cells([number, *words])
         kind = row.cells.get("T", "Rx")
-        what = NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
+        what = mark.NO_TIME if not 0 <= at_us < END_S * 1_000_000 else _aside(row, kind, tally)
         if what:
             tally.passed_over[what] += 1
             return what
@@ -189,19 +169,19 @@ class TrcLines:
         return _Row(cells, data)
 
 
-def _aside(row: _Row, kind: str, tally: LogTally) -> str:
+def _aside(row: _Row, kind: str, tally: mark.LogTally) -> str:
     """Say what a line is that is no frame of CAN or CAN FD, and note what it says of errors."""
     if kind == "XL":
-        return CAN_XL
+        return mark.CAN_XL
     # Version 1.0 has no type; a status has the CAN-ID FFFFFFFFh there.
     if kind in _STATES or row.cells.get("I") == "FFFFFFFF":
         _note_status(row.hex_bytes(), tally)
     elif kind == _COUNTERS:
         if any(row.hex_bytes()):
-            tally.errors_told[COUNTERS_TOLD] += 1
+            tally.errors_told[mark.COUNTERS_TOLD] += 1
     elif kind != _EVENT:
         return ""
-    return OTHER_LINES
+    return mark.OTHER_LINES
 
 
 def _start_us(days: str) -> int | None:
@@ -226,13 +206,13 @@ def _frame(row: _Row, kind: str) -> AnyFrame:
     can_id, extended = int(ident, 16), len(ident) > _STANDARD_DIGITS
     length = _length(row.cells, fd=kind in _FD_FLAGS)
     if kind == "RR" or row.data[:1] in (["RTR"], ["R"]):
-        return CanFrame(can_id, b"", True, extended, min(MAX_DATA_BYTES, length)).checked()
+        return can.CanFrame(can_id, b"", True, extended, min(can.MAX_DATA_BYTES, length)).checked()
     data = row.hex_bytes()
     if len(data) != length:
         raise ValueError(f"{len(data)} bytes, {length} were announced")
     if kind in _FD_FLAGS:
-        return FdFrame(can_id, data, extended, _FD_FLAGS[kind]).checked()
-    return CanFrame(can_id, data, False, extended).checked()
+        return can.FdFrame(can_id, data, extended, _FD_FLAGS[kind]).checked()
+    return can.CanFrame(can_id, data, False, extended).checked()
 
 
 def _length(cells: dict[str, str], *, fd: bool) -> int:
@@ -242,10 +222,10 @@ def _length(cells: dict[str, str], *, fd: bool) -> int:
         raise ValueError(f"{text!r} is no length")
     if "l" in cells:
         return int(text)
-    return FD_LENGTHS[int(text)] if fd else min(MAX_DATA_BYTES, int(text))
+    return can.FD_LENGTHS[int(text)] if fd else min(can.MAX_DATA_BYTES, int(text))
 
 
-def _error(row: _Row) -> ErrorFrame:
+def _error(row: _Row) -> can.ErrorFrame:
     """Return an error frame as Linux tells it.
 
     Up to version 1.3 the CAN-ID is its type, and the data are direction, place and both counters;
@@ -256,17 +236,17 @@ def _error(row: _Row) -> ErrorFrame:
         data.insert(0, int(row.cells["I"], 16))
     # 0008 4 00 19 08 08: type 8 (other), sending, place 19h (ACK slot), REC 8, TEC 8.
     kind, direction, place, received, sent = (data + [0] * 5)[:5]
-    transmitting = ProtocolFlag.TRANSMITTING * (len(data) > 1 and not direction)
+    transmitting = can.ProtocolFlag.TRANSMITTING * (len(data) > 1 and not direction)
     said = bytearray(8)
-    said[PROTOCOL_BYTE] = _KINDS.get(kind, 0) | transmitting
-    said[3], said[TEC_BYTE], said[REC_BYTE] = place & _SEGMENT, sent, received
-    error_class = ErrorClass.PROTOCOL | ErrorClass.BUS_ERROR
-    error_class |= ErrorClass.NO_ACK * (place & _SEGMENT == _ACK_SLOT)
-    error_class |= ErrorClass.COUNTERS * bool(received or sent)
-    return ErrorFrame(int(error_class), bytes(said))
+    said[can.PROTOCOL_BYTE] = _KINDS.get(kind, 0) | transmitting
+    said[3], said[can.TEC_BYTE], said[can.REC_BYTE] = place & _SEGMENT, sent, received
+    error_class = can.ErrorClass.PROTOCOL | can.ErrorClass.BUS_ERROR
+    error_class |= can.ErrorClass.NO_ACK * (place & _SEGMENT == _ACK_SLOT)
+    error_class |= can.ErrorClass.COUNTERS * bool(received or sent)
+    return can.ErrorFrame(int(error_class), bytes(said))
 
 
-def _note_status(status: bytes, tally: LogTally) -> None:
+def _note_status(status: bytes, tally: mark.LogTally) -> None:
     """Note what a status says of errors; 0 says that all is well."""
     bits = int.from_bytes(status, "big")
     text = next((text for bit, text in _STATUS.items() if bits & bit), None)

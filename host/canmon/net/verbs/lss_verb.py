@@ -11,13 +11,7 @@ import click
 
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
-from tickrig.host.canopen.commissioning.lss_master import (
-    INDICES,
-    MOST_FOUND,
-    SCAN_US,
-    LssFailed,
-    LssMaster,
-)
+from tickrig.host.canopen.commissioning import lss_master
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import time_option
@@ -79,7 +73,9 @@ class LssWork:
         settings: what is to be done.
     """
 
-    def __init__(self, session: NetSession, master: LssMaster, settings: LssSettings) -> None:
+    def __init__(
+        self, session: NetSession, master: lss_master.LssMaster, settings: LssSettings
+    ) -> None:
         self._session, self._master, self._settings = session, master, settings
 
     def run(self, *, yes: bool) -> None:
@@ -97,7 +93,7 @@ class LssWork:
         try:
             with self._master.at_work():
                 found = self._configure_all()
-        except LssFailed as error:
+        except lss_master.LssFailed as error:
             raise NodeFailed(str(error)) from None
         finally:
             if self._master.waiting:
@@ -166,7 +162,7 @@ class LssWork:
     def _scanned(self) -> Iterator[tuple[LssAddress, int]]:
         """Yield what fastscans find: who was found is in configuration, and answers no more."""
         seen = set[LssAddress]()
-        most = len(self._settings.node_ids) or MOST_FOUND
+        most = len(self._settings.node_ids) or lss_master.MOST_FOUND
         while len(seen) < most and (address := self._master.fastscan()) is not None:
             if address in seen:
                 say(f"{_text(address)} answers a fastscan twice; the search ends here")
@@ -288,7 +284,7 @@ def command(  # noqa: PLR0913, PLR0917 - options
     if settings.delay_ms is not None and settings.bit_rate is None:
         raise Refused("--activate switches to a bit rate: give --bit-rate as well")
     with net_session(call) as session:
-        master = LssMaster(session.bus, call.timeout_us, wait_us or SCAN_US)
+        master = lss_master.LssMaster(session.bus, call.timeout_us, wait_us or lss_master.SCAN_US)
         LssWork(session, master, settings).run(yes=yes)
 
 
@@ -311,8 +307,8 @@ def _node_ids(text: str) -> tuple[int, ...]:
 def _bit_rate(text: str) -> int:
     number, factor = (text[:-1], _KBIT[text[-1]]) if text[-1:] in _KBIT else (text, 1)
     rate = int(number) * factor if number.isascii() and number.isdecimal() else 0
-    if rate not in INDICES:
-        known = ", ".join(f"{each // 1_000}k" for each in sorted(INDICES))
+    if rate not in lss_master.INDICES:
+        known = ", ".join(f"{each // 1_000}k" for each in sorted(lss_master.INDICES))
         raise Refused(f"--bit-rate {text!r} is none of CiA 305: {known}")
     return rate
 

@@ -11,13 +11,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.widgets import TabbedContent, TabPane
 
-from tickrig.host.canmon.model.decode.node_board import (
-    NodeStatus,
-    emcy_history,
-    identity_words,
-    maker_text,
-    pdo_contents,
-)
+from tickrig.host.canmon.model.decode import node_board
 from tickrig.host.canmon.model.decode.node_memory import DEVICE_TYPE
 from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
@@ -61,13 +55,13 @@ class BoardColumn(NamedTuple):
     """
 
     title: str
-    cell: Callable[[NodeStatus, int, int], Line]
+    cell: Callable[[node_board.NodeStatus, int, int], Line]
     least: int = 0
     most: int = 40
     kept: bool = False
 
 
-def board_lines(rows: Sequence[NodeStatus], now_us: int, width: int) -> list[Line]:
+def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) -> list[Line]:
     """Return a head, and a line for each node, as wide as the screen where there is so much.
 
     Args:
@@ -90,7 +84,9 @@ def _columns(several: bool, width: int) -> list[BoardColumn]:
     return [BoardColumn("NODE", node, kept=True), *(one for one in _COLUMNS if one.least <= width)]
 
 
-def _cells(column: BoardColumn, rows: Sequence[NodeStatus], now_us: int, width: int) -> list[Line]:
+def _cells(
+    column: BoardColumn, rows: Sequence[node_board.NodeStatus], now_us: int, width: int
+) -> list[Line]:
     return [column.cell(row, now_us, width) for row in rows]
 
 
@@ -134,21 +130,21 @@ def _cut(line: Line, width: int) -> Line:
     return tuple(pieces)
 
 
-def _node(row: NodeStatus, now_us: int, width: int) -> Line:
+def _node(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     return plain(str(row.node), _HEAD)
 
 
-def _bus_node(row: NodeStatus, now_us: int, width: int) -> Line:
+def _bus_node(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     return plain(f"{row.channel} {row.node}", _HEAD)
 
 
-def _state(row: NodeStatus, now_us: int, width: int) -> Line:
+def _state(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     if row.is_late(now_us):
         return plain(row.state_text, BAD)
     return plain(row.state_text, _STATE_STYLES.get(row.state, _DIM))
 
 
-def heartbeat_line(row: NodeStatus, now_us: int, width: int) -> Line:
+def heartbeat_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     """Write how old the heartbeat is: a bar that is full after a period, and numbers."""
     age_us, period_us = row.age_us(now_us), row.period_us
     if age_us is None:
@@ -166,11 +162,11 @@ def heartbeat_line(row: NodeStatus, now_us: int, width: int) -> Line:
     return tuple(one for one in (*bar, (text, style if late else "")) if one[0])
 
 
-def _boots(row: NodeStatus, now_us: int, width: int) -> Line:
+def _boots(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     return plain(f"{row.boots}", WARNING if row.unrequested_boots else "") if row.boots else ()
 
 
-def _error_line(row: NodeStatus, now_us: int, width: int) -> Line:
+def _error_line(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
     """Say in words what is wrong with a node, the worst first; empty for nothing."""
     pieces = []
     if row.error_code:
@@ -186,14 +182,14 @@ def _error_line(row: NodeStatus, now_us: int, width: int) -> Line:
     return tuple(piece for one in pieces for piece in (one, ("; ", "")))[:-1]
 
 
-def _carried(row: NodeStatus, now_us: int, width: int) -> Line:
-    sent = [name for pdo in pdo_contents(row) if not pdo.receives for name in pdo.names]
+def _carried(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
+    sent = [name for pdo in node_board.pdo_contents(row) if not pdo.receives for name in pdo.names]
     return plain(", ".join(name.rpartition(".")[2] for name in sent))
 
 
 _COLUMNS: Final = (
     BoardColumn("NAME", lambda row, now_us, width: plain(row.name), most=24),
-    BoardColumn("MAKER", lambda row, now_us, width: plain(maker_text(row)), WIDE, 20),
+    BoardColumn("MAKER", lambda row, now_us, width: plain(node_board.maker_text(row)), WIDE, 20),
     BoardColumn("NMT STATE", _state, kept=True),
     BoardColumn("HEARTBEAT", heartbeat_line, kept=True),
     BoardColumn("BOOT-UPS", _boots, WIDE),
@@ -206,7 +202,9 @@ _COLUMNS: Final = (
 _INDENT: Final = 10
 
 
-def card_lines(row: NodeStatus, rows: Sequence[NodeStatus], width: int) -> list[Line]:
+def card_lines(
+    row: node_board.NodeStatus, rows: Sequence[node_board.NodeStatus], width: int
+) -> list[Line]:
     """Return what is known of one node, and the EMCYs of all, the latest first.
 
     Args:
@@ -216,14 +214,14 @@ def card_lines(row: NodeStatus, rows: Sequence[NodeStatus], width: int) -> list[
     """
     where = f"{row.channel} node {row.node}" + f": {row.name}" * bool(row.name)
     lines = [plain(where, _HEAD)]
-    lines += _wrapped("device", identity_words(row), width)
-    for pdo in pdo_contents(row):
+    lines += _wrapped("device", node_board.identity_words(row), width)
+    for pdo in node_board.pdo_contents(row):
         lines += _wrapped(f"{pdo.kind.upper()} {pdo.can_id:03X}h", pdo.text, width)
     if row.drive_state:
         lines += _wrapped("drive", row.drive_state, width)
     if row.sdo_errors:
         lines += _wrapped("SDO", f"{row.sdo_errors} failed, the latest: {row.sdo_error}", width)
-    history = emcy_history(rows)
+    history = node_board.emcy_history(rows)
     heads = [plain(line, _HEAD) for line in history[:2]]
     return [*lines, *heads, *(part for line in history[2:] for part in _wrapped("", line, width))]
 
@@ -322,7 +320,7 @@ class NodesPanel(Panel):
         super().__init__(session)
         self.master = NodeTask()
         session.tasks.append(self.master)
-        self._rows: list[NodeStatus] = []
+        self._rows: list[node_board.NodeStatus] = []
         self._lines: list[Line] = [()]
         self._card: list[Line] = []
 
@@ -336,7 +334,7 @@ class NodesPanel(Panel):
         yield PromptLine()
 
     @property
-    def chosen(self) -> NodeStatus | None:
+    def chosen(self) -> node_board.NodeStatus | None:
         """The chosen node; None where there is none."""
         number = self.query_one(ChoiceView).chosen
         return self._rows[number] if number < len(self._rows) else None

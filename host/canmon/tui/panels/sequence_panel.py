@@ -19,15 +19,9 @@ from tickrig.host.canmon.model.sequence import (
     event_line,
     outline,
 )
+from tickrig.host.canmon.tui import sequence_task
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
-from tickrig.host.canmon.tui.sequence_task import (
-    NEW,
-    SequenceTask,
-    read_texts,
-    sequence_name,
-    texts_settings,
-)
 from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.host.text.steps import StepError
 from tickrig.host.text.whole_file import write_whole
@@ -85,9 +79,9 @@ class SequencePanel(SendingPanel):
     ]
 
     def __init__(self, session: Session) -> None:
-        self.runner = SequenceTask(session.model.eds)
+        self.runner = sequence_task.SequenceTask(session.model.eds)
         super().__init__(session, self.runner)
-        self.texts, self.number = [NEW], 0
+        self.texts, self.number = [sequence_task.NEW], 0
         self._steps: list[str] = []
         self._events: list[SequenceEvent] = []
         self._going = False
@@ -118,11 +112,11 @@ class SequencePanel(SendingPanel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the bus and the sequences."""
         super().load(settings)
-        self.texts = read_texts(settings) or [NEW]
+        self.texts = sequence_task.read_texts(settings) or [sequence_task.NEW]
 
     def save(self) -> dict[str, Any]:
         """Return them."""
-        return {"bus": self.runner.channel, "item": texts_settings(self.texts)}
+        return {"bus": self.runner.channel, "item": sequence_task.texts_settings(self.texts)}
 
     def on_text_area_changed(self, event: TextArea.Changed) -> None:
         """Keep what is written."""
@@ -156,13 +150,13 @@ class SequencePanel(SendingPanel):
 
     def action_new(self) -> None:
         """Begin a new sequence."""
-        self.texts.append(NEW)
+        self.texts.append(sequence_task.NEW)
         self._open(len(self.texts) - 1)
 
     def action_remove(self) -> None:
         """Forget the sequence of the editor."""
         del self.texts[self.number]
-        self.texts = self.texts or [NEW]
+        self.texts = self.texts or [sequence_task.NEW]
         self._open(min(self.number, len(self.texts) - 1))
 
     def action_open(self) -> None:
@@ -209,7 +203,7 @@ class SequencePanel(SendingPanel):
         self.notify(f"{text} is written", markup=False)
 
     def _called(self) -> str:
-        return sequence_name(self.texts[self.number], self.number + 1)
+        return sequence_task.sequence_name(self.texts[self.number], self.number + 1)
 
     def _state(self) -> str:
         words = [f"{self._called()} ({self.number + 1} of {len(self.texts)})"]

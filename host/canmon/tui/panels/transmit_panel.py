@@ -12,16 +12,8 @@ from typing import Any, ClassVar, Final
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
-from tickrig.host.canmon.model.transmit import (
-    ON,
-    AnyFrames,
-    PdoFrames,
-    RowText,
-    TransmitList,
-    parse_row_text,
-    render_transmit,
-)
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
@@ -30,9 +22,9 @@ from tickrig.host.tui import plain
 from tickrig.wire.can import CanFrame, FdFrame
 
 
-def _read_row(settings: Mapping[str, Any]) -> RowText:
+def _read_row(settings: Mapping[str, Any]) -> transmit.RowText:
     """Return what a row says; SettingError if a setting is none."""
-    return RowText(
+    return transmit.RowText(
         text_of(settings, "send", ""),
         text_of(settings, "every", ""),
         texts_of(settings, "counter"),
@@ -41,7 +33,7 @@ def _read_row(settings: Mapping[str, Any]) -> RowText:
     )
 
 
-def _row_settings(words: RowText) -> dict[str, Any]:
+def _row_settings(words: transmit.RowText) -> dict[str, Any]:
     """Return it as settings; what is empty is None, so that a workspace leaves it out."""
     return {
         "send": words.frame,
@@ -70,9 +62,9 @@ class TransmitTask(Task):
 
     def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
         self.channel = channel
-        self.words: list[RowText] = []
-        self.list = TransmitList()
-        self._pdos = PdoFrames(eds)
+        self.words: list[transmit.RowText] = []
+        self.list = transmit.TransmitList()
+        self._pdos = transmit.PdoFrames(eds)
         self._out: list[CanFrame | FdFrame] = []
 
     @property
@@ -80,12 +72,12 @@ class TransmitTask(Task):
         """When it next wants to be called."""
         return _NOW if self._out else self.list.due_us
 
-    def add(self, words: RowText) -> None:
+    def add(self, words: transmit.RowText) -> None:
         """Add a row at the end; ValueError if it cannot be sent."""
         self.list.rows.append(words.row(self._pdos))
         self.words.append(words)
 
-    def change(self, number: int, words: RowText) -> None:
+    def change(self, number: int, words: transmit.RowText) -> None:
         """Put another row in the place of one, which sends no more; ValueError as `add`."""
         self.list.rows[number] = words.row(self._pdos)
         self.words[number] = words
@@ -108,7 +100,7 @@ class TransmitTask(Task):
         self.list.armed = armed
         self._out += self.list.once(number)
 
-    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> AnyFrames:
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> transmit.AnyFrames:
         """Return what is due."""
         out, self._out = self._out, []
         return (*out, *self.list.tick(now_us))
@@ -166,7 +158,7 @@ class TransmitPanel(SendingPanel):
 
     def snapshot(self, model: Model) -> None:
         """Keep the list."""
-        self._lines = render_transmit(self.transmit.list.rows)
+        self._lines = transmit.render_transmit(self.transmit.list.rows)
 
     def paint(self) -> None:
         """Show it."""
@@ -175,7 +167,7 @@ class TransmitPanel(SendingPanel):
         self.query_one("#head", TitleLine).show(head + bus)
         rows = rows or ["no rows: a adds one"]
         self.query_one(ChoiceView).show(
-            [plain(row, "bold green" if row.startswith(ON) else "") for row in rows]
+            [plain(row, "bold green" if row.startswith(transmit.ON) else "") for row in rows]
         )
 
     def load(self, settings: Mapping[str, Any]) -> None:
@@ -227,10 +219,10 @@ class TransmitPanel(SendingPanel):
         self.refresh_view()
 
     def _add(self, text: str) -> None:
-        words = parse_row_text(text)
+        words = transmit.parse_row_text(text)
         self.change(lambda: self.transmit.add(words))
         self.query_one(ChoiceView).choose(len(self.transmit.words) - 1)
 
     def _change(self, number: int, text: str) -> None:
-        words: RowText = parse_row_text(text)
+        words: transmit.RowText = transmit.parse_row_text(text)
         self.change(lambda: self.transmit.change(number, words))

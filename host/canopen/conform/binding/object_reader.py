@@ -8,17 +8,8 @@ from typing import Final
 from tickrig.host.canopen.conform.bus.sdo import number_of
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds import object_table
 from tickrig.wire.canopen.eds.eds_device import EdsDevice
-from tickrig.wire.canopen.eds.object_table import (
-    CONST,
-    RO,
-    RW,
-    Access,
-    DeviceInfo,
-    Element,
-    EntryDescription,
-    ObjectTable,
-)
 from tickrig.wire.canopen.sdo_frame import AbortCode, describe_abort
 
 Upload = Callable[[int, int], bytes]
@@ -48,7 +39,7 @@ class ObjectReader:
         self._silent = 0
         self.findings: list[str] = []
 
-    def read(self, entry: EntryDescription) -> bytes | None:
+    def read(self, entry: object_table.EntryDescription) -> bytes | None:
         """Return what a described object holds, None where it cannot be read or has another size.
 
         Raises:
@@ -99,7 +90,7 @@ class ObjectReader:
         return self._known[at]
 
 
-def _contradiction(entry: EntryDescription, answer: bytes | SdoFailed) -> str:
+def _contradiction(entry: object_table.EntryDescription, answer: bytes | SdoFailed) -> str:
     """Return how an answer differs from a description, empty if it does not."""
     match answer:
         case SdoAborted() if answer.code in _ABSENT and entry.sub in {0, 1}:
@@ -120,34 +111,34 @@ _U16: Final = DataType.UNSIGNED16
 _U32: Final = DataType.UNSIGNED32
 _TEXT: Final = DataType.VISIBLE_STRING
 
-_VARIABLES: Final[tuple[tuple[int, str, DataType, Access], ...]] = (
-    (0x1000, "Device type", _U32, RO),
-    (0x1001, "Error register", _U8, RO),
-    (0x1002, "Manufacturer status register", _U32, RO),
-    (0x1005, "COB-ID SYNC", _U32, RW),
-    (0x1006, "Communication cycle period", _U32, RW),
-    (0x1007, "Synchronous window length", _U32, RW),
-    (0x1008, "Manufacturer device name", _TEXT, CONST),
-    (0x1009, "Manufacturer hardware version", _TEXT, CONST),
-    (0x100A, "Manufacturer software version", _TEXT, CONST),
-    (0x100C, "Guard time", _U16, RW),
-    (0x100D, "Life time factor", _U8, RW),
-    (0x1012, "COB-ID TIME", _U32, RW),
-    (0x1014, "COB-ID EMCY", _U32, RW),
-    (0x1015, "Inhibit time EMCY", _U16, RW),
-    (0x1017, "Producer heartbeat time", _U16, RW),
-    (0x1019, "Synchronous counter overflow value", _U8, RW),
-    (0x1F80, "NMT startup", _U32, RW),
+_VARIABLES: Final[tuple[tuple[int, str, DataType, object_table.Access], ...]] = (
+    (0x1000, "Device type", _U32, object_table.RO),
+    (0x1001, "Error register", _U8, object_table.RO),
+    (0x1002, "Manufacturer status register", _U32, object_table.RO),
+    (0x1005, "COB-ID SYNC", _U32, object_table.RW),
+    (0x1006, "Communication cycle period", _U32, object_table.RW),
+    (0x1007, "Synchronous window length", _U32, object_table.RW),
+    (0x1008, "Manufacturer device name", _TEXT, object_table.CONST),
+    (0x1009, "Manufacturer hardware version", _TEXT, object_table.CONST),
+    (0x100A, "Manufacturer software version", _TEXT, object_table.CONST),
+    (0x100C, "Guard time", _U16, object_table.RW),
+    (0x100D, "Life time factor", _U8, object_table.RW),
+    (0x1012, "COB-ID TIME", _U32, object_table.RW),
+    (0x1014, "COB-ID EMCY", _U32, object_table.RW),
+    (0x1015, "Inhibit time EMCY", _U16, object_table.RW),
+    (0x1017, "Producer heartbeat time", _U16, object_table.RW),
+    (0x1019, "Synchronous counter overflow value", _U8, object_table.RW),
+    (0x1F80, "NMT startup", _U32, object_table.RW),
 )
-_ARRAYS: Final[tuple[tuple[int, str, DataType, Access], ...]] = (
-    (0x1010, "Store parameters", _U32, RW),
-    (0x1011, "Restore default parameters", _U32, RW),
-    (0x1016, "Consumer heartbeat time", _U32, RW),
-    (0x1018, "Identity object", _U32, RO),
-    (0x1029, "Error behaviour", _U8, RW),
+_ARRAYS: Final[tuple[tuple[int, str, DataType, object_table.Access], ...]] = (
+    (0x1010, "Store parameters", _U32, object_table.RW),
+    (0x1011, "Restore default parameters", _U32, object_table.RW),
+    (0x1016, "Consumer heartbeat time", _U32, object_table.RW),
+    (0x1018, "Identity object", _U32, object_table.RO),
+    (0x1029, "Error behaviour", _U8, object_table.RW),
 )
 _ERROR_FIELD: Final = 0x1003
-_SDO_SERVERS: Final = ((0x1200, RO), (0x1201, RW))
+_SDO_SERVERS: Final = ((0x1200, object_table.RO), (0x1201, object_table.RW))
 """The default server, which nobody may move, and the first beside it."""
 _SDO_COB_IDS: Final = ((1, "client to server"), (2, "server to client"))
 _COMMUNICATION: Final = ((1, "COB-ID", _U32), (2, "Transmission type", _U8))
@@ -164,7 +155,7 @@ def probe_device(reader: ObjectReader) -> EdsDevice:
     Raises:
         SdoTimeout: the node does not answer.
     """
-    table = ObjectTable()
+    table = object_table.ObjectTable()
     for index, name, kind, access in _VARIABLES:
         if _has(reader, index):
             table.variable(index, name, kind, access)
@@ -172,16 +163,21 @@ def probe_device(reader: ObjectReader) -> EdsDevice:
         if count := min(reader.number(index, 0) or 0, _MOST_SUBS):
             table.array(index, name, count, kind, access)
     _add_records(table, reader)
-    return EdsDevice(DeviceInfo(), tuple(table), table.objects)
+    return EdsDevice(object_table.DeviceInfo(), tuple(table), table.objects)
 
 
-def _add_records(table: ObjectTable, reader: ObjectReader) -> None:
+def _add_records(table: object_table.ObjectTable, reader: ObjectReader) -> None:
     if _has(reader, _ERROR_FIELD):
-        rows = [Element(1, "Standard error field", _U32, RO)]
-        table.record(_ERROR_FIELD, "Pre-defined error field", rows, count_access=RW, count=0)
+        rows = [object_table.Element(1, "Standard error field", _U32, object_table.RO)]
+        table.record(
+            _ERROR_FIELD, "Pre-defined error field", rows, count_access=object_table.RW, count=0
+        )
     for index, access in _SDO_SERVERS:
         if _has(reader, index, 1):
-            rows = [Element(sub, f"COB-ID {way}", _U32, access) for sub, way in _SDO_COB_IDS]
+            rows = [
+                object_table.Element(sub, f"COB-ID {way}", _U32, access)
+                for sub, way in _SDO_COB_IDS
+            ]
             table.record(index, "SDO server parameter", rows)
     for first, kind in _PDOS:
         for number in range(_MOST_PDOS):
@@ -193,16 +189,25 @@ def _has(reader: ObjectReader, index: int, sub: int = 0) -> bool:
     return isinstance(reader.try_read(index, sub), bytes)
 
 
-def _add_pdo(table: ObjectTable, reader: ObjectReader, index: int, name: str) -> None:
+def _add_pdo(table: object_table.ObjectTable, reader: ObjectReader, index: int, name: str) -> None:
     head = [*_present(reader, index, _COMMUNICATION), *_present(reader, index, _TIMING)]
     table.record(index, f"{name} communication parameter", head)
     mapping = index + 0x200
     if _has(reader, mapping):
-        rows = [Element(sub, f"Object {sub}", _U32, RW) for sub in range(1, _MAPPED + 1)]
-        table.record(mapping, f"{name} mapping parameter", rows, count_access=RW, count=0)
+        rows = [
+            object_table.Element(sub, f"Object {sub}", _U32, object_table.RW)
+            for sub in range(1, _MAPPED + 1)
+        ]
+        table.record(
+            mapping, f"{name} mapping parameter", rows, count_access=object_table.RW, count=0
+        )
 
 
 def _present(
     reader: ObjectReader, index: int, rows: tuple[tuple[int, str, DataType], ...]
-) -> Iterator[Element]:
-    return (Element(sub, name, kind, RW) for sub, name, kind in rows if _has(reader, index, sub))
+) -> Iterator[object_table.Element]:
+    return (
+        object_table.Element(sub, name, kind, object_table.RW)
+        for sub, name, kind in rows
+        if _has(reader, index, sub)
+    )

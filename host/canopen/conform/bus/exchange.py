@@ -11,16 +11,8 @@ from tickrig.host.canopen.conform.bus.frame_pattern import can_id_of, matches, u
 from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 from tickrig.host.links.link import StampedFrames, StampedLink
 from tickrig.wire.can import CanFrame, data_frame, frame_bits
+from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
-from tickrig.wire.canopen.sdo_frame import (
-    BLOCK_ENDED,
-    REQUEST_COB_ID,
-    RESPONSE_COB_ID,
-    SPECIFIER,
-    ClientCommand,
-    ServerCommand,
-    index_sub,
-)
 from tickrig.wire.instant import NEVER
 
 # What ends a check before its end.
@@ -129,7 +121,7 @@ def _off_period(stamps: Sequence[int], each_ms: int, times: int, resolution_us: 
 
 _LEAST: Final = 3
 """So many objects that were asked for say something."""
-_ANSWERS: Final = (ServerCommand.UPLOAD, ServerCommand.ABORT)
+_ANSWERS: Final = (sdo_frame.ServerCommand.UPLOAD, sdo_frame.ServerCommand.ABORT)
 _MULTIPLEXER: Final = slice(1, 4)
 """Of an SDO frame."""
 
@@ -151,13 +143,13 @@ class Answers:
 
     def count_request(self, data: bytes) -> None:
         """Count a request."""
-        if data and data[0] & SPECIFIER == ClientCommand.UPLOAD:
+        if data and data[0] & sdo_frame.SPECIFIER == sdo_frame.ClientCommand.UPLOAD:
             self._uploads[data[_MULTIPLEXER]] += 1
 
     def count_response(self, data: bytes) -> None:
         """Count a response."""
         self._silent = False
-        if data and data[0] & SPECIFIER in _ANSWERS:
+        if data and data[0] & sdo_frame.SPECIFIER in _ANSWERS:
             self._answered[data[_MULTIPLEXER]] += 1
 
     @property
@@ -255,7 +247,7 @@ _HELD_US: Final = 20_000
 _PAUSE_US: Final = 10_000
 """So long nothing is asked behind an SDO request that has no answer: a server may take one frame
 at a time, and CiA 301 does not say how fast it is ready for the next one."""
-_UNANSWERED: Final = (ClientCommand.ABORT, BLOCK_ENDED)
+_UNANSWERED: Final = (sdo_frame.ClientCommand.ABORT, sdo_frame.BLOCK_ENDED)
 _TOO_LOW: Final = "your --max-load is too low for this check"
 
 _NODE_ID_MASK: Final = 0x7F
@@ -266,10 +258,10 @@ _NODES: Final[tuple[range, ...]] = (range(0x081, 0x100), range(0x181, 0x680), ra
 """CAN-IDs of the pre-defined connection set that belong to a node."""
 
 _BEGINNING: Final = (
-    ClientCommand.DOWNLOAD,
-    ClientCommand.UPLOAD,
-    ClientCommand.BLOCK_UPLOAD,
-    ClientCommand.BLOCK_DOWNLOAD,
+    sdo_frame.ClientCommand.DOWNLOAD,
+    sdo_frame.ClientCommand.UPLOAD,
+    sdo_frame.ClientCommand.BLOCK_UPLOAD,
+    sdo_frame.ClientCommand.BLOCK_DOWNLOAD,
 )
 """Requests that name an object; some others of a block look like them, and do no harm."""
 
@@ -320,9 +312,12 @@ class BusExchange:
         self._permit = permit
         self._boot_up = data_frame(ERROR_CONTROL_COB_ID + node_id, bytes(1))
         self.start_us = self._known_us = self._busy_us = link.now_us
-        self._reserved = frozenset(("000", f"{REQUEST_COB_ID + node_id:03X}"))
+        self._reserved = frozenset(("000", f"{sdo_frame.REQUEST_COB_ID + node_id:03X}"))
         self.deadline_us, self.boots, self.others = NEVER, 0, set[int]()
-        self._request, self._response = REQUEST_COB_ID + node_id, RESPONSE_COB_ID + node_id
+        self._request, self._response = (
+            sdo_frame.REQUEST_COB_ID + node_id,
+            sdo_frame.RESPONSE_COB_ID + node_id,
+        )
         self._origins: dict[tuple[int, bool], tuple[str, bool]] = {}
         self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
         self.unanswered: list[tuple[int, int]] = []
@@ -403,8 +398,8 @@ class BusExchange:
                 self._ready_us = now_us + _PAUSE_US
             self._multiplexer = data[_MULTIPLEXER]
             self._answers.count_request(data)
-            if len(data) >= _MULTIPLEXER.stop and data[0] & SPECIFIER in _BEGINNING:
-                self.unanswered.append(index_sub(data))
+            if len(data) >= _MULTIPLEXER.stop and data[0] & sdo_frame.SPECIFIER in _BEGINNING:
+                self.unanswered.append(sdo_frame.index_sub(data))
         link.send((frame,))
 
     def expect(self, patterns: Sequence[str], within_ms: int) -> str:
@@ -561,7 +556,7 @@ class BusExchange:
         self._allowance.use(at_us, frame)
         self._answers.count_response(data)
         if len(data) >= _MULTIPLEXER.stop:
-            at = index_sub(data)
+            at = sdo_frame.index_sub(data)
             if data[_MULTIPLEXER] == self._multiplexer:
                 self.transfer = at
             self._settle(at, data)

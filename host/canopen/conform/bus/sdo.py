@@ -12,15 +12,8 @@ from tickrig.host.canopen.errors import SdoFailed, SdoTimeout
 from tickrig.host.canopen.network import NodeSession
 from tickrig.host.canopen.sdo_transfer import download, upload
 from tickrig.wire.can import data_frame
+from tickrig.wire.canopen import sdo_frame
 from tickrig.wire.canopen.sdo import Abort
-from tickrig.wire.canopen.sdo_frame import (
-    EXPEDITED_BYTES,
-    REQUEST_COB_ID,
-    RESPONSE_COB_ID,
-    SEGMENT_BYTES,
-    AbortCode,
-    index_sub,
-)
 
 # Reads and writes objects of the node under test, beside its checks.
 
@@ -92,8 +85,8 @@ class SdoClient:
 
     def abort(self) -> None:
         """End a transfer that a check left open; stacks look which object the abort names."""
-        frame = Abort(*self._exchange.transfer, AbortCode.GENERAL).encode()
-        self._send(REQUEST_COB_ID + self._node_id, frame)
+        frame = Abort(*self._exchange.transfer, sdo_frame.AbortCode.GENERAL).encode()
+        self._send(sdo_frame.REQUEST_COB_ID + self._node_id, frame)
 
     def run(self, script: Script[T]) -> T:
         """Run a script, and return or raise what it does; LinkClosed if the bus is gone."""
@@ -108,8 +101,8 @@ class SdoClient:
 
     def _keep_misnamed(self, at: tuple[int, int], data: bytes) -> None:
         """Keep an answer that names another object."""
-        asked, named = (f"{index:04X}h:{sub:02X}" for index, sub in (at, index_sub(data)))
-        frame = data_frame(RESPONSE_COB_ID + self._node_id, data)
+        asked, named = (f"{index:04X}h:{sub:02X}" for index, sub in (at, sdo_frame.index_sub(data)))
+        frame = data_frame(sdo_frame.RESPONSE_COB_ID + self._node_id, data)
         if len(self.misnamed) < _MOST_MISNAMED:
             self.misnamed[f"{asked} was answered with {frame}, which names {named}"] = None
 
@@ -133,7 +126,10 @@ class SdoFrames:
 
     def __init__(self, exchange: BusExchange, node_id: int) -> None:
         self.exchange = exchange
-        self._request, self._response = REQUEST_COB_ID + node_id, f"{RESPONSE_COB_ID + node_id:03X}"
+        self._request, self._response = (
+            sdo_frame.REQUEST_COB_ID + node_id,
+            f"{sdo_frame.RESPONSE_COB_ID + node_id:03X}",
+        )
 
     def say(self, data: bytes) -> None:
         """Send a request."""
@@ -148,7 +144,7 @@ class SdoFrames:
         """Write an object; StepFailed if that is not confirmed."""
         self.download(at, data)
         self.answer(f"60{multiplexer(at)}00000000")
-        if len(data) > EXPEDITED_BYTES:
+        if len(data) > sdo_frame.EXPEDITED_BYTES:
             self.download_segments(data)
 
     def refuse_write(self, at: Address, data: bytes, codes: Sequence[str]) -> None:
@@ -160,15 +156,18 @@ class SdoFrames:
         """Read an object; StepFailed unless it holds what the pattern says."""
         size = len(data) // 2
         self.say(bytes([_UPLOAD, *bytes.fromhex(multiplexer(at)), *bytes(4)]))
-        if 1 <= size <= EXPEDITED_BYTES:
+        if 1 <= size <= sdo_frame.EXPEDITED_BYTES:
             self.answer(f"{_uploaded(size)}{multiplexer(at)}{data:.<8}")
             return
         self.answer(f"41{multiplexer(at)}{size.to_bytes(4, 'little').hex().upper()}")
-        for number, start in enumerate(range(0, max(1, size), SEGMENT_BYTES)):
-            toggle, part = (number & 1) << 4, data[2 * start : 2 * (start + SEGMENT_BYTES)]
+        for number, start in enumerate(range(0, max(1, size), sdo_frame.SEGMENT_BYTES)):
+            toggle, part = (
+                (number & 1) << 4,
+                data[2 * start : 2 * (start + sdo_frame.SEGMENT_BYTES)],
+            )
             self.say(bytes([0x60 | toggle, *bytes(7)]))
-            last = start + SEGMENT_BYTES >= size
-            head = toggle | (SEGMENT_BYTES - len(part) // 2) << 1 | last
+            last = start + sdo_frame.SEGMENT_BYTES >= size
+            head = toggle | (sdo_frame.SEGMENT_BYTES - len(part) // 2) << 1 | last
             self.answer(f"{head:02X}{part:.<14}")
 
     def read_other(self, at: Address, data: str) -> None:
@@ -189,18 +188,18 @@ class SdoFrames:
     def download(self, at: Address, data: bytes) -> None:
         """Send the request to write an object: expedited, or how many bytes will come."""
         mux = bytes.fromhex(multiplexer(at))
-        if 1 <= len(data) <= EXPEDITED_BYTES:
+        if 1 <= len(data) <= sdo_frame.EXPEDITED_BYTES:
             self.say(bytes([_sized(_DOWNLOAD, len(data)), *mux]) + data.ljust(4, b"\0"))
         else:
             self.say(bytes([0x21, *mux]) + len(data).to_bytes(4, "little"))
 
     def download_segments(self, data: bytes) -> None:
         """Send the segments of a download that was begun, each when the one before is confirmed."""
-        for number, start in enumerate(range(0, len(data), SEGMENT_BYTES)):
-            part, toggle = data[start : start + SEGMENT_BYTES], (number & 1) << 4
-            last = start + SEGMENT_BYTES >= len(data)
-            head = toggle | (SEGMENT_BYTES - len(part)) << 1 | last
-            self.say(bytes([head]) + part.ljust(SEGMENT_BYTES, b"\0"))
+        for number, start in enumerate(range(0, len(data), sdo_frame.SEGMENT_BYTES)):
+            part, toggle = data[start : start + sdo_frame.SEGMENT_BYTES], (number & 1) << 4
+            last = start + sdo_frame.SEGMENT_BYTES >= len(data)
+            head = toggle | (sdo_frame.SEGMENT_BYTES - len(part)) << 1 | last
+            self.say(bytes([head]) + part.ljust(sdo_frame.SEGMENT_BYTES, b"\0"))
             self.answer(f"{0x20 | toggle:02X}00000000000000")
 
 
@@ -229,4 +228,4 @@ def _uploaded(size: int) -> str:
 
 
 def _sized(command: int, size: int) -> int:
-    return command | (EXPEDITED_BYTES - size) << 2
+    return command | (sdo_frame.EXPEDITED_BYTES - size) << 2

@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Final, Protocol
 
+from tickrig.host.canopen.conform import check
 from tickrig.host.canopen.conform.bus.exchange import (
     MS_US,
     BusExchange,
@@ -16,28 +17,6 @@ from tickrig.host.canopen.conform.bus.exchange import (
 from tickrig.host.canopen.conform.bus.frame_pattern import codes_text
 from tickrig.host.canopen.conform.bus.macros import MACROS
 from tickrig.host.canopen.conform.bus.sdo import SdoFrames
-from tickrig.host.canopen.conform.check import (
-    Act,
-    Count,
-    Expect,
-    ExpectNone,
-    Forget,
-    Hold,
-    Keep,
-    Macro,
-    OfObject,
-    Period,
-    Read,
-    ReadOther,
-    RefuseRead,
-    RefuseRewrite,
-    RefuseWrite,
-    Send,
-    Step,
-    Stimulus,
-    Wait,
-    Write,
-)
 from tickrig.host.canopen.errors import SdoAborted, SdoMisnamed, SdoTimeout
 from tickrig.wire.can import CanFrame
 from tickrig.wire.canopen.datatypes import DataType
@@ -61,56 +40,56 @@ class StepPlayer:
         self,
         exchange: BusExchange,
         node_id: int,
-        stimulus: Stimulus | None,
+        stimulus: check.Stimulus | None,
         client: Client,
     ) -> None:
         self._exchange, self._stimulus, self._client = exchange, stimulus, client
         self._sdo = SdoFrames(exchange, node_id)
 
-    def play(self, step: Step) -> None:
+    def play(self, step: check.Step) -> None:
         """Do one step; StepFailed if the node does not do as it says."""
         action, bus = step.action, self._exchange
         match action:
-            case OfObject():
+            case check.OfObject():
                 self._play_sdo(action)
-            case Send(text, extended):
+            case check.Send(text, extended):
                 frame = CanFrame.parse(_REMOTE.sub(r"\1#R", text))
                 bus.send(frame._replace(extended=frame.extended or extended))
-            case Expect(patterns, within_ms):
+            case check.Expect(patterns, within_ms):
                 bus.expect(patterns, within_ms)
-            case ExpectNone(can_id, for_ms):
+            case check.ExpectNone(can_id, for_ms):
                 bus.none(can_id, for_ms)
-            case Count(pattern, for_ms, least, most):
+            case check.Count(pattern, for_ms, least, most):
                 bus.count(pattern, for_ms, least, most)
-            case Period(pattern, each_ms, times):
+            case check.Period(pattern, each_ms, times):
                 bus.period(pattern, each_ms, times)
-            case Wait(for_ms):
+            case check.Wait(for_ms):
                 bus.wait(for_ms)
-            case Forget(can_id):
+            case check.Forget(can_id):
                 bus.forget(can_id)
-            case Act(words, int(within_ms)):
+            case check.Act(words, int(within_ms)):
                 self._act_within(within_ms, *words)
-            case Act(words):
+            case check.Act(words):
                 self._act(*words)
-            case Macro(name, words):
+            case check.Macro(name, words):
                 MACROS[name](self._sdo, *words)
 
-    def _play_sdo(self, action: OfObject) -> None:
+    def _play_sdo(self, action: check.OfObject) -> None:
         sdo, at = self._sdo, action.address
         match action:
-            case RefuseRead(_, codes):
+            case check.RefuseRead(_, codes):
                 sdo.refuse_read(at, codes)
-            case Hold() | RefuseRewrite():
+            case check.Hold() | check.RefuseRewrite():
                 play_of_object(self._client, action)
-            case Write(_, data):
+            case check.Write(_, data):
                 sdo.write(at, bytes.fromhex(data))
-            case RefuseWrite(_, data, codes):
+            case check.RefuseWrite(_, data, codes):
                 sdo.refuse_write(at, bytes.fromhex(data), codes)
-            case Read(_, data):
+            case check.Read(_, data):
                 sdo.read(at, data)
-            case ReadOther(_, data):
+            case check.ReadOther(_, data):
                 sdo.read_other(at, data)
-            case Keep():
+            case check.Keep():
                 pass  # what it names is written back at the end
             case _:
                 raise AssertionError(action)
@@ -176,14 +155,14 @@ class Client(Protocol):
         """Write an object; raises SdoAborted, SdoMisnamed and SdoTimeout."""
 
 
-def play_of_object(client: Client, action: Hold | RefuseRewrite) -> None:
+def play_of_object(client: Client, action: check.Hold | check.RefuseRewrite) -> None:
     """Do what only checks of objects do.
 
     Raises:
         StepFailed: the node does not do as the step says.
     """
     try:
-        if isinstance(action, Hold):
+        if isinstance(action, check.Hold):
             _play_hold(client, action)
         else:
             _rewrite(client, *action.address, action.grow, action.codes)
@@ -191,7 +170,7 @@ def play_of_object(client: Client, action: Hold | RefuseRewrite) -> None:
         raise StepFailed(str(error)) from error
 
 
-def _play_hold(client: Client, step: Hold) -> None:
+def _play_hold(client: Client, step: check.Hold) -> None:
     try:
         data = client.upload(*step.address)
     except SdoAborted as error:
@@ -206,7 +185,7 @@ def _play_hold(client: Client, step: Hold) -> None:
     _check_limits(kind, data, step)
 
 
-def _check_limits(kind: DataType, data: bytes, step: Hold) -> None:
+def _check_limits(kind: DataType, data: bytes, step: check.Hold) -> None:
     value = kind.decode(data)
     if not isinstance(value, int | float):
         return

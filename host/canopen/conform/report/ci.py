@@ -6,24 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
+from tickrig.host.canopen.conform.report import overview
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
-from tickrig.host.canopen.conform.report.overview import (
-    ShowFrames,
-    all_goes,
-    by_group,
-    cut,
-    plain_frames,
-)
 from tickrig.host.canopen.conform.verdict import FAILED, UNDECIDED, CheckVerdict, Report, Result
-from tickrig.host.text.junit import (
-    ERROR,
-    FAILURE,
-    OUTPUT,
-    SKIPPED,
-    JunitCase,
-    JunitSuite,
-    junit_text,
-)
+from tickrig.host.text import junit
 
 # A badge for a README: how many checks passed, as SVG.
 
@@ -59,16 +45,18 @@ _MOST_LINES: Final = 200
 """Of a case."""
 
 _TAGS: Final[Mapping[CheckVerdict, str]] = {
-    CheckVerdict.FAIL: FAILURE,
-    CheckVerdict.INCONCLUSIVE: ERROR,
-    CheckVerdict.BLOCKED: ERROR,
-    CheckVerdict.NOT_APPLICABLE: SKIPPED,
-    CheckVerdict.IMPLEMENTATION_DEFINED: OUTPUT,
+    CheckVerdict.FAIL: junit.FAILURE,
+    CheckVerdict.INCONCLUSIVE: junit.ERROR,
+    CheckVerdict.BLOCKED: junit.ERROR,
+    CheckVerdict.NOT_APPLICABLE: junit.SKIPPED,
+    CheckVerdict.IMPLEMENTATION_DEFINED: junit.OUTPUT,
 }
 
 
 def report_junit(
-    report: Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
+    report: Report,
+    baseline: Baseline = NONE_KNOWN,
+    show: overview.ShowFrames = overview.plain_frames,
 ) -> str:
     """Return the report; a known failure is skipped, what could not be judged is an error.
 
@@ -78,32 +66,37 @@ def report_junit(
         show: writes frames.
     """
     suites = [
-        JunitSuite(row.name, [_case(result, baseline, show) for result in row.results])
-        for row in by_group(report)
+        junit.JunitSuite(row.name, [_case(result, baseline, show) for result in row.results])
+        for row in overview.by_group(report)
     ]
     if report.aborted:
-        ended = JunitCase("run", "comes to its end", ERROR, report.aborted, duration_us=0)
-        suites.append(JunitSuite("run", [ended]))
+        ended = junit.JunitCase(
+            "run", "comes to its end", junit.ERROR, report.aborted, duration_us=0
+        )
+        suites.append(junit.JunitSuite("run", [ended]))
     if suites:
         suites[0] = replace(suites[0], properties=_properties(report))
-    return junit_text(suites, f"node {report.node_id} on {report.source}")
+    return junit.junit_text(suites, f"node {report.node_id} on {report.source}")
 
 
-def _case(result: Result, baseline: Baseline, show: ShowFrames) -> JunitCase:
+def _case(result: Result, baseline: Baseline, show: overview.ShowFrames) -> junit.JunitCase:
     check, outcome = result.check, result.outcome
     known = baseline.knows(result)
-    tag = SKIPPED if known else _TAGS.get(outcome.verdict, "")
+    tag = junit.SKIPPED if known else _TAGS.get(outcome.verdict, "")
     reason = f"{'known failure: ' if known else ''}{outcome.reason or outcome.verdict}"
-    text = {SKIPPED: "", OUTPUT: reason}.get(tag)
-    return JunitCase(
+    text = {junit.SKIPPED: "", junit.OUTPUT: reason}.get(tag)
+    return junit.JunitCase(
         *(check.group, f"{check.id} {check.title}", tag, f"{reason} ({check.source})"),
         "\n".join(_lines(result, show)) if text is None and tag else text or "",
         outcome.end_us - outcome.start_us,
     )
 
 
-def _lines(result: Result, show: ShowFrames) -> list[str]:
-    return [result.check.source, *cut(all_goes(result.outcome, result.first, show), _MOST_LINES)]
+def _lines(result: Result, show: overview.ShowFrames) -> list[str]:
+    return [
+        result.check.source,
+        *overview.cut(overview.all_goes(result.outcome, result.first, show), _MOST_LINES),
+    ]
 
 
 def _properties(report: Report) -> dict[str, str]:

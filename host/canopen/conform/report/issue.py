@@ -10,16 +10,10 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from tickrig.host.canopen.conform import verdict
 from tickrig.host.canopen.conform.notation import step_words
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
 from tickrig.host.canopen.conform.report.overview import ShowFrames, plain_frames
-from tickrig.host.canopen.conform.verdict import (
-    CheckOutcome,
-    CheckVerdict,
-    Direction,
-    Report,
-    Result,
-)
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
 from tickrig.wire.canopen.nmt import ERROR_CONTROL_COB_ID
@@ -35,7 +29,7 @@ _GROUP: Final = re.compile(r"\(.*\)")
 
 
 def issue_text(
-    report: Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
+    report: verdict.Report, baseline: Baseline = NONE_KNOWN, show: ShowFrames = plain_frames
 ) -> str:
     """Return the page: of each failure what the text says, what came, its frames and a script.
 
@@ -47,21 +41,21 @@ def issue_text(
     failed = [
         result
         for result in report.results
-        if result.outcome.verdict is CheckVerdict.FAIL and not baseline.knows(result)
+        if result.outcome.verdict is verdict.CheckVerdict.FAIL and not baseline.knows(result)
     ]
     parts = ["\n".join(_head(report, len(failed)))]
     parts += ["\n".join(_failure(report, result, show)) for result in failed]
     return "\n\n".join(parts) + "\n"
 
 
-def _head(report: Report, failures: int) -> Iterator[str]:
+def _head(report: verdict.Report, failures: int) -> Iterator[str]:
     yield f"# {counted(failures, 'failure')} of CANopen conformance, node {report.node_id}"
     yield ""
     told = {**report.node, **report.settings}
     yield from (f"- {one_line(name)}: {one_line(value)}" for name, value in told.items())
 
 
-def _failure(report: Report, result: Result, show: ShowFrames) -> Iterator[str]:
+def _failure(report: verdict.Report, result: verdict.Result, show: ShowFrames) -> Iterator[str]:
     check, outcome = result.check, result.outcome
     yield f"## {one_line(check.id)}: {one_line(check.title)}"
     yield ""
@@ -75,7 +69,7 @@ def _failure(report: Report, result: Result, show: ShowFrames) -> Iterator[str]:
     yield from ("", "```toml", *_sequence(outcome, report.node_id), "```")
 
 
-def _sequence(outcome: CheckOutcome, node_id: int) -> list[str]:
+def _sequence(outcome: verdict.CheckOutcome, node_id: int) -> list[str]:
     """Return the lines of a sequence that does what a check did up to where it failed.
 
     Args:
@@ -86,30 +80,30 @@ def _sequence(outcome: CheckOutcome, node_id: int) -> list[str]:
     boot_up = f"{ERROR_CONTROL_COB_ID + node_id:03X}#00"
     lines = _step("send", f"000#80{node_id:02X}") + _step("wait", "20ms")
     evidence = list(outcome.evidence)
-    if evidence and outcome.wanted and evidence[-1].direction is Direction.RECEIVED:
+    if evidence and outcome.wanted and evidence[-1].direction is verdict.Direction.RECEIVED:
         del evidence[-1]  # what came in place of what is expected below
     last_us, asked = evidence[0].at_us if evidence else 0, False
     for line in evidence:
         match line.direction:
-            case Direction.SENT:
+            case verdict.Direction.SENT:
                 if line.at_us - last_us >= _LEAST_WAIT_US:
                     lines += _step("wait", f"{(line.at_us - last_us + 500) // 1_000}ms")
                 lines += _step("send", line.text)
                 last_us, asked = line.at_us, line.text.startswith(f"{request:03X}#")
-            case Direction.RECEIVED if asked and line.text.startswith(response):
+            case verdict.Direction.RECEIVED if asked and line.text.startswith(response):
                 lines += _step("expect", f"{line.text[:_MULTIPLEXER_END]}*", within="1s")
                 last_us, asked = line.at_us, False
-            case Direction.RECEIVED if line.text == boot_up:
+            case verdict.Direction.RECEIVED if line.text == boot_up:
                 lines += _step("expect", boot_up, within="5s")
                 last_us = line.at_us
-            case Direction.REMARK:
+            case verdict.Direction.REMARK:
                 lines.append(f"# {one_line(line.text)}")
             case _:
                 pass
     return lines + _end(outcome)
 
 
-def _end(outcome: CheckOutcome) -> list[str]:
+def _end(outcome: verdict.CheckOutcome) -> list[str]:
     """Return the step that tells whether the failure is there."""
     if outcome.wanted:
         return _step("expect", _merged(outcome.wanted), within="1s")

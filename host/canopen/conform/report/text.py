@@ -6,20 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Final
 
+from tickrig.host.canopen.conform.report import overview
 from tickrig.host.canopen.conform.report.baseline import NONE_KNOWN, Baseline
-from tickrig.host.canopen.conform.report.overview import (
-    ShowFrames,
-    all_goes,
-    by_group,
-    causes,
-    counts_text,
-    cut,
-    hint,
-    plain_frames,
-    repair_commands,
-    unwell,
-    verdict_counts,
-)
 from tickrig.host.canopen.conform.suite import group_titles
 from tickrig.host.canopen.conform.verdict import CheckVerdict, Report, Result
 from tickrig.host.text.page_text import duration, one_line
@@ -36,7 +24,7 @@ _MOST_REASONS: Final = 12
 def text_report(
     report: Report,
     baseline: Baseline = NONE_KNOWN,
-    show: ShowFrames = plain_frames,
+    show: overview.ShowFrames = overview.plain_frames,
     again: str = "",
 ) -> str:
     """Return the text.
@@ -48,14 +36,14 @@ def text_report(
         again: the command that judges one check alone, without its id; empty if there is none.
     """
     parts = [_head(report), _groups(report), _not_applicable(report)]
-    found = [result for result in unwell(report) if not baseline.knows(result)]
-    begun = causes(result for result in found if _was_begun(result))
+    found = [result for result in overview.unwell(report) if not baseline.knows(result)]
+    begun = overview.causes(result for result in found if _was_begun(result))
     parts += [_failure(alike, show, again) for alike in begun[:_MOST_SHOWN]]
     if more := begun[_MOST_SHOWN:]:
         parts += [[f"{len(more)} {_ELSEWHERE}"], *(_failure(alike, None, again) for alike in more)]
     parts.append(_never_begun([result for result in found if not _was_begun(result)]))
     parts += [_list("findings", report.findings), _list("not restored", report.unrestored)]
-    parts.append(_list("to restore it, in this order", repair_commands(report)))
+    parts.append(_list("to restore it, in this order", overview.repair_commands(report)))
     parts.append(list(_ending(report, baseline)))
     return "\n\n".join("\n".join(part) for part in parts if part) + "\n"
 
@@ -71,12 +59,12 @@ def _head(report: Report) -> list[str]:
 
 
 def _groups(report: Report) -> list[str]:
-    rows = by_group(report)
+    rows = overview.by_group(report)
     titles = group_titles()
     names = [f"{one_line(row.name):<4} {titles.get(row.name, '')}" for row in rows]
     wide = max(map(len, names), default=0)
     return [
-        f"{name:<{wide}}  {len(row.results):5}: {counts_text(row.counts)}"
+        f"{name:<{wide}}  {len(row.results):5}: {overview.counts_text(row.counts)}"
         for name, row in zip(names, rows, strict=True)
     ]
 
@@ -110,15 +98,15 @@ def _never_begun(results: list[Result]) -> list[str]:
     ]
 
 
-def _failure(alike: list[Result], show: ShowFrames | None, again: str) -> list[str]:
+def _failure(alike: list[Result], show: overview.ShowFrames | None, again: str) -> list[str]:
     """Tell a failure, and which are like it; without frames, without where to look too."""
     result = alike[0]
     clause = f"  {one_line(result.check.source)}"
     reason = [f"  {one_line(result.outcome.reason)}"] if result.outcome.reason else []
     frames, next_to = list[str](), list[str]()
     if show is not None:
-        frames = cut(all_goes(result.outcome, result.first, show), _MOST_LINES)
-        next_to = [f"  look at {text}"] if (text := hint(result)) else []
+        frames = overview.cut(overview.all_goes(result.outcome, result.first, show), _MOST_LINES)
+        next_to = [f"  look at {text}"] if (text := overview.hint(result)) else []
     alone = [f"  alone: {again} --only {result.check.id}"] if again else []
     return [_title(result), clause, *reason, *frames, *next_to, *alone, *_like(alike[1:])]
 
@@ -144,7 +132,8 @@ def _list(what: str, lines: tuple[str, ...]) -> list[str]:
 def _ending(report: Report, baseline: Baseline) -> Iterator[str]:
     if report.findings:
         yield f"{counted(len(report.findings), 'finding')}, above"
-    yield f"{counted(len(report.results), 'check')}: {counts_text(verdict_counts(report.results))}"
+    counts = overview.counts_text(overview.verdict_counts(report.results))
+    yield f"{counted(len(report.results), 'check')}: {counts}"
     if baseline.known:
         known, new = sum(map(baseline.knows, report.results)), len(baseline.new(report))
         yield f"{counted(known, 'failure')} known, {new} new"

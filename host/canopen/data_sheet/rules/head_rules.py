@@ -9,14 +9,7 @@ from typing import Final
 
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.canopen.data_sheet.rule import Edit, EditPlace, RuleFinding
-from tickrig.host.canopen.data_sheet.rules.known_keys import (
-    DEVICE_INFO,
-    FILE_INFO,
-    FLAGS,
-    NAMES,
-    NUMBERS,
-    OF_DCF,
-)
+from tickrig.host.canopen.data_sheet.rules import known_keys
 from tickrig.host.canopen.data_sheet.rules.list_rules import are_whole
 from tickrig.wire.canopen.eds.eds_file import shorten
 from tickrig.wire.canopen.eds.eds_value import (
@@ -61,7 +54,9 @@ def sections(document: Document) -> Iterator[RuleFinding]:
     for title in _NEEDED:
         if title not in document.file.sections and not document.file.is_xml:
             last = len(document.texts)
-            first = "SupportedObjects=0" if title == "MandatoryObjects" else f"{NAMES[0]}="
+            first = (
+                "SupportedObjects=0" if title == "MandatoryObjects" else f"{known_keys.NAMES[0]}="
+            )
             added = Edit(last, EditPlace.AFTER, ("", f"[{title}]", first))
             edits = () if document.head_is_lost else (added,)
             yield document.found("section-missing", f"[{title}] is missing", "", 0, *edits)
@@ -72,7 +67,7 @@ def file_info(document: Document) -> Iterator[RuleFinding]:
     if document.file.is_xml:
         return
     file = document.file
-    for key in FILE_INFO:
+    for key in known_keys.FILE_INFO:
         if not file.has("FileInfo", key):
             what = f"{key} is missing"
             yield document.found("file-info-missing", what, "FileInfo", key)
@@ -92,19 +87,19 @@ def device_info(document: Document) -> Iterator[RuleFinding]:
     file, title = document.file, "DeviceInfo"
     if title not in file.sections:
         return
-    for key in DEVICE_INFO:
+    for key in known_keys.DEVICE_INFO:
         if not file.has(title, key):
             value = _missing(document, key)
             edit = document.add_to(title, [f"{key}={value}"])
             what = f"{key} is missing: {value or 'none'} is taken"
             if not file.is_xml:
                 yield document.found("device-info-missing", what, title, key, edit)
-    for key in (*NUMBERS, *FLAGS):
+    for key in (*known_keys.NUMBERS, *known_keys.FLAGS):
         line = document.keyword(title, key)
         if line is not None and not line.value:
             edits = () if file.is_xml else (document.with_value(line, "0"),)
             yield document.found("empty-value", f"{key} is empty: 0 is taken", title, key, *edits)
-    for key in FLAGS:
+    for key in known_keys.FLAGS:
         if number(document, title, key) not in (None, 0, 1):
             what = f"{key}={shorten(file.value(title, key))} is not 0 or 1"
             yield document.found("flag", what, title, key)
@@ -121,7 +116,7 @@ def _missing(document: Document, key: str) -> str:
     row = document.rows.get((_IDENTITY_OBJECT, dict(_IDENTITY).get(key, 0)))
     if key in dict(_IDENTITY) and row is not None and row.has_default:
         return f"0x{int.from_bytes(row.default, 'little'):08X}"
-    return "" if key in NAMES else "0"
+    return "" if key in known_keys.NAMES else "0"
 
 
 def counts(document: Document) -> Iterator[RuleFinding]:
@@ -211,5 +206,5 @@ def commissioning(document: Document) -> Iterator[RuleFinding]:
             yield document.found("dcf-key", what, line.section, line.number)
 
 
-_DCF_KEYS: Final = frozenset(key.lower() for key in OF_DCF if key != "ParameterValue")
+_DCF_KEYS: Final = frozenset(key.lower() for key in known_keys.OF_DCF if key != "ParameterValue")
 """Of that one the reader tells."""

@@ -12,27 +12,16 @@ from tickrig.host.canopen.data_sheet.rule import RULES, Edit, RuleFinding
 from tickrig.host.canopen.data_sheet.rules.known_keys import is_number
 from tickrig.host.canopen.data_sheet.rules.object_rules import compact_edits
 from tickrig.wire.canopen.datatypes import DataType
+from tickrig.wire.canopen.eds import eds_value
 from tickrig.wire.canopen.eds.eds_entry import LONE_LETTERS
 from tickrig.wire.canopen.eds.eds_file import Finding, shorten
-from tickrig.wire.canopen.eds.eds_value import (
-    FLOATS,
-    NODE_IDS,
-    TIMES,
-    EdsLine,
-    describes_device,
-    is_hex_bytes,
-    object_section,
-    parse_limit,
-    plain_numbers,
-    without_comment,
-)
 from tickrig.wire.canopen.eds.object_table import EntryDescription, ObjectCode
 
 _OCTAL: Final = re.compile(r"0[0-7]{0,20}[1-7][0-7]{0,20}", re.ASCII)
 _CANDIDATE: Final = re.compile(r"\b0[0-9]|nodeid", re.IGNORECASE)
 _NODE_ID: Final = re.compile(r"\$NODEID(\+(0x[0-9A-F]+|[0-9]+))?", re.IGNORECASE | re.ASCII)
 _NUMBERS: Final = frozenset(
-    kind for kind in DataType if kind.is_integer or kind in (*FLOATS, *TIMES)
+    kind for kind in DataType if kind.is_integer or kind in (*eds_value.FLOATS, *eds_value.TIMES)
 )
 """Data types that have a number for a value."""
 _VALUES: Final = frozenset({"defaultvalue", "lowlimit", "highlimit", "parametervalue"})
@@ -53,7 +42,7 @@ def numbers(document: Document) -> Iterator[RuleFinding]:
             continue
         if line.section == "FileInfo" or (document.file.is_xml and line.key == "ObjFlags"):
             continue  # `file_info` looks at the form of a version; flags of XML are hexadecimal
-        terms = without_comment(line.value).replace(" ", "").split("+")
+        terms = eds_value.without_comment(line.value).replace(" ", "").split("+")
         if any(_OCTAL.fullmatch(term) for term in terms) and (kind is None or kind.is_integer):
             yield _leading_zero(document, line, terms)
         elif kind is not None and kind.is_integer and "nodeid" in line.value.lower():
@@ -64,7 +53,7 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
     """Find keywords of lists whose own number has leading zeros: other readers do not find them."""
     for line in () if document.file.is_xml else document.file.lines:
         zeros = _NUMBERED.fullmatch(line.key) if line.is_keyword else None
-        if zeros is None or object_section(line.section) is not None:
+        if zeros is None or eds_value.object_section(line.section) is not None:
             continue
         spelled = f"{zeros[1] or ''}{zeros[2]}"
         text = document.texts[line.number - 1].replace(line.key, spelled, 1)
@@ -73,10 +62,10 @@ def list_numbers(document: Document) -> Iterator[RuleFinding]:
         yield document.found("leading-zero", what, line.section, line.number, edit)
 
 
-def kind_of(document: Document, line: EdsLine) -> DataType | None:
+def kind_of(document: Document, line: eds_value.EdsLine) -> DataType | None:
     """Return the data type of the value that a line gives, None if it gives none, or no number."""
     of_elements = _OF_ELEMENTS.fullmatch(line.section)
-    place = object_section(line.section)
+    place = eds_value.object_section(line.section)
     if of_elements is not None and of_elements[2] == "Value" and line.key.isdecimal():
         at = int(of_elements[1], 16), int(line.key)
     elif place is not None and line.key.lower() in _VALUES:
@@ -88,7 +77,7 @@ def kind_of(document: Document, line: EdsLine) -> DataType | None:
     return row.data_type if row is not None and row.data_type in _NUMBERS else None
 
 
-def _leading_zero(document: Document, line: EdsLine, terms: list[str]) -> RuleFinding:
+def _leading_zero(document: Document, line: eds_value.EdsLine, terms: list[str]) -> RuleFinding:
     """Judge a number, or a sum with the node-ID; a value is mended that is one either way."""
     octal = [term for term in terms if _OCTAL.fullmatch(term)]
     first = octal[0]
@@ -98,18 +87,22 @@ def _leading_zero(document: Document, line: EdsLine, terms: list[str]) -> RuleFi
     edits: tuple[Edit, ...] = ()
     if all(int(term, 8) == int(term) for term in octal) and not document.file.is_xml:
         plain = "+".join(str(int(term)) if term in octal else term for term in terms)
-        said = without_comment(line.value)
+        said = eds_value.without_comment(line.value)
         edits = (document.with_value(line, line.value.replace(said, plain, 1)),)
     return document.found("leading-zero", what, line.section, line.number, *edits)
 
 
-def _node_id(document: Document, section: str, line: EdsLine) -> Iterator[RuleFinding]:
+def _node_id(document: Document, section: str, line: eds_value.EdsLine) -> Iterator[RuleFinding]:
     """Judge what the node-ID is added to; blanks are left to the author."""
     plain = line.value.replace(" ", "")
     if _NODE_ID.fullmatch(plain) and plain.startswith("$NODEID"):
         return
     terms = plain.upper().split("+")
-    others = [plain_numbers(term.replace("0X", "0x")) for term in terms if term not in NODE_IDS]
+    others = [
+        eds_value.plain_numbers(term.replace("0X", "0x"))
+        for term in terms
+        if term not in eds_value.NODE_IDS
+    ]
     mended = "+".join(("$NODEID", *others))
     edits: tuple[Edit, ...] = ()
     if len(others) == len(terms) - 1 and _NODE_ID.fullmatch(mended) and not document.file.is_xml:
@@ -141,7 +134,7 @@ def _limit(
         yield document.found("limit-type", what, section, key)
     elif kind.is_integer and kind is not DataType.BOOLEAN:
         try:
-            limit = parse_limit(kind, plain_numbers(text))
+            limit = eds_value.parse_limit(kind, eds_value.plain_numbers(text))
         except (ValueError, OverflowError):
             return
         lowest, highest = kind.limits
@@ -187,24 +180,24 @@ def of_reader(document: Document) -> Iterator[RuleFinding]:
 
 
 def _is_compact_record(document: Document, section: str) -> bool:
-    place = object_section(section)
+    place = eds_value.object_section(section)
     described = document.device.objects.get(place[0]) if place else None
     compact = document.file.value(section, "CompactSubObj")
     return described is not None and described.code == ObjectCode.RECORD and compact != ""
 
 
-def _doubled_text(document: Document, title: EdsLine) -> str:
+def _doubled_text(document: Document, title: eds_value.EdsLine) -> str:
     others = _contradicting(document, title)
     more = f" and {len(others) - 1} more" if others[1:] else ""
     what = "is there twice: of each keyword the first is taken"
     return f"{what}: {others[0]}{more}" if others else what
 
 
-def _plain(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
-    return (document.with_value(line, plain_numbers(line.value)),)
+def _plain(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
+    return (document.with_value(line, eds_value.plain_numbers(line.value)),)
 
 
-def _word(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _word(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Write the number that a word stands for."""
     return (document.with_value(line, _taken(finding)),)
 
@@ -214,19 +207,21 @@ def _taken(finding: Finding) -> str:
     return finding.reason.rpartition(": ")[2].partition(" ")[0]
 
 
-def _access(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _access(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     known = LONE_LETTERS.get(line.value.lower())
     return (document.with_value(line, known),) if known else ()
 
 
-def _empty(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _empty(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Give an empty keyword the value that it counts as; a DataType only where CiA 301 has one."""
     if line.key.lower() == "datatype" and _taken(finding) == str(int(DataType.DOMAIN)):
         return ()
     return (document.with_value(line, _taken(finding)),)
 
 
-def _standard_type(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _standard_type(
+    document: Document, finding: Finding, line: eds_value.EdsLine
+) -> tuple[Edit, ...]:
     """Add the data type that CiA 301 gives an object, where it gives one."""
     kind = DataType[_taken(finding)]
     if kind is DataType.DOMAIN:
@@ -234,29 +229,29 @@ def _standard_type(document: Document, finding: Finding, line: EdsLine) -> tuple
     return (document.add_to(finding.section, [f"DataType=0x{kind:04X}"]),)
 
 
-def _bytes(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _bytes(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Write the bytes that are taken; what a text is meant for is left to the author."""
     taken = finding.reason.rpartition(": ")[2].removesuffix(" is taken").replace(" ", "")
-    is_plain = is_hex_bytes(taken) and without_comment(line.value) == line.value
+    is_plain = eds_value.is_hex_bytes(taken) and eds_value.without_comment(line.value) == line.value
     return (document.with_value(line, taken),) if is_plain else ()
 
 
-def _bit_rate(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _bit_rate(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Write kbit/s where bit/s are meant."""
     taken = _taken(finding)
     return (document.with_value(line, taken),) if taken.isdecimal() else ()
 
 
-def _kind(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _kind(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Write the kind that is taken, where it has sub-indices."""
-    place = object_section(finding.section)
+    place = eds_value.object_section(finding.section)
     described = document.device.objects.get(place[0]) if place is not None else None
     if described is None or not document.subs(place[0] if place else 0):
         return ()
     return (document.with_value(line, f"0x{described.code:X}"),)
 
 
-def _comment(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _comment(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Make the line a comment; before the first section, where one is told, all such lines.
 
     What has lost its title stays: as comments its keywords would be lost without a word.
@@ -272,14 +267,16 @@ def _comment(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit,
     return tuple(document.comment_out(other.number) for other in lines)
 
 
-def _doubled_key(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _doubled_key(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     """Drop a keyword that says the same again; which of two values is meant nobody knows."""
     first = document.keyword(line.section, line.key)
     same = first is not None and first.value == line.value
     return (Edit(line.number),) if same else ()
 
 
-def _doubled_section(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _doubled_section(
+    document: Document, finding: Finding, line: eds_value.EdsLine
+) -> tuple[Edit, ...]:
     """Move keywords to the first section, and the title out; unless they contradict it."""
     if _contradicting(document, line):
         return ()
@@ -294,7 +291,9 @@ def _doubled_section(document: Document, finding: Finding, line: EdsLine) -> tup
     return tuple(edits)
 
 
-def _again(document: Document, title: EdsLine) -> Iterator[tuple[EdsLine, EdsLine | None]]:
+def _again(
+    document: Document, title: eds_value.EdsLine
+) -> Iterator[tuple[eds_value.EdsLine, eds_value.EdsLine | None]]:
     """Give the keywords behind a title, each with the line that counts."""
     lines = document.file.lines  # a slice would be all of the rest, for each title
     behind = (lines[at] for at in range(title.number, len(lines)))
@@ -303,7 +302,7 @@ def _again(document: Document, title: EdsLine) -> Iterator[tuple[EdsLine, EdsLin
             yield line, document.keyword(title.section, line.key)
 
 
-def _contradicting(document: Document, title: EdsLine) -> list[str]:
+def _contradicting(document: Document, title: eds_value.EdsLine) -> list[str]:
     """Return what a section that is there again says otherwise."""
     return [
         f"{shorten(line.content)} against {shorten(first.value)}"
@@ -312,11 +311,11 @@ def _contradicting(document: Document, title: EdsLine) -> list[str]:
     ]
 
 
-def _compact(document: Document, finding: Finding, line: EdsLine) -> tuple[Edit, ...]:
+def _compact(document: Document, finding: Finding, line: eds_value.EdsLine) -> tuple[Edit, ...]:
     return compact_edits(document, finding.section)
 
 
-_MENDS: Final[dict[str, Callable[[Document, Finding, EdsLine], tuple[Edit, ...]]]] = {
+_MENDS: Final[dict[str, Callable[[Document, Finding, eds_value.EdsLine], tuple[Edit, ...]]]] = {
     "number-form": _plain,
     "number-word": _word,
     "access-form": _access,
@@ -342,14 +341,14 @@ def stray_lines(document: Document) -> Iterator[RuleFinding]:
     seen: set[tuple[str, str]] = set()
     for line in () if document.file.is_xml else document.file.lines:
         if line.title:
-            again = (line.section, "") in seen and not describes_device(line.section)
+            again = (line.section, "") in seen and not eds_value.describes_device(line.section)
             seen.add((line.section, ""))
             if again:
                 finding = Finding(document.name, line.section, "", line.number)
                 edits = _doubled_section(document, finding, line)
                 what = _doubled_text(document, line)
                 yield document.found("doubled-section", what, line.section, line.number, *edits)
-        elif line.content and not describes_device(line.section):
+        elif line.content and not eds_value.describes_device(line.section):
             yield from _stray(document, line, seen)
         elif line.content and not line.section and line.is_keyword and line.key:
             what = f"{shorten(line.content)!r} stands before the first section"
@@ -357,7 +356,9 @@ def stray_lines(document: Document) -> Iterator[RuleFinding]:
             yield document.found("no-keyword", what, "", line.number, *edits)
 
 
-def _stray(document: Document, line: EdsLine, seen: set[tuple[str, str]]) -> Iterator[RuleFinding]:
+def _stray(
+    document: Document, line: eds_value.EdsLine, seen: set[tuple[str, str]]
+) -> Iterator[RuleFinding]:
     if not line.is_keyword or not line.key:
         what = f"{shorten(line.content)!r} is no keyword with a value"
         edit = document.comment_out(line.number)

@@ -10,13 +10,7 @@ from tickrig.host.canopen.bus_file.bus_file import BusFile
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusPdo, BusSlave
 from tickrig.host.canopen.bus_file.notes import BusFileNotes
 from tickrig.host.canopen.data_sheet.rule import RuleFinding
-from tickrig.host.canopen.master.cia402.drive_driver import (
-    AXIS,
-    CONTROLWORD,
-    READ,
-    is_drive,
-    period_us_of,
-)
+from tickrig.host.canopen.master.cia402 import drive_driver
 from tickrig.host.canopen.master.cia402.drive_mode import TARGETS, DriveObject
 from tickrig.host.canopen.master.process_image import EVENT_DRIVEN, Key, keys
 from tickrig.host.text.values import counted
@@ -66,19 +60,19 @@ def _said(drives: int, sdo: _Load, pdos: _Load) -> str:
 
 def polling_load(slave: BusSlave, master: BusMaster) -> _Load:
     """Return what is asked of a drive, and told it, by SDO."""
-    period_us = period_us_of(slave) or master.sync_period_us
-    if not (is_drive(slave) and slave.boot and period_us):
+    period_us = drive_driver.period_us_of(slave) or master.sync_period_us
+    if not (drive_driver.is_drive(slave) and slave.boot and period_us):
         return 0.0
     there = {(row.index, row.sub) for row in slave.device.entries}
     sent, received = _mapped(slave, transmit=True), _mapped(slave, transmit=False)
     bits = 0
     for axis in range(slave.num_channels):
-        for item in READ:
+        for item in drive_driver.READ:
             if (key := _key(item, axis)) in there - sent:
                 response = UploadInitiateResponse(*key, bytes(item.size), item.size)
                 bits += _bits(slave, UploadInitiateRequest(*key).encode(), response.encode())
         targets = {_key(item, axis): item for item in TARGETS}
-        written = {_key(CONTROLWORD, axis): CONTROLWORD}
+        written = {_key(drive_driver.CONTROLWORD, axis): drive_driver.CONTROLWORD}
         if not received & targets.keys():
             written |= dict(list(targets.items())[:1])
         for key, item in written.items():
@@ -89,7 +83,7 @@ def polling_load(slave: BusSlave, master: BusMaster) -> _Load:
 
 
 def _key(item: DriveObject, axis: int) -> Key:
-    return item.index + AXIS * axis, item.sub
+    return item.index + drive_driver.AXIS * axis, item.sub
 
 
 def _mapped(slave: BusSlave, *, transmit: bool) -> set[Key]:
@@ -105,7 +99,11 @@ def _bits(slave: BusSlave, request: bytes, response: bytes) -> int:
 
 def pdo_load(slave: BusSlave, master: BusMaster) -> _Load:
     """Return what PDOs take that come in periods."""
-    written_us = period_us_of(slave) or master.sync_period_us if is_drive(slave) else 0
+    written_us = (
+        drive_driver.period_us_of(slave) or master.sync_period_us
+        if drive_driver.is_drive(slave)
+        else 0
+    )
     return fsum(_loads((pdo for pdo in slave.pdos if pdo.enabled), master, written_us))
 
 

@@ -11,24 +11,7 @@ from tickrig.host.canopen.bus_file.bus_values import BusSlave, DriveChannel
 from tickrig.host.canopen.bus_file.known_keys import SETTINGS
 from tickrig.host.canopen.dialogue import QueuedScript, Script
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.canopen.master.cia402.drive_mode import (
-    MODES,
-    POSITIONS,
-    SPEEDS,
-    DriveMode,
-    DriveObject,
-    HomingMode,
-    ModeNumber,
-)
-from tickrig.host.canopen.master.cia402.drive_state import (
-    MODE_BITS,
-    Controlword,
-    DriveState,
-    Statusword,
-    lead,
-    next_state,
-    state_of,
-)
+from tickrig.host.canopen.master.cia402 import drive_mode, drive_state
 from tickrig.host.canopen.master.network_slave import NetworkSlave
 from tickrig.host.canopen.master.process_image import Key, ProcessImage
 from tickrig.host.canopen.master.waiting import DriveFailed, Operation, Until
@@ -44,11 +27,11 @@ _HOMING_S: Final = 10
 _ENABLED: Final = 5
 
 _SWITCHING_STATES: Final = {
-    2: DriveState.SWITCH_ON_DISABLED,
-    3: DriveState.READY_TO_SWITCH_ON,
-    4: DriveState.SWITCHED_ON,
-    5: DriveState.OPERATION_ENABLED,
-    6: DriveState.QUICK_STOP_ACTIVE,
+    2: drive_state.DriveState.SWITCH_ON_DISABLED,
+    3: drive_state.DriveState.READY_TO_SWITCH_ON,
+    4: drive_state.DriveState.SWITCHED_ON,
+    5: drive_state.DriveState.OPERATION_ENABLED,
+    6: drive_state.DriveState.QUICK_STOP_ACTIVE,
 }
 """`switching_state` of a bus.yml, by its number."""
 
@@ -66,7 +49,7 @@ class DriveSettings:
 
     channel: DriveChannel
     axis: int = 0
-    switching_state: DriveState = DriveState.OPERATION_ENABLED
+    switching_state: drive_state.DriveState = drive_state.DriveState.OPERATION_ENABLED
     homing_us: int = 1_000_000 * _HOMING_S
 
 
@@ -109,13 +92,13 @@ _START_US: Final = 1_000_000
 _SEEN_US: Final = 100_000
 """By then a drive that has homed before shows that it homes again."""
 
-_REACHED: Final = Statusword.TARGET_REACHED
-_ATTAINED: Final = Statusword.MODE_12
-_ERROR: Final = Statusword.MODE_13
+_REACHED: Final = drive_state.Statusword.TARGET_REACHED
+_ATTAINED: Final = drive_state.Statusword.MODE_12
+_ERROR: Final = drive_state.Statusword.MODE_13
 
 
 async def home(
-    name: str, mode: HomingMode, within_us: int, caught_up: Callable[[], Operation]
+    name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
     """Start homing in a drive that is in this mode, and wait for its end.
 
@@ -135,7 +118,7 @@ async def home(
 
 
 async def _home(
-    name: str, mode: HomingMode, within_us: int, caught_up: Callable[[], Operation]
+    name: str, mode: drive_mode.HomingMode, within_us: int, caught_up: Callable[[], Operation]
 ) -> None:
     await _await(name, mode, _ERROR | _REACHED, 0, _START_US, "is not at rest")
     mode.runs = True
@@ -151,7 +134,7 @@ async def _home(
 
 
 async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
-    name: str, mode: HomingMode, mask: int, before: int, within_us: int, complaint: str
+    name: str, mode: drive_mode.HomingMode, mask: int, before: int, within_us: int, complaint: str
 ) -> None:
     """Wait until some bits are no longer as before; raise DriveFailed where they say error."""
     await Until(lambda: mode.status & mask != before, within_us, f"{name}: homing {complaint}")
@@ -159,18 +142,18 @@ async def _await(  # noqa: PLR0913, PLR0917 - a row of what is awaited
         raise DriveFailed(f"{name}: homing error (bit 13 of the statusword)")
 
 
-CONTROLWORD: Final = DriveObject(0x6040, 2, signed=False)
-_STATUSWORD: Final = DriveObject(0x6041, 2, signed=False)
-_MODE: Final = DriveObject(0x6060, 1)
-_MODE_DISPLAY: Final = DriveObject(0x6061, 1)
-_POSITION: Final = DriveObject(0x6064, 4)
-_VELOCITY: Final = DriveObject(0x606C, 4)
-_TORQUE: Final = DriveObject(0x6077, 2)
+CONTROLWORD: Final = drive_mode.DriveObject(0x6040, 2, signed=False)
+_STATUSWORD: Final = drive_mode.DriveObject(0x6041, 2, signed=False)
+_MODE: Final = drive_mode.DriveObject(0x6060, 1)
+_MODE_DISPLAY: Final = drive_mode.DriveObject(0x6061, 1)
+_POSITION: Final = drive_mode.DriveObject(0x6064, 4)
+_VELOCITY: Final = drive_mode.DriveObject(0x606C, 4)
+_TORQUE: Final = drive_mode.DriveObject(0x6077, 2)
 READ: Final = (_STATUSWORD, _MODE_DISPLAY, _POSITION, _VELOCITY, _TORQUE)
 """In each period."""
 
-_HOMING_METHOD: Final = DriveObject(0x6098, 1)
-_SUPPORTED: Final = DriveObject(0x6502, 4, signed=False)
+_HOMING_METHOD: Final = drive_mode.DriveObject(0x6098, 1)
+_SUPPORTED: Final = drive_mode.DriveObject(0x6502, 4, signed=False)
 
 AXIS: Final = 0x800
 """From the objects of an axis to those of the next."""
@@ -214,16 +197,18 @@ class DriveDriver:
         self.statusword = self.controlword = self.mode = self.cycles = 0
         self.refusals: list[SdoAborted] = []
         self._missing: set[Key] = set()
-        self._chosen, self._mode = ModeNumber.NONE, DriveMode()
+        self._chosen, self._mode = drive_mode.ModeNumber.NONE, drive_mode.DriveMode()
         self._reset_fault = self._known = False
 
     @property
-    def state(self) -> DriveState:
+    def state(self) -> drive_state.DriveState:
         """The state that the statusword says; unknown until one was read since the node booted.
 
         It is unknown again when the node is lost, until a statusword comes.
         """
-        return state_of(self.statusword) if self._known else DriveState.UNKNOWN
+        return (
+            drive_state.state_of(self.statusword) if self._known else drive_state.DriveState.UNKNOWN
+        )
 
     def doubt(self) -> None:
         """Know nothing of the drive's state until its next statusword."""
@@ -255,12 +240,12 @@ class DriveDriver:
         """
         if not hasattr(target, "__float__"):
             raise ValueError(f"{self.name}: {target!r} is no target: a number is wanted")
-        if self.state is not DriveState.OPERATION_ENABLED:
+        if self.state is not drive_state.DriveState.OPERATION_ENABLED:
             raise DriveFailed(f"{self.name}: no target in {self._where()}")
         channel = self._channel
-        if self._chosen in POSITIONS:
+        if self._chosen in drive_mode.POSITIONS:
             target = target * channel.scale_pos_to_dev + channel.offset_pos_to_dev
-        elif self._chosen in SPEEDS:
+        elif self._chosen in drive_mode.SPEEDS:
             target *= channel.scale_vel_to_dev
         self._mode.set_target(target)
 
@@ -278,19 +263,19 @@ class DriveDriver:
 
     def _control(self) -> Script[None]:
         """Write the set-point and the controlword."""
-        word = self.controlword | Controlword.HALT
-        if state_of(self.statusword) is DriveState.OPERATION_ENABLED:
+        word = self.controlword | drive_state.Controlword.HALT
+        if drive_state.state_of(self.statusword) is drive_state.DriveState.OPERATION_ENABLED:
             halted = True
-            self._mode.controlword = word & MODE_BITS
+            self._mode.controlword = word & drive_state.MODE_BITS
             if self.mode == self._chosen:
                 halted = not (yield from self._mode.write(self._write))
             else:
                 self._mode.controlword = 0
-            word = word & ~MODE_BITS | self._mode.controlword
-            word = word if halted else word & ~Controlword.HALT
+            word = word & ~drive_state.MODE_BITS | self._mode.controlword
+            word = word if halted else word & ~drive_state.Controlword.HALT
         self.controlword = word
         if self._reset_fault:
-            self._reset_fault, word = False, word & ~Controlword.FAULT_RESET
+            self._reset_fault, word = False, word & ~drive_state.Controlword.FAULT_RESET
         yield from self._write(CONTROLWORD, word)
 
     async def init(self) -> None:
@@ -301,30 +286,34 @@ class DriveDriver:
         """
         await Until(lambda: self.cycles > 0, _SWITCH_US, f"{self.name}: the node has not booted")
         self.controlword, self._reset_fault = 0, True
-        await self.switch_to(DriveState.OPERATION_ENABLED)
-        if await self._supports(ModeNumber.HOMING):
-            await self.choose(ModeNumber.HOMING)
+        await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
+        if await self._supports(drive_mode.ModeNumber.HOMING):
+            await self.choose(drive_mode.ModeNumber.HOMING)
             await self._home()
-            await self.choose(ModeNumber.NONE)
+            await self.choose(drive_mode.ModeNumber.NONE)
 
     async def recover(self) -> None:
         """Reset a fault, and enable the drive again; the target is forgotten."""
         self._reset_fault = True
         self._mode.begin()
-        await self.switch_to(DriveState.OPERATION_ENABLED)
+        await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
 
     async def shut_down(self) -> None:
         """Choose no mode, and take the voltage away."""
-        await self.choose(ModeNumber.NONE)
-        await self.switch_to(DriveState.SWITCH_ON_DISABLED)
+        await self.choose(drive_mode.ModeNumber.NONE)
+        await self.switch_to(drive_state.DriveState.SWITCH_ON_DISABLED)
 
     def halt(self) -> None:
         """Stop quickly; a drive that is not in Operation enabled stays as it is."""
-        state = state_of(self.statusword)
-        if (word := lead(self.controlword, state, DriveState.QUICK_STOP_ACTIVE)) is not None:
+        state = drive_state.state_of(self.statusword)
+        if (
+            word := drive_state.lead(
+                self.controlword, state, drive_state.DriveState.QUICK_STOP_ACTIVE
+            )
+        ) is not None:
             self.controlword = word
 
-    async def switch_to(self, goal: DriveState | str) -> None:
+    async def switch_to(self, goal: drive_state.DriveState | str) -> None:
         """Lead the drive to a state, step by step to Operation enabled, else at once.
 
         Args:
@@ -334,18 +323,18 @@ class DriveDriver:
             ValueError: there is no such state.
             DriveFailed: no transition leads there, or it takes too long.
         """
-        goal = DriveState.of(goal)
+        goal = drive_state.DriveState.of(goal)
         silent = f"{self.name}: no statusword since the node was lost, or booted"
         await Until(lambda: self._known, _SWITCH_US, silent)
         while (state := self.state) is not goal:
-            following = next_state(state, goal)
-            word = lead(self.controlword, state, following)
+            following = drive_state.next_state(state, goal)
+            word = drive_state.lead(self.controlword, state, following)
             if word is None:
                 raise DriveFailed(f"{self.name}: no way from {self._where()} to {goal.value}")
             self.controlword = word
             await self._leave(state, f"{self.name}: {following.value} was not reached")
 
-    async def _leave(self, state: DriveState, complaint: str) -> None:
+    async def _leave(self, state: drive_state.DriveState, complaint: str) -> None:
         await Until(lambda: self.state is not state, _SWITCH_US, complaint)
 
     async def choose(self, mode: int | str) -> None:
@@ -359,16 +348,16 @@ class DriveDriver:
             ValueError: there is no such mode.
             DriveFailed: the drive has not this mode, or does not show it in time.
         """
-        number = ModeNumber.of(mode)
-        if number is ModeNumber.NONE:
-            self._chosen, self._mode = number, DriveMode()
+        number = drive_mode.ModeNumber.of(mode)
+        if number is drive_mode.ModeNumber.NONE:
+            self._chosen, self._mode = number, drive_mode.DriveMode()
             await self._exchange(self._write(_MODE, number))
             return
         if not await self._supports(number):
             raise DriveFailed(f"{self.name}: the drive has no mode {number} (6502h)")
-        chosen = MODES[number]()
+        chosen = drive_mode.MODES[number]()
         chosen.begin()
-        self._chosen, self._mode = ModeNumber.NONE, DriveMode()
+        self._chosen, self._mode = drive_mode.ModeNumber.NONE, drive_mode.DriveMode()
         await self.switch_to(self._settings.switching_state)
         await self._exchange(self._write(_MODE, number))
         await Until(
@@ -377,9 +366,9 @@ class DriveDriver:
             f"{self.name}: mode {number} is not shown in 6061h",
         )
         self._chosen, self._mode = number, chosen
-        await self.switch_to(DriveState.OPERATION_ENABLED)
+        await self.switch_to(drive_state.DriveState.OPERATION_ENABLED)
 
-    async def _supports(self, number: ModeNumber) -> bool:
+    async def _supports(self, number: drive_mode.ModeNumber) -> bool:
         """Say whether 6502h has a mode."""
         modes = await self._exchange(self._read(_SUPPORTED))
         return bool(modes >> number - 1 & 1)
@@ -387,7 +376,7 @@ class DriveDriver:
     async def _home(self) -> None:
         """Home, unless the method is 0."""
         method = await self._exchange(self._read(_HOMING_METHOD))
-        if method and isinstance(self._mode, HomingMode):
+        if method and isinstance(self._mode, drive_mode.HomingMode):
             await home(self.name, self._mode, self._settings.homing_us, self._catch_up)
 
     async def _catch_up(self) -> None:
@@ -423,13 +412,13 @@ class DriveDriver:
             raise DriveFailed(f"{self.name}: {ended[0]}") from ended[0]
         return ended[0]
 
-    def _key(self, item: DriveObject) -> Key:
+    def _key(self, item: drive_mode.DriveObject) -> Key:
         return item.index + AXIS * self._settings.axis, item.sub
 
-    def _value(self, item: DriveObject) -> int:
+    def _value(self, item: drive_mode.DriveObject) -> int:
         return item.value_of(self._image.read(self._key(item)))
 
-    def _read(self, item: DriveObject) -> Script[int]:
+    def _read(self, item: drive_mode.DriveObject) -> Script[int]:
         """Read an object by SDO, unless a TPDO carries it or the drive has it not."""
         key = self._key(item)
         if not self._image.receives(key) and key not in self._missing:
@@ -441,7 +430,7 @@ class DriveDriver:
                 self._image.learn(key, int.from_bytes(data[: item.size], "little"))
         return self._value(item)
 
-    def _write(self, item: DriveObject, value: int) -> Script[None]:
+    def _write(self, item: drive_mode.DriveObject, value: int) -> Script[None]:
         """Write an object by RPDO, by SDO where none carries it."""
         key, bits = self._key(item), item.bits_of(value)
         if self._image.sends(key):

@@ -18,20 +18,10 @@ from tickrig.host.rtc.canopen.builder.skeleton import SKELETON_SUFFIX, write_ske
 from tickrig.host.rtc.canopen.definition import NodeEntry, SdoPortEntry, SystemDefinition
 from tickrig.host.rtc.canopen.definition_writer import write_definition
 from tickrig.host.text.whole_file import write_whole
+from tickrig.wire import rtc_canopen
 from tickrig.wire.canopen.eds.eds_value import format_value
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 from tickrig.wire.canopen.eds.object_table import Access, EntryDescription
-from tickrig.wire.rtc_canopen import (
-    FIRST_PORT,
-    INTEGER,
-    CanopenPortType,
-    PlacedPort,
-    PortDirection,
-    PortTransport,
-    RtcProfile,
-    device_info,
-    object_table,
-)
 
 
 def build(project: Project) -> dict[str, str]:
@@ -44,7 +34,9 @@ def build(project: Project) -> dict[str, str]:
     check_identifiers(profile.type_name, (port.name for port in profile.ports))
     stem = snake_name(profile.type_name)
     return {
-        f"{stem}.eds": write_eds(object_table(profile), device_info(profile)),
+        f"{stem}.eds": write_eds(
+            rtc_canopen.object_table(profile), rtc_canopen.device_info(profile)
+        ),
         f"{stem}_od.h": write_header(profile),
         f"{stem}.yaml": _write_fragment(project),
         f"{stem}{SKELETON_SUFFIX}": write_skeleton(project),
@@ -70,16 +62,16 @@ def _write_fragment(project: Project) -> str:
     return write_definition(SystemDefinition((node,)))
 
 
-def _sdo_type(kind: CanopenPortType[Any]) -> str | None:
+def _sdo_type(kind: rtc_canopen.CanopenPortType[Any]) -> str | None:
     """Return what a System Definition calls a type; the data type in the EDS says which Integer."""
-    return None if kind.name == INTEGER else kind.name
+    return None if kind.name == rtc_canopen.INTEGER else kind.name
 
 
-def _pdo_name(port: PlacedPort) -> str:
+def _pdo_name(port: rtc_canopen.PlacedPort) -> str:
     """Return what a System Definition calls the PDO of a port: `tpdo1`, `rpdo1`; else `sdo`."""
     if not port.number:
-        return PortTransport.SDO.value
-    kind = "rpdo" if port.profile.direction is PortDirection.IN else "tpdo"
+        return rtc_canopen.PortTransport.SDO.value
+    kind = "rpdo" if port.profile.direction is rtc_canopen.PortDirection.IN else "tpdo"
     return f"{kind}{port.number}"
 
 
@@ -94,9 +86,13 @@ _LETTERS: Final = {
 PDO: Final = "{:<9} {:<9} {:<5} {}"
 
 
-def summary(profile: RtcProfile, *, every: bool = False) -> Iterator[str]:
+def summary(profile: rtc_canopen.RtcProfile, *, every: bool = False) -> Iterator[str]:
     """Give the lines: objects of the ports, or `every` object, then the PDOs."""
-    rows = [row for row in object_table(profile) if every or row.index >= FIRST_PORT]
+    rows = [
+        row
+        for row in rtc_canopen.object_table(profile)
+        if every or row.index >= rtc_canopen.FIRST_PORT
+    ]
     yield from _objects(rows)
     yield ""
     yield PDO.format("PDO", "COB-ID", "bits", "carries")
@@ -114,7 +110,7 @@ def _objects(rows: Iterable[EntryDescription]) -> Iterator[str]:
         yield _OBJECT.format(place, row.name, row.data_type.name, access, shown).rstrip()
 
 
-def _pdo(port: PlacedPort) -> str:
+def _pdo(port: rtc_canopen.PlacedPort) -> str:
     kind = port.profile.port_type
     what = f"{kind.length} x {kind.name}" if kind.length > 1 else kind.name
     if not port.number:

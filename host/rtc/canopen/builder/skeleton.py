@@ -6,13 +6,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from tickrig.host.rtc.canopen.builder.profile_file import Project, python_name, snake_name
-from tickrig.wire.rtc_canopen import (
-    INTEGER,
-    CanopenPortProfile,
-    CanopenPortType,
-    PortDirection,
-    RtcProfile,
-)
+from tickrig.wire import rtc_canopen
 
 SKELETON_SUFFIX: Final = ".py"
 
@@ -55,7 +49,7 @@ def _head(project: Project) -> Iterator[str]:
     yield ""
 
 
-def _imports(profile: RtcProfile) -> Iterator[str]:
+def _imports(profile: rtc_canopen.RtcProfile) -> Iterator[str]:
     ports = sorted({_port_class(port) for port in profile.ports})
     told = any(port.transport for port in profile.ports)
     types = sorted({_constant(port.port_type) for port in profile.ports})
@@ -98,17 +92,17 @@ def _callbacks() -> Iterator[str]:
         yield f'        """{text}"""'
 
 
-def _port_class(port: CanopenPortProfile) -> str:
-    return "CanopenInPort" if port.direction is PortDirection.IN else "CanopenOutPort"
+def _port_class(port: rtc_canopen.CanopenPortProfile) -> str:
+    return "CanopenInPort" if port.direction is rtc_canopen.PortDirection.IN else "CanopenOutPort"
 
 
-def _constant(kind: CanopenPortType[Any]) -> str:
-    return "integer" if kind.name == INTEGER else snake_name(kind.name).upper()
+def _constant(kind: rtc_canopen.CanopenPortType[Any]) -> str:
+    return "integer" if kind.name == rtc_canopen.INTEGER else snake_name(kind.name).upper()
 
 
-def _type(kind: CanopenPortType[Any]) -> str:
+def _type(kind: rtc_canopen.CanopenPortType[Any]) -> str:
     element = _constant(kind)
-    if kind.name == INTEGER:
+    if kind.name == rtc_canopen.INTEGER:
         element = f"integer({kind.data_type.bits})"
     return element if kind.length == 1 else f"{element}.sequence({kind.length})"
 

@@ -10,14 +10,7 @@ from pathlib import Path
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import BusFailed, Refused
 from tickrig.host.links.link import LinkClosed
-from tickrig.host.rtc.canopen.commands.opening import (
-    STANDARD_OUTPUT,
-    add_components,
-    bus_of,
-    log_listener,
-    open_link,
-    read_server,
-)
+from tickrig.host.rtc.canopen.commands import opening
 from tickrig.host.rtc.canopen.editor.app import SystemEditor
 from tickrig.host.rtc.canopen.editor.session import EditorSession
 from tickrig.wire.can import ErrorState
@@ -35,21 +28,21 @@ def run_editor(
         start: activate all nodes.
         bus_options: the bus of the command line.
     """
-    if log == STANDARD_OUTPUT:
+    if log == opening.STANDARD_OUTPUT:
         raise Refused("--log -: the screen is on standard output; name a file")
-    server = read_server(file, components)
+    server = opening.read_server(file, components)
     if not sys.stdout.isatty():
         raise Refused("the editor needs a terminal; rtc-canopen-server does without one")
     with ExitStack() as stack:
-        listeners = tuple(log_listener(log, stack))
-        bus = bus_of(bus_options, server.definition.bus)
+        listeners = tuple(opening.log_listener(log, stack))
+        bus = opening.bus_of(bus_options, server.definition.bus)
 
         def bus_state(state: ErrorState) -> None:
             session.bus_state(state)
 
-        link, name = open_link(bus, bus_state, stack)
+        link, name = opening.open_link(bus, bus_state, stack)
         session = EditorSession(
-            server, file, link, lambda other: add_components(other, components), listeners
+            server, file, link, lambda other: opening.add_components(other, components), listeners
         )
         if start:
             server.start()

@@ -10,18 +10,9 @@ from typing import Any, Final, Protocol
 
 from omniORB import CORBA
 
+from tickrig.host.rtc.engines import peer_ports
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
-from tickrig.host.rtc.engines.peer_ports import (
-    Codec,
-    InPortPullConnector,
-    InPortPushConnector,
-    OutPortPullConnector,
-    OutPortPushConnector,
-    PeerEnd,
-    PeerWatch,
-    cdr,
-)
 from tickrig.host.rtc.ports.connect import connect
 from tickrig.host.rtc.ports.connector import DataflowType
 from tickrig.host.rtc.ports.data_port import DataPort, InPort, OutPort
@@ -134,9 +125,9 @@ class ConnectorPlace:
     name: str
     peer: str
 
-    def end(self, properties: dict[str, str]) -> PeerEnd:
+    def end(self, properties: dict[str, str]) -> peer_ports.PeerEnd:
         """Return the peer's end with the properties that hold."""
-        return PeerEnd(self.peer, self.connector_id, properties, self.name)
+        return peer_ports.PeerEnd(self.peer, self.connector_id, properties, self.name)
 
 
 class ConnectorEnd(ABC):
@@ -372,13 +363,13 @@ class DataEnd(ConnectorEnd):
         end, codec = self._agree(values)
         port, pulls = self._port, end.options.dataflow is DataflowType.PULL
         if isinstance(port, InPort) and not pulls:
-            self._connector = put_into = InPortPushConnector(
+            self._connector = put_into = peer_ports.InPortPushConnector(
                 port, end, codec, self._place.calls, self._place.post
             )
             put_into.begin()  # the peer may push before its answer is here
             return {INPORT_IOR: self.serve("OpenRTM.InPortCdr", InPortAnswers(put_into))}
         if isinstance(port, OutPort) and pulls:
-            self._connector = held = OutPortPullConnector(port, end, codec)
+            self._connector = held = peer_ports.OutPortPullConnector(port, end, codec)
             held.begin()
             return {_OUTPORT_IOR: self.serve("OpenRTM.OutPortCdr", OutPortAnswers(held))}
         return {}
@@ -398,13 +389,15 @@ class DataEnd(ConnectorEnd):
             raise RtcRefused(f"{place.peer} says no {key}")
         if isinstance(port, OutPort):
             put = InPortClient(self.reference(ior, openrtm.InPortCdr), place.peer)
-            return OutPortPushConnector(port, end, codec, put, place.threads)
+            return peer_ports.OutPortPushConnector(port, end, codec, put, place.threads)
         get = OutPortClient(self.reference(ior, openrtm.OutPortCdr), place.peer)
-        return InPortPullConnector(port, end, codec, get, place.threads, place.calls)
+        return peer_ports.InPortPullConnector(port, end, codec, get, place.threads, place.calls)
 
-    def _agree(self, values: dict[str, str]) -> tuple[PeerEnd, Codec[Any, bytes]]:
+    def _agree(
+        self, values: dict[str, str]
+    ) -> tuple[peer_ports.PeerEnd, peer_ports.Codec[Any, bytes]]:
         values = _agreed(self._port, values)
-        return self._place.end(values), cdr(self._port.data_type, Endian(values[ENDIAN]))
+        return self._place.end(values), peer_ports.cdr(self._port.data_type, Endian(values[ENDIAN]))
 
 
 _OPERATIONS: Final[Mapping[str, tuple[str, ...]]] = {"RefHard": ("Go", "Stop")}
@@ -455,7 +448,7 @@ class ServiceEnd(ConnectorEnd):
         return connect(self._port, peer, values, **names)
 
     def _calls(self, reference: Reference, wanted: InterfaceProfile) -> object:
-        watch = PeerWatch(f"{self._port.full_name} to {self._place.peer}")
+        watch = peer_ports.PeerWatch(f"{self._port.full_name} to {self._place.peer}")
         return _Calls(reference, _OPERATIONS[wanted.type_name], self.calling_thread(), watch)
 
     def _ior(self, wanted: InterfaceProfile, values: dict[str, str]) -> str:
@@ -493,14 +486,14 @@ class _Calls:
         reference: Reference,
         operations: tuple[str, ...],
         thread: PeerThread,
-        watch: PeerWatch,
+        watch: peer_ports.PeerWatch,
     ) -> None:
         for name in operations:
             call = partial(_call, getattr(reference, name), watch)
             setattr(self, name, partial(thread.submit, call))
 
 
-def _call(operation: Callable[[], None], watch: PeerWatch) -> None:
+def _call(operation: Callable[[], None], watch: peer_ports.PeerWatch) -> None:
     """Call a peer, in its thread."""
     try:
         operation()

@@ -12,18 +12,7 @@ from typing import Any, Final, Protocol
 from omniORB import CORBA
 
 from tickrig.host.rtc.component import RtComponent
-from tickrig.host.rtc.engines.openrtm.connector_ends import (
-    ENDIAN,
-    ConnectorEnd,
-    ConnectorPlace,
-    DataEnd,
-    ServiceEnd,
-    agreed_endian,
-    changed,
-    completed,
-    offered,
-    texts,
-)
+from tickrig.host.rtc.engines.openrtm import connector_ends
 from tickrig.host.rtc.engines.openrtm.orb import Orb, Reference, carried, explain, nvlist
 from tickrig.host.rtc.engines.openrtm.stubs import stubs
 from tickrig.host.rtc.ports.connector import Connector
@@ -93,7 +82,11 @@ class PeerConnection:
     """
 
     def __init__(
-        self, place: int, peer: Reference, where: ConnectorPlace, end: ConnectorEnd
+        self,
+        place: int,
+        peer: Reference,
+        where: connector_ends.ConnectorPlace,
+        end: connector_ends.ConnectorEnd,
     ) -> None:
         self.connector_id, self.peer_name = where.connector_id, where.peer
         self.place, self.peer, self.end = place, peer, end
@@ -147,7 +140,7 @@ class PeerConnections:
             self._system.connect(ports, profile, values)
             return None
         system = self._system
-        where = ConnectorPlace(
+        where = connector_ends.ConnectorPlace(
             system.orb,
             system.calls,
             system.threads,
@@ -256,12 +249,12 @@ class PeerConnections:
         self._system.ending.pop(connection.connector_id, None)
 
 
-def _end_at(place: ConnectorPlace, port: AnyPort) -> ConnectorEnd:
+def _end_at(place: connector_ends.ConnectorPlace, port: AnyPort) -> connector_ends.ConnectorEnd:
     match port:
         case InPort() | OutPort():
-            return DataEnd(place, port)
+            return connector_ends.DataEnd(place, port)
         case ServicePort():
-            return ServiceEnd(place, port)
+            return connector_ends.ServiceEnd(place, port)
     raise RtcRefused(f"{port.full_name} cannot be joined with a peer")
 
 
@@ -319,7 +312,7 @@ class PortAnswers:
     def connect(self, profile: _Profile) -> tuple[Any, _Profile]:
         """Join the ports of a connector; an ID and the byte orders are filled in."""
         profile.connector_id = profile.connector_id or str(uuid.uuid4())
-        profile.properties = completed(profile.properties)
+        profile.properties = connector_ends.completed(profile.properties)
         if not profile.ports or profile.ports[0] is None:
             return _code(ReturnCode.BAD_PARAMETER), profile
         try:
@@ -332,7 +325,7 @@ class PortAnswers:
 
     def notify_connect(self, profile: _Profile) -> tuple[Any, _Profile]:
         """Join our port with a connector, and have the port after it do the same."""
-        code, values = _OK, texts(profile.properties)
+        code, values = _OK, connector_ends.texts(profile.properties)
         try:
             name = _peer_name(profile, self._port.full_name)
             connection = self._calls.call(partial(self._connections.reserve, profile, values, name))
@@ -377,13 +370,13 @@ class PortAnswers:
         """Have the peer join, then join our end; if that fails nothing is left of either."""
         asked = False
         try:
-            profile.properties = changed(profile.properties, connection.additions)
+            profile.properties = connector_ends.changed(profile.properties, connection.additions)
             if connection.place == 0:
                 asked, ports = True, profile.ports
                 code, profile = connection.peer.notify_connect(profile)
                 _refuse(connection.peer_name, code)
                 profile.connector_id, profile.ports = connection.connector_id, ports
-            values = texts(profile.properties)
+            values = connector_ends.texts(profile.properties)
             self._calls.call(partial(self._connections.keep, connection, profile, values))
         except Exception:
             if asked:
@@ -485,7 +478,12 @@ class SystemPorts:
     ) -> None:
         """Join two ports of ours."""
         if isinstance(ports[0], DataPort):
-            values = {**values, ENDIAN: agreed_endian(values.get(ENDIAN, ""))}
+            values = {
+                **values,
+                connector_ends.ENDIAN: connector_ends.agreed_endian(
+                    values.get(connector_ends.ENDIAN, "")
+                ),
+            }
         names = {"name": profile.name, "connector_id": profile.connector_id}
         self._manager.connect(ports[0].full_name, ports[1].full_name, values, **names)
 
@@ -578,7 +576,7 @@ class ComponentPorts:
             for one in port.profile.interfaces
         ]
         about = {"port.port_type": port.port_type}
-        properties = offered(port) if isinstance(port, DataPort) else about
+        properties = connector_ends.offered(port) if isinstance(port, DataPort) else about
         return rtc.PortProfile(
             port.full_name,
             interfaces,

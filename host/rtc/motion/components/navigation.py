@@ -6,18 +6,12 @@ from math import pi, sqrt
 from typing import ClassVar
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion import ports
 from tickrig.host.rtc.motion.geometry import Pose, wrap
-from tickrig.host.rtc.motion.ports import (
-    NavigationState,
-    RunMode,
-    read_newest,
-    read_newest_pose,
-    to_pose,
-)
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Path, Time, TimedState
 
-_State = NavigationState
+_State = ports.NavigationState
 
 _TUNED = {
     "align_angle": "0.01",
@@ -80,15 +74,15 @@ class Navigation(RtComponent):
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Take a new list, judge a new pose, write the state."""
         now = Time.from_us(ec.now_us)
-        if (way := read_newest(self.min_path)) is not None:
+        if (way := ports.read_newest(self.min_path)) is not None:
             self._start(now, way)
-        if (pose := read_newest_pose(self.position)) is not None and self._relays:
+        if (pose := ports.read_newest_pose(self.position)) is not None and self._relays:
             self._judge(now, pose)
         self.status.write(TimedState(now, self.state))
         return ReturnCode.RTC_OK
 
     def _start(self, now: Time, way: iis.TimedPath2DSeq) -> None:
-        relays = [to_pose(data) for data in way.pose]
+        relays = [ports.to_pose(data) for data in way.pose]
         if None in relays:
             return
         self._relays = tuple(relay for relay in relays if relay is not None)
@@ -120,7 +114,7 @@ class Navigation(RtComponent):
     def _check_angle(self, now: Time, relay: Pose, pose: Pose) -> None:
         last = self._at == len(self._relays) - 1
         if last or _off(relay, pose) > self.align_angle.value:
-            self._send(now, RunMode.SPIN, relay, w=1.0)
+            self._send(now, ports.RunMode.SPIN, relay, w=1.0)
             self.state = _State.TURNING2 if last else _State.TURNING
         else:
             self.state = _State.GOAL_CHECK
@@ -152,7 +146,7 @@ class Navigation(RtComponent):
             left = -relay.along(pose) - self.goal_distance.value - self._v * self.latency.value
             can = sqrt(2 * self.braking.value * max(0.0, left))
             v = min(self.max_vel.value, max(can, self.creep_vel.value))
-        self._send(now, RunMode.LINEFOLLOW, relay, v=v)
+        self._send(now, ports.RunMode.LINEFOLLOW, relay, v=v)
 
     def _next(self, now: Time) -> None:
         self._stop(now)
@@ -162,9 +156,11 @@ class Navigation(RtComponent):
             self.state, self._relays = _State.FINISH, ()
 
     def _stop(self, now: Time) -> None:
-        self._send(now, RunMode.STOP, Pose())
+        self._send(now, ports.RunMode.STOP, Pose())
 
-    def _send(self, now: Time, mode: RunMode, relay: Pose, v: float = 0.0, w: float = 0.0) -> None:
+    def _send(
+        self, now: Time, mode: ports.RunMode, relay: Pose, v: float = 0.0, w: float = 0.0
+    ) -> None:
         self._v = v
         self.path.write(Path(mode, 0, relay.x, relay.y, relay.heading, v, w, tm=now))
 

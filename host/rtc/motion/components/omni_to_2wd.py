@@ -6,19 +6,13 @@ from collections.abc import Sequence
 from typing import ClassVar, Final
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion import ports
 from tickrig.host.rtc.motion.components.position_input import (
     END_POINT,
     INTERMEDIATE_POINT,
     START_POINT,
 )
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.ports import (
-    NavigationState,
-    read_all,
-    read_newest,
-    to_pose,
-    to_pose_2d,
-)
 from tickrig.host.text.log import log_of
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time, TimedState
@@ -65,13 +59,13 @@ class OmniTo2WD(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Plan what arrived, and write what has finished."""
-        if (latest := read_newest(self.current_position)) is not None:
-            self._pose = to_pose(latest.data) or self._pose
-        for message in read_all(self.goal):
+        if (latest := ports.read_newest(self.current_position)) is not None:
+            self._pose = ports.to_pose(latest.data) or self._pose
+        for message in ports.read_all(self.goal):
             self._take(message)
         if self._waiting and self._pose is not None:
             self._plan(ec, self._pose)
-        for status in read_all(self.status_in):
+        for status in ports.read_all(self.status_in):
             self._follow(ec, status)
         return ReturnCode.RTC_OK
 
@@ -80,7 +74,7 @@ class OmniTo2WD(RtComponent):
         kind = message.id[0] if message.id else None
         if kind not in (INTERMEDIATE_POINT, END_POINT):
             self._points = []
-        self._points.append(to_pose(message.data))
+        self._points.append(ports.to_pose(message.data))
         if kind in (START_POINT, INTERMEDIATE_POINT):
             return
         plausible = [point for point in self._points if point is not None]
@@ -95,17 +89,17 @@ class OmniTo2WD(RtComponent):
         way = plan(pose, self._waiting)
         self._waiting = []
         now = Time.from_us(ec.now_us)
-        self.min_path.write(iis.TimedPath2DSeq(now, pose=tuple(to_pose_2d(p) for p in way)))
-        for _ in read_all(self.status_in):  # of the command before
+        self.min_path.write(iis.TimedPath2DSeq(now, pose=tuple(ports.to_pose_2d(p) for p in way)))
+        for _ in ports.read_all(self.status_in):  # of the command before
             continue
         self._began, self._ran = True, False
 
     def _follow(self, ec: ExecutionContext, status: TimedState) -> None:
-        if status.data != NavigationState.FINISH:
+        if status.data != ports.NavigationState.FINISH:
             self._ran = True
         elif self._began and self._ran:
             self._began = False
-            self.status_out.write(TimedState(Time.from_us(ec.now_us), NavigationState.FINISH))
+            self.status_out.write(TimedState(Time.from_us(ec.now_us), ports.NavigationState.FINISH))
 
 
 def plan(start: Pose, points: Sequence[Pose]) -> list[Pose]:

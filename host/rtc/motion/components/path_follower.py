@@ -6,14 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
-from tickrig.host.rtc.motion.control_laws import (
-    ControlLaw,
-    ReferenceSpin,
-    Regulator,
-    TimeOptimalSpin,
-    VelocityLimits,
-    steps,
-)
+from tickrig.host.rtc.motion import control_laws
 from tickrig.host.rtc.motion.geometry import Pose, Twist, clip, twist_of
 from tickrig.host.rtc.motion.ports import RunMode, plausible, read_newest_pose, write_velocity
 from tickrig.wire.rtc_types import iis
@@ -87,18 +80,20 @@ class PathFollower(RtComponent):
 
     def _configure(self) -> None:
         h, alpha = self.control_cycle.value, self.max_acc_w.value / self.control_cycle.value
-        self._regulator = Regulator(
+        self._regulator = control_laws.Regulator(
             self.line_k1.value,
             self.line_k2.value,
             self.line_k3.value,
             self.line_dist.value,
             self.line_c1.value,
             h,
-            ControlLaw(self.law.value),
+            control_laws.ControlLaw(self.law.value),
         )
-        self._spin: ReferenceSpin | TimeOptimalSpin = ReferenceSpin(alpha)
+        self._spin: control_laws.ReferenceSpin | control_laws.TimeOptimalSpin = (
+            control_laws.ReferenceSpin(alpha)
+        )
         if self.spin.value == "time-optimal":
-            self._spin = TimeOptimalSpin(alpha / 2, h, self.latency.value)
+            self._spin = control_laws.TimeOptimalSpin(alpha / 2, h, self.latency.value)
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
         """Begin at standstill."""
@@ -115,11 +110,11 @@ class PathFollower(RtComponent):
         write_velocity(self.velocity, ec, self.twist.v, 0.0, self.twist.w)
         return ReturnCode.RTC_OK
 
-    def _limits(self, ec: ExecutionContext) -> VelocityLimits:
-        dv, dw = steps(
+    def _limits(self, ec: ExecutionContext) -> control_laws.VelocityLimits:
+        dv, dw = control_laws.steps(
             self.max_acc_v.value, self.max_acc_w.value, ec.period_us / 1e6, self.acc_cycle.value
         )
-        return VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
+        return control_laws.VelocityLimits(self.max_v.value, self.max_w.value, dv, dw)
 
     def _update_pose(self, ec: ExecutionContext) -> Pose | None:
         """Read new poses. Returns: the latest, None if there was none for `pose_timeout`."""

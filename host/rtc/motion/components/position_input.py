@@ -8,15 +8,9 @@ from pathlib import Path
 from typing import ClassVar, Final
 
 from tickrig.host.rtc import ExecutionContext, InPort, ModuleSpec, OutPort, ReturnCode, RtComponent
+from tickrig.host.rtc.motion import ports
 from tickrig.host.rtc.motion.geometry import Pose
 from tickrig.host.rtc.motion.path_file import describe_pose, parse_points, read_path
-from tickrig.host.rtc.motion.ports import (
-    NavigationState,
-    plausible,
-    read_newest,
-    to_pose,
-    to_pose_2d,
-)
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time, TimedState
 
@@ -142,8 +136,8 @@ class PositionInput(RtComponent):
 
     def on_execute(self, ec: ExecutionContext) -> ReturnCode:
         """Send the next command, or look whether the last one has finished."""
-        status = read_newest(self.status)
-        if self._running and status is not None and status.data == NavigationState.FINISH:
+        status = ports.read_newest(self.status)
+        if self._running and status is not None and status.data == ports.NavigationState.FINISH:
             self._running = self._prompted = False
             self.finished += 1
             self._say("FINISH")
@@ -162,7 +156,7 @@ class PositionInput(RtComponent):
         now = Time.from_us(ec.now_us)
         for point in points:
             self.position.write(iis.TimedPose2D(now, point.id, point.data))
-        last = to_pose(points[-1].data) or Pose()
+        last = ports.to_pose(points[-1].data) or Pose()
         what = "goal" if len(points) == 1 else f"path of {len(points)} points to"
         self._say(f"{what} {describe_pose(last)}")
 
@@ -186,6 +180,6 @@ def _points(poses: Sequence[Pose]) -> tuple[iis.TimedPose2D, ...]:
 
 
 def _point(pose: Pose, *ids: int) -> iis.TimedPose2D:
-    if not plausible(*pose):
+    if not ports.plausible(*pose):
         raise ValueError(f"a pose has three numbers, got {tuple(pose)}")
-    return iis.TimedPose2D(id=ids, data=to_pose_2d(pose))
+    return iis.TimedPose2D(id=ids, data=ports.to_pose_2d(pose))

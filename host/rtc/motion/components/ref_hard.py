@@ -24,22 +24,7 @@ from tickrig.host.rtc.motion.geometry import Twist, wheel_speeds
 from tickrig.host.rtc.motion.modbus_master import ModbusAnswer, ModbusMaster
 from tickrig.host.rtc.motion.ports import plausible, read_newest
 from tickrig.host.text.log import log_of
-from tickrig.wire.modbus import (
-    DEVICE_ID,
-    READ,
-    READ_WRITE,
-    REPORT,
-    WRITE,
-    Address,
-    Command,
-    ExceptionCode,
-    Fault,
-    Mode,
-    Report,
-    Request,
-    Status,
-    wide,
-)
+from tickrig.wire import modbus
 from tickrig.wire.rtc_types import iis
 from tickrig.wire.rtc_types.rtc import Time, TimedDoubleSeq
 
@@ -57,9 +42,9 @@ _WATCHDOG_MS: Final = 500
 
 _TURN: Final = 2**32  # counts after which a counter begins again
 
-_IDENTITY: Final = Request(READ, (Address.DEVICE_ID, 1))
+_IDENTITY: Final = modbus.Request(modbus.READ, (modbus.Address.DEVICE_ID, 1))
 
-_MODE: Final = Request(READ, (Address.MODE, 1))
+_MODE: Final = modbus.Request(modbus.READ, (modbus.Address.MODE, 1))
 
 _LOG: Final = log_of(__name__)
 
@@ -136,10 +121,10 @@ class RefHardRh3(RtComponent):
         self.constants = (bind("EncoderConstant_L", 1.0), bind("EncoderConstant_R", 1.0))
 
     def _forget(self) -> None:
-        self._orders: deque[Request] = deque()
+        self._orders: deque[modbus.Request] = deque()
         self._twist, self._stopped, self._refused = Twist(), False, 0
         self._identified = False
-        self.report: Report | None = None
+        self.report: modbus.Report | None = None
 
     @property
     def lost(self) -> int:
@@ -166,14 +151,18 @@ class RefHardRh3(RtComponent):
             return self._failed(str(error))
         gains = (gain.value for gain in self.gains)
         limits = (self._limit(self.velocity_limit), self._limit(self.acceleration_limit))
-        settings = (*gains, *(word for limit in limits for word in wide(limit)))
+        settings = (*gains, *(word for limit in limits for word in modbus.wide(limit)))
         self._identified = bool(self.any_device.value)
         if not self._identified:
             self._orders.append(_IDENTITY)
         self._orders.append(_MODE)
-        self._orders.append(_write(Address.GAIN_P, *settings))
-        self._orders.append(_write(Address.MODE, Mode.VELOCITY, Command.CLEAR_FAULT, _WATCHDOG_MS))
-        self._orders.append(_write(Address.COMMAND, Command.ENABLE))
+        self._orders.append(_write(modbus.Address.GAIN_P, *settings))
+        self._orders.append(
+            _write(
+                modbus.Address.MODE, modbus.Mode.VELOCITY, modbus.Command.CLEAR_FAULT, _WATCHDOG_MS
+            )
+        )
+        self._orders.append(_write(modbus.Address.COMMAND, modbus.Command.ENABLE))
         return ReturnCode.RTC_OK
 
     def on_deactivated(self, ec: ExecutionContext) -> ReturnCode:
@@ -181,7 +170,7 @@ class RefHardRh3(RtComponent):
         if self._master is not None:
             try:
                 if self._identified:
-                    self._master.begin(_write(Address.COMMAND, Command.STOP))
+                    self._master.begin(_write(modbus.Address.COMMAND, modbus.Command.STOP))
             except LinkError as error:
                 _LOG.warning("%s: %s", self.instance_name, error)
             self._master.close()
@@ -222,9 +211,9 @@ class RefHardRh3(RtComponent):
     def _limit(self, parameter: Parameter[float]) -> int:
         return min(round(parameter.value * self._counts_per_rad), _TURN // 2 - 1)
 
-    def _cycle(self) -> Request:
+    def _cycle(self) -> modbus.Request:
         """Return the exchange of a period: speeds there, report back."""
-        bumped = self.report is not None and bool(self.report.status & Status.BUMPER)
+        bumped = self.report is not None and bool(self.report.status & modbus.Status.BUMPER)
         twist = Twist() if self._stopped or bumped else self._twist
         speeds = wheel_speeds(
             twist, self.tread.value, self.radius_left.value, self.radius_right.value
@@ -232,8 +221,10 @@ class RefHardRh3(RtComponent):
         share = min(1.0, self.velocity_limit.value / max(1e-9, *map(abs, speeds)))
         words: list[int] = []
         for speed, constant in zip(speeds, self.constants, strict=True):
-            words += wide(round(speed * share * self._counts_per_rad * constant.value))
-        return Request(READ_WRITE, REPORT, (Address.TARGET_SPEED_LEFT, tuple(words)))
+            words += modbus.wide(round(speed * share * self._counts_per_rad * constant.value))
+        return modbus.Request(
+            modbus.READ_WRITE, modbus.REPORT, (modbus.Address.TARGET_SPEED_LEFT, tuple(words))
+        )
 
     def _take(self, ec: ExecutionContext, answer: ModbusAnswer) -> ReturnCode:
         if answer.refusal is not None:
@@ -245,19 +236,19 @@ class RefHardRh3(RtComponent):
         self._refused = 0
         if self._orders:
             if self._orders[0] == _IDENTITY:
-                if answer.values != (DEVICE_ID,):
+                if answer.values != (modbus.DEVICE_ID,):
                     says = ", ".join(f"{value:04X}h" for value in answer.values)
-                    what = f"register 0000h is {says}, not {DEVICE_ID:04X}h"
+                    what = f"register 0000h is {says}, not {modbus.DEVICE_ID:04X}h"
                     return self._failed(f"{self.device.value}: {what}{self._stranger}")
                 self._identified = True
-            if self._orders.popleft() == _MODE and answer.values == (Mode.FREE,):
+            if self._orders.popleft() == _MODE and answer.values == (modbus.Mode.FREE,):
                 self._counts = (0, 0)  # it was without power
             return ReturnCode.RTC_OK
-        self.report = report = Report.parse(answer.values)
+        self.report = report = modbus.Report.parse(answer.values)
         self._turn(report)
         now = Time.from_us(ec.now_us)
         self.angles.write(TimedDoubleSeq(now, tuple(self._angles)))
-        if report.status & Status.FAULT:
+        if report.status & modbus.Status.FAULT:
             faults = _fault_text(report.fault_left, report.fault_right)
             return self._failed(f"fault of the base: {faults}")
         return ReturnCode.RTC_OK
@@ -269,7 +260,7 @@ class RefHardRh3(RtComponent):
             return ""
         return "; not an RH3 base, so nothing was written (rh3 --any-device goes on)"
 
-    def _turn(self, report: Report) -> None:
+    def _turn(self, report: modbus.Report) -> None:
         """Add what the counters counted; they begin again after 2**32."""
         counts = (report.left, report.right)
         for place, constant in enumerate(self.constants):
@@ -283,16 +274,16 @@ class RefHardRh3(RtComponent):
         return ReturnCode.RTC_ERROR
 
 
-def _write(address: Address, *values: int) -> Request:
-    return Request(WRITE, write=(address, tuple(int(value) for value in values)))
+def _write(address: modbus.Address, *values: int) -> modbus.Request:
+    return modbus.Request(modbus.WRITE, write=(address, tuple(int(value) for value in values)))
 
 
-def _fault_text(left: Fault, right: Fault) -> str:
+def _fault_text(left: modbus.Fault, right: modbus.Fault) -> str:
     """Return the faults of both wheels, each with the wheels that have it.
 
-    >>> _fault_text(Fault.EMERGENCY_STOP | Fault.STALL, Fault.EMERGENCY_STOP)
+    >>> _fault_text(modbus.Fault.EMERGENCY_STOP | modbus.Fault.STALL, modbus.Fault.EMERGENCY_STOP)
     'stall (left), emergency stop (left, right)'
-    >>> _fault_text(Fault(0x20), Fault(0))
+    >>> _fault_text(modbus.Fault(0x20), modbus.Fault(0))
     'fault 20h (left)'
     """
     sides = {"left": left, "right": right}
@@ -302,17 +293,21 @@ def _fault_text(left: Fault, right: Fault) -> str:
 
 
 def _name(bit: int) -> str:
-    return _words(Fault(bit).name or f"fault {bit:02X}h")
+    return _words(modbus.Fault(bit).name or f"fault {bit:02X}h")
 
 
-def _refusal_text(request: Request, code: ExceptionCode | int) -> str:
+def _refusal_text(request: modbus.Request, code: modbus.ExceptionCode | int) -> str:
     """Return which request was refused, and why.
 
-    >>> _refusal_text(Request(3, (0x10, 1)), ExceptionCode.ILLEGAL_DATA_ADDRESS)
+    >>> _refusal_text(modbus.Request(3, (0x10, 1)), modbus.ExceptionCode.ILLEGAL_DATA_ADDRESS)
     'function 03h at 0010h: illegal data address'
     """
     first, _ = request.write or request.read or (0, 0)
-    why = _words(code.name) if isinstance(code, ExceptionCode) else f"exception code {code:02X}h"
+    why = (
+        _words(code.name)
+        if isinstance(code, modbus.ExceptionCode)
+        else f"exception code {code:02X}h"
+    )
     return f"function {request.function:02X}h at {first:04X}h: {why}"
 
 
