@@ -55,7 +55,7 @@ class Press:
 
 
 @dataclass(frozen=True, slots=True)
-class Release:
+class _Release:
     """Let a button go."""
 
     name: str
@@ -69,7 +69,7 @@ class Clear:
 
 
 @dataclass(frozen=True, slots=True)
-class ExpectWatch:
+class _ExpectWatch:
     """Show outputs when they change."""
 
     names: tuple[str, ...]
@@ -80,7 +80,7 @@ class ScenarioEnd:
     """End the run."""
 
 
-_Action = Send | Set | Press | Release | FaultSpec | Clear | ExpectWatch | ScenarioEnd
+_Action = Send | Set | Press | _Release | FaultSpec | Clear | _ExpectWatch | ScenarioEnd
 
 
 ScenarioStep = Step[_Action, str]
@@ -181,9 +181,9 @@ class ScenarioParser:
         self._operator.check_press(press.name, press.duration_us)
         return press
 
-    def _parse_release(self, rest: str) -> Release:
+    def _parse_release(self, rest: str) -> _Release:
         self._operator.check_press(rest)
-        return Release(rest)
+        return _Release(rest)
 
     def _parse_fault(self, rest: str) -> FaultSpec:
         spec = parse_fault_spec(rest, self._operator.check_clear)
@@ -194,12 +194,12 @@ class ScenarioParser:
         self._operator.check_clear(rest)
         return Clear(rest)
 
-    def _parse_watch(self, rest: str) -> ExpectWatch:
+    def _parse_watch(self, rest: str) -> _ExpectWatch:
         names, device = tuple(rest.split()), self._device
         for name in names or ("",):
             if name not in device.outputs and name not in device.inputs.table:
                 raise ValueError(f"no output {name!r}; {near(name, device.outputs)}")
-        return ExpectWatch(names)
+        return _ExpectWatch(names)
 
 
 def _line_senders(encoders: Mapping[str, Encoder]) -> dict[str, Sender]:
@@ -304,13 +304,13 @@ class ScenarioPlayer:
                 operator.set(name, *values)
             case Press(name, duration_us):
                 operator.press(now_us, name, duration_us)
-            case Release(name):
+            case _Release(name):
                 operator.release(name)
             case FaultSpec() as spec:
                 operator.fault(now_us, spec)
             case Clear(name):
                 operator.clear(name)
-            case ExpectWatch(names):
+            case _ExpectWatch(names):
                 self._transcript.watch(now_us, *names)
             case None:
                 self._open.append(step)

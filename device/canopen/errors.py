@@ -64,7 +64,7 @@ INPUT_ERROR: Final = 3
 """Sub-indices; output and input errors are those of CiA 401."""
 
 
-class Behaviour(IntEnum):
+class _Behaviour(IntEnum):
     """NMT state after an error."""
 
     PRE_OPERATIONAL = 0  # only from Operational
@@ -119,18 +119,18 @@ class ErrorBehaviour(Service):
         if error in self._behaviours:
             return self._behaviours[error].number
         communication = error == _COMMUNICATION_ERROR
-        return Behaviour.PRE_OPERATIONAL if communication else Behaviour.NO_CHANGE
+        return _Behaviour.PRE_OPERATIONAL if communication else _Behaviour.NO_CHANGE
 
     def _change(self, behaviour: int) -> None:
         node = self.node
-        if behaviour == Behaviour.PRE_OPERATIONAL and node.state is NmtState.OPERATIONAL:
+        if behaviour == _Behaviour.PRE_OPERATIONAL and node.state is NmtState.OPERATIONAL:
             node.enter(NmtState.PRE_OPERATIONAL)
-        elif behaviour == Behaviour.STOPPED and node.state in ALIVE:
+        elif behaviour == _Behaviour.STOPPED and node.state in ALIVE:
             node.enter(NmtState.STOPPED)
 
 
 def _known(entry: Entry, value: Value) -> None:
-    if value not in tuple(Behaviour):
+    if value not in tuple(_Behaviour):
         raise SdoAbort(AbortCode.VALUE_RANGE)
 
 
@@ -163,7 +163,7 @@ class EmcyProducer(Service):
         find = node.dictionary.find
         self._register, self._cob_id = find(_ERROR_REGISTER), find(_COB_ID_EMCY)
         self._inhibit = find(_INHIBIT_TIME_EMCY)
-        self._history = ErrorHistory(node.dictionary)
+        self._history = _ErrorHistory(node.dictionary)
         self._active: dict[tuple[int, bytes], int] = {}
         self._queue: list[bytes] = []
         self._free_us, self._bus_off = 0, False
@@ -245,7 +245,7 @@ class EmcyProducer(Service):
         self.schedule(self._free_us)
 
 
-class ErrorHistory(Part):
+class _ErrorHistory(Part):
     """Keeps the latest errors, the newest at sub-index 1.
 
     Sub-index 0 counts them; 0 written to it forgets them all, other values are

@@ -91,7 +91,7 @@ if TYPE_CHECKING:
 #   for each segment, and the service comes back at the old deadline and sees that there is
 #   a later one.
 # - What comes is counted against the announced size, the object and the memory while it
-#   comes (`DownloadSize`), so that a client cannot fill the memory before it is refused.
+#   comes (`_DownloadSize`), so that a client cannot fill the memory before it is refused.
 #
 # `_without_transfer` answers the commonest request itself: reading up to four bytes that
 # nobody makes on demand. It must answer exactly as `initiate` would; `by_multiplexer` holds
@@ -116,7 +116,7 @@ _TAKEN: Final = {
 """Response to a downloaded segment, by its toggle bit."""
 
 
-class DownloadSize(Part):
+class _DownloadSize(Part):
     """Judges the size that a client announces, and that of what comes.
 
     Args:
@@ -151,7 +151,7 @@ class DownloadSize(Part):
             raise SdoAbort(AbortCode.OUT_OF_MEMORY)
 
 
-class SegmentedUpload(Part):
+class _SegmentedUpload(Part):
     """Gives a value as it was when the client asked for it."""
 
     def __init__(self, server: SdoServer, data: bytes) -> None:
@@ -187,7 +187,7 @@ class SegmentedDownload(Part):
         self._server, self._entry = server, entry
         self._data, self._toggle = bytearray(), 0
         announced = int.from_bytes(request[4:], "little") if request[0] & SIZE_INDICATED else None
-        self._size = DownloadSize(server, entry, announced)
+        self._size = _DownloadSize(server, entry, announced)
         self._most, self._put = self._size.most, server.node.put
         self._taken = {at: data_frame(server.response_id, _TAKEN[at]) for at in _TAKEN}
         server.confirm(ServerCommand.DOWNLOAD)
@@ -226,7 +226,7 @@ _END_MASK: Final = 0xE1
 """Command specifier and subcommand of the end; n is between them."""
 
 
-class BlockDownload(Part):
+class _BlockDownload(Part):
     """Collects a value in blocks; the object changes when the client has ended the transfer.
 
     A segment out of sequence is dropped, and the block acknowledged at its end
@@ -243,7 +243,7 @@ class BlockDownload(Part):
         # C2: size indicated; C4: the client can do the CRC; C0: neither.
         indicated = request[0] & BLOCK_SIZE_INDICATED
         announced = int.from_bytes(request[4:], "little") if indicated else None
-        self._size = DownloadSize(server, entry, announced)
+        self._size = _DownloadSize(server, entry, announced)
         self._block_size = server.block_size
         command = ServerCommand.BLOCK_DOWNLOAD | self._crc
         server.confirm(command, bytes([self._block_size, 0, 0, 0]))
@@ -304,7 +304,7 @@ class BlockDownload(Part):
         self._server.end()
 
 
-class BlockUpload(Part):
+class _BlockUpload(Part):
     """Gives a value as it was when the client asked for it, a block in one tick.
 
     A value no longer than the client's protocol switch threshold is given by
@@ -534,9 +534,9 @@ class SdoServer(Part):
             case ClientCommand.UPLOAD:
                 self.upload(entry.upload())
             case ClientCommand.BLOCK_UPLOAD:
-                BlockUpload(self, entry.upload(), request)
+                _BlockUpload(self, entry.upload(), request)
             case _:
-                BlockDownload(self, entry, request)
+                _BlockDownload(self, entry, request)
 
     def upload(self, data: bytes) -> None:
         """Give a value in one answer, or begin to give it in segments."""
@@ -545,7 +545,7 @@ class SdoServer(Part):
             self.respond(_EXPEDITED[size] + self._multiplexer + data + _FILL[size])
             self.end()
         else:
-            SegmentedUpload(self, data)
+            _SegmentedUpload(self, data)
 
     def _without_transfer(self, request: bytes) -> None:
         """Take a request while no transfer runs; reading a small value is the short way."""

@@ -78,7 +78,7 @@ _DEADBAND: Final = 1
 """Counts that are near enough."""
 
 
-class PositionLoop(Part):
+class _PositionLoop(Part):
     """A PID loop from counts to counts/ms, with gains P in 1/s, I in 1/s2, D plain.
 
     Args:
@@ -120,7 +120,7 @@ _INTEGRAL_LIMIT: Final = 10_000.0
 """Counts that the integral holds at most; a choice."""
 
 
-class SpeedLoop(Part):
+class _SpeedLoop(Part):
     """A PID loop on the counts of each millisecond (rh3-control, wheel servo).
 
     Torque in per mille = VP e + VI sum(e) + VD delta(e), with e in counts/ms, cut to the
@@ -235,8 +235,8 @@ class Side(Part):
     ) -> None:
         self.name, self.wheel = name, Wheel(parameters)
         self._registers, self._backward_bit = registers, backward_bit
-        self._speed_loop = SpeedLoop(registers)
-        self._position_loop = PositionLoop(registers)
+        self._speed_loop = _SpeedLoop(registers)
+        self._position_loop = _PositionLoop(registers)
         self._rated_ma, self._per_mille, self._zero = parameters.rated_ma, parameters.per_mille, 0
         self.power_up()
 

@@ -135,7 +135,7 @@ def _square(
 
 
 @dataclass(slots=True)
-class Losses:
+class _Losses:
     """Energies since the start.
 
     Attributes:
@@ -196,7 +196,7 @@ class Plant(Part):
         self._motor, self._coulomb_nm = parameters.motor, parameters.coulomb_nm
         self._counts_per_rad = parameters.encoders.counts_per_turn / (2 * pi)
         self.current_a = self.speed_rad_s = self.position = 0.0
-        self.blocked, self.losses = False, Losses()
+        self.blocked, self.losses = False, _Losses()
         self.bear(0.0, 1.0)
         self.shape(parameters.inertia_kg_m2, parameters.motor.resistance_ohm)
 

@@ -146,7 +146,7 @@ def _derated_a(limit_a: float, winding_c: float, winding_max_c: float) -> float:
 _AGES_S: Final = 1e9  # after this all temperatures stand still
 
 
-class Heat(Part):
+class _Heat(Part):
     """Temperatures and I2t budget of a servo, from the squared current.
 
     Attributes:
@@ -341,7 +341,7 @@ class Readings(ServoSettings):
     def __init__(self, parameters: ServoParameters) -> None:
         super().__init__(parameters.stage.supply_v)
         self.parameters, self._plant = parameters, Plant(parameters)
-        self._heat = Heat(parameters, self.ambient_c)
+        self._heat = _Heat(parameters, self.ambient_c)
         self.counts_per_turn = parameters.encoders.counts_per_turn
         self.gear_ratio = parameters.gear.ratio
         self._degrees_per_count = 360.0 / self.counts_per_turn / self.gear_ratio

@@ -14,7 +14,7 @@ from tickrig.device.twin import Part
 # Theory of operation
 # ===================
 #
-# A servo is four parts in three files: `Loops` (what current is wanted), `Plant` in
+# A servo is four parts in three files: `_Loops` (what current is wanted), `Plant` in
 # plant.py (what winding, shaft and friction do with it), `Heat` in readings.py
 # (temperatures and I2t, from the squared current), and `Servo`, which lets them act. One
 # control step is 1 ms, whatever the tick of the drive: `step_to(now_us)` makes as many as
@@ -37,7 +37,7 @@ from tickrig.device.twin import Part
 # - Resting is exact. A servo rests only when a step leaves position, current, integral and
 #   cut as they were to the bit; floating point makes that possible because dry friction
 #   stops the shaft at exactly 0.0 (plant.py) and a demand within one count counts as
-#   reached (`Loops`). While it rests no steps are made, and the temperatures come in closed
+#   reached (`_Loops`). While it rests no steps are made, and the temperatures come in closed
 #   form, from one place (`Heat.at`), whoever asks. `_wake` pays for the time of rest before
 #   anything else changes.
 # - Several steps in one go are the same steps. `_work_out` repeats `Loops.follow` and
@@ -57,7 +57,7 @@ from tickrig.device.twin import Part
 # The velocity and position loops of a drive.
 
 
-class Loops(Part):
+class _Loops(Part):
     """A position loop around a velocity loop, in control steps of 1 ms.
 
     Position: proportional, in whole counts; an error below one count counts as
@@ -143,7 +143,7 @@ position, counts; largest distance from the demanded position, counts; velocity,
 which the motor stands: it may not stand while it is demanded to turn faster.
 """
 
-Four = tuple[float, float, float, float]
+_Four = tuple[float, float, float, float]
 
 
 class RunAhead(Part):
@@ -160,12 +160,12 @@ class RunAhead(Part):
 
     __slots__ = ("counts", "losses", "motion", "steps")
 
-    def __init__(self, steps: int, counts: int, motion: Four, losses: Four) -> None:
+    def __init__(self, steps: int, counts: int, motion: _Four, losses: _Four) -> None:
         self.steps, self.counts, self.motion, self.losses = steps, counts, motion, losses
 
 
 def _work_out(  # noqa: PLR0915 - one loop over locals
-    plant: Plant, loops: Loops, encoder: tuple[int, float], demands: _Demands, bounds: _Bounds
+    plant: Plant, loops: _Loops, encoder: tuple[int, float], demands: _Demands, bounds: _Bounds
 ) -> RunAhead:
     """Work out what the loops and the plant do in steps with a position demand, to the bit.
 
@@ -243,7 +243,7 @@ _SLOW_US: Final = 20_000  # between two looks at heat and overload
 _RESISTANCE_STEP: Final = 0.005  # how far the resistance may be off before it is followed
 
 
-class Demand(Enum):
+class _Demand(Enum):
     """What the drive wants of the motor."""
 
     NOTHING = "nothing"
@@ -261,7 +261,7 @@ class Servo(Readings):
     `resting`, nothing moves and time passes at no cost; the temperatures
     follow in closed form.
 
-    Not emulated: see `Plant`, `ThermalModel` and `Loops`; the velocity is
+    Not emulated: see `Plant`, `ThermalModel` and `_Loops`; the velocity is
     measured without noise, the supply gives and takes any current.
 
     Attributes:
@@ -291,23 +291,23 @@ class Servo(Readings):
 
     def __init__(self, parameters: ServoParameters) -> None:
         super().__init__(parameters)
-        self._loops, self._lost_counts = Loops(parameters), 0.0
-        self._demand, self._values = Demand.NOTHING, (0.0, 0.0, 0.0)
+        self._loops, self._lost_counts = _Loops(parameters), 0.0
+        self._demand, self._values = _Demand.NOTHING, (0.0, 0.0, 0.0)
         self.changed()
 
     # what the drive wants
 
     def release(self) -> None:
         """Switch the power stage off; the shaft coasts."""
-        self._want(Demand.NOTHING, (0.0, 0.0, 0.0))
+        self._want(_Demand.NOTHING, (0.0, 0.0, 0.0))
 
     def drive_current(self, current_a: float) -> None:
         """Impose a current."""
-        self._want(Demand.CURRENT, (current_a, 0.0, 0.0))
+        self._want(_Demand.CURRENT, (current_a, 0.0, 0.0))
 
     def drive_velocity(self, velocity: float, acceleration: float = 0.0) -> None:
         """Keep a velocity, counts/s; the acceleration, counts/s^2, is fed forward."""
-        self._want(Demand.VELOCITY, (0.0, velocity, acceleration))
+        self._want(_Demand.VELOCITY, (0.0, velocity, acceleration))
 
     def drive_position(
         self, position: float, velocity: float = 0.0, acceleration: float = 0.0
@@ -319,9 +319,9 @@ class Servo(Readings):
             velocity: the velocity that it shall have now, counts/s.
             acceleration: its acceleration in the next millisecond, counts/s^2.
         """
-        self._want(Demand.POSITION, (position, velocity, acceleration))
+        self._want(_Demand.POSITION, (position, velocity, acceleration))
 
-    def _want(self, demand: Demand, values: tuple[float, float, float]) -> None:
+    def _want(self, demand: _Demand, values: tuple[float, float, float]) -> None:
         """Take a demand, if it is another one."""
         if demand is not self._demand or values != self._values:
             if self.resting:
@@ -335,7 +335,7 @@ class Servo(Readings):
         """How many control steps at most may be plain, so that `run_ahead` can work them out."""
         feed = self._values[2]
         special = self.resting or self._off or self.encoder_unplugged or self._loops.cut
-        if special or feed != 0.0 or self._demand is not Demand.POSITION:
+        if special or feed != 0.0 or self._demand is not _Demand.POSITION:
             return 0
         # The step at whose end heat is looked at is made singly: it may change resistance
         # and limit.
@@ -415,17 +415,17 @@ class Servo(Readings):
         ):
             self._rest()
 
-    def _push(self, plant: Plant, loops: Loops) -> int:
+    def _push(self, plant: Plant, loops: _Loops) -> int:
         """Act on the demand; return the direction in which it was cut."""
         demand, (value, velocity, acceleration) = self._demand, self._values
-        if demand is Demand.NOTHING or self._off:
+        if demand is _Demand.NOTHING or self._off:
             loops.integral_a = 0.0
             plant.open()
             return 0
         speed = 0.0 if self.encoder_unplugged else plant.speed_rad_s
-        if demand is Demand.POSITION:
+        if demand is _Demand.POSITION:
             current = loops.follow(value, self.counts, velocity, acceleration, speed)
-        elif demand is Demand.VELOCITY:
+        elif demand is _Demand.VELOCITY:
             current = loops.turn(velocity, acceleration, speed)
         else:
             current, loops.integral_a = value, 0.0

@@ -20,7 +20,7 @@ from tickrig.wire.instant import NEVER
 #
 # Two clocks and three memories make the behaviour; the rest is texts.
 #
-# The clocks. `Rotation` counts whole turns of the mirror from `began_us`, without drift:
+# The clocks. `_Rotation` counts whole turns of the mirror from `began_us`, without drift:
 # scans end at multiples of its period from there, whoever asks for them. `_timer` counts
 # milliseconds from `_zero_us`, modulo 2^24, and stamps each scan with the time of its
 # beginning (decision U2 in the reference page). CR starts the turn anew, TM and the laser
@@ -99,7 +99,7 @@ _TURN_US_RPM = 60_000_000
 
 
 @dataclass(slots=True)
-class Rotation:
+class _Rotation:
     """One scan a turn, without drift.
 
     Attributes:
@@ -264,7 +264,7 @@ class ScipServer(Part):
             self._classic = self.light(now_us)
 
     def _begin(self, now_us: int) -> None:
-        self.rotation = Rotation(URG_04LX.speed_rpm)
+        self.rotation = _Rotation(URG_04LX.speed_rpm)
         self.rotation.began_us = self._zero_us = now_us
         self._adjusting, self.settings = False, Settings()
         self.stop()

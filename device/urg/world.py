@@ -298,7 +298,7 @@ class Beams(Part):
 _HALF: Final = 2.0**63
 
 
-class NoDistance(IntEnum):
+class _NoDistance(IntEnum):
     """Numbers below DMIN that are no distances (SCIP 2.0, error codes)."""
 
     WEAK = 1
@@ -347,7 +347,7 @@ class View(Immutable):
         numbers = self._numbers(ways_m)
         if not measurable:
             numbers = [
-                number if kind.first <= step <= kind.last else NoDistance.NOT_MEASURABLE
+                number if kind.first <= step <= kind.last else _NoDistance.NOT_MEASURABLE
                 for step, number in enumerate(numbers, first)
             ]
         if cluster <= 1:
@@ -374,7 +374,7 @@ class View(Immutable):
     def _numbers(self, ways_m: Sequence[float]) -> list[int]:
         """Return distances in mm, and codes."""
         near_m, far_m = self.kind.nearest_mm / 1_000, self.kind.farthest_mm / 1_000
-        weak, other = int(NoDistance.WEAK), int(NoDistance.OTHER)
+        weak, other = int(_NoDistance.WEAK), int(_NoDistance.OTHER)
         return [
             weak if way_m > far_m else other if way_m < near_m else round(way_m * 1_000)
             for way_m in ways_m

@@ -64,7 +64,7 @@ _EXTENDED: Final = 1 << 29
 _CACHED_ROUTES: Final = 4_096
 
 
-class CanRoutes(RoutesFields):
+class _CanRoutes(RoutesFields):
     """The ends of a bus and their filters, looked up once for each CAN-ID.
 
     Attributes:
@@ -135,7 +135,7 @@ class TransmissionOutcomes(SegmentFields):
     ) -> None:
         common = gcd(bit_rate, 1_000_000)
         self.unit, self.bit = bit_rate // common, 1_000_000 // common
-        self.routes = CanRoutes()
+        self.routes = _CanRoutes()
         self.busy = BusyTime()
         self._faults, self._observers, self._on_traffic = faults, observers, on_traffic
         self._confinement = FaultConfinement(self.routes.ends, self._state_changed)

@@ -23,7 +23,7 @@ _FAR_M: Final = 1e6
 _MOST_FRICTION: Final = 10
 
 
-class PoseSignal:
+class _PoseSignal:
     """One coordinate of a body; setting it puts the body elsewhere, wheels and speed as they are.
 
     Args:
@@ -65,7 +65,7 @@ class PoseSignal:
         self._body.pose = pose
 
 
-class FrictionSignal:
+class _FrictionSignal:
     """The ground's friction, of a body that can slip."""
 
     def __init__(self, body: WheeledBody) -> None:
@@ -88,7 +88,7 @@ class FrictionSignal:
             contact.friction = friction
 
 
-NAME: Final = "body"
+_NAME: Final = "body"
 
 _BODY_OUTPUTS: Final = (
     OutputSignal("x_m", "place", "m"),
@@ -131,7 +131,7 @@ class BodyOnDrives:
         ValueError: a node that has no shaft.
     """
 
-    name = NAME
+    name = _NAME
     tick_us = TICK_US
 
     def __init__(self, body: WheeledBody, wheels: Collection[DrivenWheel]) -> None:
@@ -140,13 +140,13 @@ class BodyOnDrives:
         self.physical: Mapping[str, NodeSignal] = {
             signal.item.name: signal
             for signal in (
-                PoseSignal(body, "x_m", "place", "m"),
-                PoseSignal(body, "y_m", "place, to the left of x", "m"),
-                PoseSignal(body, "heading_deg", "from x towards y", "deg"),
+                _PoseSignal(body, "x_m", "place", "m"),
+                _PoseSignal(body, "y_m", "place, to the left of x", "m"),
+                _PoseSignal(body, "heading_deg", "from x towards y", "deg"),
             )
         }
         if body.parameters.friction is not None:
-            self.physical = {**self.physical, "friction": FrictionSignal(body)}
+            self.physical = {**self.physical, "friction": _FrictionSignal(body)}
         self.outputs: Mapping[str, OutputSignal] = {item.name: item for item in _BODY_OUTPUTS}
         self.groups: Mapping[str, tuple[str, ...]] = {"pose": ("x_m", "y_m", "heading_deg")}
         self._load()

@@ -294,7 +294,7 @@ class Nodes:
         self.nodes, self.parts = tuple(nodes), (*nodes, *bodies)
         self._alone = self.parts[0] if len(nodes) == 1 or len(self.parts) == 1 else None
         self._by_name: Mapping[str, NodePart] = {part.name: part for part in self.parts}
-        self.inputs = NodeInputs(self)
+        self.inputs = _NodeInputs(self)
         self.outputs: Mapping[str, OutputSignal] = {
             self.full_name(part, item.name): replace(item, name=self.full_name(part, item.name))
             for part in self.parts
@@ -330,7 +330,7 @@ class Nodes:
         return sum(node.port.lost for node in self.nodes)
 
 
-class NodeInputs:
+class _NodeInputs:
     """The `Inputs` of nodes: their physical side and every object of their dictionaries.
 
     Attributes:

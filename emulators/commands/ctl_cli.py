@@ -44,7 +44,7 @@ def _settable(described: Any) -> Iterator[str]:
     yield from (each["name"] for each in described.get("inputs", ()))
 
 
-def seen(described: Any) -> Iterator[str]:
+def _seen(described: Any) -> Iterator[str]:
     """Give inputs and outputs."""
     yield from (
         each["name"] for each in [*described.get("inputs", ()), *described.get("outputs", ())]
@@ -162,7 +162,7 @@ def describe() -> Object:
 
 
 @verb(_values)
-@click.argument("names", nargs=-1, shell_complete=_complete(seen))
+@click.argument("names", nargs=-1, shell_complete=_complete(_seen))
 def get(names: tuple[str, ...]) -> Object:
     """Show inputs and outputs by NAME, all if none is named."""
     return {"names": list(names)} if names else {}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tickrig.device.physical import InputSignal
     from tickrig.emulators.commands.device_type import DeviceType
 
-OURS: Final = {
+_OURS: Final = {
     "rrc": ("tickrig.emulators.rrc.cli:main", "Emulate an RRC, as rrc-emu."),
     "rtc-lite": ("tickrig.emulators.rtc_lite.cli:main", "Emulate a PIC, as rtc-lite-emu."),
     "rh3-base": ("tickrig.emulators.rh3.cli:main", "Emulate the base of RH3, as rh3-emu."),
@@ -42,7 +42,7 @@ played in real time."""
 _PANEL: Final = "Show an operator panel in this terminal."
 
 
-class DeviceGroup(LazyGroup):
+class _DeviceGroup(LazyGroup):
     """Our command lines, and one made for each device type of another package."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -63,7 +63,7 @@ class DeviceGroup(LazyGroup):
             from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
 
         if cmd_name not in (names := DEVICES.names()):
-            hint = near(cmd_name, dict.fromkeys([*OURS, *names]))
+            hint = near(cmd_name, dict.fromkeys([*_OURS, *names]))
             raise Refused(f"no device {cmd_name!r}; {hint}")
         try:
             return device_command(DEVICES.load(cmd_name))
@@ -93,6 +93,6 @@ def _inputs(device_type: DeviceType) -> Iterable[InputSignal]:
     return device_type.build({}).inputs.table.values()
 
 
-@click.group(cls=DeviceGroup, commands=OURS)
+@click.group(cls=_DeviceGroup, commands=_OURS)
 def emu() -> None:
     """Emulate a device, ours or that of an installed package."""

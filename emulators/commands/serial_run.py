@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Options(RunOptions):
+class _Options(RunOptions):
     """What the command lines of all serial emulators share (`line_options`)."""
 
     link: Path | None = None
@@ -52,18 +52,18 @@ def run_device(device_type: DeviceType, options: Mapping[str, Any]) -> int:
     Raises:
         Refused: the command line asks for something that cannot be done.
     """
-    names = {item.name for item in fields(Options)}
+    names = {item.name for item in fields(_Options)}
     own = {name: value for name, value in options.items() if name not in names}
-    shared = Options(**{name: value for name, value in options.items() if name in names})
+    shared = _Options(**{name: value for name, value in options.items() if name in names})
     try:
         configured = device_type.of_options(own, shared.seed)
     except ValueError as error:
         raise Refused(str(error)) from None
     with mistakes_in([configured.type.user_code]):
-        return SerialRun(configured, shared).run()
+        return _SerialRun(configured, shared).run()
 
 
-class SerialRun(EmulatorRun):
+class _SerialRun(EmulatorRun):
     """One run.
 
     Args:
@@ -71,7 +71,7 @@ class SerialRun(EmulatorRun):
         options: the command line.
     """
 
-    def __init__(self, configured: ConfiguredDevice, options: Options) -> None:
+    def __init__(self, configured: ConfiguredDevice, options: _Options) -> None:
         super().__init__(options, in_real_time=options.in_real_time)
         self._type, self._device = configured.type, configured.device
         self._config = configured.config

@@ -117,7 +117,7 @@ _OFF: Final = 1 << 31
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class _Write:
     """One expedited SDO download.
 
     Attributes:
@@ -138,25 +138,25 @@ class Write:
 
 
 _WRITES: Final = (
-    Write(PALETTE, 0x1017, 0, 100, 2, "heartbeat each 100 ms"),
-    Write(MOTOR, 0x1017, 0, 100, 2, "heartbeat each 100 ms"),
-    Write(PALETTE, 0x1801, 1, _OFF | LINK, 4, "TPDO2 off"),
-    Write(PALETTE, 0x1A01, 0, 0, 1, "no entries"),
-    Write(PALETTE, 0x1A01, 1, 0x6401_0110, 4, "analogue input 1, 16 bit"),
-    Write(PALETTE, 0x1A01, 0, 1, 1, "one entry"),
-    Write(PALETTE, 0x1801, 2, 255, 1, "event-driven"),
-    Write(PALETTE, 0x1801, 3, 100, 2, "inhibit time 10 ms"),
-    Write(PALETTE, 0x1801, 5, 50, 2, "event timer 50 ms"),
-    Write(PALETTE, 0x6426, 1, 8, 4, "delta: more than one step of the converter"),
-    Write(PALETTE, 0x6423, 0, 1, 1, "analogue events on"),
-    Write(PALETTE, 0x1801, 1, LINK, 4, "TPDO2 on, COB-ID 290h"),
-    Write(MOTOR, 0x2000, 0, 3, 1, "angle mode"),
-    Write(MOTOR, 0x1401, 1, _OFF | LINK, 4, "RPDO2 off, the palette's COB-ID"),
-    Write(MOTOR, 0x1601, 0, 0, 1, "no entries"),
-    Write(MOTOR, 0x1601, 1, 0x6411_0110, 4, "reference, 16 bit"),
-    Write(MOTOR, 0x1601, 0, 1, 1, "one entry"),
-    Write(MOTOR, 0x1401, 2, 255, 1, "act on reception"),
-    Write(MOTOR, 0x1401, 1, LINK, 4, "RPDO2 on: the link is made"),
+    _Write(PALETTE, 0x1017, 0, 100, 2, "heartbeat each 100 ms"),
+    _Write(MOTOR, 0x1017, 0, 100, 2, "heartbeat each 100 ms"),
+    _Write(PALETTE, 0x1801, 1, _OFF | LINK, 4, "TPDO2 off"),
+    _Write(PALETTE, 0x1A01, 0, 0, 1, "no entries"),
+    _Write(PALETTE, 0x1A01, 1, 0x6401_0110, 4, "analogue input 1, 16 bit"),
+    _Write(PALETTE, 0x1A01, 0, 1, 1, "one entry"),
+    _Write(PALETTE, 0x1801, 2, 255, 1, "event-driven"),
+    _Write(PALETTE, 0x1801, 3, 100, 2, "inhibit time 10 ms"),
+    _Write(PALETTE, 0x1801, 5, 50, 2, "event timer 50 ms"),
+    _Write(PALETTE, 0x6426, 1, 8, 4, "delta: more than one step of the converter"),
+    _Write(PALETTE, 0x6423, 0, 1, 1, "analogue events on"),
+    _Write(PALETTE, 0x1801, 1, LINK, 4, "TPDO2 on, COB-ID 290h"),
+    _Write(MOTOR, 0x2000, 0, 3, 1, "angle mode"),
+    _Write(MOTOR, 0x1401, 1, _OFF | LINK, 4, "RPDO2 off, the palette's COB-ID"),
+    _Write(MOTOR, 0x1601, 0, 0, 1, "no entries"),
+    _Write(MOTOR, 0x1601, 1, 0x6411_0110, 4, "reference, 16 bit"),
+    _Write(MOTOR, 0x1601, 0, 1, 1, "one entry"),
+    _Write(MOTOR, 0x1401, 2, 255, 1, "act on reception"),
+    _Write(MOTOR, 0x1401, 1, LINK, 4, "RPDO2 on: the link is made"),
 )
 """In this order (NEDO report, 3.4.43.3, Fig. 120: PDO linking)."""
 
@@ -257,7 +257,7 @@ class VirtualStage:
         self._nodes.inputs.set(name, value)
 
 
-class BusStage:
+class _BusStage:
     """An emulator in a process of its own on a bus of python-can, in real time."""
 
     step_us = 20_000
@@ -307,7 +307,7 @@ def bus_stage(
         stack.callback(bus.shutdown)
         network = canopen.Network(bus)
         stack.callback(network.disconnect)
-        yield BusStage(network.connect(), hand)
+        yield _BusStage(network.connect(), hand)
 
 
 def _node(node_id: int, model: EmulatedModel, wire: CanWire) -> Node:

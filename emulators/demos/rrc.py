@@ -29,7 +29,7 @@ _STATUS_SHOWN: Final = 2
 """So many status lines in a row are printed; the rest is counted."""
 
 
-class AnswerSample(NamedTuple):
+class _AnswerSample(NamedTuple):
     """One of the nine sample commands of the manual's test procedure."""
 
     command: cmd.Command
@@ -37,17 +37,17 @@ class AnswerSample(NamedTuple):
 
 
 _SAMPLES: Final = (
-    AnswerSample(cmd.Limit(50, 50), "the stick drives, at most 50 %"),
-    AnswerSample(cmd.Output(30, 0), "the host drives, forward at 30 %"),
-    AnswerSample(cmd.SpeedMode(4), "speed mode 4, its buttons not locked"),
-    AnswerSample(cmd.Joystick(reverse_mode=3), "stick shaping, backing toward the stick"),
-    AnswerSample(cmd.Watchdog(100), "VR2 stops after 1 s without a correct command"),
-    AnswerSample(cmd.Status(1), "a status line each 10 ms from now on"),
-    AnswerSample(
+    _AnswerSample(cmd.Limit(50, 50), "the stick drives, at most 50 %"),
+    _AnswerSample(cmd.Output(30, 0), "the host drives, forward at 30 %"),
+    _AnswerSample(cmd.SpeedMode(4), "speed mode 4, its buttons not locked"),
+    _AnswerSample(cmd.Joystick(reverse_mode=3), "stick shaping, backing toward the stick"),
+    _AnswerSample(cmd.Watchdog(100), "VR2 stops after 1 s without a correct command"),
+    _AnswerSample(cmd.Status(1), "a status line each 10 ms from now on"),
+    _AnswerSample(
         cmd.StableMode(1), "CHECK wanted from now on, and no OK: 'device' behind a line confirms it"
     ),
-    AnswerSample(cmd.PowerOff(), "VR2 is stopped by force"),
-    AnswerSample(cmd.Beep((100,) * 4 + (10,) * 6), "two beeps of 1 s, three of 0.1 s"),
+    _AnswerSample(cmd.PowerOff(), "VR2 is stopped by force"),
+    _AnswerSample(cmd.Beep((100,) * 4 + (10,) * 6), "two beeps of 1 s, three of 0.1 s"),
 )
 
 _MEANING: Final = {
@@ -62,7 +62,7 @@ _MEANING: Final = {
 }
 
 
-class DemoTranscript:
+class _DemoTranscript:
     """A `Link[bytes]` that prints each line that passes through another."""
 
     def __init__(self, link: Link[bytes], echo: _Echo) -> None:
@@ -121,7 +121,7 @@ def play(link: Link[bytes], request: _Request, echo: _Echo) -> None:
         LinkError, DeviceRefused: something went wrong on the way.
     """
     echo("> is what the host sends, < what the RRC answers, with the time in seconds.")
-    transcript = DemoTranscript(link, echo)
+    transcript = _DemoTranscript(link, echo)
     with RrcClient(transcript, timeout_us=_PATIENCE_US, max_refusals=_MAX_REFUSALS) as rrc:
         for title in _chapters(rrc, transcript, request, echo):
             echo(f"\n{title}")

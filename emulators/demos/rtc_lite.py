@@ -157,10 +157,10 @@ def run_demo(setup: DemoSetup, echo: _Echo) -> None:
         RuntimeError: something did not come in time.
         RtcRefused: a device does not start up.
     """
-    DemoRun(setup, echo).run()
+    _DemoRun(setup, echo).run()
 
 
-class DemoRun:
+class _DemoRun:
     """The system on a stage, and what it looks like.
 
     In real time an answer may come later than its proxy waits. The proxy then goes to Error, or

@@ -99,7 +99,7 @@ def _corridor() -> tuple[tuple[Marker, ...], UcodeTable]:
     return markers, UcodeTable(dict(zip(ucodes, names, strict=True)), contents)
 
 
-class MountedReader:
+class _MountedReader:
     """A reader in the middle of the axle, as a coupling of the rig.
 
     Args:
@@ -194,8 +194,8 @@ class CorridorStage:
             if (level := self._round.get(place.data[0])) is not None:
                 self.estimate.fix(point.data.x, point.data.y, level)
 
-    def _mount(self, base: Rh3Base, markers: tuple[Marker, ...]) -> MountedReader:
-        self._mounted = MountedReader(base, markers)
+    def _mount(self, base: Rh3Base, markers: tuple[Marker, ...]) -> _MountedReader:
+        self._mounted = _MountedReader(base, markers)
         return self._mounted
 
     def _open(self, name: str) -> SimLink:

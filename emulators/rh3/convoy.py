@@ -75,7 +75,7 @@ class OmniCart(RtComponent):
 
 
 @dataclass(frozen=True, slots=True)
-class Robot:
+class _Robot:
     """One robot of a convoy, by the names of its ports.
 
     Attributes:
@@ -144,20 +144,20 @@ class Convoy:
         manager.connect(f"{name}.velocity", own.velocity, _WIDE)
         manager.activate(name)
 
-    def _cart(self, number: int, pose: Pose) -> Robot:
+    def _cart(self, number: int, pose: Pose) -> _Robot:
         cart, manager = self.loop.carts[number], self.loop.manager
         place(cart, pose)
         velocity = f"RefHardRh3{number}.InTargetVelocity"
         if number:
             manager.disconnect(f"PathFollower{number}.velocity", velocity)
-        return Robot(f"Odometry{number}.OdometryPosition", velocity, cart)
+        return _Robot(f"Odometry{number}.OdometryPosition", velocity, cart)
 
-    def _omni_cart(self, number: int, pose: Pose) -> Robot:
+    def _omni_cart(self, number: int, pose: Pose) -> _Robot:
         name = f"OmniCart{number}"
         cart = self.loop.manager.add(OmniCart(name), rate_hz=50.0)
         cart.place(pose)
         self.loop.manager.activate(name)
-        return Robot(f"{name}.OdometryPosition", f"{name}.InTargetVelocity", cart, sideways=True)
+        return _Robot(f"{name}.OdometryPosition", f"{name}.InTargetVelocity", cart, sideways=True)
 
 
 def place(cart: Cart, pose: Pose) -> None:

@@ -86,7 +86,7 @@ class PanelView:
         return tuple(str(self.status.get("faults", "")).split())
 
 
-class WireRow(NamedTuple):
+class _WireRow(NamedTuple):
     """A line on the wire."""
 
     number: int
@@ -110,7 +110,7 @@ class Observer:
 
     def __init__(self) -> None:
         self.view, self.seen = PanelView(), 0
-        self._report = WireRow(0, -_REPORT_US, "", "")  # the latest SA
+        self._report = _WireRow(0, -_REPORT_US, "", "")  # the latest SA
 
     def take(self, values: Object, status: Object, lines: Object) -> None:
         """Take three answers in, asked for at the same time."""
@@ -140,11 +140,11 @@ def _values(answer: object) -> _Values:
     return {name: value for name, value in answer.items() if isinstance(value, int | str)}
 
 
-def _lines(answer: Object) -> list[WireRow]:
+def _lines(answer: Object) -> list[_WireRow]:
     lines = answer["lines"]
     if not isinstance(lines, list):
         return []
-    return [WireRow(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]
+    return [_WireRow(x["number"], x["at_us"], x["mark"], x["text"]) for x in lines]
 
 
 _STICK_HINTS: Final = {

@@ -317,7 +317,7 @@ _NO_FLOW_CONTROL_IN: Final = 14
 _NO_FLOW_CONTROL: Final = 1
 
 
-class QuietAdapter(SerialBase):
+class _QuietAdapter(SerialBase):
     """The settings of a serial adapter with nothing on its modem lines: all of them are off."""
 
     cts = dsr = ri = cd = False
@@ -329,7 +329,7 @@ class QuietAdapter(SerialBase):
         """Do nothing: what came before is on the line."""
 
 
-class SafePortManager(PortManager):
+class _SafePortManager(PortManager):
     """pyserial's, made whole: it answers what RFC 2217 has answered, and survives any value."""
 
     def _telnet_process_subnegotiation(self, suboption: bytes) -> None:
@@ -378,9 +378,9 @@ class Rfc2217Connection(HostConnection):
 
     def __init__(self, connection: socket.socket, buffer_bytes: int, baud: int) -> None:
         super().__init__(connection, buffer_bytes)
-        self._adapter = QuietAdapter(baudrate=baud)  # type: ignore[abstract] # it carries no bytes
+        self._adapter = _QuietAdapter(baudrate=baud)  # type: ignore[abstract] # it carries no bytes
         # typeshed wants two pyserial ports; any port and a writer will do (pyserial docs)
-        self._manager = SafePortManager(self._adapter, self)  # type: ignore[arg-type]
+        self._manager = _SafePortManager(self._adapter, self)  # type: ignore[arg-type]
 
     @property
     def setting(self) -> str:

@@ -21,7 +21,7 @@ from tickrig.wire.instant import NEVER
 # The name under which a pseudo-terminal is found, and who gave it.
 
 
-class PtyLink:
+class _PtyLink:
     """A symbolic link to a terminal that tells whether its emulator lives.
 
     Beside `NAME` lies `.NAME.emulator`, locked for as long as the link is in use: it names the
@@ -132,7 +132,7 @@ _IN_OPEN: Final = 0x20
 _IN_CLOSE: Final = 0x08 | 0x10
 
 
-class PtyVisits(NonCopyable):
+class _PtyVisits(NonCopyable):
     """Wakes the emulator when a host opens or closes the terminal, or sends something.
 
     Args:
@@ -187,7 +187,7 @@ class PtyPort(NonCopyable):
     pyserial's `exclusive=True` does, refuse each other.
 
     Args:
-        link: path of a symbolic link to the terminal, see `PtyLink`; none if not given.
+        link: path of a symbolic link to the terminal, see `_PtyLink`; none if not given.
             One that is left over from a killed emulator is replaced.
         buffer_bytes: bytes kept for a host that does not read.
 
@@ -210,14 +210,14 @@ class PtyPort(NonCopyable):
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
-        self._visits = PtyVisits(self._master, self.path)
+        self._visits = _PtyVisits(self._master, self.path)
         self.lost, self.spoken = 0, False
         self._buffer_bytes, self._unsent = buffer_bytes, b""
-        self._link: PtyLink | None = None
+        self._link: _PtyLink | None = None
         self._setting: HostSetting | None = None
         if link is not None:
             try:
-                self._link = PtyLink(link, self.path)
+                self._link = _PtyLink(link, self.path)
             except OSError:
                 self.close()
                 raise

@@ -18,7 +18,7 @@ from tickrig.wire.can import CanFrame
 
 # What a device is told, as a user writes it.
 
-Word = bytes | str
+_Word = bytes | str
 """Bytes of a serial line, or a frame in candump's notation."""
 
 
@@ -107,7 +107,7 @@ class FuzzAct(NamedTuple):
         return f"{self.verb} {text}".rstrip() + f", wait {self.wait_us} us"
 
 
-class InputReader:
+class _InputReader:
     """Reads bytes as acts, any bytes: what fuzzers change in them is small in the acts too.
 
     Args:
@@ -226,11 +226,11 @@ class DeviceFuzz:
     def __init__(  # noqa: PLR0913 - by name
         self,
         device: DeviceType | str | Callable[[], Any],
-        words: Sequence[Word] = (),
+        words: Sequence[_Word] = (),
         *,
-        start: Sequence[Word] = (),
-        request: Sequence[Word] = (),
-        answer: Word = b"",
+        start: Sequence[_Word] = (),
+        request: Sequence[_Word] = (),
+        answer: _Word = b"",
         wire: Callable[[], ByteLine | CanWire] | None = None,
         warm_us: int = 1_000_000,
     ) -> None:
@@ -243,7 +243,7 @@ class DeviceFuzz:
         port, self._end = _ends(joined)
         self.rig = Rig(Station(self.device, port))
         self._inputs = _inputs_of(self.device)
-        self._reader = InputReader(
+        self._reader = _InputReader(
             [self._traffic(word) for word in words],
             list(self._inputs.table.values()) if self._inputs else [],
             self.device.tick_us,
@@ -287,7 +287,7 @@ class DeviceFuzz:
         return False
 
     def _check_words(
-        self, words: object, start: object, request: Sequence[Word], answer: Word
+        self, words: object, start: object, request: Sequence[_Word], answer: _Word
     ) -> None:
         """Raise ValueError unless all are of the wire of the device."""
         for name, given in (("words", words), ("start", start), ("request", request)):
@@ -307,7 +307,7 @@ class DeviceFuzz:
         """
         return list(self._reader.acts(data))
 
-    def _traffic(self, word: Word) -> Any:
+    def _traffic(self, word: _Word) -> Any:
         return CanFrame.parse(word) if isinstance(word, str) else word
 
     def _send(self, what: Any) -> None:

@@ -24,7 +24,7 @@ _OUTPUTS: Final = (
 )
 
 
-class BoardState(IntEnum):
+class _BoardState(IntEnum):
     """What a board does."""
 
     OFF = 0
@@ -32,7 +32,7 @@ class BoardState(IntEnum):
     RUNNING = 2
 
 
-class SolderedLines(Protocol):
+class _SolderedLines(Protocol):
     """What is soldered to a board and is let go without a word when its supply goes."""
 
     def cut(self) -> None:
@@ -60,12 +60,12 @@ class Board:
         boots: how often it was up.
     """
 
-    def __init__(self, limits: NodeLimits, start: _StartSystem, lines: SolderedLines) -> None:
+    def __init__(self, limits: NodeLimits, start: _StartSystem, lines: _SolderedLines) -> None:
         self.limits, self._start, self._lines = limits, start, lines
         self.inputs = InputBank(INPUTS, on_change=self._input_set)
         self.manager: NodeManager | None = None
         self.boots, self._changed, self._up_us = 0, True, NEVER
-        self._state, self._stack = BoardState.OFF, ExitStack()
+        self._state, self._stack = _BoardState.OFF, ExitStack()
         self._refused = dict.fromkeys(REFUSED, 0)
 
     @property
@@ -98,7 +98,7 @@ class Board:
         """Go on: lose or get the supply, boot, run what is due."""
         if self._changed:
             self._inputs_changed(now_us)
-        if self._state is BoardState.BOOTING and now_us >= self._up_us:
+        if self._state is _BoardState.BOOTING and now_us >= self._up_us:
             self._begin(now_us)
         if self.manager is not None:
             self.manager.tick(now_us)
@@ -117,23 +117,23 @@ class Board:
         self._changed = False
         # Holding the reset button is being without supply; letting it go begins the boot.
         off = bool(self.inputs["power_cut"] or self.inputs["reset"])
-        if off and self._state is not BoardState.OFF:
+        if off and self._state is not _BoardState.OFF:
             self._lose()
-        elif not off and self._state is BoardState.OFF:
-            self._state, self._up_us = BoardState.BOOTING, now_us + self.limits.boot_us
+        elif not off and self._state is _BoardState.OFF:
+            self._state, self._up_us = _BoardState.BOOTING, now_us + self.limits.boot_us
 
     def _begin(self, now_us: int) -> None:
         self.manager = manager = NodeManager(self.limits)
         manager.now_us, self._up_us = now_us, NEVER
         self._start(manager, self._stack)
-        self._state = BoardState.RUNNING
+        self._state = _BoardState.RUNNING
         self.boots += 1
 
     def _lose(self) -> None:
         """Be without supply: nothing of the system is left."""
         for what in REFUSED:
             self._refused[what] += self.manager.refused[what] if self.manager else 0
-        self._state, self.manager, self._up_us = BoardState.OFF, None, NEVER
+        self._state, self.manager, self._up_us = _BoardState.OFF, None, NEVER
         # Lines before the stack: a power cut says nothing to anybody, and closing doors in
         # order would.
         self._lines.cut()

@@ -11,7 +11,7 @@ from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
 
 
-class NoWire:
+class _NoWire:
     """A wire that has no faults."""
 
     fault_types: Mapping[str, WireFault] = MappingProxyType({})
@@ -51,7 +51,7 @@ class Operated:
         status: Callable[[], Mapping[str, object]] = dict,
     ) -> None:
         self.name, self.device, self.stop, self._more = name, thing, stop, status
-        self._events, self.now_us, self.wire = EventQueue(), 0, NoWire()
+        self._events, self.now_us, self.wire = EventQueue(), 0, _NoWire()
         self.operator = Operator(thing.inputs, thing.tick_us, self._events, self.wire)
 
     @property

@@ -21,8 +21,8 @@
 #
 # Answers that name another object. A dialogue ignores them, unless its holder asks for them: then
 # an answer about an object that nobody has asked about ends the question, if the right answer does
-# not come: within `MISNAMED_US` if no other question is open, else until the time-out. Ask for them
-# only if no other client uses the server.
+# not come: within `_MISNAMED_US` if no other question is open, else until the time-out. Ask for
+# them only if no other client uses the server.
 #
 # What couples to what. `_unanswered` lasts as long as the dialogue, all else as long as a step:
 #
@@ -57,7 +57,7 @@ SDO_TIMEOUT_US: Final = 500_000
 LEAST_COPY_US: Final = 2_000
 """How long a copy of an answer may take: an error frame and the frame again, at 125 kbit/s."""
 _MOST_COPY_US: Final = 20_000
-MISNAMED_US: Final = 100_000
+_MISNAMED_US: Final = 100_000
 """How long the right answer may follow one that names another object, as a late copy does."""
 
 Object = tuple[int, int]
@@ -331,7 +331,7 @@ class Dialogue:
             return
         self._misnamed = data
         if len(self._unanswered) == 1:
-            self.due_us = min(self.due_us, now_us + MISNAMED_US)
+            self.due_us = min(self.due_us, now_us + _MISNAMED_US)
 
     def _end_misnamed(self, step: SdoRequest) -> sdo.Abort | errors.SdoMisnamed:
         """Return what an answer that names another object says about the one that was asked for.

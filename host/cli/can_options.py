@@ -76,7 +76,7 @@ def _bit_s(text: str) -> int:
     return int(match[1]) * _FACTORS[match[2]]
 
 
-class BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4 only
+class _BitRate(click.ParamType):  # type: ignore[type-arg] # generic since click 8.4 only
     """A bit rate on the command line."""
 
     name = "bit rate"
@@ -143,7 +143,7 @@ bus_options: Final[Decorator] = add_options(
     ),
     click.option("-c", "--channel", metavar="CHANNEL", help="Channel of it, as can0."),
     click.option(
-        "-b", "--bitrate", type=BitRate(), metavar="BITRATE", help="Bit rate in bit/s; 500k."
+        "-b", "--bitrate", type=_BitRate(), metavar="BITRATE", help="Bit rate in bit/s; 500k."
     ),
     click.option(
         "--timing",
@@ -165,7 +165,7 @@ fd_options: Final[Decorator] = add_options(
     click.option("--fd", is_flag=True, help="Have the driver send and receive CAN FD."),
     click.option(
         "--data-bitrate",
-        type=BitRate(),
+        type=_BitRate(),
         metavar="BITRATE",
         help="Of data of CAN FD frames with BRS; for the load, and with --fd for the driver.",
     ),

@@ -71,7 +71,7 @@ class NumberRange(click.FloatRange):
         return number
 
 
-class NodeId(click.IntRange):
+class _NodeId(click.IntRange):
     """A node-ID 1..127, as `5`."""
 
     def __init__(self) -> None:
@@ -84,7 +84,7 @@ class NodeId(click.IntRange):
         return int(super().convert(value, param, ctx))
 
 
-NODE_ID: Final = NodeId()
+NODE_ID: Final = _NodeId()
 
 
 def version_option() -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -4,8 +4,8 @@ All commands start here. Until a command is loaded, a signal ends the process at
 Ctrl-C, SIGTERM and SIGHUP raise KeyboardInterrupt (`Interrupter`), so that it can clean up.
 
 What files, buses and lines hold may carry characters that a terminal obeys. So whatever a command
-prints passes `HarmlessStream`, in one place for all of them; what a command itself paints, and what
-programs read, goes through `paint`.
+prints passes `_HarmlessStream`, in one place for all of them; what a command itself paints, and
+what programs read, goes through `paint`.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ _PLAIN: Final = bytes((ord("\n"), *range(0x20, 0x7F)))
 """ASCII that is harmless to a terminal."""
 
 
-class HarmlessStream(io.TextIOWrapper):
+class _HarmlessStream(io.TextIOWrapper):
     """Standard output or error; characters that a terminal obeys are written as pictures.
 
     Args:
@@ -166,7 +166,7 @@ def paint(stream: TextIO, text: str) -> None:
 def as_is(stream: TextIO) -> TextIO:
     """Return the stream that writes what a command paints itself."""
     stream.flush()
-    return stream.as_is if isinstance(stream, HarmlessStream) else stream
+    return stream.as_is if isinstance(stream, _HarmlessStream) else stream
 
 
 @contextmanager
@@ -178,11 +178,11 @@ def standard_streams() -> Iterator[None]:
     """
     _open_closed_streams()
     before = sys.stdout, sys.stderr
-    if isinstance(sys.stdout, HarmlessStream):
+    if isinstance(sys.stdout, _HarmlessStream):
         yield
         return
     ours = [
-        HarmlessStream(one, drops=one is before[1]) if hasattr(one, "buffer") else one
+        _HarmlessStream(one, drops=one is before[1]) if hasattr(one, "buffer") else one
         for one in before
     ]
     sys.stdout, sys.stderr = ours
@@ -191,7 +191,7 @@ def standard_streams() -> Iterator[None]:
     finally:
         with suppress(BrokenPipeError):  # click has seen to it that this passes in silence
             for stream in ours:
-                if isinstance(stream, HarmlessStream):
+                if isinstance(stream, _HarmlessStream):
                     stream.detach()
             sys.stdout, sys.stderr = before
 

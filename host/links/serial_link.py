@@ -63,7 +63,7 @@ _WRITE_S: Final = 1.0
 """How long a write waits for room; pyserial's own waits for 5 s."""
 
 
-class Rfc2217Serial(rfc2217.Serial):
+class _Rfc2217Serial(rfc2217.Serial):
     """A serial port of another machine (RFC 2217).
 
     pyserial agrees with the other end on all settings when one is changed, in 50 ms at least; it
@@ -232,14 +232,14 @@ class SerialLink:
         return b""
 
 
-def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | Rfc2217Serial:
+def _open_port(url: str, baud: int, *, exclusive: bool) -> serial.Serial | _Rfc2217Serial:
     """Open what pyserial knows under a URL; one of RFC 2217 with what pyserial's lacks."""
     if not url.startswith("rfc2217:"):
         return serial.serial_for_url(
             url, baudrate=baud, timeout=0, write_timeout=1, exclusive=exclusive or None
         )
 
-    return Rfc2217Serial(url, baudrate=baud, timeout=0)
+    return _Rfc2217Serial(url, baudrate=baud, timeout=0)
 
 
 _LOCKS: Final = Path("/proc/locks")

@@ -49,7 +49,7 @@ class OnRefusals(Enum):
     WATCHDOG = "watchdog"  # send nothing, so that the watchdog trips; poweroff if none is set
 
 
-class RefusalCounter:
+class _RefusalCounter:
     """Counts for each command how many times in a row it was refused.
 
     Each command has a row of its own: a `beep` that works in between must not
@@ -89,7 +89,7 @@ class RefusalCounter:
 
 
 @dataclass(slots=True)
-class BelievedSettings:
+class _BelievedSettings:
     """Settings of the RRC that change how the client talks, as far as they are known.
 
     Attributes:
@@ -137,7 +137,7 @@ class _Sent(NamedTuple):
         return self.command.name.decode()
 
 
-class UnconfirmedCommands:
+class _UnconfirmedCommands:
     """Commands that were sent and that nobody waits for, until a reply or time tells their fate.
 
     Replies come in the order of the commands, so a reply belongs to the oldest
@@ -211,9 +211,9 @@ class ReplyMatcher:
     """
 
     def __init__(self, max_refusals: int) -> None:
-        self.settings = BelievedSettings()
-        self.refusals = RefusalCounter(max_refusals)
-        self.unconfirmed = UnconfirmedCommands()
+        self.settings = _BelievedSettings()
+        self.refusals = _RefusalCounter(max_refusals)
+        self.unconfirmed = _UnconfirmedCommands()
 
     def sent(self, now_us: int, command: Command) -> None:
         """Note a command that nobody waits for."""

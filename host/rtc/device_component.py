@@ -13,14 +13,14 @@ from tickrig.host.text.log import log_of
 _LOG: Final = log_of(__name__)
 
 
-class DeviceClient(Protocol):
+class _DeviceClient(Protocol):
     """What talks with a device."""
 
     def close(self) -> None:
         """Give the line back."""
 
 
-C = TypeVar("C", bound=DeviceClient)
+C = TypeVar("C", bound=_DeviceClient)
 
 
 class DeviceComponent(RtComponent, ABC, Generic[C]):

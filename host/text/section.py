@@ -48,7 +48,7 @@ from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath, read_toml
 from tickrig.host.text.values import counted, parse_size, us_of
 
-Taker = Callable[[Any], Any]
+_Taker = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
 
 _LONGEST: Final = 60
@@ -92,7 +92,7 @@ def string(value: object) -> str:
     raise ValueError(f"it takes a text, not {shown(value)}")
 
 
-def matching(accepts: Callable[[str], object], what: str) -> Taker:
+def matching(accepts: Callable[[str], object], what: str) -> _Taker:
     """Return what takes a text that a function accepts; `what` names it for people."""
 
     def take(value: object) -> str:
@@ -152,7 +152,7 @@ def lines(value: object) -> dict[str, str]:
     raise ValueError(f'it takes lines like name = "value", not {shown(value)}')
 
 
-def whole(low: int, high: int) -> Taker:
+def whole(low: int, high: int) -> _Taker:
     """Return what takes a whole number of a range."""
 
     def take(value: object) -> int:
@@ -163,7 +163,7 @@ def whole(low: int, high: int) -> Taker:
     return take
 
 
-def number(low: float, high: float, *, above: bool = False) -> Taker:
+def number(low: float, high: float, *, above: bool = False) -> _Taker:
     """Return what takes a number of a range; `above` leaves its lower end out."""
     allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
@@ -177,7 +177,7 @@ def number(low: float, high: float, *, above: bool = False) -> Taker:
     return take
 
 
-def one_of(*names: str) -> Taker:
+def one_of(*names: str) -> _Taker:
     """Return what takes one of some words."""
 
     def take(value: object) -> str:
@@ -221,7 +221,7 @@ class Field:
         default: what holds without it, for people; empty where it has to be there.
     """
 
-    field: Taker
+    field: _Taker
     values: str
     text: str
     default: str = ""
@@ -260,7 +260,7 @@ class Notes:
 
     def place(self, keys: TomlPath) -> str:
         """Return how a mistake begins: with the keys as the file has them."""
-        return f"{self.names.get(keys) or dotted(keys)}: " if keys else ""
+        return f"{self.names.get(keys) or _dotted(keys)}: " if keys else ""
 
     @property
     def all(self) -> tuple[Mistake, ...]:
@@ -329,7 +329,7 @@ class Section:
             return None
         if isinstance(value, dict):
             return Section(self.notes, (*self.keys, key), value)
-        self.wrong(f"it is a table [{dotted((*self.keys, key))}], not {shown(value)}", key)
+        self.wrong(f"it is a table [{_dotted((*self.keys, key))}], not {shown(value)}", key)
         return None
 
     def tables(self, key: str) -> list[Section]:
@@ -337,7 +337,7 @@ class Section:
         value = self.values.get(key, [])
         if value is BROKEN:
             return []
-        header = dotted((*self.keys, key))
+        header = _dotted((*self.keys, key))
         if not isinstance(value, list):
             given = f"[{header}]" if isinstance(value, dict) else shown(value)
             self.wrong(f"it is a table [[{header}]], not {given}", key)
@@ -396,10 +396,10 @@ def _printable(text: str) -> str:
     return text if len(text) <= _MOST else f"{text[: _MOST - 3]}..."
 
 
-def dotted(keys: TomlPath) -> str:
+def _dotted(keys: TomlPath) -> str:
     """Write keys as TOML does; indices count from 1.
 
-    >>> dotted(("device", "left", "start", "0x6000:1", 0))
+    >>> _dotted(("device", "left", "start", "0x6000:1", 0))
     'device.left.start."0x6000:1"[1]'
     """
     out = ""

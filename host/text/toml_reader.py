@@ -23,13 +23,13 @@ from typing import Any, Final, NamedTuple
 # A TOML text as it was read: its values, the line of each, and all that is wrong with it.
 
 
-class Broken(Enum):
+class _Broken(Enum):
     """In place of a value that is no TOML; its mistake is told already."""
 
     BROKEN = "broken"
 
 
-BROKEN: Final = Broken.BROKEN
+BROKEN: Final = _Broken.BROKEN
 
 
 class Mistake(NamedTuple):
@@ -76,7 +76,7 @@ class TomlDocument:
 
 
 @dataclass(slots=True, eq=False)
-class Leaf:
+class _Leaf:
     """A scalar."""
 
     line: int
@@ -84,7 +84,7 @@ class Leaf:
 
 
 @dataclass(slots=True, eq=False)
-class Array:
+class _Array:
     """An array; `frozen` unless of tables with headers `[[...]]`."""
 
     line: int
@@ -108,7 +108,7 @@ class Table:
             TakenError: there is something else.
         """
         node = self.entries.setdefault(key, Table(line))
-        if isinstance(node, Array) and not node.frozen:
+        if isinstance(node, _Array) and not node.frozen:
             node = node.items[-1]
         if not isinstance(node, Table) or node.frozen:
             raise TakenError(key, node.line)
@@ -124,8 +124,8 @@ class Table:
 
     def add(self, line: int, key: str) -> Table:
         """Return a new table of a header `[[key]]`; TakenError if it cannot have one."""
-        node = self.entries.setdefault(key, Array(line, frozen=False))
-        if not isinstance(node, Array) or node.frozen:
+        node = self.entries.setdefault(key, _Array(line, frozen=False))
+        if not isinstance(node, _Array) or node.frozen:
             raise TakenError(key, node.line)
         node.items.append(table := Table(line, closed=True))
         return table
@@ -138,7 +138,7 @@ class Table:
         return node
 
 
-_Node = Table | Array | Leaf
+_Node = Table | _Array | _Leaf
 
 
 class TakenError(Exception):
@@ -161,7 +161,7 @@ def _plain(node: _Node, path: TomlPath, lines: dict[TomlPath, int]) -> Any:
     match node:
         case Table():
             return {key: _plain(each, (*path, key), lines) for key, each in node.entries.items()}
-        case Array():
+        case _Array():
             return [_plain(each, (*path, at), lines) for at, each in enumerate(node.items)]
     return node.value
 
@@ -351,7 +351,7 @@ class _Reader:
         except TakenError as error:
             table, taken = Table(0), error
         if not taken:
-            table.entries[last] = Leaf(line, BROKEN)  # until it is read
+            table.entries[last] = _Leaf(line, BROKEN)  # until it is read
         self._take("=", ".".join(keys))
         if taken:
             self._report(start, str(taken))
@@ -397,14 +397,14 @@ class _Reader:
             return self._missing(start, depth)
         value = self._scalar(match[0])
         self._at = match.end()
-        return Leaf(self._line(start), value)
+        return _Leaf(self._line(start), value)
 
-    def _missing(self, start: int, depth: int) -> Leaf:
+    def _missing(self, start: int, depth: int) -> _Leaf:
         reason = f"a value is missing before {self._rest()}"
         if depth == 0 or self._text[start : start + 1] not in (",", "}"):
             raise _WrongError(start, reason)
         self._report(start, reason)
-        return Leaf(self._line(start), BROKEN)
+        return _Leaf(self._line(start), BROKEN)
 
     def _scalar(self, token: str) -> Any:
         """Return the value of a token; tell what is wrong with it, and return BROKEN."""
@@ -422,8 +422,8 @@ class _Reader:
             self._report(self._at, f"{shown} is no value: {reason}")
             return BROKEN
 
-    def _array(self, start: int, depth: int) -> Array:
-        array = Array(self._line(start))
+    def _array(self, start: int, depth: int) -> _Array:
+        array = _Array(self._line(start))
         while self._skip(_BETWEEN) < len(self._text) and not self._is("]"):
             self._check_unclosed(start)
             if self._is("}"):

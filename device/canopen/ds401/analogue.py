@@ -96,7 +96,7 @@ def _show(entry: Entry, value: float) -> None:
         entry.value = copysign(inf, value) if abs(value) > _REAL32_MAX else value
 
 
-class AnalogueChannel(Part):
+class _AnalogueChannel(Part):
     """One channel: its objects, its converter, its scaling.
 
     The widest integer object has the counts; narrower ones have their upper bits.
@@ -170,7 +170,7 @@ class AnalogueChannel(Part):
 # One analogue input, what of it is an event, and which were one (CiA 401, 6400h to 642Dh).
 
 
-class EventRule(Part):
+class _EventRule(Part):
     """The limits and deltas of one channel, as integers or as REAL32.
 
     Each bit of the interrupt trigger selection (6421h) is an event of its own:
@@ -275,14 +275,16 @@ class AnalogueInput(Part):
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
         self.number = number
-        self.channel = AnalogueChannel(dictionary, families.ANALOGUE_INPUT, "ai", number, converter)
+        self.channel = _AnalogueChannel(
+            dictionary, families.ANALOGUE_INPUT, "ai", number, converter
+        )
         real = [self.channel.real] if self.channel.real is not None else []
         self.entries = [*self.channel.integers, *real]
         self._trigger = families.find_number(dictionary, families.INTERRUPT_TRIGGER, number)
-        whole = EventRule(
+        whole = _EventRule(
             dictionary, number, families.INTEGER_LIMITS, ([*real, *self.channel.integers])[-1]
         )
-        fraction = EventRule(dictionary, number, families.REAL_LIMITS, self.entries[-1])
+        fraction = _EventRule(dictionary, number, families.REAL_LIMITS, self.entries[-1])
         self._rules = [rule for rule in (whole, fraction) if rule.settings] or [whole]
         self._judged: tuple[float, bool] | None = None
         for entry in self.objects():
@@ -387,7 +389,7 @@ class AnalogueOutput(Part):
 
     def __init__(self, dictionary: Dictionary, number: int, converter: Converter | None) -> None:
         self.number, self.level, self.failed = number, 0.0, False
-        self.channel = AnalogueChannel(
+        self.channel = _AnalogueChannel(
             dictionary, families.ANALOGUE_OUTPUT, "ao", number, converter
         )
         real = [self.channel.real] if self.channel.real is not None else []

@@ -27,7 +27,7 @@ from tickrig.device.twin import Part
 from tickrig.wire.instant import NEVER
 
 
-class View(NamedTuple):
+class _View(NamedTuple):
     """An element of an object and the lines that it shows.
 
     Attributes:
@@ -49,7 +49,7 @@ class View(NamedTuple):
         return ((bits & self.lines) >> self.shift).to_bytes(self.entry.size, "little")
 
 
-class Bits(Part):
+class _Bits(Part):
     """What one family of objects says of all lines; line 1 is the lowest bit.
 
     If objects of several widths name a line, a change of one changes the others.
@@ -68,7 +68,7 @@ class Bits(Part):
     def __init__(self, dictionary: Dictionary, family: DigitalObjects, default: int = 0) -> None:
         self.views = sorted(_views(dictionary, family), key=lambda view: view.entry.key)
         self.value = default
-        self.changed: Callable[[View], None] | None = None
+        self.changed: Callable[[_View], None] | None = None
         for view in self.views:
             self.value = view.into(self.value)
         self.assign(self.value)
@@ -99,7 +99,7 @@ class Bits(Part):
                 self.changed(view)
 
 
-def _views(dictionary: Dictionary, family: DigitalObjects) -> Iterator[View]:
+def _views(dictionary: Dictionary, family: DigitalObjects) -> Iterator[_View]:
     for width, index in ((8, family.by_8), (16, family.by_16), (32, family.by_32)):
         for sub, entry in elements(dictionary, index):
             yield _view(entry, width, (sub - 1) * width)
@@ -108,9 +108,9 @@ def _views(dictionary: Dictionary, family: DigitalObjects) -> Iterator[View]:
             yield _view(entry, 1, bank * SINGLE_BANK_LINES + sub - 1)
 
 
-def _view(entry: Entry, width: int, shift: int) -> View:
+def _view(entry: Entry, width: int, shift: int) -> _View:
     bits = min(width, 8 * entry.size)
-    return View(entry, (1 << bits) - 1 << shift, shift)
+    return _View(entry, (1 << bits) - 1 << shift, shift)
 
 
 FILTER_US: Final = 10_000
@@ -126,12 +126,12 @@ class DigitalInputs(Part):
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
-        self.value = Bits(dictionary, READ_INPUT)
-        self._polarity = Bits(dictionary, POLARITY_INPUT)
-        self._filter = Bits(dictionary, FILTER_INPUT)
-        self._any = Bits(dictionary, INTERRUPT_ANY_CHANGE, -1)
-        self._rising = Bits(dictionary, INTERRUPT_LOW_TO_HIGH)
-        self._falling = Bits(dictionary, INTERRUPT_HIGH_TO_LOW)
+        self.value = _Bits(dictionary, READ_INPUT)
+        self._polarity = _Bits(dictionary, POLARITY_INPUT)
+        self._filter = _Bits(dictionary, FILTER_INPUT)
+        self._any = _Bits(dictionary, INTERRUPT_ANY_CHANGE, -1)
+        self._rising = _Bits(dictionary, INTERRUPT_LOW_TO_HIGH)
+        self._falling = _Bits(dictionary, INTERRUPT_HIGH_TO_LOW)
         self.lines = self.value.lines
         self._all = (1 << self.lines) - 1
         self._level = self._passed = 0
@@ -195,11 +195,11 @@ class DigitalOutputs(Part):
     """
 
     def __init__(self, dictionary: Dictionary) -> None:
-        self.value = Bits(dictionary, WRITE_OUTPUT)
-        self._polarity = Bits(dictionary, POLARITY_OUTPUT)
-        self._error_mode = Bits(dictionary, ERROR_MODE_OUTPUT, -1)
-        self._error_value = Bits(dictionary, ERROR_VALUE_OUTPUT)
-        self._mask = Bits(dictionary, FILTER_MASK_OUTPUT, -1)
+        self.value = _Bits(dictionary, WRITE_OUTPUT)
+        self._polarity = _Bits(dictionary, POLARITY_OUTPUT)
+        self._error_mode = _Bits(dictionary, ERROR_MODE_OUTPUT, -1)
+        self._error_value = _Bits(dictionary, ERROR_VALUE_OUTPUT)
+        self._mask = _Bits(dictionary, FILTER_MASK_OUTPUT, -1)
         self.lines = self.value.lines
         self._all = (1 << self.lines) - 1
         self.level = self._failed = 0
@@ -226,5 +226,5 @@ class DigitalOutputs(Part):
         mask = self._mask.value
         self.level = (self.level & ~mask | value & mask) & self._all
 
-    def _written(self, view: View) -> None:
+    def _written(self, view: _View) -> None:
         self._failed &= ~view.lines

@@ -67,7 +67,7 @@ _NO_BEHAVIOUR: Final = 0
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceFault(Immutable):
+class _DeviceFault(Immutable):
     """A physical fault that the module detects.
 
     Attributes:
@@ -92,7 +92,7 @@ class DeviceFault(Immutable):
         return InputSignal(self.name, self.text, SignalType.FAULT)
 
 
-_INPUT_OVERCURRENT: Final = DeviceFault(
+_INPUT_OVERCURRENT: Final = _DeviceFault(
     "input_overcurrent",
     "the current into an analogue input is too high",
     0x2110,
@@ -100,7 +100,7 @@ _INPUT_OVERCURRENT: Final = DeviceFault(
     INPUT_ERROR,
     stops_outputs=False,
 )
-_OUTPUT_OVERLOAD: Final = DeviceFault(
+_OUTPUT_OVERLOAD: Final = _DeviceFault(
     "output_overload",
     "the current out of an output is too high",
     0x2310,
@@ -108,7 +108,7 @@ _OUTPUT_OVERLOAD: Final = DeviceFault(
     OUTPUT_ERROR,
     stops_outputs=True,
 )
-_INTERNAL_FAILURE: Final = DeviceFault(
+_INTERNAL_FAILURE: Final = _DeviceFault(
     "internal_failure",
     "the electronics of the module fail",
     EmcyCode.HARDWARE,
@@ -118,7 +118,7 @@ _INTERNAL_FAILURE: Final = DeviceFault(
 )
 
 
-class FaultDetector(Part):
+class _FaultDetector(Part):
     """Sees faults come and go: EMCY, and what 1029h says.
 
     Args:
@@ -129,9 +129,9 @@ class FaultDetector(Part):
         faults: see above.
     """
 
-    def __init__(self, node: CanopenSlave, faults: Sequence[DeviceFault]) -> None:
+    def __init__(self, node: CanopenSlave, faults: Sequence[_DeviceFault]) -> None:
         self._node, self.faults = node, faults
-        self._present: list[DeviceFault] = []
+        self._present: list[_DeviceFault] = []
 
     @property
     def stops_outputs(self) -> bool:
@@ -163,7 +163,7 @@ class FaultDetector(Part):
 _GROUP_LINES: Final = 8
 
 
-class DigitalTerminal(NamedTuple):
+class _DigitalTerminal(NamedTuple):
     """One digital output, or all of them."""
 
     output: OutputSignal
@@ -177,7 +177,7 @@ class DigitalTerminal(NamedTuple):
         return self.outputs.level >> self.shift & self.mask
 
 
-_Terminal = DigitalTerminal | AnalogueOutput
+_Terminal = _DigitalTerminal | AnalogueOutput
 
 
 def _digital_input_names(lines: int) -> tuple[str, ...]:
@@ -205,12 +205,12 @@ def _outputs_by_name(
 ) -> dict[str, _Terminal]:
     """Return the outputs by name: `do1`.., `do` and `ao1`.."""
     found: list[_Terminal] = [
-        DigitalTerminal(OutputSignal(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
+        _DigitalTerminal(OutputSignal(f"do{line}", f"digital output {line}"), digital, line - 1, 1)
         for line in range(1, digital.lines + 1)
     ]
     if found:
         everything = OutputSignal("do", "all digital outputs as a number, output 1 is bit 0")
-        found.append(DigitalTerminal(everything, digital, 0, (1 << digital.lines) - 1))
+        found.append(_DigitalTerminal(everything, digital, 0, (1 << digital.lines) - 1))
     found += analogue
     return {terminal.output.name: terminal for terminal in found}
 
@@ -351,13 +351,13 @@ class Ds401(Application):
             output.failed = failed
         self.request()
 
-    def _make_faults(self) -> FaultDetector:
+    def _make_faults(self) -> _FaultDetector:
         faults = [_INTERNAL_FAILURE]
         if self.analogue_inputs:
             faults.append(_INPUT_OVERCURRENT)
         if self._digital_outputs.lines or self._analogue_outputs:
             faults.append(_OUTPUT_OVERLOAD)
-        return FaultDetector(self.node, faults)
+        return _FaultDetector(self.node, faults)
 
     def _has_physical_inputs(self) -> None:
         lines = digital_inputs(self._lines)

@@ -111,7 +111,7 @@ _COOLING_US: Final = 1_000_000
 """Period in which a drive at rest looks at its temperature."""
 
 
-class AbortConnection(IntEnum):
+class _AbortConnection(IntEnum):
     """What a lost connection does (6007h); other values do nothing."""
 
     FAULT = 1
@@ -312,11 +312,11 @@ class Ds402(Application):
             return
         self._interrupt()
         match self.parameters.number(indices.ABORT_CONNECTION):
-            case AbortConnection.FAULT:
+            case _AbortConnection.FAULT:
                 self._note(max(self._lost, default=settings.ErrorCode.COMMUNICATION))
-            case AbortConnection.DISABLE_VOLTAGE:
+            case _AbortConnection.DISABLE_VOLTAGE:
                 self.automaton.enter(automaton.DriveState.SWITCH_ON_DISABLED)
-            case AbortConnection.QUICK_STOP:
+            case _AbortConnection.QUICK_STOP:
                 self.automaton.enter(automaton.DriveState.QUICK_STOP_ACTIVE)
             case _:  # no action, or what a manufacturer might mean
                 return

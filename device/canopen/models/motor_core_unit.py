@@ -63,7 +63,7 @@ class Measurements(Immutable):
 
 
 @dataclass(frozen=True, slots=True)
-class Fault(Immutable):
+class _Fault(Immutable):
     """One row of the table.
 
     Attributes:
@@ -82,12 +82,12 @@ class Fault(Immutable):
     gone: Callable[[Measurements], bool]
     after_us: int = 0
 
-    def __reduce__(self) -> tuple[Callable[[str], Fault], tuple[str]]:
+    def __reduce__(self) -> tuple[Callable[[str], _Fault], tuple[str]]:
         """Stand in a pickle by its name."""
         return _fault, (self.name,)
 
 
-def _fault(name: str) -> Fault:
+def _fault(name: str) -> _Fault:
     return next(fault for fault in _FAULTS if fault.name == name)
 
 
@@ -119,46 +119,46 @@ def _unless_tripped(measured: Measurements) -> bool:
 
 
 _FAULTS: Final = (
-    Fault("short circuit", 0x2320, ErrorRegister.CURRENT, lambda s: s.tripped, _unless_tripped),
-    Fault(
+    _Fault("short circuit", 0x2320, ErrorRegister.CURRENT, lambda s: s.tripped, _unless_tripped),
+    _Fault(
         *("under-voltage", 0x3220, ErrorRegister.VOLTAGE),
         seen=lambda s: s.supply_mv < _SUPPLY_MV[0],
         gone=lambda s: s.supply_mv >= _SUPPLY_MV[0] + _SUPPLY_MARGIN_MV,
         after_us=_DIP_US,
     ),
-    Fault(
+    _Fault(
         *("over-voltage", 0x3210, ErrorRegister.VOLTAGE),
         seen=lambda s: s.supply_mv > _SUPPLY_MV[1],
         gone=lambda s: s.supply_mv <= _SUPPLY_MV[1] - _SUPPLY_MARGIN_MV,
     ),
-    Fault(
+    _Fault(
         *("over-temperature of the housing", 0x4210, ErrorRegister.TEMPERATURE),
         seen=lambda s: s.housing_dc > _HOUSING_DC,
         gone=lambda s: s.housing_dc <= _HOUSING_DC - _COOLED_DC,
     ),
-    Fault(
+    _Fault(
         *("over-temperature of the motor", 0x4310, ErrorRegister.TEMPERATURE),
         seen=lambda s: s.winding_dc > _WINDING_DC,
         gone=lambda s: s.winding_dc <= _WINDING_DC - _COOLED_DC,
     ),
-    Fault(
+    _Fault(
         *("motor encoder", 0x7305, _DRIVE),
         seen=lambda s: s.slip_deg > _SLIP_DEG,
         gone=_unless_tripped,
     ),
-    Fault(
+    _Fault(
         *("motor commutation", 0x7122, _DRIVE),
         seen=lambda s: s.deviates and abs(s.current_ma) < _NO_CURRENT_MA and s.spare_mv > _SPARE_MV,
         gone=_unless_tripped,
         after_us=_NO_CURRENT_US,
     ),
-    Fault(
+    _Fault(
         *("motor blocked", 0x7121, _DRIVE),
         seen=lambda s: s.loops and s.limited and abs(s.velocity_deg_s) < _STALLED_DEG_S,
         gone=_unless_tripped,
         after_us=_STALLED_US,
     ),
-    Fault(
+    _Fault(
         *("continuous over-current", 0x2310, ErrorRegister.CURRENT),
         seen=lambda s: s.overloaded and s.limited,
         gone=_unless_tripped,
@@ -168,7 +168,7 @@ _FAULTS: Final = (
 """In this order; what is seen first is reported first."""
 
 
-class Supervision(Part):
+class _Supervision(Part):
     """The faults that there are: each is reported by EMCY, and again when it is cleared.
 
     Args:
@@ -180,8 +180,8 @@ class Supervision(Part):
 
     def __init__(self, node: CanopenSlave) -> None:
         self._node = node
-        self.faults: list[Fault] = []
-        self._since_us: dict[Fault, int] = {}
+        self.faults: list[_Fault] = []
+        self._since_us: dict[_Fault, int] = {}
 
     @property
     def waiting(self) -> bool:
@@ -213,7 +213,7 @@ class Supervision(Part):
             self._node.emergency_clear(fault.code)
         return bool(gone)
 
-    def _raise(self, fault: Fault) -> None:
+    def _raise(self, fault: _Fault) -> None:
         del self._since_us[fault]
         self.faults.append(fault)
         self._node.emergency(fault.code, fault.register)
@@ -302,7 +302,7 @@ class MotorCoreUnit(Application):
             motor_core_motion.References(node, self.request),
         )
         self._motion = motor_core_motion.Motion(self._shaft, self._references)
-        self._supervision = Supervision(node)
+        self._supervision = _Supervision(node)
         self._display = motor_core_motion.Display(node.dictionary, self._shaft, self._references)
         self._mode = node.dictionary[_MODE, 0]
         self._mode.written = self._mode_written

@@ -21,7 +21,7 @@ from tickrig.wire.can import CanFrame, Frames
 from tickrig.wire.errors import FieldError
 
 
-class CanChannels:
+class _CanChannels:
     """The buses that can be opened by name at present.
 
     python-can opens a bus by two strings, so the names have to be kept where
@@ -73,7 +73,7 @@ class CanChannels:
         return CanHost(rig, wire.end(), thread, hears_own=hears_own)
 
 
-CHANNELS: Final = CanChannels()
+CHANNELS: Final = _CanChannels()
 """The channels of the interface `tickrig`."""
 
 

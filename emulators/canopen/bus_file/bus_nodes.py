@@ -58,7 +58,7 @@ class BusNode:
     about: str = ""
 
 
-class NodeMaker:
+class _NodeMaker:
     """Makes the slaves of one file.
 
     Args:
@@ -378,7 +378,7 @@ def _made(bus: BusFile, urdf: Path | None, cache: eds.EdsCache, profile: str) ->
         robot = _robot(bus, urdf)
     except node_keys.BusMistakesError as error:
         mistakes += error.mistakes
-    maker = NodeMaker(bus, robot, cache, mistakes, profile)
+    maker = _NodeMaker(bus, robot, cache, mistakes, profile)
     return _Made(tuple(maker.nodes()), mistakes, maker.remarks, maker.added)
 
 

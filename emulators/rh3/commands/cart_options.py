@@ -89,7 +89,7 @@ class MotionOptions:
 
     def _connection(self) -> BaseConnection:
         if self.device is not None:
-            connection = SerialBaseConnection(self.device, self.baud, self.clock)
+            connection = _SerialBaseConnection(self.device, self.baud, self.clock)
             connection.chain.ref_hard.configuration.set("AnyDevice", str(int(self.any_device)))
             return connection
         world = room(*self.room_m) if self.room_m else None
@@ -106,7 +106,7 @@ def _add_scanner(loop: ClosedLoop, eye: MountedUrg) -> None:
     loop.manager.activate(_SCANNER)
 
 
-class SerialBaseConnection:
+class _SerialBaseConnection:
     """A `BaseConnection` in real time, over a serial port: a base, or `rh3-emu`.
 
     Args:

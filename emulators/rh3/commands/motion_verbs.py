@@ -132,7 +132,7 @@ class SquarePlan(NamedTuple):
         return [*there, *back]
 
 
-class Squares:
+class _Squares:
     """Squares of one run of `rh3`, each with a cart at the origin.
 
     Args:
@@ -189,7 +189,7 @@ class Squares:
 def run_squares(options: MotionOptions, size: SquarePlan, save: Path | None) -> None:
     """Drive squares, calibrate, drive them again, and print how both went."""
     with watched(options, size.corners) as watcher:
-        squares = Squares(options, size, watcher)
+        squares = _Squares(options, size, watcher)
         try:
             before = squares.run()
             assert squares.latest is not None

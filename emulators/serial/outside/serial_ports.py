@@ -23,7 +23,7 @@ def register_handler() -> None:
         serial.protocol_handler_packages.append(HANDLERS)
 
 
-class SerialPorts:
+class _SerialPorts:
     """The lines that can be opened by name at present.
 
     pyserial opens a port by a string, so the names have to be kept where the whole process finds
@@ -100,5 +100,5 @@ def _parse_url(url: str) -> tuple[str, Mismatch | None]:
     return name.rstrip("/"), options[query]
 
 
-SERIAL_PORTS: Final = SerialPorts()
+SERIAL_PORTS: Final = _SerialPorts()
 """The lines behind `tickrig://`."""

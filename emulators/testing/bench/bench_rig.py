@@ -55,7 +55,7 @@ class Assembly(Copyable):
     def __init__(self, parts: Mapping[str, HasSignals]) -> None:
         self.parts = dict(parts)
         self._alone = next(iter(self.parts)) if len(self.parts) == 1 else None
-        self.inputs = AssemblyInputs(self)
+        self.inputs = _AssemblyInputs(self)
 
     @property
     def tick_us(self) -> int:
@@ -98,7 +98,7 @@ class Assembly(Copyable):
         return part.tick_us if part else self.tick_us
 
 
-class AssemblyInputs(Copyable):
+class _AssemblyInputs(Copyable):
     """The `Inputs` of several devices.
 
     Args:

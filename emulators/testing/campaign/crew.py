@@ -45,7 +45,7 @@ class RunHung(Exception):  # noqa: N818 - that of the test
     """A run took too long; its worker was ended."""
 
 
-class WorkerProcess:
+class _WorkerProcess:
     """A process in which pytest waits with the tests of an order.
 
     Args:
@@ -168,8 +168,8 @@ class Crew:
 
     def __init__(self, order: CampaignOrder) -> None:
         self.order = order
-        self._idle: deque[WorkerProcess] = deque()
-        self._busy: set[WorkerProcess] = set()
+        self._idle: deque[_WorkerProcess] = deque()
+        self._busy: set[_WorkerProcess] = set()
         self._closed = False
 
     def collect(self) -> Collected:
@@ -224,7 +224,7 @@ class Crew:
             self._busy.discard(worker)
         self._idle.append(worker)
 
-    def _take(self, digest: str) -> WorkerProcess:
+    def _take(self, digest: str) -> _WorkerProcess:
         """Return an idle worker, or a new one."""
         worker = None
         while worker is None or not worker.is_alive:  # one that was idle for long has ended
@@ -241,11 +241,11 @@ class Crew:
             )
         return worker
 
-    def _start(self) -> WorkerProcess:
+    def _start(self) -> _WorkerProcess:
         """Start a worker; one that dies at once is tried again."""
         for attempt in range(_ATTEMPTS):
             try:
-                return WorkerProcess(self.order)
+                return _WorkerProcess(self.order)
             except WorkerDied as death:
                 if attempt == _ATTEMPTS - 1:
                     raise CampaignRefusal(f"no worker starts; the last ended {death}") from None

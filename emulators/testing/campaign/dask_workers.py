@@ -44,7 +44,7 @@ _LOSSES: Final = 3
 """So often a batch is begun again that Dask gives up for lost."""
 
 
-class CrewPlugin(WorkerPlugin):
+class _CrewPlugin(WorkerPlugin):
     """Gives each worker of a cluster a crew while a campaign runs.
 
     Args:
@@ -79,7 +79,7 @@ class DaskWorkers:
 
     def __init__(self, url: str, plan: CampaignPlan) -> None:
         be_quiet()
-        self._url, self._plan, self._plugin = url, plan, CrewPlugin(plan.order)
+        self._url, self._plan, self._plugin = url, plan, _CrewPlugin(plan.order)
         if re.fullmatch(r"\w+://.+:[0-9]+", url) is None:
             raise CampaignRefusal(f"--scheduler {url}: write tcp://HOST:PORT")
         try:
@@ -182,7 +182,7 @@ def _do(name: str, runs: Sequence[Run], digest: str, version: str) -> list[RunVe
         return f"{worker.address}: there is tickrig {__version__}, here {version}"
     try:
         plugin = worker.plugins[name]
-        assert isinstance(plugin, CrewPlugin)
+        assert isinstance(plugin, _CrewPlugin)
         return plugin.crew.do([Run(*run) for run in runs], digest)
     except CampaignRefusal as refusal:
         return f"{worker.address}: {refusal}"

@@ -51,7 +51,7 @@ _REPORTER: Final = "terminalreporter"
 _ADDRESS: Final = re.compile(r"\b0x[0-9a-f]{8,16}\b")
 
 
-class Worker:
+class _Worker:
     """The plug-in that stands in the place of pytest's loop over all tests.
 
     Args:
@@ -178,7 +178,7 @@ def main(conn: Connection, alive: int) -> None:
     """Do what is asked over a pipe."""
     threading.Thread(target=_end_with, args=(alive,), daemon=True).start()
     order: CampaignOrder = conn.recv()
-    worker, said = Worker(conn, order), io.StringIO()
+    worker, said = _Worker(conn, order), io.StringIO()
     plugins: list[object] = [worker]
     if not any(point.name == "tickrig" for point in entry_points(group="pytest11")) or (
         os.environ.get("PYTEST_DISABLE_PLUGIN_AUTOLOAD")

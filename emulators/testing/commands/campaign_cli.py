@@ -13,7 +13,7 @@ _RUN: Final = "run"
 _OUTPUT: Final = "Table to write, .csv or .parquet; may be repeated."
 
 
-class CampaignGroup(click.Group):
+class _CampaignGroup(click.Group):
     """A group whose first command need not be named: `tickrig campaign tests --seeds 0-9`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -33,7 +33,7 @@ class CampaignGroup(click.Group):
             ]
 
 
-@click.group(cls=CampaignGroup)
+@click.group(cls=_CampaignGroup)
 def campaign() -> None:
     """Run tests that have a bench with many seeds and parameters, on all cores or a cluster.
 

@@ -76,7 +76,7 @@ _MOST: Final = 500
 """Runs of a batch."""
 
 
-class Workers(Protocol):
+class _Workers(Protocol):
     """Who does runs: on this machine, or on a cluster."""
 
     @property
@@ -102,7 +102,7 @@ class Campaign:
         workers: who does them.
     """
 
-    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: Workers) -> None:
+    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: _Workers) -> None:
         self._plan, self._journal, self._workers = plan, journal, workers
         done = journal.verdicts
         self._left = (number for number in plan.numbers() if number not in done)
@@ -153,7 +153,7 @@ _NEEDS_ARROW: Final = "Parquet needs pyarrow: pip install 'tickrig[campaign]'"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CampaignOptions:
+class _CampaignOptions:
     """What the command line says.
 
     Attributes:
@@ -205,7 +205,7 @@ class CampaignOptions:
         )
 
 
-class CampaignRun:
+class _CampaignRun:
     """The run of a campaign.
 
     Args:
@@ -215,7 +215,7 @@ class CampaignRun:
         CampaignRefusal: what cannot be.
     """
 
-    def __init__(self, options: CampaignOptions) -> None:
+    def __init__(self, options: _CampaignOptions) -> None:
         self._options = options
         with _refused("--seeds"):
             self._seeds = Seeds.parse(options.seeds)
@@ -223,7 +223,7 @@ class CampaignRun:
             self._shard = Shard.parse(options.shard)
         if options.timeout_us == 0:
             raise CampaignRefusal("--timeout 0: no run is over at once; write 60s")
-        check_outputs(options.output_paths)
+        _check_outputs(options.output_paths)
         self._paths = options.output_paths
         self._journal_path = Path(f"{self._paths[0]}{SUFFIX}")
         self._check_old()
@@ -278,11 +278,11 @@ class CampaignRun:
             with closing(self._workers(crew, plan)) as workers:
                 self._do(plan, workers)
             table = table_of(plan, self._journal.verdicts.values())
-            write_outputs(table, self._paths)
+            _write_outputs(table, self._paths)
             self._journal.remove()
         return table
 
-    def _workers(self, crew: Crew, plan: CampaignPlan) -> Workers:
+    def _workers(self, crew: Crew, plan: CampaignPlan) -> _Workers:
         if not self._options.scheduler:
             return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
         try:
@@ -293,7 +293,7 @@ class CampaignRun:
             ) from None
         return DaskWorkers(self._options.scheduler, plan)
 
-    def _do(self, plan: CampaignPlan, workers: Workers) -> None:
+    def _do(self, plan: CampaignPlan, workers: _Workers) -> None:
         """Do all runs, with a bar on a terminal."""
         kept = self._journal.verdicts
         if kept:
@@ -333,17 +333,17 @@ def _refused(option: str) -> Iterator[None]:
         raise CampaignRefusal(f"{option}: {error}") from None
 
 
-def check_outputs(paths: Sequence[Path]) -> None:
+def _check_outputs(paths: Sequence[Path]) -> None:
     """Refuse tables that cannot be written."""
     for path in paths:
         if path.suffix not in (_CSV, PARQUET):
             raise CampaignRefusal(f"-o {path}: a table is a .csv or a .parquet")
         with _refused("-o"):
             check_file(path, "table")
-    check_arrow(paths)
+    _check_arrow(paths)
 
 
-def check_arrow(paths: Sequence[Path]) -> None:
+def _check_arrow(paths: Sequence[Path]) -> None:
     """Refuse Parquet where pyarrow is missing."""
     if any(path.suffix == PARQUET for path in paths):
         try:
@@ -352,7 +352,7 @@ def check_arrow(paths: Sequence[Path]) -> None:
             raise CampaignRefusal(_NEEDS_ARROW) from None
 
 
-def write_outputs(table: CampaignTable, paths: Sequence[Path]) -> None:
+def _write_outputs(table: CampaignTable, paths: Sequence[Path]) -> None:
     """Write a table in each form; OSError if it cannot be."""
     for path in paths:
         write_table(table, path)
@@ -366,8 +366,8 @@ _NOT_PASSED: Final = 1
 def run(**options: Any) -> int:
     """Do the runs; return the exit status."""
     try:
-        wanted = CampaignOptions(version=VERSION, **options)
-        table = CampaignRun(wanted).run()
+        wanted = _CampaignOptions(version=VERSION, **options)
+        table = _CampaignRun(wanted).run()
     except CampaignRefusal as refusal:
         raise Refused(str(refusal)) from None
     return _shown(table, wanted.output_paths[0])
@@ -376,10 +376,10 @@ def run(**options: Any) -> int:
 def merge(tables: tuple[Path, ...], outputs: tuple[Path, ...]) -> int:
     """Join the tables; return the exit status."""
     try:
-        check_outputs(outputs)
-        check_arrow(tables)
+        _check_outputs(outputs)
+        _check_arrow(tables)
         table = merge_tables([(path, read_table(path)) for path in tables])
-        write_outputs(table, outputs)
+        _write_outputs(table, outputs)
     except CampaignRefusal as refusal:
         raise Refused(str(refusal)) from None
     except OSError as error:

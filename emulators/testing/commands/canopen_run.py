@@ -104,7 +104,7 @@ class RigNodes(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CanopenOptions(RunOptions):
+class _CanopenOptions(RunOptions):
     """The command line.
 
     Attributes:
@@ -131,10 +131,10 @@ class CanopenOptions(RunOptions):
         return not self.scenario or bool(self.bus or self.control)
 
 
-class CanopenRun(EmulatorRun):
-    """One run; see `CanopenOptions`."""
+class _CanopenRun(EmulatorRun):
+    """One run; see `_CanopenOptions`."""
 
-    def __init__(self, options: CanopenOptions) -> None:
+    def __init__(self, options: _CanopenOptions) -> None:
         super().__init__(options, in_real_time=options.in_real_time)
         self._options = options
         self._described: list[build.Described] = []
@@ -279,7 +279,7 @@ _DEVICES: Final = ("eds", "dcf", "model", "rtc")
 _STANDARD_OUTPUT: Final = Path("-")
 
 
-def emulate(
+def _emulate(
     node_id: str | None,
     nodes: tuple[str, ...],
     rig: Path | None,
@@ -296,8 +296,10 @@ def emulate(
         raise Refused(str(error)) from None
     file = RigNodes() if rig is None else read_rig(rig)
     sdo = _sdo_limits(options.pop("sdo_timeout"), options.pop("sdo_memory"))
-    run = CanopenRun(
-        CanopenOptions(specs=specs, rig=file, bus_yml=BusYml(*bus_yml), bus=bus, sdo=sdo, **options)
+    run = _CanopenRun(
+        _CanopenOptions(
+            specs=specs, rig=file, bus_yml=BusYml(*bus_yml), bus=bus, sdo=sdo, **options
+        )
     )
     files = [node.description.file for node in file.nodes]
     with mistakes_in([*(spec.device for spec in specs), *files]):
@@ -357,7 +359,7 @@ def _check_bus_yml(file: Path | None, urdf: Path | None, others: Mapping[str, ob
         raise Refused(f"--bus names all nodes: it goes without {' and '.join(beside)}")
 
 
-def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
+def _write_eds(model: str | None, rtc: str | None, path: Path) -> None:
     """Write the EDS of a model or a component."""
     if not (model or rtc):
         raise Refused("--write-eds belongs to --model or --rtc")

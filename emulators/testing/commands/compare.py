@@ -57,7 +57,7 @@ class ComparedRun:
     emulated: list[Said]
 
 
-def compare_ticks(
+def _compare_ticks(
     recording: replay.BenchRecording, name: str, configured: ConfiguredDevice
 ) -> ComparedRun:
     """Feed the emulator tick by tick, as the recorded device was.
@@ -75,7 +75,7 @@ def compare_ticks(
     )
 
 
-def compare_port(
+def _compare_port(
     recording: replay.BenchRecording,
     name: str,
     make: Callable[[], ConfiguredDevice],
@@ -193,7 +193,7 @@ _UNUSED: Final = 1 << 31
 _CAN_ID: Final = 0x1FFF_FFFF
 
 
-def compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) -> ComparedRun:
+def _compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) -> ComparedRun:
     """Feed a node tick by tick, as the recorded one was.
 
     Args:
@@ -214,7 +214,7 @@ def compare_node_ticks(recording: replay.BenchRecording, name: str, node: Node) 
     return ComparedRun(recorded, emulated)
 
 
-def compare_bus(
+def _compare_bus(
     recording: replay.BenchRecording,
     make: Callable[[CanWire], Sequence[Node]],
     tolerance: Tolerance,
@@ -467,12 +467,12 @@ def _ticked(
     header = recording.header
     entry, on_can = header.devices[name], header.on_can(name)
     if options["type_name"] and not on_can:
-        return compare_ticks(recording, name, _configured(options, ""))
+        return _compare_ticks(recording, name, _configured(options, ""))
     device = make_recorded(header, name, file.parent, EdsCache(), run_code=options["run_code"])
     if on_can:
-        return compare_node_ticks(recording, name, device)
+        return _compare_node_ticks(recording, name, device)
     configured = ConfiguredDevice(DEVICES.load(entry.type), device, entry.config)
-    return compare_ticks(recording, name, configured)
+    return _compare_ticks(recording, name, configured)
 
 
 def _on_line(
@@ -486,7 +486,7 @@ def _on_line(
     def make() -> ConfiguredDevice:
         return _configured(options, recorded)
 
-    return compare_port(recording, name, make, tolerance, options["settle_us"])
+    return _compare_port(recording, name, make, tolerance, options["settle_us"])
 
 
 def _on_bus(
@@ -505,7 +505,7 @@ def _on_bus(
     bit_rate = wire.config.get("bit_rate", _BIT_RATE)
     if not isinstance(bit_rate, int):
         raise ValueError(f"its bit rate is {bit_rate!r:.60}")
-    return compare_bus(
+    return _compare_bus(
         recording,
         lambda bus: make_nodes(described, bus),
         tolerance,

@@ -36,7 +36,7 @@ _STOPPED_S: Final = 0.5
 _READ_BYTES: Final = 4_096
 
 
-class PortTap:
+class _PortTap:
     """Passes bytes between the pty of a host and a port.
 
     One thread reads the port, the caller's reads the pty and what an operator types. A host
@@ -146,7 +146,7 @@ def record_port(port: str, out: Path, type_name: str, link: Path | None, baud: i
         pty = _open_pty(stack, link, baud or usual_baud)
         recorded = _open_port(port, baud or usual_baud, out, type_name)
         stack.callback(recorded.close)
-        tap = PortTap(recorded, pty, _typing(recorded, inputs), _late)
+        tap = _PortTap(recorded, pty, _typing(recorded, inputs), _late)
         stack.enter_context(stopped_by_signals(tap.stop))
         _greet(str(link or pty.path), port)
         began_us = recorded.now_us

@@ -176,7 +176,7 @@ def _door_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
 
 # The command `tickrig init`.
 
-RIG: Final = "rig.toml"
+_RIG: Final = "rig.toml"
 _STANDARD_OUTPUT: Final = "-"
 
 
@@ -185,7 +185,7 @@ def init(types: tuple[str, ...], file: Path) -> None:
     on_output = str(file) == _STANDARD_OUTPUT
     folder = Path() if on_output else file.parent
     try:
-        text = rig_template(types or ("rrc",), RIG if on_output else file.name, folder)
+        text = rig_template(types or ("rrc",), _RIG if on_output else file.name, folder)
     except TypeRefusedError as error:
         raise Refused(f"--device {error}") from None
     if on_output:

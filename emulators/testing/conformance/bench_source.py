@@ -129,7 +129,7 @@ def _unknown(words: tuple[str, ...]) -> NotAllowed:
 # Moves the inputs of a device on a bench.
 
 
-class BenchStimulus:
+class _BenchStimulus:
     """The hands at a device of a bench in virtual time.
 
     Args:
@@ -194,7 +194,7 @@ def bench_source(
         eds={number: f"{each}.eds" for number, each in names.items()},
         describe=lambda number: describe_slave(slaves[names[number]]) if number in names else None,
         stimulus=lambda number: guarded(
-            BenchStimulus(BenchDevice(mode, names[number]), slaves[names[number]])
+            _BenchStimulus(BenchDevice(mode, names[number]), slaves[names[number]])
         ),
         close=lambda: mode.act(lambda rig: _watch_no_more(_mount(rig, bus))),
         watch=lambda number, run: _watch(crashes, names[number], run),

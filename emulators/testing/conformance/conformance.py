@@ -160,7 +160,7 @@ class SlaveBench:
         return self._stimulus(*words)
 
 
-BIT_RATE: Final = 1_000_000
+_BIT_RATE: Final = 1_000_000
 _NODE_IDS: Final = range(1, 128)
 _LEVELS: Final = tuple(level.word for level in Level)
 
@@ -180,7 +180,7 @@ def conformance(  # noqa: PLR0913 - by keyword
     never: Iterable[int] = (),
     stimulus: Stimulus | None = None,
     seed: int = 0,
-    bit_rate: int = BIT_RATE,
+    bit_rate: int = _BIT_RATE,
 ) -> Report:
     """Judge a CANopen slave in virtual time; the same slave gives the same report.
 
@@ -295,7 +295,7 @@ _KINDS: Final[Mapping[str, str]] = {
     ".md": "--issue",
     ".txt": "--write-baseline",
 }
-JSON: Final = ".json"
+_JSON: Final = ".json"
 
 
 def conformance_text(report: Report, *, baseline: Path | str | None = None) -> str:
@@ -330,12 +330,12 @@ def write_conformance(
         ImportError: a page, and Jinja2 is not there (extra `report`).
     """
     known, ending = known_failures(baseline), Path(path).suffix
-    if ending == JSON:
+    if ending == _JSON:
         text = report_json(report, known)
     elif ending in _KINDS:
         text = file_text(_KINDS[ending], report, known, decoded_frames({}))
     else:
-        endings = ", ".join([*_KINDS, JSON])
+        endings = ", ".join([*_KINDS, _JSON])
         raise ValueError(f"{path}: nobody knows what to write, its ending is none of {endings}")
     write_whole(Path(path), text)
 

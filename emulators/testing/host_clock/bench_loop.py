@@ -24,7 +24,7 @@ _EXECUTOR_S: Final = 5.0
 _Events = list[tuple[SelectorKey, int]]
 
 
-class BenchLoop(asyncio.SelectorEventLoop):
+class _BenchLoop(asyncio.SelectorEventLoop):
     """An event loop whose time is that of a rig.
 
     Where it would wait for its next timer, time passes; what has come meanwhile from files,
@@ -84,7 +84,7 @@ def bench_loops(passing: Passing) -> Iterator[None]:
     owner, original = get_ident(), asyncio.events.new_event_loop
 
     def new_event_loop() -> asyncio.AbstractEventLoop:
-        return BenchLoop(passing) if get_ident() == owner else original()
+        return _BenchLoop(passing) if get_ident() == owner else original()
 
     asyncio.events.new_event_loop = asyncio.new_event_loop = new_event_loop
     try:

@@ -77,7 +77,7 @@ def _check_clock() -> None:
             )
 
 
-class ClockWaits:
+class _ClockWaits:
     """What hosts find in place of what waits.
 
     Args:
@@ -274,7 +274,7 @@ def patched_time(passing: Passing) -> Iterator[SimTime]:
     """
     _check_clock()
     clock = SimTime(passing)
-    waits = ClockWaits(passing, clock)
+    waits = _ClockWaits(passing, clock)
     with patches.Patches(waits.acts()), _loops(passing):
         yield clock
     if waits.refusals:

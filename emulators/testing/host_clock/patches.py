@@ -50,7 +50,7 @@ class Patch:
         return self.original(*args, **kwargs)
 
 
-class MethodSwitch(Patch):
+class _MethodSwitch(Patch):
     """A switch of a class: it is bound to its objects, as a function is."""
 
     def __get__(self, item: object, owner: type | None = None) -> Callable[..., Any]:
@@ -92,7 +92,7 @@ class Alias(NamedTuple):
     function: Any
 
 
-class HostModules:
+class _HostModules:
     """The modules of hosts that are imported: each is looked at once, and again when it grows.
 
     With 1143 modules that takes 40 us where nothing has changed, and 240 if each is asked for.
@@ -139,7 +139,7 @@ class HostModules:
         self._counts = counts
 
 
-_HOST_MODULES: Final = HostModules()
+_HOST_MODULES: Final = _HostModules()
 
 
 def _names_of_host(module: object) -> dict[str, Any] | None:
@@ -235,7 +235,7 @@ class Patches:
         new: dict[int, Patch] = {}
         for (owner, name), act in self._acts.items():
             before = vars(owner)[name]
-            switch = (MethodSwitch if isinstance(owner, type) else Patch)(before, act)
+            switch = (_MethodSwitch if isinstance(owner, type) else Patch)(before, act)
             new[id(root_of(before))] = switch
             self._undo.callback(setattr, owner, name, before)
             setattr(owner, name, switch)

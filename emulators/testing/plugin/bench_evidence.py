@@ -92,7 +92,7 @@ class _Effect:
     to_us: int | None = None
 
 
-class OrderedFaults:
+class _OrderedFaults:
     """Notes the faults of a bench as they come, from its beginning.
 
     Args:
@@ -211,7 +211,7 @@ class BenchWitness:
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._samplers: list[SignalSampler] = []
-        self._plan = OrderedFaults(bench)
+        self._plan = _OrderedFaults(bench)
         with suppress(NotOnThisBench):
             bench._mode.act(self._begin)
 

@@ -59,7 +59,7 @@ if TYPE_CHECKING:
 # on a bench that was too slow (`is_mistake`).
 
 
-class BenchedTest(TestWithBench):
+class _BenchedTest(TestWithBench):
     """A test, and its bench.
 
     Args:
@@ -231,7 +231,7 @@ def benched(
     if settings.rig_file and (settings.ordered or source is None):
         source = settings.rig_file
     wanted = bench_source.WantedBench(source, mode, settings.seed, request.path.parent)
-    test = request.node.stash[BENCHED] = BenchedTest(request.node, wanted, safe, warm_up)
+    test = request.node.stash[BENCHED] = _BenchedTest(request.node, wanted, safe, warm_up)
     try:
         yield _opened(test)
     finally:
@@ -252,7 +252,7 @@ def _libraries(rig: BenchRig) -> list[tuple[str, str]]:
     return [(one.name, "serial" if isinstance(one, LineMount) else "can") for one in mounts]
 
 
-def _opened(test: BenchedTest) -> Bench:
+def _opened(test: _BenchedTest) -> Bench:
     """Open the bench; what is wrong with what was asked needs no traceback."""
     try:
         return test.open()

@@ -19,7 +19,7 @@ WarmUp = Callable[[Bench], Coroutine[Any, Any, None] | None] | None
 """What is done to a bench before the test; None for nothing."""
 
 
-class BenchSnapshot(NamedTuple):
+class _BenchSnapshot(NamedTuple):
     """A bench after its warm-up, for others that were the same before it.
 
     Attributes:
@@ -31,7 +31,7 @@ class BenchSnapshot(NamedTuple):
     bench: Bench
 
 
-SNAPSHOTS: Final = pytest.StashKey[dict[str, BenchSnapshot]]()
+SNAPSHOTS: Final = pytest.StashKey[dict[str, _BenchSnapshot]]()
 """By node ID, where tests run many times; missing where they run once."""
 
 
@@ -69,7 +69,7 @@ def warmed(item: pytest.Item, bench: Bench, warm_up: WarmUp) -> Bench:
     finally:
         bench.close()
     if not any(chance.drawn for chance in state.chances):
-        snapshots[item.nodeid] = BenchSnapshot(digest, bench)
+        snapshots[item.nodeid] = _BenchSnapshot(digest, bench)
     return used
 
 

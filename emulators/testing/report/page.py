@@ -46,7 +46,7 @@ class PagePart(Enum):
 
 
 @dataclass(slots=True)
-class PageRoom:
+class _PageRoom:
     """Gives room to what matters most: of each part, first that of failed tests.
 
     Args:
@@ -111,7 +111,7 @@ _MOST_OPEN: Final = 12
 
 
 @dataclass(frozen=True, slots=True)
-class TestOnPage:
+class _TestOnPage:
     """A test with what of it has room.
 
     Attributes:
@@ -162,10 +162,10 @@ def _template() -> PageTemplate:
     return PageTemplate(__package__, {"Outcome": Outcome}, script="page.js")
 
 
-def _on_page(places: Sequence[overview.ReportedTest], room_bytes: int) -> Iterator[TestOnPage]:
+def _on_page(places: Sequence[overview.ReportedTest], room_bytes: int) -> Iterator[_TestOnPage]:
     tests = [place.record for place in places]
     timelines = [timeline_of(test) for test in tests]
-    admitted = PageRoom(tests, timelines, room_bytes).admitted
+    admitted = _PageRoom(tests, timelines, room_bytes).admitted
     unwell = sum(test.outcome in overview.UNWELL for test in tests)
     for number, place in enumerate(places):
         parts = {part for part in PagePart if (number, part) in admitted}
@@ -175,10 +175,10 @@ def _on_page(places: Sequence[overview.ReportedTest], room_bytes: int) -> Iterat
 
 def _test_on_page(
     place: overview.ReportedTest, timeline: Timeline | None, parts: set[PagePart], opened: bool
-) -> TestOnPage:
+) -> _TestOnPage:
     test = place.record
     lines = test.journal[-_JOURNAL_LINES:]
-    return TestOnPage(
+    return _TestOnPage(
         place,
         timeline if PagePart.TIMELINE in parts else None,
         cut(test.longrepr, _TEXT_BYTES)[0] if PagePart.TEXT in parts else "",

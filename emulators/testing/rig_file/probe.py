@@ -184,7 +184,7 @@ class _Everything(Mapping[str, T], Generic[T]):
 _ANY: Final = InputSignal("any", "", low=float("-inf"), high=float("inf"), real=True)
 
 
-class UnknownInputs:
+class _UnknownInputs:
     """Inputs that take everything."""
 
     changed = False
@@ -211,11 +211,11 @@ class UnknownInputs:
         return self.table[name]
 
 
-class UnknownDevice:
+class _UnknownDevice:
     """Stands in for a device that cannot be made: that is told, and nothing more about it."""
 
     tick_us = 1_000
-    inputs = UnknownInputs()
+    inputs = _UnknownInputs()
     outputs: Mapping[str, OutputSignal] = _Everything(OutputSignal("any", ""))
 
     def read(self, name: str, /) -> Setting:
@@ -223,4 +223,4 @@ class UnknownDevice:
         return 0
 
 
-UNKNOWN: Final = UnknownDevice()
+UNKNOWN: Final = _UnknownDevice()

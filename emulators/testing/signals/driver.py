@@ -87,7 +87,7 @@ class RunningSignal(Copyable):
         return formula.value({**values, TIME: now_us / 1e6})
 
 
-class TimeNode(RunningSignal):
+class _TimeNode(RunningSignal):
     """A signal that depends on time alone."""
 
     __slots__ = ("source",)
@@ -111,7 +111,7 @@ class TimeNode(RunningSignal):
         self.due_us = min(NEVER, next_us + spec.from_us)
 
 
-class FormulaNode(RunningSignal):
+class _FormulaNode(RunningSignal):
     """A signal that is computed of others."""
 
     __slots__ = ("formula",)
@@ -132,7 +132,7 @@ class FormulaNode(RunningSignal):
         self.setting = self.spec.shaped(self.evaluate(self.formula, now_us))
 
 
-class FilterNode(RunningSignal):
+class _FilterNode(RunningSignal):
     """A signal with a memory: it moves each `every_us`, as what moves it was before."""
 
     __slots__ = ("_gain", "_input", "_moves", "_state", "filter")
@@ -185,13 +185,13 @@ def _node_of(name: str, spec: SignalSpec, seed: int) -> RunningSignal:
     """
     source = spec.source
     if isinstance(source, Formula):
-        return FormulaNode(spec, source)
+        return _FormulaNode(spec, source)
     if isinstance(source, Lag | Integral):
-        return FilterNode(spec, source)
+        return _FilterNode(spec, source)
     if isinstance(source, Noise):
         chosen = seed if source.seed is None else source.seed
         source = replace(source, seed=chosen, stream=name)
-    return TimeNode(spec, source)
+    return _TimeNode(spec, source)
 
 
 _NO_DEVICE_US: Final = 1_000_000
@@ -234,7 +234,7 @@ class SignalDriver(Copyable):
         scope = SignalScope(signals, devices)
         self._nodes = {key: _node_of(key, signals[key], seed) for key in scope.ordered()}
         self._link(scope)
-        self._filters = [node for node in self._nodes.values() if isinstance(node, FilterNode)]
+        self._filters = [node for node in self._nodes.values() if isinstance(node, _FilterNode)]
         self._others = [node for node in self._nodes.values() if node not in self._filters]
         self._targets = {
             key: _Target(found, found.device.inputs.table[found.name])

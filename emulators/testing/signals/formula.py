@@ -1,6 +1,6 @@
 """Formulas over signals: what they are made of, and what they come to.
 
->>> Formula("t + load", Call("+", (Name("t"), Name("load"))), ("load",), True).value(
+>>> Formula("t + load", _Call("+", (_Name("t"), _Name("load"))), ("load",), True).value(
 ...     {"t": 1.5, "load": 3.0}
 ... )
 4.5
@@ -33,28 +33,28 @@ TIME: Final = "t"
 
 
 @dataclass(frozen=True, slots=True)
-class FormulaNumber(Immutable):
+class _FormulaNumber(Immutable):
     """A number."""
 
     number: float
 
 
 @dataclass(frozen=True, slots=True)
-class Name(Immutable):
+class _Name(Immutable):
     """The value of another signal, or the time."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class Call(Immutable):
+class _Call(Immutable):
     """A function or an operator, and what it is of."""
 
     function: str
     terms: tuple[_Term, ...]
 
 
-_Term = FormulaNumber | Name | Call
+_Term = _FormulaNumber | _Name | _Call
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,11 +84,11 @@ class Formula(Immutable):
 
 def _value(term: _Term, values: Mapping[str, float]) -> float:
     match term:
-        case FormulaNumber(number):
+        case _FormulaNumber(number):
             return number
-        case Name(name):
+        case _Name(name):
             return values[name]
-        case Call(function, terms):
+        case _Call(function, terms):
             try:
                 return _FUNCTIONS[function][0](*(_value(each, values) for each in terms))
             except ValueError:
@@ -191,9 +191,9 @@ def _formula(text: str, term: _Term) -> Formula:
 
 
 def _names(term: _Term) -> Iterator[str]:
-    if isinstance(term, Name):
+    if isinstance(term, _Name):
         yield term.name
-    elif isinstance(term, Call):
+    elif isinstance(term, _Call):
         for each in term.terms:
             yield from _names(each)
 
@@ -205,11 +205,11 @@ def _read(node: ast.expr, deep: int) -> _Term:
         return _constant(node)
     if isinstance(node, ast.Name | ast.Attribute):
         name = _dotted(node)
-        return FormulaNumber(pi) if name == "pi" else Name(name)
+        return _FormulaNumber(pi) if name == "pi" else _Name(name)
     if isinstance(node, ast.Compare):
         return _compared(node, deep)
     function, operands = _call(node)
-    return Call(function, tuple(_read(operand, deep - 1) for operand in operands))
+    return _Call(function, tuple(_read(operand, deep - 1) for operand in operands))
 
 
 def _call(node: ast.expr) -> tuple[str, list[ast.expr]]:
@@ -234,21 +234,21 @@ def _compared(node: ast.Compare, deep: int) -> _Term:
         raise _unknown(node)
     terms = [_read(each, deep - 1) for each in (node.left, *node.comparators)]
     calls = [
-        Call(_OPERATORS[type(op)], (left, right))
+        _Call(_OPERATORS[type(op)], (left, right))
         for op, left, right in zip(node.ops, terms, terms[1:], strict=False)
     ]
-    return calls[0] if len(calls) == 1 else Call("and", tuple(calls))
+    return calls[0] if len(calls) == 1 else _Call("and", tuple(calls))
 
 
 def _constant(node: ast.Constant) -> _Term:
     """Return a number, or the signal whose name is in quotes."""
     if isinstance(node.value, str):
-        return Name(node.value)
+        return _Name(node.value)
     if isinstance(node.value, bool) or not isinstance(node.value, int | float):
         raise _unknown(node)
     try:
         if isfinite(node.value):
-            return FormulaNumber(float(node.value))
+            return _FormulaNumber(float(node.value))
     except OverflowError:
         pass
     raise ValueError("a number in the formula is too large")

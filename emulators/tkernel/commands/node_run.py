@@ -52,7 +52,7 @@ class NodeOptions:
     engines: EngineOptions
 
 
-class Door:
+class _Door:
     """A place where somebody may be served; `serving_control` opens it."""
 
     serve: Callable[[int], None] | None = None
@@ -62,7 +62,7 @@ class Door:
         self.serve = None
 
 
-class Boot:
+class _Boot:
     """A boot, as a control socket sees it: who runs the system, and how late it was."""
 
     def __init__(self, runner: RealTime) -> None:
@@ -98,7 +98,7 @@ class NodeRun:
     def __init__(self, options: NodeOptions) -> None:
         self._options = options
         self._system = System() if options.system is None else read_system(options.system)
-        self._operator_door, self._system_door = Door(), Door()
+        self._operator_door, self._system_door = _Door(), _Door()
         self._clock, schedule = ServingClock(), Schedule()
         self._clock.serve = self._serve
         self._runner = RealTime(schedule, self._clock)
@@ -170,7 +170,7 @@ class NodeRun:
     def _open_control(
         self, path: Path, manager: node_manager.NodeManager, stack: ExitStack
     ) -> Callable[[CallQueue], None]:
-        boot = Boot(self._runner)
+        boot = _Boot(self._runner)
         control = SystemControl(manager, boot)
         server = stack.enter_context(serving_control(path, control, self._system_door))
         self._runner.after_tick.append(boot.tick)

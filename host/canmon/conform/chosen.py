@@ -38,7 +38,7 @@ def unknown(words: Iterable[str]) -> list[str]:
     return [f"{word}: no such group or check; {_near(word)}" for word in none]
 
 
-def chosen(only: Sequence[str]) -> list[Check]:
+def _chosen(only: Sequence[str]) -> list[Check]:
     """Return the checks of the suite that were chosen, whatever their level.
 
     Args:
@@ -62,9 +62,9 @@ def _near(word: str) -> str:
 
 def check_chosen(only: Sequence[str], level: Level) -> None:
     """Refused if a word names no check, or none that this level allows."""
-    chosen(only)
+    _chosen(only)
     for word in only:
-        named = chosen([word])
+        named = _chosen([word])
         least = min((check.level for check in named), default=level)
         if least > level:
             raise Refused(f"--only {word} needs --{least.word}")
@@ -86,7 +86,7 @@ def listed_checks(only: Sequence[str], device: EdsDevice | None) -> Iterator[str
     Raises:
         Refused: a word that names none.
     """
-    checks = [*chosen(only), *_of_objects(only, device)]
+    checks = [*_chosen(only), *_of_objects(only, device)]
     wide = max((len(check.id) for check in checks), default=0) + 2
     yield from (f"{check.id:<{wide}}{check.level.word:<15}{check.title}" for check in checks)
     yield ""

@@ -213,7 +213,7 @@ def open_stimulus(text: str) -> Stimulus:
         return _ask_operator
     place = text.removeprefix(CONTROL)
     if place and (place != text or Path(place).is_socket()):
-        return ControlStimulus(Path(place))
+        return _ControlStimulus(Path(place))
     with refused_at("--stimulus"):
         words = shlex.split(place)
     if not words:
@@ -272,7 +272,7 @@ class CommandStimulus:
         return next(iter(ended.stdout.decode("utf-8", "replace").splitlines()), "").strip()
 
 
-class ControlStimulus(SignalStimulus):
+class _ControlStimulus(SignalStimulus):
     """The control socket of an emulator (docs/reference/bench/control.md).
 
     Args:

@@ -30,7 +30,7 @@ _UNREAD: Final = "unread"
 """The test case of a file that cannot be read."""
 
 
-class Case(NamedTuple):
+class _Case(NamedTuple):
     """A finding for the report: its rule, and the line that tells it."""
 
     rule: str
@@ -77,7 +77,7 @@ def command(file: Sequence[Path], strict: bool, as_json: bool, report: Path | No
         click.get_current_context().exit(_FOUND)
 
 
-def _read(files: Sequence[Path]) -> tuple[list[Document], list[Case]]:
+def _read(files: Sequence[Path]) -> tuple[list[Document], list[_Case]]:
     """Read the files; what cannot be read is told, and is no reason to leave out the others."""
     documents, unread = [], []
     for path in files:
@@ -85,7 +85,7 @@ def _read(files: Sequence[Path]) -> tuple[list[Document], list[Case]]:
             documents.append(read_document(path))
         except Refused as error:
             error.show()
-            unread.append(Case(f"{path}: {_UNREAD}", error.message))
+            unread.append(_Case(f"{path}: {_UNREAD}", error.message))
     return documents, unread
 
 
@@ -120,13 +120,13 @@ def _check_report(report: Path | None, files: Sequence[Path]) -> None:
 def _write(
     report: Path | None,
     documents: Sequence[Document],
-    unread: Sequence[Case],
+    unread: Sequence[_Case],
     failures: Sequence[RuleFinding],
 ) -> None:
     """Write a test case for each rule of each file, and one for each that was not read."""
     if report is None:
         return
-    cases = [*unread, *(Case(f"{one.file}: {one.rule.name}", str(one)) for one in failures)]
+    cases = [*unread, *(_Case(f"{one.file}: {one.rule.name}", str(one)) for one in failures)]
     rules = (f"{document.name}: {name}" for document in documents for name in RULES)
     names = list(dict.fromkeys((*(case.rule for case in unread), *rules)))
     try:

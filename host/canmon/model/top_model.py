@@ -87,7 +87,7 @@ def _marked(text: str, marked: bool) -> str:
     return f"{REVERSE}{text}{PLAIN}" if marked else text
 
 
-class TopColumn(NamedTuple):
+class _TopColumn(NamedTuple):
     """A column of numbers.
 
     Attributes:
@@ -108,20 +108,20 @@ def _gap(name: str) -> Callable[[traffic.IdRow, int], str]:
 
 
 _COLUMNS: Final = (
-    TopColumn("frames", 8, 1, lambda row, now_us: str(row.frames)),
-    TopColumn("1/s", 7, 0, lambda row, now_us: rate_text(row.rate_hz)),
-    TopColumn("gap ms", 8, 3, lambda row, now_us: ms_text(row.gap_us)),
-    TopColumn("min", 8, 6, _gap("min_us")),
-    TopColumn("avg", 8, 2, _gap("mean_us")),
-    TopColumn("p99", 8, 7, _gap("p99_us")),
-    TopColumn("max", 8, 4, _gap("max_us")),
-    TopColumn("jitter", 8, 8, _gap("jitter_us")),
-    TopColumn("missed", 6, 5, lambda row, now_us: count_text(getattr(row.gaps, "missed", None))),
-    TopColumn("age s", 7, 9, lambda row, now_us: s_text(now_us - row.last_us)),
+    _TopColumn("frames", 8, 1, lambda row, now_us: str(row.frames)),
+    _TopColumn("1/s", 7, 0, lambda row, now_us: rate_text(row.rate_hz)),
+    _TopColumn("gap ms", 8, 3, lambda row, now_us: ms_text(row.gap_us)),
+    _TopColumn("min", 8, 6, _gap("min_us")),
+    _TopColumn("avg", 8, 2, _gap("mean_us")),
+    _TopColumn("p99", 8, 7, _gap("p99_us")),
+    _TopColumn("max", 8, 4, _gap("max_us")),
+    _TopColumn("jitter", 8, 8, _gap("jitter_us")),
+    _TopColumn("missed", 6, 5, lambda row, now_us: count_text(getattr(row.gaps, "missed", None))),
+    _TopColumn("age s", 7, 9, lambda row, now_us: s_text(now_us - row.last_us)),
 )
 
 
-class IdText(NamedTuple):
+class _IdText(NamedTuple):
     """The leading column: bus, if there are several, and identifier.
 
     Attributes:
@@ -151,7 +151,7 @@ class IdText(NamedTuple):
         )
 
 
-def _fitting(width: int) -> tuple[TopColumn, ...]:
+def _fitting(width: int) -> tuple[_TopColumn, ...]:
     """Return the columns that fit beside each other into so many characters."""
     kept = list(_COLUMNS)
     while len(kept) > 1 and sum(column.width + 1 for column in kept) > width:
@@ -375,8 +375,8 @@ class _Table(NamedTuple):
         width: characters of the screen.
     """
 
-    ids: IdText
-    columns: tuple[TopColumn, ...]
+    ids: _IdText
+    columns: tuple[_TopColumn, ...]
     payload: tuple[Callable[[traffic.IdRow, bool], str], str]
     styled: bool
     width: int
@@ -385,7 +385,7 @@ class _Table(NamedTuple):
     def of(cls, snapshot: traffic.TrafficSnapshot, view: TableView, width: int) -> _Table:
         """Choose the columns."""
         longest = max((len(bus.channel) for bus in snapshot.buses), default=0)
-        ids = IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
+        ids = _IdText(min(_CHANNEL_MAX, longest) if len(snapshot.buses) > 1 else 0)
         room = width - ids.width - _payload_width(view) - 1
         columns = _fitting(room)
         fits = room >= sum(column.width + 1 for column in columns)

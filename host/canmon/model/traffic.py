@@ -289,7 +289,7 @@ class IdRow(NamedTuple):
         return (self.frames - 1) * 1e6 / span_us if span_us > 0 else 0.0
 
 
-class IdTally:
+class _IdTally:
     """Counts the frames of one identifier on one bus.
 
     A frame with an earlier time than the one before it has a gap of 0.
@@ -587,13 +587,13 @@ class TrafficSnapshot(NamedTuple):
     rows: tuple[IdRow, ...] = ()
 
 
-class BusTally:
+class _BusTally:
     """Counts one bus."""
 
     def __init__(self, channel: str, first_us: int, rates: BitRates) -> None:
         self._channel = channel
         self._first_us = self._last_us = first_us
-        self._ids: dict[int, IdTally] = {}
+        self._ids: dict[int, _IdTally] = {}
         self._load, self._errors = Load(first_us), ErrorStatistics()
         self._frames = self._went_back = self._fd = self._unrated = 0
         self._rates = rates
@@ -616,7 +616,7 @@ class BusTally:
         self._frames += 1
         tally = self._ids.get(ident)
         if tally is None:
-            tally = self._ids[ident] = IdTally(at_us, frame, measure)
+            tally = self._ids[ident] = _IdTally(at_us, frame, measure)
         else:
             tally.take(at_us, frame)
         self._load.take(at_us, tally.length)
@@ -655,7 +655,7 @@ class Traffic:
     """
 
     def __init__(self, rates: BitRates = NO_RATES) -> None:
-        self._buses: dict[str, BusTally] = {}
+        self._buses: dict[str, _BusTally] = {}
         self._rates = rates
         self._last_us = 0
 
@@ -664,7 +664,7 @@ class Traffic:
         at_us, channel, frame, _ = record
         bus = self._buses.get(channel)
         if bus is None:
-            bus = self._buses[channel] = BusTally(channel, at_us, self._rates)
+            bus = self._buses[channel] = _BusTally(channel, at_us, self._rates)
         bus.take(at_us, frame)
         self._last_us = at_us
 

@@ -45,7 +45,7 @@ class NetCall:
     timeout_us: int
 
 
-class NetGroup(LazyGroup):
+class _NetGroup(LazyGroup):
     """A group with SOURCE before its verbs, unless options name the bus."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -57,7 +57,7 @@ class NetGroup(LazyGroup):
         return super().parse_args(ctx, args)
 
 
-@click.group(cls=NetGroup, commands=VERBS, subcommand_metavar="VERB [ARGS]...")
+@click.group(cls=_NetGroup, commands=VERBS, subcommand_metavar="VERB [ARGS]...")
 @click.argument("source", required=False)
 @time_option("--timeout", "timeout_us", help="How long a node may take to answer.  [500ms]")
 @bus_options

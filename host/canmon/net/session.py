@@ -39,7 +39,7 @@ class NodeFailed(click.ClickException):
         super().__init__(one_line(message))
 
 
-class Work:
+class _Work:
     """What is to be done, step by step, so that an end in the middle can say how far it came.
 
     Attributes:
@@ -88,7 +88,7 @@ class NetSession:
 
     def __init__(self, source: ConformSource, timeout_us: int) -> None:
         self.source, self.timeout_us = source, timeout_us
-        self.bus, self.work = NodeBus(source.link, timeout_us), Work()
+        self.bus, self.work = NodeBus(source.link, timeout_us), _Work()
 
     def confirm(self, what: str, *, yes: bool, risk: str = "") -> None:
         """Ask before something is changed; in a rig in virtual time nobody is.

@@ -222,7 +222,7 @@ class StatusLine(Widget):
             await self.app.run_action("arm")
 
 
-class ExportScreen(ModalScreen[str]):
+class _ExportScreen(ModalScreen[str]):
     """A field for the name of a file; Escape leaves without one.
 
     Args:
@@ -390,7 +390,7 @@ class MonitorApp(FramedApp):
     def action_export(self) -> None:
         """Ask for a file and keep the settings there."""
         path = self.panel_settings.workspace.path
-        self.push_screen(ExportScreen("" if path is None else str(path)), self._export)
+        self.push_screen(_ExportScreen("" if path is None else str(path)), self._export)
 
     def _export(self, name: str | None) -> None:
         if name:
@@ -408,7 +408,7 @@ class MonitorApp(FramedApp):
         elif not self.session.source.live:
             self.notify("all of a log is there: canmon conv writes it into another")
         else:
-            screen = ExportScreen(self.recorder.words, "record into", WORDS_METAVAR)
+            screen = _ExportScreen(self.recorder.words, "record into", WORDS_METAVAR)
             self.push_screen(screen, self._record)
 
     def _record(self, words: str | None) -> None:

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 # What `check` finds, shown as it comes: as text, or as objects in JSON.
 
 
-class FindingPrinter:
+class _FindingPrinter:
     """Findings, shown as they come.
 
     Args:
@@ -289,7 +289,7 @@ def command(  # noqa: PLR0913 - options
     heartbeats = {node: ms for node, one in objects.items() if (ms := one.heartbeat_ms)}
     kept = bool(report_path or sarif_path)
     shown = Stamp(stamp) if stamp else None
-    verdict = FindingPrinter(jsonl, shown, kept=kept, rules=rules.names())
+    verdict = _FindingPrinter(jsonl, shown, kept=kept, rules=rules.names())
     log = None if decoder else block_log(words)
     made = partial(_column_checker, rules, bit_rate, heartbeats)
     log = _in_blocks(log, made, verdict) if log else None
@@ -341,7 +341,7 @@ def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None
 
 
 def _in_blocks(
-    log: BlockLog, make: Callable[[], ColumnChecker], verdict: FindingPrinter
+    log: BlockLog, make: Callable[[], ColumnChecker], verdict: _FindingPrinter
 ) -> BlockLog | None:
     """Judge a log; return None where it is to be read again, frame by frame."""
     checker = make()
@@ -363,7 +363,7 @@ def _one_by_one(
     source: Source,
     words: Sequence[str],
     held: DecodedCheck,
-    verdict: FindingPrinter,
+    verdict: _FindingPrinter,
     span_us: int | None,
 ) -> None:
     watch, has_clock = listening.Stopwatch(), source.live and list(words) != [_STDIN]

@@ -26,7 +26,7 @@ _LEAST_LOAD: Final = 1
 """In percent: with less an answer takes longer than a check may."""
 
 
-class Percent(click.FloatRange):
+class _Percent(click.FloatRange):
     """A share in percent; `nan`, which is in no range, is refused too."""
 
     def convert(
@@ -69,7 +69,7 @@ _choice: Final[Decorator] = add_options(
     click.option("--never", multiple=True, metavar="INDEX", help="Is never written, as 2000h."),
     click.option(
         "--max-load",
-        type=Percent(_LEAST_LOAD, 100),
+        type=_Percent(_LEAST_LOAD, 100),
         default=30,
         metavar="PERCENT",
         help="Of the bus, by this tester; 30.",

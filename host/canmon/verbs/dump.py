@@ -46,7 +46,7 @@ _KEY: Final = "key"
 _STDIN: Final = 0
 
 
-class TriggerKeys:
+class _TriggerKeys:
     """Waits for Enter on standard input, where that is a terminal, and for SIGUSR1.
 
     Args:
@@ -208,7 +208,7 @@ def command(  # noqa: PLR0913 - options
             log = held.enter_context(closing(recording.open(source, frames.live, kept)))
             take = log.take
             if recording.plan.around is not None:
-                keys = TriggerKeys("-" not in source)
+                keys = _TriggerKeys("-" not in source)
                 held.enter_context(keys.watching())
                 take = _with_keys(log, keys)
         with until_interrupted() as signals, until_unread():
@@ -233,7 +233,7 @@ def _pass_pieces(
                 writer.take_text(blocks.text(piece), log.lost)
 
 
-def _with_keys(log: LogFile, keys: TriggerKeys) -> _Take:
+def _with_keys(log: LogFile, keys: _TriggerKeys) -> _Take:
     """Return what takes frames and looks for keys."""
 
     def take(decoded_frames: list[printer.DecodedFrame], lost: int, marks: Sequence[Mark]) -> bool:

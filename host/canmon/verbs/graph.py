@@ -37,7 +37,7 @@ _RANGE: Final = re.compile(r"([1-9])=((?:(?!\.\.)[0-9.eE+-])++)\.\.([0-9.eE+-]+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GraphRequest:
+class _GraphRequest:
     """The options of the verb `graph`, read.
 
     Attributes:
@@ -159,7 +159,7 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     {source}
     """  # noqa: D301 - click wants the backspace
     options["ranges"] = dict(map(_range, options["ranges"]))
-    request = GraphRequest(**{one.name: options.pop(one.name) for one in fields(GraphRequest)})
+    request = _GraphRequest(**{one.name: options.pop(one.name) for one in fields(_GraphRequest)})
     try:
         words = [parse_signal(text) for text in signals]
     except ValueError as error:
@@ -183,13 +183,13 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
 
 
 def _live(
-    series: Sequence[Series], request: GraphRequest, now_us: int, width: int, height: int
+    series: Sequence[Series], request: _GraphRequest, now_us: int, width: int, height: int
 ) -> list[str]:
     view = View(now_us - max(1, request.window_us), now_us, request.ranges, None, now_us)
     return render(series, view, width, height, colour="NO_COLOR" not in os.environ)
 
 
-def _show(series: Sequence[Series], request: GraphRequest) -> None:
+def _show(series: Sequence[Series], request: _GraphRequest) -> None:
     """Write the files, else print the picture; say what has no samples."""
     for one in series:
         if not one:

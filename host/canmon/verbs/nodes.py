@@ -57,12 +57,12 @@ def command(
     {source}
     """  # noqa: D301 - click wants the backspace
     found = read_eds_files(eds)
-    view, log = NodesView(found), block_log(source)
+    view, log = _NodesView(found), block_log(source)
     whole = log is not None and view.decoder.standard and take_blocks(log, view.take_block)
     frames = (log if whole else None) or open_source(source, BusOptions(**options))
     try:
         if not isinstance(frames, BlockLog):
-            view = view if log is None else NodesView(found)
+            view = view if log is None else _NodesView(found)
             follow(frames, source, view.take, span_us, None if jsonl else view.painted)
         with until_unread():
             for line in view.json(live=frames.live) if jsonl else view.lines(live=frames.live):
@@ -72,7 +72,7 @@ def command(
     report(frames, strict)
 
 
-class NodesView:
+class _NodesView:
     """A node board, fed and shown.
 
     Args:

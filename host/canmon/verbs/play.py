@@ -37,7 +37,7 @@ _FOREVER: Final = 0
 _LEAST_LOOP_US: Final = 1_000
 
 
-class Due(NamedTuple):
+class _Due(NamedTuple):
     """A frame that is to be sent.
 
     Attributes:
@@ -86,7 +86,7 @@ class ReplayPlan:
         if self.to_us is not None and self.to_us <= self.from_us:
             raise ValueError(f"from {self.from_us} us to {self.to_us} us there is nothing")
 
-    def __iter__(self) -> Iterator[Due]:
+    def __iter__(self) -> Iterator[_Due]:
         """Yield the frames; a log without any ends also an endless replay."""
         begin_us, loop = 0, 0
         while self.loops == _FOREVER or loop < self.loops:
@@ -98,7 +98,7 @@ class ReplayPlan:
                     self.left_out += 1
                     continue
                 sent = True
-                yield Due(self._scaled(end_us), channel, record.frame)
+                yield _Due(self._scaled(end_us), channel, record.frame)
             if not sent:
                 return
             loop += 1
@@ -305,7 +305,7 @@ def _play(
     click.echo("; ".join(summary), err=True)
 
 
-def _due(plan: ReplayPlan) -> Iterator[Due]:
+def _due(plan: ReplayPlan) -> Iterator[_Due]:
     """Yield what is planned; SourceFailed if the log cannot be read."""
     try:
         yield from plan

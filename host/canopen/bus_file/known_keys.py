@@ -54,7 +54,7 @@ _FLAGS: Final = {
 """Words that yaml-cpp takes for a flag."""
 
 
-class Allowed(NamedTuple):
+class _Allowed(NamedTuple):
     """What a setting of a driver may be: whole numbers, or without any a flag."""
 
     numbers: Sequence[int]
@@ -74,14 +74,14 @@ class Allowed(NamedTuple):
         return number if number in self.numbers else None
 
 
-_TIME: Final = Allowed(range(1, 1 << 31), "a whole number above 0")
-_MODE: Final = Allowed((1, 2, 3, 4, 6, 7, 8, 9, 10), "a mode of CiA 402: 1..4, 6..10")
+_TIME: Final = _Allowed(range(1, 1 << 31), "a whole number above 0")
+_MODE: Final = _Allowed((1, 2, 3, 4, 6, 7, 8, 9, 10), "a mode of CiA 402: 1..4, 6..10")
 SETTINGS: Final = {
-    "polling": Allowed((), "true or false"),
+    "polling": _Allowed((), "true or false"),
     "period": _TIME,
     "sdo_timeout_ms": _TIME,
     "homing_timeout_seconds": _TIME,
-    "switching_state": Allowed(range(2, 7), "a state to go to: 2..6, 5 is Operation enabled"),
+    "switching_state": _Allowed(range(2, 7), "a state to go to: 2..6, 5 is Operation enabled"),
     "position_mode": _MODE,
     "velocity_mode": _MODE,
     "effort_mode": _MODE,

@@ -72,7 +72,7 @@ _MISSED: Final = 3
 """So many periods without a heartbeat, and it is gone."""
 
 
-class StrayHeartbeat:
+class _StrayHeartbeat:
     """What was heard of the heartbeat of a node before the run.
 
     Args:
@@ -179,7 +179,7 @@ class ConformRun:
         )
         self._client = SdoClient(self._exchange, node_id)
         self._care = NodeCare(self._exchange, self._client, node_id, plan.level)
-        self._stray = StrayHeartbeat(self._exchange, node_id)
+        self._stray = _StrayHeartbeat(self._exchange, node_id)
         player = StepPlayer(self._exchange, node_id, plan.stimulus, self._client)
         self._judge = Judge(plan, self._exchange, player, self._care, self._permission)
         self._longest_us = round(plan.longest_s * 1e6)

@@ -93,7 +93,7 @@ def _resolve(text: str, names: Names) -> str:
     return NAME.sub(lambda match: names.text(match[1] or match[2], match[3] or ""), text)
 
 
-def resolve_address(target: str, names: Names) -> Address:
+def _resolve_address(target: str, names: Names) -> Address:
     """Return the address of `$name`, `1017:00` or `$tpdo.comm:01`."""
     match = NAME.fullmatch(target)
     if match is not None and not match[3]:
@@ -386,7 +386,7 @@ def _bind_step(step: Step, names: Names) -> Step:
         return step  # made of an object: all its words are numbers
     bind = _bind_word if isinstance(action, Macro) else _bind_value
     values = [
-        resolve_address(getattr(action, name), names)
+        _resolve_address(getattr(action, name), names)
         if name == "at"
         else bind(getattr(action, name), names)
         for name in action.__match_args__
@@ -408,7 +408,7 @@ def _bind_word(word: Any, names: Names) -> Any:
     if isinstance(word, tuple):
         return tuple(_bind_word(each, names) for each in word)
     if _ADDRESS.fullmatch(word):
-        return resolve_address(word, names)
+        return _resolve_address(word, names)
     match = NAME.fullmatch(word)
     if match is None or match[3]:
         return _resolve(word, names)

@@ -37,14 +37,14 @@ class Group(NamedTuple):
 
 
 @cache
-def read_group(name: str) -> Group:
+def _read_group(name: str) -> Group:
     """Return a group that comes with the package."""
     return parse_group(_text(name))
 
 
 def read_suite() -> tuple[Group, ...]:
     """Return all groups that come with the package, in the order in which they are judged."""
-    return tuple(map(read_group, ORDER))
+    return tuple(map(_read_group, ORDER))
 
 
 def suite_checks() -> list[Check]:
@@ -56,7 +56,7 @@ def chosen_checks(plan: ConformancePlan) -> Iterator[Check]:
     """Yield the checks of the suite that a plan chooses; the files of other groups are not read."""
     for name in ORDER:
         if plan.may_choose(name):
-            yield from filter(plan.chooses, read_group(name).checks)
+            yield from filter(plan.chooses, _read_group(name).checks)
 
 
 @cache

@@ -30,7 +30,7 @@ _STARTED_US: Final = 2_000
 V = TypeVar("V")
 
 
-class Named(dict[str, V]):
+class _Named(dict[str, V]):
     """What has a name; of a name that is none it says which there are.
 
     Args:
@@ -67,9 +67,9 @@ class CanopenMaster(Closing):
             raise TypeError(f"a master needs a CAN bus, got {type(link).__name__}")
         self._link = cast(StampedLink, link)  # what has receive_stamped is one
         self.nmt = NmtMaster(plan)
-        self.joints = Named[drive_driver.DriveDriver]("joint", {})
+        self.joints = _Named[drive_driver.DriveDriver]("joint", {})
         slaves = {slave.assignment.name: slave for slave in self.nmt.slaves.values()}
-        self._by_name = Named("slave", slaves)
+        self._by_name = _Named("slave", slaves)
 
     def close(self) -> None:
         """Close the bus; the slaves stay as they are."""
@@ -92,7 +92,7 @@ class CanopenMaster(Closing):
         """Let the master exchange process data and drive drives from now on."""
         self.nmt.process_data = process_data
         drivers = [driver for node in process_data.drives for driver in node.drivers]
-        self.joints = Named("joint", {driver.name: driver for driver in drivers})
+        self.joints = _Named("joint", {driver.name: driver for driver in drivers})
 
     def boot(self, within: _Duration = "10s") -> None:
         """Start the network: let time pass until each slave has booted.
@@ -224,12 +224,12 @@ def _never() -> bool:
 
 # The master that a bus.yml describes, on a bus.
 
-SDO_TIMEOUT_US: Final = 100_000
+_SDO_TIMEOUT_US: Final = 100_000
 """As Lely's master has it, unless told otherwise."""
 
 
 def open_master(
-    link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
+    link: Link[Any], path: Path | str, *, sdo_timeout_us: int = _SDO_TIMEOUT_US
 ) -> CanopenMaster:
     """Return the master of a bus.yml; it has sent nothing yet.
 
@@ -254,7 +254,7 @@ def open_master(
 
 
 def _master_of(
-    link: Link[Any], bus: BusFile, sdo_timeout_us: int = SDO_TIMEOUT_US
+    link: Link[Any], bus: BusFile, sdo_timeout_us: int = _SDO_TIMEOUT_US
 ) -> CanopenMaster:
     """Return the master of a bus.yml that was read."""
     master = CanopenMaster(link, replace(plan_of(bus), sdo_timeout_us=sdo_timeout_us))

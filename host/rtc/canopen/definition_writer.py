@@ -25,26 +25,26 @@ from tickrig.host.text.whole_file import write_whole
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-Table = dict[str, Any]
+_Table = dict[str, Any]
 
 
-class Hex(int):
+class _Hex(int):
     """A number that is written 0x.."""
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes `Hex` as such, and repeats values in place of referring to them."""
+    """Writes `_Hex` as such, and repeats values in place of referring to them."""
 
     def ignore_aliases(self, data: object) -> bool:
         """Write no anchors."""
         return True
 
 
-def _represent(dumper: _Dumper, value: Hex) -> yaml.ScalarNode:
+def _represent(dumper: _Dumper, value: _Hex) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:int", f"0x{value:X}")
 
 
-_Dumper.add_representer(Hex, _represent)
+_Dumper.add_representer(_Hex, _represent)
 
 
 def save_definition(definition: SystemDefinition, folder: Path, path: Path) -> None:
@@ -75,7 +75,7 @@ def write_definition(definition: SystemDefinition) -> str:
     )
 
 
-def _sections(definition: SystemDefinition) -> Iterator[tuple[str, Table | list[Table]]]:
+def _sections(definition: SystemDefinition) -> Iterator[tuple[str, _Table | list[_Table]]]:
     yield "bus", _changed(definition.bus)
     yield "master", _changed(definition.master)
     yield "nodes", [_node(node) for node in definition.nodes]
@@ -85,7 +85,7 @@ def _sections(definition: SystemDefinition) -> Iterator[tuple[str, Table | list[
     yield "start", _plain(_changed(definition.start))
 
 
-def _changed(value: DataclassInstance) -> Table:
+def _changed(value: DataclassInstance) -> _Table:
     """Return the fields that are not as by default, by their keys in the file."""
     return {
         item.metadata.get("key", item.name): getattr(value, item.name)
@@ -98,7 +98,7 @@ def _default(item: Field[Any]) -> object:
     return item.default if item.default_factory is MISSING else item.default_factory()
 
 
-def _plain(values: Table) -> Table:
+def _plain(values: _Table) -> _Table:
     """Return lists for tuples and texts for words of an enumeration."""
     return {key: _plain_value(value) for key, value in values.items()}
 
@@ -109,7 +109,7 @@ def _plain_value(value: object) -> object:
     return str(value) if isinstance(value, Role) else value
 
 
-def _node(node: NodeEntry) -> Table:
+def _node(node: NodeEntry) -> _Table:
     values = _plain(_changed(node))
     if node.ports:
         values["ports"] = dict(node.ports)
@@ -120,30 +120,30 @@ def _node(node: NodeEntry) -> Table:
     return values
 
 
-def _pdo(pdo: PdoEntry) -> Table:
+def _pdo(pdo: PdoEntry) -> _Table:
     values = _changed(pdo)
     if pdo.mapping is not None:
-        values["mapping"] = [Hex(entry.encode()) for entry in pdo.mapping]
+        values["mapping"] = [_Hex(entry.encode()) for entry in pdo.mapping]
     if pdo.cob_id is not None:
-        values["cob_id"] = Hex(pdo.cob_id)
+        values["cob_id"] = _Hex(pdo.cob_id)
     return values
 
 
-def _sdo_port(entry: SdoPortEntry) -> Table:
-    values: Table = {"index": Hex(entry.index), "direction": entry.direction.value}
+def _sdo_port(entry: SdoPortEntry) -> _Table:
+    values: _Table = {"index": _Hex(entry.index), "direction": entry.direction.value}
     return values if entry.type is None else {**values, "type": entry.type}
 
 
-def _sdo(entry: SdoEntry) -> Table:
+def _sdo(entry: SdoEntry) -> _Table:
     values = {item.name: getattr(entry, item.name) for item in fields(entry)}
-    return {**values, "index": Hex(entry.index)}
+    return {**values, "index": _Hex(entry.index)}
 
 
-def _link(link: PdoLink) -> Table:
+def _link(link: PdoLink) -> _Table:
     return {"from": str(link.source), "to": str(link.target)}
 
 
-def _rt_connection(entry: RtConnection) -> Table:
+def _rt_connection(entry: RtConnection) -> _Table:
     ends: Mapping[str, object] = {"from": entry.source, "to": entry.target}
     return {**ends, "properties": dict(entry.properties)} if entry.properties else {**ends}
 

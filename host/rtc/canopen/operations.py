@@ -117,7 +117,7 @@ _WELL_US: Final = 60_000_000
 """A node that was well for so long has all its restarts again."""
 
 
-class RestartCounter:
+class _RestartCounter:
     """Counts the restarts of a node.
 
     Args:
@@ -201,7 +201,7 @@ class NodeOperations:
         self.nmt_state: NmtState | None = None
         self.now_us = 0
         self.resetting = self._stopping = False
-        self.restart = RestartCounter(entry.restart)
+        self.restart = _RestartCounter(entry.restart)
 
     @property
     def is_inactive(self) -> bool:

@@ -22,7 +22,7 @@ from tickrig.wire.rtc_types.rtc import Time
 # Ports of a PDO (ours: K2, K3, K4).
 
 
-class PortShape:
+class _PortShape:
     """The ports of a PDO: one for all its objects, or one for each if their types differ.
 
     Args:
@@ -61,7 +61,7 @@ class PdoSource:
     """
 
     def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
-        shape = PortShape(layout, name)
+        shape = _PortShape(layout, name)
         self.layout, self.size, self._single = layout, layout.size, shape.single
         self._decode = pdo_layout.pdo_decoder(layout)
         self.ports = tuple(
@@ -93,7 +93,7 @@ class PdoSink:
     """
 
     def __init__(self, layout: pdo_layout.PdoLayout, name: str) -> None:
-        shape = PortShape(layout, name)
+        shape = _PortShape(layout, name)
         self.layout, self._shape, self.linked = layout, shape, False
         self.ports = tuple(
             InPort[Any](port, kind) for port, kind in zip(shape.names, shape.types, strict=True)

@@ -161,7 +161,7 @@ _QUIET_US: Final = 1_000_000
 """Another master that was not heard for so long is told of anew."""
 
 
-class FrameDispatcher:
+class _FrameDispatcher:
     """Tells nodes what they sent, and the log what others did.
 
     Args:
@@ -285,7 +285,7 @@ class RtcCanopenServer:
         self.nodes = {entry.id: self._node(entry, files) for entry in definition.nodes}
         self.links = PdoLinks(self.nodes, definition.pdo_links, self.notify)
         self.connections = PortConnections(self.manager, definition.rt_connections, self.notify)
-        self._receiver = FrameDispatcher(self.nodes, definition, self)
+        self._receiver = _FrameDispatcher(self.nodes, definition, self)
         self._data = PdoDataFlow(self.nodes, self.send, self.notify)
         self._by_sdo = SdoDataFlow(self.nodes, self.notify)
         self._start_order = tuple(self.nodes[node_id] for node_id in definition.start_order)

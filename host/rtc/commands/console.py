@@ -18,14 +18,14 @@ from tickrig.wire.rtc_types.rtc import TimedLong
 _READ_BYTES: Final = 4_096
 
 
-class TypedTo(Protocol):
+class _TypedTo(Protocol):
     """A component to which lines are typed, as ConsoleIn and PositionInput."""
 
     def typed(self, line: str) -> None:
         """Take a line; ValueError if it is none for this component, which is not changed."""
 
 
-def _is_typed_to(component: object) -> TypeGuard[TypedTo]:
+def _is_typed_to(component: object) -> TypeGuard[_TypedTo]:
     """Return whether lines are typed to a component."""
     return hasattr(component, "typed")
 

@@ -248,7 +248,7 @@ class SendBuffer(RingBuffer[P]):
 P_co = TypeVar("P_co", covariant=True)
 
 
-class OutPortConsumer(Protocol[P_co]):
+class _OutPortConsumer(Protocol[P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> P_co | None:
@@ -333,7 +333,7 @@ class InPortPushConnector(_InPortConnector[T, P]):
         return status
 
 
-class PulledBuffer(RingBuffer[T]):
+class _PulledBuffer(RingBuffer[T]):
     """A ring buffer that asks for more as soon as it is empty.
 
     Args:
@@ -387,12 +387,12 @@ class InPortPullConnector(_InPortConnector[T, P]):
         port: InPort[T],
         end: PeerEnd,
         codec: Codec[T, P],
-        consumer: OutPortConsumer[P],
+        consumer: _OutPortConsumer[P],
         thread: PeerCaller,
         calls: CallQueue,
     ) -> None:
         super().__init__(port, end, codec, calls)
-        self.buffer = PulledBuffer(end.options.inport, self._request)
+        self.buffer = _PulledBuffer(end.options.inport, self._request)
         self._consumer, self._thread, self._fetching = consumer, thread, False
         self._watch = PeerWatch(self._way)
 
@@ -434,7 +434,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
 P_contra = TypeVar("P_contra", contravariant=True)
 
 
-class InPortConsumer(Protocol[P_contra]):
+class _InPortConsumer(Protocol[P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
     def put(self, payload: P_contra, /) -> PortStatus:
@@ -475,7 +475,7 @@ class OutPortPushConnector(Connector[Any], Generic[T, P]):
         port: OutPort[T],
         end: PeerEnd,
         codec: Codec[T, P],
-        consumer: InPortConsumer[P],
+        consumer: _InPortConsumer[P],
         thread: PeerCaller,
     ) -> None:
         options = replace(end.options, dataflow=DataflowType.PUSH)

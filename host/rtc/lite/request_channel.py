@@ -83,7 +83,7 @@ _KEPT: Final = 8
 _FRAMES_LOG: Final = log_of(__name__)
 
 
-class ReplyDecoder(Protocol):
+class _ReplyDecoder(Protocol):
     """`Decoder` or `RtnoReplies`."""
 
     @property
@@ -116,7 +116,7 @@ class FrameLink:
     """
 
     def __init__(
-        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: ReplyDecoder
+        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: _ReplyDecoder
     ) -> None:
         self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us
@@ -158,7 +158,7 @@ class FrameLink:
         self.latest.append(f"{self.now_us / 1e6:.3f} {arrow} {str(frame.body)[2:-1]}")
 
 
-class RtnoLink(FrameLink):
+class _RtnoLink(FrameLink):
     """Says what RTno has a letter for, and makes up for the rest.
 
     | asked for | said instead |
@@ -424,7 +424,7 @@ class RequestChannel:
 
 def _frames_over(link: Link[bytes], settings: ProxySettings) -> FrameLink:
     if settings.framing is Framing.RTNO:
-        return RtnoLink(link)
+        return _RtnoLink(link)
     checksum = settings.checksum
     return FrameLink(link, lambda frame: frame.encode(checksum), LiteDecoder(REPLIES, checksum))
 

@@ -135,10 +135,10 @@ class WrappedHeading(Adapter[iis.TimedPose2D, iis.TimedPose2D]):
 
     def convert(self, value: iis.TimedPose2D) -> iis.TimedPose2D | None:
         """Return the pose with its heading in -pi..pi; None if a number is none."""
-        return with_wrapped_heading(value)
+        return _with_wrapped_heading(value)
 
 
-def with_wrapped_heading(value: iis.TimedPose2D) -> iis.TimedPose2D | None:
+def _with_wrapped_heading(value: iis.TimedPose2D) -> iis.TimedPose2D | None:
     """Return a pose with its heading in -pi..pi; None if a number is none."""
     pose = ports.to_pose(value.data)
     return pose and iis.TimedPose2D(value.tm, value.id, ports.to_pose_2d(pose), value.error)
@@ -231,7 +231,7 @@ class GoalInterface(RtComponent):
         now = Time.from_us(ec.now_us)
         if not goal.data:
             self.min_path.write(iis.TimedPath2DSeq(now))
-        elif (pose := with_wrapped_heading(iis.TimedPose2D(now, data=goal.data[0]))) is not None:
+        elif (pose := _with_wrapped_heading(iis.TimedPose2D(now, data=goal.data[0]))) is not None:
             self.position.write(pose)
         return ReturnCode.RTC_OK
 
@@ -246,7 +246,7 @@ _LEAST_WAY_M: Final = 1e-3
 """Metres between way points that are no way."""
 
 
-class PathStage(Enum):
+class _PathStage(Enum):
     """What the cart does on its path."""
 
     IDLE = auto()
@@ -255,7 +255,7 @@ class PathStage(Enum):
     LAST_TURN = auto()  # to the heading of the last way point
 
 
-class WayPoint(NamedTuple):
+class _WayPoint(NamedTuple):
     """A way point, and the speed on the line that leads there, negative backward."""
 
     pose: Pose
@@ -299,9 +299,9 @@ class PathInterface(RtComponent):
         self._forget()
 
     def _forget(self) -> None:
-        self._points: list[WayPoint] = []
+        self._points: list[_WayPoint] = []
         self._line, self._at, self._speed = Pose(), 0, 0.0
-        self._stage, self._fresh = PathStage.IDLE, False
+        self._stage, self._fresh = _PathStage.IDLE, False
         self._order: Path | None = None
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -328,7 +328,7 @@ class PathInterface(RtComponent):
             return
         speeds += [0.0] * (len(poses) - len(speeds))
         self._forget()
-        self._points = [WayPoint(*pair) for pair in zip(poses, speeds, strict=True)]
+        self._points = [_WayPoint(*pair) for pair in zip(poses, speeds, strict=True)]
         self._fresh = len(poses) > 1
         if not self._fresh:
             self._command(now, ports.RunMode.STOP, Pose())
@@ -340,16 +340,16 @@ class PathInterface(RtComponent):
             self._fresh = False
             self._next(now, pose)
         match self._stage:
-            case PathStage.TURN:
+            case _PathStage.TURN:
                 if _off(self._line, pose) < self.turn_angle.value:
-                    self._stage = PathStage.LINE
+                    self._stage = _PathStage.LINE
                     self._drive(now, pose)
-            case PathStage.LINE:
+            case _PathStage.LINE:
                 self._drive(now, pose)
-            case PathStage.LAST_TURN:
+            case _PathStage.LAST_TURN:
                 if _off(self._line, pose) < self.goal_angle.value:
                     self._finish(now)
-            case PathStage.IDLE:
+            case _PathStage.IDLE:
                 pass
 
     def _next(self, now: Time, pose: Pose) -> None:
@@ -359,13 +359,13 @@ class PathInterface(RtComponent):
             target, speed = self._points[self._at]
             if pose.distance(target) > max(_LEAST_WAY_M, self.goal_distance.value):
                 heading = pose.bearing(target) + (pi if speed < 0 else 0.0)
-                self._turn(now, PathStage.TURN, target._replace(heading=wrap(heading)))
+                self._turn(now, _PathStage.TURN, target._replace(heading=wrap(heading)))
                 return
             self._report(now, target, PASSED)
             self._at += 1
-        self._turn(now, PathStage.LAST_TURN, self._points[-1].pose)
+        self._turn(now, _PathStage.LAST_TURN, self._points[-1].pose)
 
-    def _turn(self, now: Time, stage: PathStage, line: Pose) -> None:
+    def _turn(self, now: Time, stage: _PathStage, line: Pose) -> None:
         self._stage, self._line, self._speed = stage, line, 0.0
         self._command(now, ports.RunMode.SPIN, line, w=1.0)
 
@@ -385,7 +385,7 @@ class PathInterface(RtComponent):
         self._command(now, ports.RunMode.LINEFOLLOW, self._line, v=way * self._speed)
 
     def _finish(self, now: Time) -> None:
-        self._stage = PathStage.IDLE
+        self._stage = _PathStage.IDLE
         self._command(now, ports.RunMode.STOP, Pose())
         self._report(now, self._points[-1].pose, STOPPED)
 

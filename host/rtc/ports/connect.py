@@ -42,7 +42,7 @@ def connect(
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
     for port in (first, second) if connector_id else ():
         refuse_known_id(port, connector_id)
-    connector = _connector(first, second, properties or {}, ConnectorNames(name, connector_id))
+    connector = _connector(first, second, properties or {}, _ConnectorNames(name, connector_id))
     connector.begin()
     return connector
 
@@ -54,7 +54,7 @@ def refuse_known_id(port: AnyPort, connector_id: str) -> None:
         raise RtcRefused(message, ReturnCode.PRECONDITION_NOT_MET)
 
 
-class ConnectorNames(NamedTuple):
+class _ConnectorNames(NamedTuple):
     """What a caller wants a connector to be called; empty where that does not matter."""
 
     name: str
@@ -62,7 +62,7 @@ class ConnectorNames(NamedTuple):
 
 
 def _connector(
-    first: AnyPort, second: AnyPort, properties: Properties, names: ConnectorNames
+    first: AnyPort, second: AnyPort, properties: Properties, names: _ConnectorNames
 ) -> ConnectorBase:
     match first, second:
         case OutPort(), InPort():
@@ -76,7 +76,7 @@ def _connector(
 
 
 def _profile(
-    first: AnyPort, second: AnyPort, properties: Properties, names: ConnectorNames
+    first: AnyPort, second: AnyPort, properties: Properties, names: _ConnectorNames
 ) -> ConnectorProfile:
     ports = (first.full_name, second.full_name)
     connector_id = names.connector_id or automatic_id(ports)
@@ -84,7 +84,7 @@ def _profile(
 
 
 def _data_connector(
-    out: OutPort[Any], in_: InPort[Any], properties: Properties, names: ConnectorNames
+    out: OutPort[Any], in_: InPort[Any], properties: Properties, names: _ConnectorNames
 ) -> ConnectorBase:
     if out.data_type is not in_.data_type:
         raise RtcRefused(
@@ -97,7 +97,7 @@ def _data_connector(
 
 
 def _service_connector(
-    first: ServicePort, second: ServicePort, properties: Properties, names: ConnectorNames
+    first: ServicePort, second: ServicePort, properties: Properties, names: _ConnectorNames
 ) -> ConnectorBase:
     pairs = (*_pairs(first, second), *_pairs(second, first))
     if not pairs:

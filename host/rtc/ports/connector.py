@@ -173,7 +173,7 @@ T = TypeVar("T", bound=Struct)
 _SECOND_US: Final = 1_000_000
 
 
-class Publisher(Generic[T]):
+class _Publisher(Generic[T]):
     """Holds values until a tick takes them: at once with `new`, at multiples of a period else.
 
     With `new` the push policy `fifo` means `all`: OpenRTM pushes once a write.
@@ -253,7 +253,7 @@ class Connector(ConnectorBase, Generic[T]):
         pulled = options.dataflow is DataflowType.PULL
         at_once = pulled or options.subscription is SubscriptionType.FLUSH
         self.buffer = ring_buffer.RingBuffer[T](options.outport if pulled else options.inport)
-        self._publisher = None if at_once else Publisher[T](options)
+        self._publisher = None if at_once else _Publisher[T](options)
         self._encodes, self._endian = options.interface is InterfaceType.CORBA_CDR, options.endian
 
     @property

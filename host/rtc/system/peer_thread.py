@@ -24,7 +24,7 @@ _RETRY_US: Final = 1_000_000
 _LOG: Final = log_of(__name__)
 
 
-class CallingThread(threading.Thread):
+class _CallingThread(threading.Thread):
     """The thread of a `PeerThread`; it does not keep the process alive.
 
     Attributes:
@@ -40,7 +40,7 @@ def calls_run() -> bool:
     A process that ends in the middle of one may abort, or never end: the call is in code of C++.
     """
     threads = threading.enumerate()
-    return any(isinstance(thread, CallingThread) and thread.ending for thread in threads)
+    return any(isinstance(thread, _CallingThread) and thread.ending for thread in threads)
 
 
 class PeerThread:
@@ -61,7 +61,7 @@ class PeerThread:
         self.retry_s, self._order = retry_us / 1e6, count()
         self._calls: WaitingQueue[_PeerCall | None] = WaitingQueue()
         self._repeated: list[tuple[float, int, _PeerCall]] = []
-        self._thread = CallingThread(target=self._run, name=name, daemon=True)
+        self._thread = _CallingThread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
     def submit(self, call: _PeerCall) -> None:

@@ -78,7 +78,7 @@ class CacheLimits:
 
 
 @dataclass(slots=True)
-class CacheCounts:
+class _CacheCounts:
     """What became of the questions to a cache.
 
     Attributes:
@@ -128,7 +128,7 @@ class LookupCache(Generic[V]):
 
     def __init__(self, parse: Callable[[str], V]) -> None:
         self._parse, self._entries = parse, OrderedDict[str, _Entry[V]]()
-        self.counts, self.trouble, self.invalid, self._pending = CacheCounts(), "", "", 0
+        self.counts, self.trouble, self.invalid, self._pending = _CacheCounts(), "", "", 0
 
     def __len__(self) -> int:
         """Return how many addresses have a value."""

@@ -46,7 +46,7 @@ ELEMENTS: Final = (
 _Implied = tuple[ObjectDescription, list[EntryDescription]]
 
 
-class Way(NamedTuple):
+class _Way(NamedTuple):
     """What RPDOs and TPDOs differ in.
 
     Attributes:
@@ -63,8 +63,8 @@ class Way(NamedTuple):
 
 
 WAYS: Final = (
-    Way("RPDO", "NrOfRXPDO", 0x1400, 0x200),
-    Way("TPDO", "NrOfTXPDO", 0x1800, 0x180),
+    _Way("RPDO", "NrOfRXPDO", 0x1400, 0x200),
+    _Way("TPDO", "NrOfTXPDO", 0x1800, 0x180),
 )
 
 
@@ -91,7 +91,7 @@ def _implied_pdos(file: EdsFile) -> Iterator[_Implied]:
                 yield _mapping(file, way, number)
 
 
-def _numbers(file: EdsFile, way: Way, described: set[int]) -> list[int]:
+def _numbers(file: EdsFile, way: _Way, described: set[int]) -> list[int]:
     """Return the numbers of all PDOs, from 0 on."""
     begun, free = list[int](), list[int]()
     for number in range(_MOST_PDOS):
@@ -102,7 +102,7 @@ def _numbers(file: EdsFile, way: Way, described: set[int]) -> list[int]:
     return sorted([*begun, *islice(free, missing)])
 
 
-def _parameter(file: EdsFile, way: Way, number: int, subs: list[int]) -> _Implied:
+def _parameter(file: EdsFile, way: _Way, number: int, subs: list[int]) -> _Implied:
     index = way.first + number
     count = EntryDescription(index, 0, "Highest sub-index supported", _U8, CONST, default=subs[-1])
     rows = [_entry(file, index, sub, *ELEMENTS[sub - 1], RW) for sub in subs]
@@ -112,14 +112,14 @@ def _parameter(file: EdsFile, way: Way, number: int, subs: list[int]) -> _Implie
     return ObjectDescription(title, ObjectCode.RECORD), [count, *rows]
 
 
-def _cob_id(way: Way, number: int) -> EntryDescription:
+def _cob_id(way: _Way, number: int) -> EntryDescription:
     """Make the COB-ID of a PDO as CiA 301 has it."""
     index, (name, kind), on = way.first + number, ELEMENTS[0], number < _PREDEFINED
     cob_id = way.can_id + 0x100 * number if on else _OFF
     return EntryDescription(index, 1, name, kind, RW, default=cob_id, relative=on)
 
 
-def _mapping(file: EdsFile, way: Way, number: int) -> _Implied:
+def _mapping(file: EdsFile, way: _Way, number: int) -> _Implied:
     index = way.first + _MAPPING + number
     rows = [_entry(file, index, 0, "Number of mapped objects", _U8, RW)]
     for sub in range(1, _MOST_MAPPED + 1):

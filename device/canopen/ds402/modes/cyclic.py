@@ -230,7 +230,7 @@ _VELOCITY_SETTING: Final = 0x206B
 SETTINGS: Final = (_CURRENT_SETTING, _POSITION_SETTING, _VELOCITY_SETTING)
 
 
-class PositionSetting(LatchedSetPoint):
+class _PositionSetting(LatchedSetPoint):
     """Position mode, -1: 2062h in position units.
 
     That bit 8 of the controlword does nothing in these modes is DECISION K21.
@@ -244,7 +244,7 @@ class PositionSetting(LatchedSetPoint):
         return True
 
 
-class VelocitySetting(Mode):
+class _VelocitySetting(Mode):
     """Velocity mode, -2: 206Bh in velocity units.
 
     When the mode is chosen while the drive is enabled, 206Bh takes the present
@@ -268,7 +268,7 @@ class VelocitySetting(Mode):
         return True
 
 
-class CurrentSetting(Mode):
+class _CurrentSetting(Mode):
     """Current mode, -3: 2030h in milliamperes.
 
     When the mode is chosen while the drive is enabled, 2030h takes the present
@@ -292,8 +292,8 @@ class CurrentSetting(Mode):
 
 
 MODES: Final[dict[int, type[Mode]]] = {
-    -1: PositionSetting,
-    -2: VelocitySetting,
-    -3: CurrentSetting,
+    -1: _PositionSetting,
+    -2: _VelocitySetting,
+    -3: _CurrentSetting,
 }
 """By number in 6060h."""

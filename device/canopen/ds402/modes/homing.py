@@ -176,7 +176,7 @@ class HomingSearch(Part):
             self.phase = Phase.FAILED
 
 
-class Stage(Enum):
+class _Stage(Enum):
     """Where a homing is."""
 
     IDLE = auto()  # not begun, or interrupted
@@ -186,10 +186,10 @@ class Stage(Enum):
 
 
 _FLAGS: Final = {
-    Stage.IDLE: Statusword(0),
-    Stage.SEARCHING: Statusword(0),
-    Stage.ATTAINED: Statusword.MODE_12,
-    Stage.FAILED: Statusword.MODE_13,
+    _Stage.IDLE: Statusword(0),
+    _Stage.SEARCHING: Statusword(0),
+    _Stage.ATTAINED: Statusword.MODE_12,
+    _Stage.FAILED: Statusword.MODE_13,
 }
 
 
@@ -213,7 +213,7 @@ class Homing(Mode):
     def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
         self._path = trapezoid.PathFollower(self.reference)
-        self._stage = Stage.ATTAINED if self.axis.homed else Stage.IDLE
+        self._stage = _Stage.ATTAINED if self.axis.homed else _Stage.IDLE
         self._search: HomingSearch | None = None
         self._counts, self._velocity = self.axis.motor.counts, 0.0
         self._home: float | None = None
@@ -223,14 +223,14 @@ class Homing(Mode):
         method = METHODS.get(self.number(indices.HOMING_METHOD))
         self._counts, self._home = self.axis.motor.counts, None
         self.axis.homed = False
-        self._end(Stage.FAILED if method is None else Stage.SEARCHING)
+        self._end(_Stage.FAILED if method is None else _Stage.SEARCHING)
         if method is not None:
             self._search = HomingSearch(method, self._switches)
 
     def stop(self) -> None:
         """Interrupt a homing in progress."""
         if self._search is not None:
-            self._end(Stage.IDLE)
+            self._end(_Stage.IDLE)
 
     def halt(self, now_us: int) -> bool:
         """Interrupt a homing in progress; brake as 605Dh says."""
@@ -252,7 +252,7 @@ class Homing(Mode):
             self.flags |= Statusword.TARGET_REACHED
         return ended
 
-    def _end(self, stage: Stage) -> None:
+    def _end(self, stage: _Stage) -> None:
         self._stage, self._search = stage, None
         self._path.leave()
 
@@ -268,13 +268,13 @@ class Homing(Mode):
             method = search.method
             self._attain(method, self._counts if pulse is None or not method.by_index else pulse)
         elif search.phase is Phase.FAILED:
-            self._end(Stage.FAILED)
+            self._end(_Stage.FAILED)
 
     def _attain(self, method: HomingMethod, counts: int) -> None:
         """Take a place for the home position."""
         self.axis.place_home(self.number(indices.HOME_OFFSET), counts)
         self._home = float(counts) if method.approach else None
-        self._end(Stage.ATTAINED)
+        self._end(_Stage.ATTAINED)
 
     def _steer(self, search: HomingSearch, now_us: int) -> None:
         """Go where the search wants to go."""

@@ -20,7 +20,7 @@ from tickrig.device.canopen.ds402.modes.profile_position import ProfilePosition
 # Profile velocity, profile torque and cyclic synchronous torque mode (CiA 402-2).
 
 
-class ProfileVelocity(Mode):
+class _ProfileVelocity(Mode):
     """Ramps to the target velocity with 6083h and 6084h.
 
     Bit 10: the velocity is within 606Dh of the target for 606Eh; without a window,
@@ -64,7 +64,7 @@ class ProfileVelocity(Mode):
         self.flags = flags
 
 
-class ProfileTorque(Mode):
+class _ProfileTorque(Mode):
     """Ramps the current to the target torque, 6071h, with the slope 6087h.
 
     The torque is taken as the current: rated torque at rated current, without
@@ -94,7 +94,7 @@ class ProfileTorque(Mode):
         return False
 
 
-class CyclicTorque(Mode):
+class _CyclicTorque(Mode):
     """Has the torque 6071h and the offset 60B2h at once.
 
     When the mode is chosen while the drive is enabled, the target torque becomes
@@ -121,13 +121,13 @@ class CyclicTorque(Mode):
 MODES: Final[dict[int, type[Mode]]] = {
     0: Mode,
     1: ProfilePosition,
-    3: ProfileVelocity,
-    4: ProfileTorque,
+    3: _ProfileVelocity,
+    4: _ProfileTorque,
     6: Homing,
     7: InterpolatedPosition,
     8: CyclicPosition,
     9: CyclicVelocity,
-    10: CyclicTorque,
+    10: _CyclicTorque,
 }
 """Of any drive; a model may have more of its own, with negative numbers."""
 

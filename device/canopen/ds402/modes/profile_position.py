@@ -19,7 +19,7 @@ STEEPEST: Final = 1e12
 
 
 @dataclass(frozen=True, slots=True)
-class SetPoint(Immutable):
+class _SetPoint(Immutable):
     """A target and how to get there, as it was when the set-point was given.
 
     Attributes:
@@ -54,8 +54,8 @@ class ProfilePosition(Mode):
     def __init__(self, drive: DriveView) -> None:
         super().__init__(drive)
         self._path, self._near = trapezoid.PathFollower(self.reference), Window()
-        self._present: SetPoint | None = None
-        self._waiting: SetPoint | None = None
+        self._present: _SetPoint | None = None
+        self._waiting: _SetPoint | None = None
         self._last = self.reference.position
         self._acknowledges = self._arrived = False
 
@@ -92,19 +92,19 @@ class ProfilePosition(Mode):
         self._acknowledge()
         return stands
 
-    def _go(self, point: SetPoint) -> None:
+    def _go(self, point: _SetPoint) -> None:
         """Go to a set-point from here."""
         self._present, self._waiting, self._arrived = point, None, False
         self._path.leave()
 
-    def _pass_by(self, present: SetPoint, following: SetPoint) -> None:
+    def _pass_by(self, present: _SetPoint, following: _SetPoint) -> None:
         """Do not stop at the present set-point, if the way goes on in its direction."""
         onward = (following.target - present.target) * (present.target - self.reference.position)
         if onward > 0:
             self._present = replace(present, end_velocity=present.limits.velocity)
             self._path.leave()
 
-    def _set_point(self) -> SetPoint:
+    def _set_point(self) -> _SetPoint:
         settings, position = self.settings, self.number(indices.TARGET_POSITION)
         if self.drive.controlword & Controlword.RELATIVE:
             target = self._last + position * settings.units.per_position
@@ -118,7 +118,7 @@ class ProfilePosition(Mode):
             else trapezoid.RampShape.LINEAR
         )
         limits = _profile_limits(settings, shape)
-        return SetPoint(self._last, limits, settings.end_velocity, cut)
+        return _SetPoint(self._last, limits, settings.end_velocity, cut)
 
     def _plan(self, now_us: int) -> trapezoid.Path:
         start, point = self._path.motion, self._present

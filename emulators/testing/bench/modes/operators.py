@@ -28,7 +28,7 @@ from tickrig.wire.instant import NEVER
 # The hands at one real device, and the eyes on it.
 
 
-class DeviceOperator(Protocol):
+class _DeviceOperator(Protocol):
     """An operator: a human at the terminal, or an emulator that stands in for one.
 
     Names are those of the device alone, without the name of the device.
@@ -110,7 +110,7 @@ class Operators:
     ) -> None:
         self._plan, self._where, self._like = plan, where, like
         self._terminal, self._journal = terminal, journal
-        self._operators: dict[str, DeviceOperator] = {}
+        self._operators: dict[str, _DeviceOperator] = {}
         self._waiting: list[str] = []
         with ExitStack() as undo:
             undo.callback(self.close)
@@ -234,7 +234,7 @@ class Operators:
                 return True
         return False
 
-    def _start(self, device: str, operator: DeviceOperator) -> None:
+    def _start(self, device: str, operator: _DeviceOperator) -> None:
         """Have the inputs as the rig file has them at the start; nobody's hand plays a signal."""
         start = self._plan.devices[device].start
         values = {key: each for key, each in start.items() if not isinstance(each, SignalSpec)}
@@ -243,7 +243,7 @@ class Operators:
             said = ", ".join(f"{name}={value}" for name, value in values.items())
             self._journal.note(device, said, **values)
 
-    def _operator_of(self, device: str) -> DeviceOperator:
+    def _operator_of(self, device: str) -> _DeviceOperator:
         if path := self._where.control.get(device):
             return EmulatorOperator(path, self._plan.devices[device])
         power = self._where.power.get(device)
@@ -272,7 +272,7 @@ class Operators:
         quick = [device.name for device in on_wire if self._operators[device.name].quick]
         return (quick or [on_wire[0].name])[0], bare
 
-    def _operator_at(self, device: str) -> DeviceOperator:
+    def _operator_at(self, device: str) -> _DeviceOperator:
         if device not in self._operators:
             raise NotOnThisBench(f"nobody here is at {device}")
         return self._operators[device]

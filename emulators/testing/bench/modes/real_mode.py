@@ -43,7 +43,7 @@ _Call = Callable[[Callable[[], bytes]], bytes]
 """Does something between two ticks."""
 
 
-class ControlThread:
+class _ControlThread:
     """Serves a control socket, and has each request answered between two ticks of the rig.
 
     Args:
@@ -150,7 +150,7 @@ class RealMode(EmulatedMode):
             undo.callback(outside.close)
             mode = cls(rig_at(outside), outside)
             if plan.control is not None:
-                server = ControlThread(plan.control, mode._control, mode._thread.call)
+                server = _ControlThread(plan.control, mode._control, mode._thread.call)
                 mode._stack.callback(server.close)
             undo.pop_all()
         return mode

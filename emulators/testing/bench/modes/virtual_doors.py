@@ -67,7 +67,7 @@ class RigPassing:
 T = TypeVar("T")
 
 
-class Offers:
+class _Offers:
     """What programs find under names; a snapshot takes back what was offered since."""
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class VirtualDoors:
         self._rig, self._mounts = rig.rig, rig.state.mounts
         self._sides: dict[str, SerialSide] = {}
         self._addresses: dict[str, Address] = {}
-        self._offers = Offers()
+        self._offers = _Offers()
 
     def link(self, wire: str) -> Link[Any]:
         """Connect a link."""

@@ -65,7 +65,7 @@ class ColumnChecker:
         self._rules, self._made = rules, rules.make(eds_heartbeats)
         self._limit = rules.load(bit_rate)
         self._wanting: dict[int, list[tuple[int, Rule]]] = {}
-        self._selections: dict[str, BusSelection] = {}
+        self._selections: dict[str, _BusSelection] = {}
         self._loads: dict[str, ColumnLoad] = {}
         self._last_us, self._begun = 0, False
 
@@ -80,7 +80,7 @@ class ColumnChecker:
         for channel, rows, frames in by_channel(columns):
             if self._limit is not None:
                 placed += self._too_busy(self._limit, channel, rows, frames)
-            places, gaps = self._selections.setdefault(channel, BusSelection(self._made)).take(
+            places, gaps = self._selections.setdefault(channel, _BusSelection(self._made)).take(
                 frames
             )
             found.append(rows[places])
@@ -155,7 +155,7 @@ class ColumnChecker:
                     yield row, place, TrafficFinding(record.at_us, rule.name, text, record)
 
 
-class BusSelection:
+class _BusSelection:
     """Tells which frames of a bus rules must see: by their gaps, first bytes and places.
 
     Args:

@@ -585,7 +585,7 @@ class Answered(DeadlineDemand):
 
 # Demands on the values of signals.
 
-EMCY: Final = "emcy"
+_EMCY: Final = "emcy"
 
 
 @dataclass(frozen=True, slots=True)
@@ -629,7 +629,7 @@ class In(RuleDemand):
             return None
         self.judged = True
         sender = _sender_of(record)
-        if self._values.holds(signal) or (decoded.kind == EMCY and not signal.value):
+        if self._values.holds(signal) or (decoded.kind == _EMCY and not signal.value):
             self._wrong.discard(sender)
             return None
         if self._once and sender in self._wrong:

@@ -242,7 +242,7 @@ class QuantityParser(expression_rule.SliceParser):
 
 # EMCYs that take an error back: where errors are looked for they are none.
 
-EMCY: Final = "emcy"
+_EMCY: Final = "emcy"
 _OTHERS: Final = frozenset(["not", "!", "!="])
 
 
@@ -260,13 +260,13 @@ def errors_alone(
         signals: that it asks for.
     """
     words = {token.text for token in tokens}
-    if signals or EMCY not in words or words & _OTHERS:
+    if signals or _EMCY not in words or words & _OTHERS:
         return test
     return lambda record, decoded: test(record, decoded) and not _is_reset(decoded)
 
 
 def _is_reset(decoded: Decoded) -> bool:
-    return decoded.kind == EMCY and bool(decoded.signals) and not decoded.signals[0].value
+    return decoded.kind == _EMCY and bool(decoded.signals) and not decoded.signals[0].value
 
 
 DEMANDS: Final = (
@@ -299,7 +299,7 @@ _OF: Final = re.compile(r"(?<!\s)\s++of\s")
 _OWN_NODE: Final = re.compile(r"[0-9]{1,3}\.")
 
 
-class RuleParser(QuantityParser):
+class _RuleParser(QuantityParser):
     """Recursive descent over the grammar above.
 
     Args:
@@ -451,7 +451,7 @@ class Expression:
 
 
 def _made(name: str, text: str) -> expression_rule.ExpressionRule:
-    parser = RuleParser(text)
+    parser = _RuleParser(text)
     demand, scopes, paths, slices = parser.rule()
     mapped = "pdo" in text or any("." in path for path in paths)
     missing = filter_terms.MissingSignals(paths, parser.words)
@@ -468,7 +468,7 @@ def parse_rule(text: str, name: str = "") -> Expression:
     Raises:
         RuleError: it is none; says the column.
     """
-    demand, *_ = RuleParser(text).rule()
+    demand, *_ = _RuleParser(text).rule()
     name = name or " ".join(text.split())
     if not name.isprintable():
         raise RuleError(text, 1, f"its name {name!r} cannot be printed")

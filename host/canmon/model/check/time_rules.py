@@ -131,7 +131,7 @@ _SURE_GAPS: Final = 2
 """So many gaps tell a period, where a heartbeat comes after all; silence wants one."""
 
 
-class Watched:
+class _Watched:
     """What `NoLostHeartbeat` knows of a node on a bus.
 
     Args:
@@ -244,7 +244,7 @@ class NoLostHeartbeat(Rule):
 
     def __init__(self, periods_ms: Mapping[int, int]) -> None:
         self._periods_ms = {node: ms for node, ms in periods_ms.items() if ms}
-        self._nodes: dict[tuple[str, int], Watched] = {}
+        self._nodes: dict[tuple[str, int], _Watched] = {}
         self._begin_us: int | None = None
 
     def wants(self, ident: int, /) -> bool:
@@ -296,10 +296,10 @@ class NoLostHeartbeat(Rule):
         """Name the nodes of which nothing was judged."""
         return self._doubts()
 
-    def _watched(self, channel: str, node: int) -> Watched:
+    def _watched(self, channel: str, node: int) -> _Watched:
         key = channel, node
         if key not in self._nodes:
-            self._nodes[key] = Watched(channel, node, self._periods_ms.get(node, 0))
+            self._nodes[key] = _Watched(channel, node, self._periods_ms.get(node, 0))
         return self._nodes[key]
 
     def _is_watched(self, node: int) -> bool:

@@ -21,7 +21,7 @@ from tickrig.wire.can import ERROR_FLAG, EXTENDED_MAX, MAX_DATA_BYTES, STANDARD_
 #
 # It takes 0.3 us a frame, where writing each line takes 3 us.
 
-Cells = npt.NDArray[np.uint8]
+_Cells = npt.NDArray[np.uint8]
 """A part of each line: a row of characters, zeros where it has fewer."""
 
 _ABSENT: Final = 256
@@ -45,26 +45,26 @@ def fits(columns: Columns) -> bool:
     return all(name.isascii() and name.isprintable() for name in columns.channels)
 
 
-def _cells(numbers: npt.NDArray[Any]) -> Cells:
+def _cells(numbers: npt.NDArray[Any]) -> _Cells:
     """Return the characters in numbers of a table, a row for each frame."""
     return np.ascontiguousarray(numbers).view(np.uint8).reshape(len(numbers), -1)
 
 
-def _of_values(values: npt.NDArray[Any], write: Callable[[int], str]) -> Cells:
+def _of_values(values: npt.NDArray[Any], write: Callable[[int], str]) -> _Cells:
     """Write numbers of which few are different."""
     found, places = np.unique(values, return_inverse=True)
     texts = np.array([write(value).encode() for value in found.tolist()], "S")
     return _cells(texts[:, np.newaxis])[places]
 
 
-def _where(rows: npt.NDArray[np.bool_], text: bytes, other: bytes = b"") -> Cells:
+def _where(rows: npt.NDArray[np.bool_], text: bytes, other: bytes = b"") -> _Cells:
     """Write one text in some rows, and another one in all others."""
     width = max(len(text), len(other))
     both = np.array([other, text], f"S{width}")
     return _cells(both[:, np.newaxis])[rows.astype(np.int8)]
 
 
-def _lines(count: int, parts: Sequence[bytes | Cells]) -> str:
+def _lines(count: int, parts: Sequence[bytes | _Cells]) -> str:
     """Put the parts of all lines together."""
     widths = [len(part) if isinstance(part, bytes) else part.shape[1] for part in parts]
     matrix, begin = np.empty((count, sum(widths)), np.uint8), 0
@@ -75,7 +75,7 @@ def _lines(count: int, parts: Sequence[bytes | Cells]) -> str:
     return matrix.tobytes().translate(None, b"\0").decode("ascii")
 
 
-def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[bytes | Cells]:
+def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[bytes | _Cells]:
     """Write times of at least 0, whose seconds have a form of their own."""
     seconds = span_us // 1_000_000
     micros = span_us - seconds * 1_000_000
@@ -83,7 +83,7 @@ def _seconds(span_us: Ints, write: Callable[[int], str]) -> list[bytes | Cells]:
     return [_of_values(seconds, write), b".", _cells(_THREE[high]), _cells(_THREE[low])]
 
 
-def _channels(columns: Columns, write: Callable[[str], str] = str) -> Cells:
+def _channels(columns: Columns, write: Callable[[str], str] = str) -> _Cells:
     texts = np.array([write(name).encode() for name in columns.channels], "S")
     return _cells(texts[:, np.newaxis])[columns.channel]
 
@@ -92,7 +92,7 @@ def _escaped(name: str) -> str:
     return name.replace("%", "%%")
 
 
-def _octets(columns: Columns, table: npt.NDArray[Any], remote: npt.NDArray[np.bool_]) -> Cells:
+def _octets(columns: Columns, table: npt.NDArray[Any], remote: npt.NDArray[np.bool_]) -> _Cells:
     """Write the bytes of the data."""
     octets = columns.payload.astype("<u8").view(np.uint8).reshape(-1, MAX_DATA_BYTES)
     lengths = np.where(remote, 0, columns.dlc)
@@ -100,7 +100,7 @@ def _octets(columns: Columns, table: npt.NDArray[Any], remote: npt.NDArray[np.bo
     return _cells(table[np.where(there, octets, np.int16(_ABSENT))])
 
 
-def _idents(ident: npt.NDArray[np.uint32]) -> tuple[Cells, npt.NDArray[np.bool_]]:
+def _idents(ident: npt.NDArray[np.uint32]) -> tuple[_Cells, npt.NDArray[np.bool_]]:
     """Write identifiers of three or eight digits, and say which have eight."""
     long = ident & np.uint32(frames.EXTENDED | frames.ERROR) != 0
     short = _cells(_STANDARD[ident & STANDARD_MAX])
@@ -117,7 +117,7 @@ def _idents(ident: npt.NDArray[np.uint32]) -> tuple[Cells, npt.NDArray[np.bool_]
 def log_lines(columns: Columns) -> str:
     """Write frames as `log_line` does, each line with its end."""
     ident, remote = columns.ident, columns.ident & np.uint32(frames.REMOTE) != 0
-    sharp: list[bytes | Cells] = [b"#"]
+    sharp: list[bytes | _Cells] = [b"#"]
     if remote.any():
         lengths = np.where(remote, columns.dlc, 0)
         sharp += [_where(remote, b"R"), _of_values(lengths, lambda length: str(length or ""))]
@@ -164,7 +164,7 @@ class ScreenText:
             parts += [b"  ", _where(columns.sent, b"TX - -", b"RX - -")]
         parts += [b"  ", *self._indents(long), cells, b"  "]
         told = _cells(_THREE[columns.dlc])[:, 2:3]
-        data: list[bytes | Cells] = [b" [", told, b"] ", _octets(columns, _SPACED, remote)]
+        data: list[bytes | _Cells] = [b" [", told, b"] ", _octets(columns, _SPACED, remote)]
         errors = ident & np.uint32(frames.ERROR) != 0
         if remote.any():
             data.append(_where(remote, b" remote request"))
@@ -178,7 +178,7 @@ class ScreenText:
         data += [_of_values(blanks, lambda count: " " * count), b"%s\n"]
         return _lines(len(columns), [*parts, *data]) % tuple(meanings)
 
-    def _indents(self, long: npt.NDArray[np.bool_]) -> list[bytes | Cells]:
+    def _indents(self, long: npt.NDArray[np.bool_]) -> list[bytes | _Cells]:
         """Return what stands before identifiers of three digits once one of eight was there."""
         lines = self._lines
         if lines.width > len("7FF"):
@@ -188,7 +188,7 @@ class ScreenText:
         lines.width = len("1FFFFFFF")
         return [_where(np.maximum.accumulate(long) & ~long, b"     ")]
 
-    def _stamps(self, at_us: Ints) -> list[bytes | Cells]:
+    def _stamps(self, at_us: Ints) -> list[bytes | _Cells]:
         lines = self._lines
         if lines.form is frames.Stamp.NONE:
             return []
@@ -232,10 +232,10 @@ class ColumnText:
 
     def asc_lines(self, begin_us: int, number: Callable[[str], int], /) -> str:
         """Write lines as a log of Vector's has them."""
-        return asc_lines(self._columns, begin_us, number)
+        return _asc_lines(self._columns, begin_us, number)
 
 
-def asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) -> str:
+def _asc_lines(columns: Columns, begin_us: int, number: Callable[[str], int]) -> str:
     """Write data and remote frames as a log of Vector's has them, each line with its end.
 
     Args:

@@ -40,7 +40,7 @@ _SPREAD: Final = (
 """The bits of each byte, a byte of a word each."""
 
 
-class ColumnChanges:
+class _ColumnChanges:
     """Counts the changes of each bit of each identifier of a bus.
 
     A payload that is shorter than the one before counts as filled up with zeros.
@@ -109,14 +109,14 @@ class ColumnTraffic:
     """Counts all frames of all buses; what it keeps grows with identifiers, not with frames."""
 
     def __init__(self) -> None:
-        self._buses: dict[str, ColumnBus] = {}
+        self._buses: dict[str, _ColumnBus] = {}
         self._last_us = 0
 
     def take(self, columns: Columns) -> None:
         """Count a block of frames, in the order of the log."""
         for channel, _, frames in by_channel(columns):
             if channel not in self._buses:
-                self._buses[channel] = ColumnBus(channel, int(frames.at_us[0]))
+                self._buses[channel] = _ColumnBus(channel, int(frames.at_us[0]))
             self._buses[channel].take(frames)
             self._last_us = int(columns.at_us[-1])
 
@@ -129,7 +129,7 @@ class ColumnTraffic:
         )
 
 
-class ColumnBus:
+class _ColumnBus:
     """Counts one bus.
 
     Args:
@@ -141,7 +141,7 @@ class ColumnBus:
         self._channel, self._first_us, self._last_us = channel, first_us, first_us
         self._frames = self._went_back = 0
         self._load, self._errors = ColumnLoad(first_us), traffic.ErrorStatistics()
-        self._idents, self._gaps, self._changes = Identifiers(), ColumnGaps(), ColumnChanges()
+        self._idents, self._gaps, self._changes = Identifiers(), ColumnGaps(), _ColumnChanges()
         self._bits, self._dlc = np.empty(0, np.int64), np.empty(0, np.uint8)
 
     def take(self, frames: Columns) -> None:

@@ -85,7 +85,7 @@ class PdoDecoder:
         return Decoded(kind, node, said, tuple(signals), self.source, size=told)
 
 
-class MpdoLayout:
+class _MpdoLayout:
     """Decodes multiplexed PDOs: each frame names its object.
 
     Args:
@@ -165,7 +165,7 @@ _TPDO, _RPDO = "tpdo", "rpdo"
 _INDICES: Final = {_TPDO: (0x1800, 0x1A00, 0x180), _RPDO: (0x1400, 0x1600, 0x200)}
 """First communication parameter, first mapping, pre-defined CAN-ID of the first PDO."""
 
-_Layout = PdoDecoder | MpdoLayout
+_Layout = PdoDecoder | _MpdoLayout
 
 
 class NodePdo(NamedTuple):
@@ -251,7 +251,7 @@ def _layout(pdo: NodePdo, memory: NodeMemory) -> _Layout | None:
         note = f"{UNMAPPED}: {mapping:04X}h was not heard"
         return PdoDecoder((pdo.kind, pdo.node, source), note=note) if source else None
     if count in MPDO:
-        return MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
+        return _MpdoLayout((pdo.kind, pdo.node, source), memory.describe)
     entries = mapped_objects(memory, mapping, min(count, MAX_MAPPED_OBJECTS))
     if (STATUSWORD, 16) in {((item.index, item.sub), item.bits) for item in entries}:
         memory.maps_statusword()

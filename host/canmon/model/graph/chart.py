@@ -191,7 +191,7 @@ _STYLE: Final = (
 )
 
 
-class Area(NamedTuple):
+class _Area(NamedTuple):
     """Where the curves are, in pixels."""
 
     left: int
@@ -200,12 +200,12 @@ class Area(NamedTuple):
     height: int
 
 
-def _area_of(axes: int, curves: int, width: int, height: int) -> Area:
+def _area_of(axes: int, curves: int, width: int, height: int) -> _Area:
     """Return what remains for the curves beside axes and legend: 50 pixels at least."""
     left = _AXIS_WIDTH
     right = _AXIS_WIDTH * max(0, axes - 1) + 16
     top = _LEGEND_HEIGHT * curves + 8
-    return Area(left, top, max(50, width - left - right), max(50, height - top - _BOTTOM))
+    return _Area(left, top, max(50, width - left - right), max(50, height - top - _BOTTOM))
 
 
 def svg(series: Sequence[Series], view: View, width: int = 960, height: int = 400) -> str:
@@ -230,7 +230,7 @@ def svg(series: Sequence[Series], view: View, width: int = 960, height: int = 40
     return "\n".join(part for part in parts if part) + "\n"
 
 
-def _rect(area: Area, more: str = "") -> str:
+def _rect(area: _Area, more: str = "") -> str:
     left, top, width, height = area
     return f'<rect x="{left}" y="{top}" width="{width}" height="{height}"{more}/>'
 
@@ -240,7 +240,7 @@ def _text_element(x: float, y: float, anchor: str, text: str, colour: str = "") 
     return f'<text x="{x:g}" y="{y:g}" text-anchor="{anchor}"{fill}>{escape(text)}</text>'
 
 
-def _time_axis(view: View, area: Area) -> Iterator[str]:
+def _time_axis(view: View, area: _Area) -> Iterator[str]:
     low, high = view.seconds(view.from_us), view.seconds(view.to_us)
     bottom = area.top + area.height
     for second, label in ticks(low, high, max(2, area.width // 100)):
@@ -249,7 +249,7 @@ def _time_axis(view: View, area: Area) -> Iterator[str]:
         yield _text_element(x, bottom + 18, "middle", f"{label} s")
 
 
-def _value_axes(drawn: Chart, area: Area) -> Iterator[str]:
+def _value_axes(drawn: Chart, area: _Area) -> Iterator[str]:
     for number, (axis, (low, high)) in enumerate(drawn.ranges.items()):
         owners = [n for n, curve in enumerate(drawn.curves) if curve.axis == axis]
         colour = COLOURS[owners[0] % len(COLOURS)] if len(drawn.ranges) > 1 else ""
@@ -262,7 +262,7 @@ def _value_axes(drawn: Chart, area: Area) -> Iterator[str]:
             yield _text_element(x, y + 4, anchor, label, colour)
 
 
-def _curves(drawn: Chart, area: Area) -> Iterator[str]:
+def _curves(drawn: Chart, area: _Area) -> Iterator[str]:
     for number, curve in enumerate(drawn.curves):
         colour = COLOURS[number % len(COLOURS)]
         path = "L".join(_points(curve, drawn.ranges[curve.axis], area))
@@ -270,7 +270,7 @@ def _curves(drawn: Chart, area: Area) -> Iterator[str]:
         yield f'<path class="curve" stroke="{colour}" d="{path and "M"}{path}">{title}</path>'
 
 
-def _points(curve: Curve, shown: tuple[float, float], area: Area) -> list[str]:
+def _points(curve: Curve, shown: tuple[float, float], area: _Area) -> list[str]:
     low, high = shown
     points: list[str] = []
     for x, bar in curve.stops:
@@ -292,7 +292,7 @@ def _legend(curves: Sequence[Curve]) -> Iterator[str]:
         )
 
 
-def _cursor(view: View, area: Area) -> str:
+def _cursor(view: View, area: _Area) -> str:
     if view.cursor_us is None:
         return ""
     x = area.left + (view.cursor_us - view.from_us) / view.span_us * area.width

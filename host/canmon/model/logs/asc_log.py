@@ -1,6 +1,6 @@
 """Vector's ASC logs: whatever header they have, with absolute and with relative times.
 
->>> lines, tally = AscLines(), mark.LogTally()
+>>> lines, tally = _AscLines(), mark.LogTally()
 >>> for line in ("base hex  timestamps relative", " 0.100000 1  705  Rx d 1 7F", " 0.1 1  705  Rx d 1 05"):
 ...     record = lines.read(line, tally)
 >>> record.at_us, record.channel, str(record.frame)
@@ -84,7 +84,7 @@ _MONTHS: Final = {
 """English, and German where that differs: Vector's tools write the names of the machine."""
 
 
-class AscLines:
+class _AscLines:
     """Reads the lines of an ASC log, in their order.
 
     Times count from the date of the header or of the trigger block that they stand in, or, with
@@ -273,4 +273,4 @@ class AscLogReader(LineLogReader):
     """A reader of an ASC log."""
 
     comments = ("//",)
-    make_lines = AscLines
+    make_lines = _AscLines

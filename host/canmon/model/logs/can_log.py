@@ -94,7 +94,7 @@ class CanLogReader:
         """Read the file."""
         return cast("Iterator[Record]", self.blocks(None))
 
-    def blocks(self, apart: TakeApart | None) -> Iterator[Record | BlfBlock]:
+    def blocks(self, apart: _TakeApart | None) -> Iterator[Record | BlfBlock]:
         """Read the file; what `apart` takes apart of a BLF log comes as it gives it."""
         self.tally = LogTally()
         names: dict[object, str] = {}
@@ -113,12 +113,12 @@ class CanLogReader:
         """Read the file; its marks are counted alone."""
         return iter(self)
 
-    def _messages(self, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
+    def _messages(self, apart: _TakeApart | None) -> Iterator[can.Message | BlfBlock]:
         logging.getLogger("can.io.blf").addHandler(_UNSAID)
         with log_file.open_log(self._path) as file:
             try:
                 if self._kind is log_file.LogFormat.BLF:
-                    yield from self._blf(BlfReader(file), apart)
+                    yield from self._blf(_BlfReader(file), apart)
                 else:
                     yield from self._mf4(file)
             except log_file.LogError:
@@ -138,7 +138,9 @@ class CanLogReader:
         except NotImplementedError as error:
             raise log_file.LogError(f"{self._path}: {log_file.NO_MF4}") from error
 
-    def _blf(self, reader: BlfReader, apart: TakeApart | None) -> Iterator[can.Message | BlfBlock]:
+    def _blf(
+        self, reader: _BlfReader, apart: _TakeApart | None
+    ) -> Iterator[can.Message | BlfBlock]:
         count, reader.tally, reader.apart = 0, self.tally, apart
         for message in cast("Iterator[can.Message | BlfBlock]", reader):
             count += 1 if isinstance(message, can.Message) else message.frames
@@ -179,7 +181,7 @@ class BlfBlock(NamedTuple):
     end: int
 
 
-TakeApart = Callable[[bytes, float], BlfBlock | None]
+_TakeApart = Callable[[bytes, float], BlfBlock | None]
 """Takes the contents of a container apart, whose log begins at a time in s."""
 
 _FILE: Final = struct.Struct("<4sL8xQ8xL")  # signature, sizes of header and file, objects
@@ -207,7 +209,7 @@ _ERROR_COUNT: Final = struct.Struct("<20xL")
 _COUNTERS: Final = struct.Struct("<2xBB")
 
 
-class BlfReader(can.BLFReader):
+class _BlfReader(can.BLFReader):
     """python-can's reader, with all error frames, and an end at objects without a size.
 
     Attributes:
@@ -216,7 +218,7 @@ class BlfReader(can.BLFReader):
     """
 
     tally: LogTally
-    apart: TakeApart | None = None
+    apart: _TakeApart | None = None
 
     def _parse_data(self, data: bytes) -> Iterator[Any]:
         if self.apart is not None and (block := self.apart(data, self.start_timestamp)):
@@ -362,7 +364,7 @@ _EXACT_US: Final = 1 << 51
 """Below it a time in seconds is exact to the microsecond as a floating-point number."""
 
 
-class AscWriter:
+class _AscWriter:
     """Begins at a millisecond of local time; a frame from before begins another block.
 
     python-can's own dates the file with the time of writing, writes 5 ms of a date as `.5`, and a
@@ -465,7 +467,7 @@ _TRC_STEP_US: Final = 10_546_875
 """2**-13 days: a multiple of it is exact as the fraction of a day that TRC begins with."""
 
 
-class TrcWriter(can.TRCWriter):
+class _TrcWriter(can.TRCWriter):
     """Begins at a multiple of `_TRC_STEP_US`: a date that the text holds to the microsecond."""
 
     def on_message_received(self, msg: can.Message) -> None:
@@ -503,7 +505,7 @@ def _fd_trc_line(message: can.Message, number: int, begin_s: float) -> str:
     )
 
 
-class BlfWriter(can.BLFWriter):
+class _BlfWriter(can.BLFWriter):
     """Begins at a second; BLF holds nothing from before.
 
     Attributes:
@@ -543,7 +545,7 @@ class BlfWriter(can.BLFWriter):
         return self.start_timestamp
 
 
-class Mf4Writer(can.MF4Writer):
+class _Mf4Writer(can.MF4Writer):
     """Is written as a whole at its end."""
 
     def flush(self) -> None:
@@ -551,12 +553,12 @@ class Mf4Writer(can.MF4Writer):
 
 
 _TEXT: Final[dict[log_file.LogFormat, Any]] = {
-    log_file.LogFormat.ASC: AscWriter,
-    log_file.LogFormat.TRC: TrcWriter,
+    log_file.LogFormat.ASC: _AscWriter,
+    log_file.LogFormat.TRC: _TrcWriter,
 }
 _BINARY: Final[dict[log_file.LogFormat, Any]] = {
-    log_file.LogFormat.BLF: BlfWriter,
-    log_file.LogFormat.MF4: Mf4Writer,
+    log_file.LogFormat.BLF: _BlfWriter,
+    log_file.LogFormat.MF4: _Mf4Writer,
 }
 
 _END_US: Final = 16_725_225_600_000_000
@@ -605,7 +607,7 @@ class CanLogWriter:
     def write_block(self, block: TextBlock, /) -> bool:
         """Add many frames at once; False where they are to be added one by one."""
         writer = self._writer
-        return isinstance(writer, AscWriter) and writer.write_block(block, self._numbers.number)
+        return isinstance(writer, _AscWriter) and writer.write_block(block, self._numbers.number)
 
     def mark(self, mark: Mark, /) -> None:
         """Add a comment or marker, or count it."""
@@ -633,7 +635,7 @@ class CanLogWriter:
         named = self._path.name
         said = [f"{named}: {count} {what} left out" for what, count in self._passed_over.items()]
         said += self._numbers.messages(named)
-        if isinstance(self._writer, BlfWriter) and self._writer.early:
+        if isinstance(self._writer, _BlfWriter) and self._writer.early:
             said.append(f"{named}: {self._writer.early} frames from before its start moved there")
         return said
 

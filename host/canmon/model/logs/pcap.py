@@ -173,7 +173,7 @@ _END_US: Final = END_S * _MICROS
 _END_HIGH: Final = _END_US >> 32
 
 
-class Interface(NamedTuple):
+class _Interface(NamedTuple):
     """Where packets were captured.
 
     Attributes:
@@ -200,7 +200,7 @@ class _Usual(NamedTuple):
     tail: bytes
 
 
-class PcapngReader:
+class _PcapngReader:
     """Takes blocks apart, one file.
 
     Args:
@@ -211,7 +211,7 @@ class PcapngReader:
 
     def __init__(self, name: str, tally: LogTally, marks: bool = False) -> None:
         self._name, self._tally, self._marks = name, tally, marks
-        self._order, self._interfaces = "<", list[Interface]()
+        self._order, self._interfaces = "<", list[_Interface]()
         self._usual: _Usual | None = None
         self._idents: dict[bytes, tuple[int, bool]] = {}
         self._names: list[str] = []
@@ -333,7 +333,7 @@ class PcapngReader:
         offset = told.get(_TIME_OFFSET, b"")
         offset_s = struct.unpack(f"{self._order}q", offset)[0] if len(offset) == 8 else 0
         self._interfaces.append(
-            Interface(
+            _Interface(
                 name or f"can{len(self._interfaces)}",
                 link_type == _LINK_TYPE,
                 1 << power if binary else 10**power,
@@ -448,7 +448,7 @@ class PcapReader:
     def _frames(self, file: BinaryIO, marks: bool) -> Iterator[Item]:
         first = file.read(4)
         if first == SECTION.to_bytes(4, "little"):
-            yield from PcapngReader(str(self._path), self.tally, marks).frames(file, first)
+            yield from _PcapngReader(str(self._path), self.tally, marks).frames(file, first)
         elif first in _PCAP:
             yield from self._packets(file, *_PCAP[first])
         else:

@@ -1,6 +1,6 @@
 """PEAK's traces (TRC), of versions 1.0 to 3.0, with their error frames.
 
->>> lines, tally = TrcLines(), mark.LogTally()
+>>> lines, tally = _TrcLines(), mark.LogTally()
 >>> lines.read(";$FILEVERSION=1.1", tally)
 ';$FILEVERSION=1.1'
 >>> record = lines.read("     6)      1349.2  Error      0008  4  00 19 08 08", tally)
@@ -81,7 +81,7 @@ class _Row(NamedTuple):
         return bytes.fromhex("".join(self.data[:count]))
 
 
-class TrcLines:
+class _TrcLines:
     """Reads the lines of a trace, in their order."""
 
     def __init__(self) -> None:
@@ -258,4 +258,4 @@ class TrcLogReader(LineLogReader):
     """A reader of a trace."""
 
     comments = (";",)
-    make_lines = TrcLines
+    make_lines = _TrcLines

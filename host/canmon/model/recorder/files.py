@@ -35,7 +35,7 @@ _USUAL_BYTES: Final = 64
 """Of a frame, until there are some."""
 
 
-class RecordingPart:
+class _RecordingPart:
     """A log under way, and what is in it.
 
     Args:
@@ -165,7 +165,7 @@ _REMOVED: Final = "removed"
 _END: Final = "end"
 
 
-class Index:
+class _Index:
     """A file to which lines are added, each at once; one that is there is gone on with.
 
     Args:
@@ -275,9 +275,9 @@ class Files:
         self.frames = self.parts = self.removed = self._safe_frames = 0
         self.ended = ""
         self._said: list[str] = []
-        self._part: RecordingPart | None = None
+        self._part: _RecordingPart | None = None
         self._latest_us, self._looked_frames = now_us, -_LOOK_FRAMES
-        self._index = Index(plan.index, plan.number) if plan.numbered else None
+        self._index = _Index(plan.index, plan.number) if plan.numbered else None
         self._number = 0
         if self._index is None:
             self._part = self._begin(now_us)
@@ -374,7 +374,7 @@ class Files:
         """Say what formats could not hold, and what was found of an earlier recording."""
         return self._said
 
-    def _part_for(self, record: Record) -> RecordingPart:
+    def _part_for(self, record: Record) -> _RecordingPart:
         part = self._part
         if part is not None and part.frames and self._is_full(part, record.at_us):
             self.end_part()
@@ -383,17 +383,17 @@ class Files:
             part = self._part = self._begin(record.at_us)
         return part
 
-    def _room(self, part: RecordingPart) -> int:
+    def _room(self, part: _RecordingPart) -> int:
         return part.room(self._plan.rotate_bytes)
 
-    def _is_full(self, part: RecordingPart, at_us: int) -> bool:
+    def _is_full(self, part: _RecordingPart, at_us: int) -> bool:
         if self._index is None or self._room(part) <= 0:
             return self._index is not None
         after_us, first_us = self._plan.rotate_us, part.first_us
         return after_us is not None and first_us is not None and at_us - first_us >= after_us
 
     def _up_to_due(
-        self, part: RecordingPart, records: Sequence[Record], begin: int, end: int
+        self, part: _RecordingPart, records: Sequence[Record], begin: int, end: int
     ) -> int:
         """Return where the first of these frames is that belongs into the next file."""
         after_us = self._plan.rotate_us
@@ -405,7 +405,7 @@ class Files:
         due = bisect_left(records, first_us + after_us, begin, end, key=lambda one: one.at_us)
         return max(due, begin + 1)
 
-    def _begin(self, at_us: int) -> RecordingPart:
+    def _begin(self, at_us: int) -> _RecordingPart:
         path = self._plan.path
         if self._index is not None:
             self._number += 1
@@ -414,14 +414,14 @@ class Files:
             # for (`_recover`).
             self._index.write(_OPEN, at_us, file=path.name)
         self.parts += 1
-        return RecordingPart(path)
+        return _RecordingPart(path)
 
     def _numbers(self) -> list[int]:
         assert self._index is not None, "there are numbers where there is an index"
         here = [path.name for path in self._plan.path.parent.iterdir()]
         return [self._plan.number(name) for name in (*here, *self._index.files)] or [0]
 
-    def _recover(self, index: Index, now_us: int) -> None:
+    def _recover(self, index: _Index, now_us: int) -> None:
         """Put files into the index that a recorder was killed at."""
         for name in list(index.unended):
             path = self._plan.path.with_name(name)
@@ -460,7 +460,7 @@ class Files:
                 left = f"{RESERVE_BYTES >> 10} KiB are left on the disk"
                 raise OSError(errno.ENOSPC, left, path)
 
-    def _remove_oldest(self, index: Index) -> bool:
+    def _remove_oldest(self, index: _Index) -> bool:
         """Remove a file; say whether there was one."""
         if not index.files:
             return False

@@ -43,7 +43,7 @@ MIDDLE, WIDE = 110, 160
 _LEAST_ERRORS: Final = 12
 
 
-class BoardColumn(NamedTuple):
+class _BoardColumn(NamedTuple):
     """A column of the board.
 
     Attributes:
@@ -79,18 +79,18 @@ def board_lines(rows: Sequence[node_board.NodeStatus], now_us: int, width: int) 
     return [plain(head.rstrip(), _HEAD), *_joined([cells for _, cells in used], widths)]
 
 
-def _columns(several: bool, width: int) -> list[BoardColumn]:
+def _columns(several: bool, width: int) -> list[_BoardColumn]:
     node = _bus_node if several else _node
-    return [BoardColumn("NODE", node, kept=True), *(one for one in _COLUMNS if one.least <= width)]
+    return [_BoardColumn("NODE", node, kept=True), *(one for one in _COLUMNS if one.least <= width)]
 
 
 def _cells(
-    column: BoardColumn, rows: Sequence[node_board.NodeStatus], now_us: int, width: int
+    column: _BoardColumn, rows: Sequence[node_board.NodeStatus], now_us: int, width: int
 ) -> list[Line]:
     return [column.cell(row, now_us, width) for row in rows]
 
 
-def _widths(used: Sequence[tuple[BoardColumn, Sequence[Line]]], width: int) -> list[int]:
+def _widths(used: Sequence[tuple[_BoardColumn, Sequence[Line]]], width: int) -> list[int]:
     """Return the width of each column; the last one has what is left."""
     widths = [
         min(column.most, max(len(column.title), *map(line_width, cells), 0))
@@ -188,14 +188,14 @@ def _carried(row: node_board.NodeStatus, now_us: int, width: int) -> Line:
 
 
 _COLUMNS: Final = (
-    BoardColumn("NAME", lambda row, now_us, width: plain(row.name), most=24),
-    BoardColumn("MAKER", lambda row, now_us, width: plain(node_board.maker_text(row)), WIDE, 20),
-    BoardColumn("NMT STATE", _state, kept=True),
-    BoardColumn("HEARTBEAT", heartbeat_line, kept=True),
-    BoardColumn("BOOT-UPS", _boots, WIDE),
-    BoardColumn("DRIVE", lambda row, now_us, width: plain(row.drive_state), MIDDLE, 22),
-    BoardColumn("TPDOs CARRY", _carried, WIDE, 34),
-    BoardColumn("ERRORS", _error_line, kept=True),
+    _BoardColumn("NAME", lambda row, now_us, width: plain(row.name), most=24),
+    _BoardColumn("MAKER", lambda row, now_us, width: plain(node_board.maker_text(row)), WIDE, 20),
+    _BoardColumn("NMT STATE", _state, kept=True),
+    _BoardColumn("HEARTBEAT", heartbeat_line, kept=True),
+    _BoardColumn("BOOT-UPS", _boots, WIDE),
+    _BoardColumn("DRIVE", lambda row, now_us, width: plain(row.drive_state), MIDDLE, 22),
+    _BoardColumn("TPDOs CARRY", _carried, WIDE, 34),
+    _BoardColumn("ERRORS", _error_line, kept=True),
 )
 
 
@@ -240,7 +240,7 @@ _NOW: Final = 0
 """When commands are due that have not been sent yet."""
 
 
-class NodeTask(Task):
+class _NodeTask(Task):
     """Sends what it is told to; what comes of it, the traffic says."""
 
     def __init__(self) -> None:
@@ -318,7 +318,7 @@ class NodesPanel(Panel):
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
-        self.master = NodeTask()
+        self.master = _NodeTask()
         session.tasks.append(self.master)
         self._rows: list[node_board.NodeStatus] = []
         self._lines: list[Line] = [()]

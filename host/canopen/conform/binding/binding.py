@@ -39,7 +39,7 @@ _Place = tuple[int, int]
 """Index and sub-index."""
 
 
-class AbsentPlaces(NamedTuple):
+class _AbsentPlaces(NamedTuple):
     """Places of a kind, in the order in which they are tried.
 
     Attributes:
@@ -55,7 +55,7 @@ class AbsentPlaces(NamedTuple):
     likely: tuple[_Place, ...]
 
 
-def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[AbsentPlaces]:
+def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[_AbsentPlaces]:
     """Yield an object, a sub-index behind a record, and one of a variable that are not there.
 
     Args:
@@ -69,16 +69,16 @@ def _absent_places(device: EdsDevice, reader: ObjectReader) -> Iterator[AbsentPl
     for entry in device.entries:
         highest[entry.index] = max(entry.sub, highest.get(entry.index, 0))
     free = tuple((index, 0) for index in _ABSENT_OBJECTS if index not in highest)
-    yield AbsentPlaces("absent_object", "index free", (), free)
+    yield _AbsentPlaces("absent_object", "index free", (), free)
     counted = ((i, max(highest[i], reader.number(i, 0) or 0) + 1) for i in _COUNTED if i in highest)
     behind = ((i, last + 1) for i, last in highest.items() if last and i not in _GROWING)
     certain, likely = ([at for at in places if at[1] <= _LAST_SUB] for places in (counted, behind))
     what = "record with a sub-index free"
-    yield AbsentPlaces("absent_sub", what, tuple(certain), tuple(likely))
+    yield _AbsentPlaces("absent_sub", what, tuple(certain), tuple(likely))
     variables = [index for index, last in highest.items() if not last and not _is_composed(index)]
     certain = [(index, 1) for index in variables if standard_object(index)]
     likely = [(index, 1) for index in variables if not standard_object(index)]
-    yield AbsentPlaces("sub_of_variable", "variable", tuple(certain), tuple(likely))
+    yield _AbsentPlaces("sub_of_variable", "variable", tuple(certain), tuple(likely))
 
 
 def _is_composed(index: int) -> bool:
@@ -273,7 +273,7 @@ def _room(wanted: WantedObject, entry: EntryDescription) -> int:
     return len(entry.default) if wanted.use is Use.WRITE and entry.data_type in TEXTS else 0
 
 
-def _bind_absent(search: _Search, places: AbsentPlaces) -> None:
+def _bind_absent(search: _Search, places: _AbsentPlaces) -> None:
     """Take a place at which there can be nothing and is something: the checks tell it.
 
     Else the first at which the node has nothing, else, as it has something everywhere, any.

@@ -65,7 +65,7 @@ class BoundPdo(PdoDescription):
         return None
 
 
-class PdoKind(NamedTuple):
+class _PdoKind(NamedTuple):
     """A name in checks, what it stands for in words, and which PDOs are of that kind."""
 
     name: str
@@ -73,13 +73,13 @@ class PdoKind(NamedTuple):
     fits: Callable[[BoundPdo], bool]
 
 
-def _kinds(way: str) -> Iterator[PdoKind]:
+def _kinds(way: str) -> Iterator[_PdoKind]:
     """Give the kinds that both directions have."""
     pdo = way.upper()
-    yield PdoKind(way, pdo, lambda pdo: True)
-    yield PdoKind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
-    yield PdoKind(f"{way}_disabled", f"{pdo} that is disabled", lambda pdo: not pdo.enabled)
-    yield PdoKind(
+    yield _PdoKind(way, pdo, lambda pdo: True)
+    yield _PdoKind(f"{way}_enabled", f"{pdo} that is enabled", lambda pdo: pdo.enabled)
+    yield _PdoKind(f"{way}_disabled", f"{pdo} that is disabled", lambda pdo: not pdo.enabled)
+    yield _PdoKind(
         f"{way}_async",
         f"{pdo} that is enabled, event-driven, has a mapping and no timer that cannot be stopped",
         lambda pdo: (
@@ -89,13 +89,13 @@ def _kinds(way: str) -> Iterator[PdoKind]:
             and not pdo.restless
         ),
     )
-    yield PdoKind(
+    yield _PdoKind(
         f"{way}_sync",
         f"{pdo} that is enabled, synchronous and has a mapping",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and pdo.transmission_type in _CYCLIC,
     )
-    yield PdoKind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
-    yield PdoKind(
+    yield _PdoKind(f"{way}_remappable", f"{pdo} with a mapping that may be changed", _is_remappable)
+    yield _PdoKind(
         f"{way}_event_timer",
         f"{pdo} with an event timer",
         lambda pdo: pdo.remappable and _EVENT_TIMER in pdo.subs,
@@ -111,12 +111,12 @@ CARRIED: Final[dict[str, tuple[int, int]]] = {
 """Names of event-driven PDOs that carry the first input or output of a module of CiA 401."""
 
 
-def _carrying(way: str) -> Iterator[PdoKind]:
+def _carrying(way: str) -> Iterator[_PdoKind]:
     """Give the kinds that carry an object."""
     for name, (index, sub) in CARRIED.items():
         if name.startswith(way):
             what = f"{way.upper()} that is enabled, event-driven and carries {index:04X}h:{sub:02X}"
-            yield PdoKind(name, what, partial(_carries, (index, sub)))
+            yield _PdoKind(name, what, partial(_carries, (index, sub)))
 
 
 def _carries(address: tuple[int, int], pdo: BoundPdo) -> bool:
@@ -131,9 +131,11 @@ def _is_remappable(pdo: BoundPdo) -> bool:
 _TPDO_KINDS: Final = (
     *_kinds("tpdo"),
     *_carrying("tpdo"),
-    PdoKind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: _INHIBIT in pdo.subs),
-    PdoKind("tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: _SYNC_START in pdo.subs),
-    PdoKind(
+    _PdoKind("tpdo_inhibit", "TPDO with an inhibit time", lambda pdo: _INHIBIT in pdo.subs),
+    _PdoKind(
+        "tpdo_sync_start", "TPDO with a SYNC start value", lambda pdo: _SYNC_START in pdo.subs
+    ),
+    _PdoKind(
         "tpdo_rtr",
         "TPDO that may be fetched with a remote frame",
         lambda pdo: pdo.enabled and bool(pdo.mapping) and not pdo.cob_id & FLAG_30,
@@ -172,8 +174,8 @@ def bind_pdos(
     return bound, reasons
 
 
-def _harmless(may_write: Callable[[int], bool]) -> PdoKind:
-    return PdoKind(
+def _harmless(may_write: Callable[[int], bool]) -> _PdoKind:
+    return _PdoKind(
         _MAPPED_RPDO,
         "RPDO that is enabled and whose objects may be written without moving anything",
         lambda pdo: (

@@ -134,7 +134,7 @@ class Presence(Enum):
     TWO = 2
 
 
-class Answers:
+class _Answers:
     """Counts uploads that begin, and answers to them, by object."""
 
     def __init__(self) -> None:
@@ -181,7 +181,7 @@ _FOREIGN_LOAD: Final = 0.5
 """With more of it by other nodes, a late or missing answer says nothing of the node."""
 
 
-class Allowance:
+class _Allowance:
     """What may be sent: a bucket that fills with the allowed share of the bit rate.
 
     Args:
@@ -216,7 +216,7 @@ class Allowance:
             self._at_us = now_us
 
 
-class ForeignLoad:
+class _ForeignLoad:
     """The load by other nodes, in windows of `_WINDOW_US`.
 
     Args:
@@ -265,7 +265,7 @@ _BEGINNING: Final = (
 )
 """Requests that name an object; some others of a block look like them, and do no harm."""
 
-NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
+_NAMING: Final = frozenset((*range(0x40, 0x50), 0x60, 0x80, 0xA0, 0xA4, 0xC0, 0xC2, 0xC4, 0xC6))
 """Commands of answers that name an object; segments of a block look like them, and do no harm."""
 
 _UNREAD_FRAMES: Final = 2_000
@@ -308,7 +308,7 @@ class BusExchange:
         shared_host: bool = False,
     ) -> None:
         self._link, self._node_id, self.resolution_us = link, node_id, resolution_us
-        self._allowance, self._foreign = Allowance(bit_rate, max_load), ForeignLoad(bit_rate)
+        self._allowance, self._foreign = _Allowance(bit_rate, max_load), _ForeignLoad(bit_rate)
         self._permit = permit
         self._boot_up = data_frame(ERROR_CONTROL_COB_ID + node_id, bytes(1))
         self.start_us = self._known_us = self._busy_us = link.now_us
@@ -321,7 +321,7 @@ class BusExchange:
         self._origins: dict[tuple[int, bool], tuple[str, bool]] = {}
         self._multiplexer, self.transfer, self._ready_us = b"", (0, 0), 0
         self.unanswered: list[tuple[int, int]] = []
-        self._answers, self._others_by = Answers(), _NODES
+        self._answers, self._others_by = _Answers(), _NODES
         self.played: int | None = None
         self._shared_host, self._late_us = shared_host, 0
         self._unread: defaultdict[str, deque[tuple[int, CanFrame]]] = defaultdict(_queue)
@@ -565,7 +565,7 @@ class BusExchange:
         """Drop the objects that the node has answered about, or will not answer about any more."""
         if at in self.unanswered:  # and those asked before it
             del self.unanswered[: self.unanswered.index(at) + 1]
-        elif data[0] in NAMING:  # the node names another object
+        elif data[0] in _NAMING:  # the node names another object
             del self.unanswered[:1]
 
 

@@ -158,7 +158,7 @@ class TargetMode(DriveMode):
         return True
 
 
-class ProfilePositionMode(TargetMode):
+class _ProfilePositionMode(TargetMode):
     """Writes each new target once, and has it taken by the handshake of bits 4 and 12."""
 
     def begin(self) -> None:
@@ -223,7 +223,7 @@ TARGETS: Final = (_POSITION, _SPEED, _TORQUE, _FREQUENCY, _INTERPOLATED)
 """The set-points of all modes."""
 
 MODES: Final[Mapping[ModeNumber, Callable[[], DriveMode]]] = {
-    ModeNumber.PROFILE_POSITION: lambda: ProfilePositionMode(_POSITION),
+    ModeNumber.PROFILE_POSITION: lambda: _ProfilePositionMode(_POSITION),
     ModeNumber.VELOCITY: lambda: TargetMode(_FREQUENCY, 0x70),
     ModeNumber.PROFILE_VELOCITY: lambda: TargetMode(_SPEED),
     ModeNumber.PROFILE_TORQUE: lambda: TargetMode(_TORQUE),

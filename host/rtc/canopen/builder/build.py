@@ -86,7 +86,7 @@ _LETTERS: Final = {
 PDO: Final = "{:<9} {:<9} {:<5} {}"
 
 
-def summary(profile: rtc_canopen.RtcProfile, *, every: bool = False) -> Iterator[str]:
+def _summary(profile: rtc_canopen.RtcProfile, *, every: bool = False) -> Iterator[str]:
     """Give the lines: objects of the ports, or `every` object, then the PDOs."""
     rows = [
         row
@@ -140,7 +140,7 @@ def run_builder(
     project, files = _read_and_build(path)
     if out is not None:
         _write_files(out, files, warn, force=force)
-    yield from summary(project.profile, every=every)
+    yield from _summary(project.profile, every=every)
 
 
 def _read_and_build(path: Path) -> tuple[Project, dict[str, str]]:

@@ -33,7 +33,7 @@ _CHANGED: Final = "bold yellow"
 _ObjectRow = CursorRow[Entry]
 
 
-class NodeObjects:
+class _NodeObjects:
     """Reads objects of a node by SDO while somebody looks, and writes them.
 
     Each is read once when it comes into view; if it is live, again and again.
@@ -223,8 +223,8 @@ class ObjectsPane(CursorView[Entry]):
 
     def forget(self) -> None:
         """Begin anew, with another system."""
-        self.objects: NodeObjects | None = None
-        self._of: dict[int, NodeObjects] = {}
+        self.objects: _NodeObjects | None = None
+        self._of: dict[int, _NodeObjects] = {}
 
     def turn_to(self, node_id: int, eds: Mapping[int, Path]) -> None:
         """Show the objects of a node from now on, 0 for none; reads its EDS the first time."""
@@ -250,9 +250,9 @@ class ObjectsPane(CursorView[Entry]):
         self.offer([] if self.objects is None else self.objects.rows)
 
 
-def _read(node_id: int, path: Path) -> NodeObjects:
+def _read(node_id: int, path: Path) -> _NodeObjects:
     """Return the objects of an EDS; none if it is there no more."""
     try:
-        return NodeObjects(node_id, read_eds_objects(path, node_id))
+        return _NodeObjects(node_id, read_eds_objects(path, node_id))
     except (OSError, EdsError):
-        return NodeObjects(node_id, EdsObjects())
+        return _NodeObjects(node_id, EdsObjects())

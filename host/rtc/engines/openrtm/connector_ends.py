@@ -265,7 +265,7 @@ class InPortClient:
         return _ours(status)
 
 
-class OutPortClient:
+class _OutPortClient:
     """Gets values from the OutPort of a peer (OpenRTM-aist, OutPortCorbaCdrConsumer).
 
     Args:
@@ -313,7 +313,7 @@ class InPortAnswers:
         return self._theirs[self._put(data)]
 
 
-class OutPortAnswers:
+class _OutPortAnswers:
     """The operations of OutPortCdr, carried out by a connector."""
 
     def __init__(self, connector: _Get) -> None:
@@ -371,7 +371,7 @@ class DataEnd(ConnectorEnd):
         if isinstance(port, OutPort) and pulls:
             self._connector = held = peer_ports.OutPortPullConnector(port, end, codec)
             held.begin()
-            return {_OUTPORT_IOR: self.serve("OpenRTM.OutPortCdr", OutPortAnswers(held))}
+            return {_OUTPORT_IOR: self.serve("OpenRTM.OutPortCdr", _OutPortAnswers(held))}
         return {}
 
     def join(self, values: dict[str, str]) -> ConnectorBase:
@@ -390,7 +390,7 @@ class DataEnd(ConnectorEnd):
         if isinstance(port, OutPort):
             put = InPortClient(self.reference(ior, openrtm.InPortCdr), place.peer)
             return peer_ports.OutPortPushConnector(port, end, codec, put, place.threads)
-        get = OutPortClient(self.reference(ior, openrtm.OutPortCdr), place.peer)
+        get = _OutPortClient(self.reference(ior, openrtm.OutPortCdr), place.peer)
         return peer_ports.InPortPullConnector(port, end, codec, get, place.threads, place.calls)
 
     def _agree(

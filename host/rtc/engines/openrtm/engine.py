@@ -57,7 +57,7 @@ class _Served:
     path: str
 
 
-class OpenRtmEngine:
+class _OpenRtmEngine:
     """Makes the components of a manager known to a name server, and answers for them.
 
     To be made and closed in the manager's thread.
@@ -171,8 +171,8 @@ def openrtm_joined(
     *,
     fixed: bool,
 ) -> Iterator[None]:
-    """Let the components of a manager take part in a system of OpenRTM; see `OpenRtmEngine`."""
-    engine = OpenRtmEngine(options, rtcs, calls, stop, fixed=fixed)
+    """Let the components of a manager take part in a system of OpenRTM; see `_OpenRtmEngine`."""
+    engine = _OpenRtmEngine(options, rtcs, calls, stop, fixed=fixed)
     try:
         yield
     finally:

@@ -33,7 +33,7 @@ _Profile = Any
 _CONNECTIONS_LOG: Final = log_of(__name__)
 
 
-class PortSystem(Protocol):
+class _PortSystem(Protocol):
     """The ports of the same system, and its orb.
 
     Attributes:
@@ -102,7 +102,7 @@ class PeerConnection:
             _CONNECTIONS_LOG.info("%s was not told of the end: %s", self.peer_name, explain(error))
 
 
-class PeerConnections:
+class _PeerConnections:
     """What joins a port of ours with peers.
 
     Args:
@@ -110,7 +110,7 @@ class PeerConnections:
         system: its own.
     """
 
-    def __init__(self, port: AnyPort, system: PortSystem) -> None:
+    def __init__(self, port: AnyPort, system: _PortSystem) -> None:
         self._port, self._system = port, system
         self._by_id: dict[str, PeerConnection] = {}
         self._closed = False
@@ -266,7 +266,7 @@ _OK: Final = ReturnCode.RTC_OK
 _NAME_LENGTH: Final = 100
 
 
-class PortAnswers:
+class _PortAnswers:
     """The operations of PortService, in threads of the ORB.
 
     What concerns the port is done in the manager's thread; peers are called here, and nothing is
@@ -282,7 +282,7 @@ class PortAnswers:
     def __init__(
         self,
         port: AnyPort,
-        connections: PeerConnections,
+        connections: _PeerConnections,
         calls: CallQueue,
         describe: Callable[[], Any],
     ) -> None:
@@ -525,7 +525,7 @@ class ComponentPorts:
 
     def __init__(self, system: SystemPorts, component: RtComponent, owner: Reference) -> None:
         self._system, self._component, self._owner = system, component, owner
-        self._connections: dict[AnyPort, PeerConnections] = {}
+        self._connections: dict[AnyPort, _PeerConnections] = {}
         system.calls.call(self._begin)
 
     def services(self) -> list[Reference]:
@@ -559,8 +559,8 @@ class ComponentPorts:
 
     def _serve(self, port: AnyPort) -> None:
         system = self._system
-        self._connections[port] = connections = PeerConnections(port, system)
-        answers = PortAnswers(port, connections, system.calls, partial(self._profile, port))
+        self._connections[port] = connections = _PeerConnections(port, system)
+        answers = _PortAnswers(port, connections, system.calls, partial(self._profile, port))
         system.enter(port, system.orb.serve(stubs().skeleton("RTC.PortService"), answers))
 
     def _withdraw(self, ports: tuple[AnyPort, ...]) -> None:

@@ -13,7 +13,7 @@ from tickrig.host.rtc.system.manager import Manager
 INTERFACE: Final = "OpenRTM.DataFlowComponent"
 
 
-class Ports(Protocol):
+class _Ports(Protocol):
     """The ports of a component as an ORB serves them."""
 
     def services(self) -> list[Reference]:
@@ -46,7 +46,7 @@ class RtObjectServant:
     ) -> None:
         self._component, self._manager, self._references = component, manager, references
         self._calls, self._stubs = references.calls, references.stubs
-        self.ports: Ports | None = None
+        self.ports: _Ports | None = None
         self.configuration: Reference = None
 
     def get_component_profile(self) -> Any:

@@ -66,7 +66,7 @@ _LEVELS: Final = {LifeCycleState.ACTIVE: 0, LifeCycleState.ERROR: 2}
 """OK and ERROR of DiagnosticStatus; whoever is neither Active nor in Error is WARN."""
 
 
-class Diagnostics:
+class _Diagnostics:
     """Tells the states of all components each period; the manager ticks it.
 
     Args:
@@ -126,7 +126,7 @@ def ros2_joined(options: Ros2Options, manager: Manager, calls: CallQueue) -> Ite
     """
     table = _read_table(options)
     _refuse_mistakes(table, manager)
-    engine = Ros2Engine(options, table, manager, calls)
+    engine = _Ros2Engine(options, table, manager, calls)
     manager.on_added.append(engine.join)
     try:
         yield
@@ -176,7 +176,7 @@ def _mistakes_of(entry: TopicEntry, component: RtComponent) -> list[str]:
     return [f"{entry} carries {port.data_type.idl_id()}: {', '.join(fitting)}, not {entry.type}"]
 
 
-class Ros2Engine:
+class _Ros2Engine:
     """Reads and writes topics in threads of its own, and joins them with ports.
 
     Args:
@@ -276,7 +276,7 @@ class Ros2Engine:
         connector = InPortPushConnector(port, _end(entry), codec, self._calls)
         return connector, TopicReader(self._participant, entry, self._in, connector.put)
 
-    def _add_diagnostics(self) -> Diagnostics:
+    def _add_diagnostics(self) -> _Diagnostics:
         topic, period_us = self._table.diagnostics, self._table.period_us
         entry = TopicEntry("diagnostics", topic, _TYPE)
         writer = TopicWriter(self._participant, entry)
@@ -284,7 +284,7 @@ class Ros2Engine:
         def send(message: Any) -> None:
             self._out.submit(partial(_written, writer, message))
 
-        item = Diagnostics(self._manager, self._stamps, period_us, send)
+        item = _Diagnostics(self._manager, self._stamps, period_us, send)
         if topic:
             self._writing[dds_topic(topic)] = writer
             self._endpoints.append(writer)

@@ -43,7 +43,7 @@ _NUMBER: Final = re.compile(r"(?<![0-9a-f])(?=[a-f]*+[0-9])[0-9a-f]++")
 _HEAD: Final = re.compile(r"^[\d.]+ \[[^]]*\] +\S* *")
 
 
-class DdsLog:
+class _DdsLog:
     """Reads its lines from a pipe until it is closed, and logs each kind once.
 
     Lines of a kind differ in numbers. What the pipe does not hold is lost: nothing waits.
@@ -118,7 +118,7 @@ class DdsParticipant:
     def __init__(self, domain: int, interface: str = "") -> None:
         self._topics: dict[str, Topic[Any]] = {}
         place, discovery = _place(interface)
-        self._log = DdsLog()
+        self._log = _DdsLog()
         configuration = _CONFIGURATION.format(
             interface=place, discovery=discovery, log=self._log.configuration
         )

@@ -101,7 +101,7 @@ class ObstacleMonitor(RtComponent):
         return max(0.0, min([self.range.value, *ways]))
 
 
-class WatchedDistance:
+class _WatchedDistance:
     """Blocked below one distance, free above another, and blocked when nothing is heard.
 
     Args:
@@ -151,7 +151,7 @@ class ObstaclesAvoidance(RtComponent):
         self.arriving = self.add_port(InPort("InTargetVelocity", iis.TimedVelocity2D))
         self.distance = self.add_port(InPort("distance", TimedDouble))
         self.leaving = self.add_port(OutPort("OutTargetVelocity", iis.TimedVelocity2D))
-        self._watched = WatchedDistance(self.distance)
+        self._watched = _WatchedDistance(self.distance)
         self._before = Twist()
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
@@ -199,7 +199,7 @@ class CollisionDetection(RtComponent):
         self.distance = self.add_port(InPort("distance", TimedDouble))
         port = self.add_port(ServicePort("BumpRefHard"))
         self.ref_hard = port.require(Consumer[RefHard]("service", "RefHard"))
-        self._watched = WatchedDistance(self.distance)
+        self._watched = _WatchedDistance(self.distance)
         self._stopped = False
 
     def on_activated(self, ec: ExecutionContext) -> ReturnCode:
