@@ -269,7 +269,7 @@ _ENDING: Final = {
 # The life cycle of RTC inside the NMT states (NEDO report, 3.4.43.3, Fig. 110).
 
 
-class _CanopenLifeCycle(CallbackRunner[CanopenComponent]):
+class CanopenLifeCycle(CallbackRunner[CanopenComponent]):
     """Runs the callbacks of a component when its node changes its NMT state, and before.
 
     The NMT state is the state of the component, once that is initialized. Whoever
@@ -396,7 +396,7 @@ def _outputs_of(component: CanopenComponent) -> dict[str, OutputSignal]:
     return {output.name: output for output in (*_OUTPUTS, *ports)}
 
 
-def _text_of(life: _CanopenLifeCycle, name: str) -> float | str:
+def _text_of(life: CanopenLifeCycle, name: str) -> float | str:
     """Return the present value of an output; KeyError if there is none."""
     match name:
         case "rtc_state":
@@ -435,7 +435,7 @@ class DeviceRtc(Application):
         super().__init__(node, slot)
         self._kind, self._placed = kind, kind.profile().placed()
         self.has_inputs(_inputs_of(kind))
-        self.life = _CanopenLifeCycle(node, self._make)
+        self.life = CanopenLifeCycle(node, self._make)
         self.outputs: Mapping[str, OutputSignal] = _outputs_of(self.life.component)
         self._timer = Timer(kind.rate_hz)
         node.boots, node.admits = self.life.boots, self.life.admits

@@ -246,7 +246,7 @@ class Entry(Part):
 
 # The object dictionary: entries by index and sub-index.
 
-_NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
+NO_OBJECTS: Final[Mapping[int, ObjectDescription]] = {}
 
 
 class DictionaryDescription(Immutable):
@@ -323,7 +323,7 @@ class Dictionary(Part):
     def __init__(
         self,
         entries: Iterable[EntryDescription],
-        objects: Mapping[int, ObjectDescription] = _NO_OBJECTS,
+        objects: Mapping[int, ObjectDescription] = NO_OBJECTS,
     ) -> None:
         if isinstance(entries, DictionaryDescription):
             description = entries

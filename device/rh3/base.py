@@ -60,7 +60,7 @@ _STEP_S: Final = 1e-3
 _HALF: Final = 2.0**63
 
 
-class _Ground(Part):
+class Ground(Part):
     """Takes the turning of two wheels for a way over the ground, on exact arcs.
 
     Not emulated: castors, slopes, walls; a slipping wheel turns as easily as before.
@@ -207,7 +207,7 @@ class Rh3Base(Copyable):
     def __init__(self, parameters: BaseParameters | None = None) -> None:
         self.parameters: BaseParameters = parameters or BaseParameters()
         self.inputs = QuantityBank(INPUTS)
-        self.ground = _Ground(self.parameters)
+        self.ground = Ground(self.parameters)
         self._driver = driver = Driver(self.parameters, self.inputs)
         self.sides = driver.sides
         self.slave = ModbusSlave(driver.registers, driver.written, self.parameters.address)

@@ -143,7 +143,7 @@ position, counts; largest distance from the demanded position, counts; velocity,
 which the motor stands: it may not stand while it is demanded to turn faster.
 """
 
-_Four = tuple[float, float, float, float]
+Four = tuple[float, float, float, float]
 
 
 class RunAhead(Part):
@@ -160,7 +160,7 @@ class RunAhead(Part):
 
     __slots__ = ("counts", "losses", "motion", "steps")
 
-    def __init__(self, steps: int, counts: int, motion: _Four, losses: _Four) -> None:
+    def __init__(self, steps: int, counts: int, motion: Four, losses: Four) -> None:
         self.steps, self.counts, self.motion, self.losses = steps, counts, motion, losses
 
 

@@ -15,7 +15,7 @@ from tickrig.emulators.can.transmission_outcomes import Observer
 from tickrig.wire.can import CanFrame
 
 _BIT_RATES: Final = range(10_000, 1_000_001)
-_WINDOW_US: Final = 1_000_000
+WINDOW_US: Final = 1_000_000
 _BABBLER: Final = -1  # number of the node that the fault `babble` adds
 
 
@@ -120,7 +120,7 @@ class CanWire(Copyable):
         self.advance(min(due_us, until_us))
         return due_us <= until_us
 
-    def load_permille(self, window_us: int = _WINDOW_US) -> int:
+    def load_permille(self, window_us: int = WINDOW_US) -> int:
         """Measure how busy the bus was.
 
         Args:

@@ -42,7 +42,7 @@ class DeviceType:
         fields: what can be set of it, on its command line and in rig files; their values are the
             configuration.
         options: the same as options of click, as before `fields`; they become fields.
-        configure: what else a command line makes of them; see `_Configure`.
+        configure: what else a command line makes of them; see `Configure`.
         line: baud rate, wire faults, and how the log cuts what passes.
         encoders: further verbs of its scenarios that send a line.
         senders: the verbs of its scenarios that send, where the line carries no text.
@@ -60,7 +60,7 @@ class DeviceType:
     text: str = ""
     fields: tuple[DeviceField, ...] = ()
     options: tuple[click.Option, ...] = ()
-    configure: _Configure | None = None
+    configure: Configure | None = None
     line: LineSettings = field(default_factory=LineSettings)
     encoders: Mapping[str, Encoder] = field(default_factory=dict)
     senders: Mapping[str, Sender] | None = None
@@ -131,7 +131,7 @@ class ConfiguredDevice:
     config: Config
 
 
-_Configure = Callable[[DeviceType, Mapping[str, Any], int], ConfiguredDevice]
+Configure = Callable[[DeviceType, Mapping[str, Any], int], ConfiguredDevice]
 """Makes a device of its type, its options and a seed."""
 
 DEVICES: Final = ExtensionGroup[DeviceType](

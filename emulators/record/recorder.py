@@ -67,7 +67,7 @@ class TraceFile(NonCopyable):
 W_contra = TypeVar("W_contra", contravariant=True)
 
 
-class _Trace(Protocol[W_contra]):
+class Trace(Protocol[W_contra]):
     """Where the ticks of a device are recorded."""
 
     @property
@@ -91,7 +91,7 @@ class TracedDevice(Generic[W]):
         trace: where the ticks go.
     """
 
-    def __init__(self, device: Device[W], trace: _Trace[W]) -> None:
+    def __init__(self, device: Device[W], trace: Trace[W]) -> None:
         self._device: Any = device
         self._trace = trace
         bank: Inputs | None = getattr(device, "inputs", None)

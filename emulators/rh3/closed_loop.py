@@ -78,7 +78,7 @@ class MountedUrg:
         self.urg.world = self.world.with_posts(*posts) if posts else self.world
 
 
-class _Aboard(Coupling, Protocol):
+class Aboard(Coupling, Protocol):
     """Something that a cart carries; it moves along as a coupling of the rig."""
 
     @property
@@ -135,7 +135,7 @@ class ClosedLoop:
         seed: int = 0,
         dense: bool = False,
         world: World | None = None,
-        aboard: Callable[[Rh3Base], _Aboard] | None = None,
+        aboard: Callable[[Rh3Base], Aboard] | None = None,
         pace: float | None = None,
         clock: RealClock | None = None,
     ) -> None:

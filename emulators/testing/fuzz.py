@@ -18,7 +18,7 @@ from tickrig.wire.can import CanFrame
 
 # What a device is told, as a user writes it.
 
-_Word = bytes | str
+Word = bytes | str
 """Bytes of a serial line, or a frame in candump's notation."""
 
 
@@ -226,11 +226,11 @@ class DeviceFuzz:
     def __init__(  # noqa: PLR0913 - by name
         self,
         device: DeviceType | str | Callable[[], Any],
-        words: Sequence[_Word] = (),
+        words: Sequence[Word] = (),
         *,
-        start: Sequence[_Word] = (),
-        request: Sequence[_Word] = (),
-        answer: _Word = b"",
+        start: Sequence[Word] = (),
+        request: Sequence[Word] = (),
+        answer: Word = b"",
         wire: Callable[[], ByteLine | CanWire] | None = None,
         warm_us: int = 1_000_000,
     ) -> None:
@@ -287,7 +287,7 @@ class DeviceFuzz:
         return False
 
     def _check_words(
-        self, words: object, start: object, request: Sequence[_Word], answer: _Word
+        self, words: object, start: object, request: Sequence[Word], answer: Word
     ) -> None:
         """Raise ValueError unless all are of the wire of the device."""
         for name, given in (("words", words), ("start", start), ("request", request)):
@@ -307,7 +307,7 @@ class DeviceFuzz:
         """
         return list(self._reader.acts(data))
 
-    def _traffic(self, word: _Word) -> Any:
+    def _traffic(self, word: Word) -> Any:
         return CanFrame.parse(word) if isinstance(word, str) else word
 
     def _send(self, what: Any) -> None:

@@ -349,7 +349,7 @@ _FRAME: Final = (_BUS, _NODES)
 """Sections that are no panel's."""
 
 
-class _Kept(Protocol):
+class Kept(Protocol):
     """What has settings in a workspace, as a panel."""
 
     @property
@@ -375,7 +375,7 @@ class PanelSettings:
         panels: whose settings they are.
     """
 
-    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[_Kept]) -> None:
+    def __init__(self, workspace: Workspace, setup: MonitorSetup, panels: Sequence[Kept]) -> None:
         self.workspace, self._setup, self._panels = workspace, setup, tuple(panels)
         self._conflict = ""
 

@@ -15,7 +15,7 @@ from tickrig.wire.rrc import commands as cmd
 from tickrig.wire.rrc.commands import Command
 from tickrig.wire.rrc.replies import COMMAND_CHECKSUM, Event, RrcEvent, StatusA
 
-_TIMEOUT_US: Final = 200_000
+TIMEOUT_US: Final = 200_000
 _SETTLE_US: Final = 100_000
 """Wait behind the dummy command at the start (RRC manual, notes)."""
 
@@ -63,7 +63,7 @@ class RrcClient(Closing):
         self,
         link: Link[bytes],
         *,
-        timeout_us: int = _TIMEOUT_US,
+        timeout_us: int = TIMEOUT_US,
         max_refusals: int = 3,
         on_refusals: OnRefusals = OnRefusals.POWER_OFF,
         on_unknown: Callable[[Arrival[str]], None] | None = None,

@@ -490,7 +490,7 @@ class ExecutionContexts:
         self.replan()
 
 
-_MoveListener = Callable[["RtComponent", LifeCycleState, ReturnCode], object]
+MoveListener = Callable[["RtComponent", LifeCycleState, ReturnCode], object]
 
 
 class ExecutionContext:
@@ -531,7 +531,7 @@ class ExecutionContext:
         self._participants: tuple[Participant, ...] = ()
         self._by_id: dict[int, Participant] = {}
         self.allows_period: Callable[[int], bool] | None = None
-        self.on_move: list[_MoveListener] = []
+        self.on_move: list[MoveListener] = []
 
     @property
     def now_us(self) -> int:

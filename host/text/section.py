@@ -48,7 +48,7 @@ from tickrig.host.text.names import closest, near
 from tickrig.host.text.toml_reader import BROKEN, Mistake, TomlDocument, TomlPath, read_toml
 from tickrig.host.text.values import counted, parse_size, us_of
 
-_Taker = Callable[[Any], Any]
+Taker = Callable[[Any], Any]
 """Takes what TOML gives; ValueError with what was allowed."""
 
 _LONGEST: Final = 60
@@ -92,7 +92,7 @@ def string(value: object) -> str:
     raise ValueError(f"it takes a text, not {shown(value)}")
 
 
-def matching(accepts: Callable[[str], object], what: str) -> _Taker:
+def matching(accepts: Callable[[str], object], what: str) -> Taker:
     """Return what takes a text that a function accepts; `what` names it for people."""
 
     def take(value: object) -> str:
@@ -152,7 +152,7 @@ def lines(value: object) -> dict[str, str]:
     raise ValueError(f'it takes lines like name = "value", not {shown(value)}')
 
 
-def whole(low: int, high: int) -> _Taker:
+def whole(low: int, high: int) -> Taker:
     """Return what takes a whole number of a range."""
 
     def take(value: object) -> int:
@@ -163,7 +163,7 @@ def whole(low: int, high: int) -> _Taker:
     return take
 
 
-def number(low: float, high: float, *, above: bool = False) -> _Taker:
+def number(low: float, high: float, *, above: bool = False) -> Taker:
     """Return what takes a number of a range; `above` leaves its lower end out."""
     allowed = f"above {low:g} and up to {high:g}" if above else f"{low:g}..{high:g}"
 
@@ -177,7 +177,7 @@ def number(low: float, high: float, *, above: bool = False) -> _Taker:
     return take
 
 
-def one_of(*names: str) -> _Taker:
+def one_of(*names: str) -> Taker:
     """Return what takes one of some words."""
 
     def take(value: object) -> str:
@@ -221,7 +221,7 @@ class Field:
         default: what holds without it, for people; empty where it has to be there.
     """
 
-    field: _Taker
+    field: Taker
     values: str
     text: str
     default: str = ""

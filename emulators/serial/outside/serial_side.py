@@ -89,7 +89,7 @@ class ModemLines(Copyable):
 # The receiver of a host, and what it makes of a device of another setting.
 
 
-class _HostReceiver(Copyable):
+class HostReceiver(Copyable):
     """Takes bytes of a device from a line, as a UART of the host's setting samples them.
 
     Of another setting than the device's, a character is there when the device's byte has passed
@@ -186,7 +186,7 @@ _HELD_BYTES: Final = 4_096
 """So many bytes wait for CTS."""
 
 
-class _HostTransmitter(Copyable):
+class HostTransmitter(Copyable):
     """Sends bytes of a host to a device, which samples them at its own setting.
 
     Bytes of the device's setting go on the line as they are. All else, a break too, is sampled:
@@ -372,7 +372,7 @@ NO_ASYNCIO: Final = (
 _LOOKING: Final = "read with a timeout, or let time.sleep be that of the rig"
 
 
-class _HostWaits(Copyable):
+class HostWaits(Copyable):
     """Steps a rig while a host waits, in the thread that made it and in no other.
 
     Args:
@@ -477,10 +477,10 @@ class SerialSide(Copyable):
             raise ValueError(f"mismatch {mismatch!r}: 'errors' or 'refuse'")
         self.rig, self.device, self.mismatch = rig, device, mismatch
         self.setting: UartSetting = device or UartSetting()
-        self.waits = _HostWaits(rig)
+        self.waits = HostWaits(rig)
         self.modem_lines, self.in_use = ModemLines(), False
-        self.receiver = _HostReceiver(end, self.setting)
-        self.transmitter = _HostTransmitter(rig.event_queue, end, self.setting, self.modem_lines)
+        self.receiver = HostReceiver(end, self.setting)
+        self.transmitter = HostTransmitter(rig.event_queue, end, self.setting, self.modem_lines)
         self.modem_lines.cts_changed = self._release
 
     def _release(self) -> None:

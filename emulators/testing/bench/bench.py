@@ -39,11 +39,11 @@ if TYPE_CHECKING:
 
 # What a test does to one device of a bench, and where its host connects.
 
-_Duration = int | str
+Duration = int | str
 """Microseconds, or a text as `"100ms"`."""
 
 PRESS: Final = "100ms"
-_SOON: Final = "100ms"
+SOON: Final = "100ms"
 
 
 class BenchDevice:
@@ -102,7 +102,7 @@ class BenchDevice:
         value: Setting = values[full]
         return value
 
-    def press(self, name: str, for_: _Duration = PRESS) -> None:
+    def press(self, name: str, for_: Duration = PRESS) -> None:
         """Press a button and let it go after a time, whoever makes time pass meanwhile.
 
         Args:
@@ -112,7 +112,7 @@ class BenchDevice:
         self._mode.request("press", name=self._full(name), duration_us=us_of(for_))
 
     def fault(
-        self, spec: str, *, when: tasks.Condition | None = None, for_: _Duration | None = None
+        self, spec: str, *, when: tasks.Condition | None = None, for_: Duration | None = None
     ) -> None:
         """Let a fault come: now, at a time, or as soon as something is so.
 
@@ -173,7 +173,7 @@ class BenchDevice:
         """
         self._mode.perform(self.name, text, do)
 
-    def observe(self, text: str, seen: tasks.Condition, within: _Duration = _SOON) -> bool:
+    def observe(self, text: str, seen: tasks.Condition, within: Duration = SOON) -> bool:
         """Look whether something is seen at the device: in an emulator, or by who sits there.
 
         Args:
@@ -299,7 +299,7 @@ class Bench(BenchDevice, Closing):
         seed: int = 0,
         line: LineSettings | None = None,
         mode: str = VIRTUAL,
-        sdo_timeout: _Duration | None = None,
+        sdo_timeout: Duration | None = None,
         **devices: BenchedDevice,
     ) -> None:
         named = {**({} if device is None else {name_of(device): device}), **devices}
@@ -369,7 +369,7 @@ class Bench(BenchDevice, Closing):
         """The time since the bench was opened."""
         return self._mode.now_us
 
-    def run_for(self, duration: _Duration) -> None:
+    def run_for(self, duration: Duration) -> None:
         """Let time pass.
 
         Args:
@@ -377,7 +377,7 @@ class Bench(BenchDevice, Closing):
         """
         self._mode.run_for(us_of(duration))
 
-    def wait_until(self, done: Callable[[], bool], within: _Duration) -> bool:
+    def wait_until(self, done: Callable[[], bool], within: Duration) -> bool:
         """Let time pass until something is so.
 
         Args:
@@ -390,7 +390,7 @@ class Bench(BenchDevice, Closing):
         tasks.check_condition(done)
         return self._mode.wait_until(done, us_of(within))
 
-    async def sleep(self, duration: _Duration) -> None:
+    async def sleep(self, duration: Duration) -> None:
         """Wait in an async body; other tasks go on meanwhile.
 
         Args:
@@ -398,7 +398,7 @@ class Bench(BenchDevice, Closing):
         """
         await tasks.Wait(_never, self.now_us + us_of(duration))
 
-    async def until(self, done: tasks.Condition, within: _Duration | None = None) -> bool:
+    async def until(self, done: tasks.Condition, within: Duration | None = None) -> bool:
         """Wait in an async body until something is so.
 
         Args:
@@ -410,7 +410,7 @@ class Bench(BenchDevice, Closing):
         """
         return await tasks.Wait(done, NEVER if within is None else self.now_us + us_of(within))
 
-    async def edge(self, name: str, within: _Duration | None = None) -> Setting:
+    async def edge(self, name: str, within: Duration | None = None) -> Setting:
         """Wait in an async body until an input or output changes.
 
         Args:

@@ -76,7 +76,7 @@ _MOST: Final = 500
 """Runs of a batch."""
 
 
-class _Workers(Protocol):
+class Workers(Protocol):
     """Who does runs: on this machine, or on a cluster."""
 
     @property
@@ -102,7 +102,7 @@ class Campaign:
         workers: who does them.
     """
 
-    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: _Workers) -> None:
+    def __init__(self, plan: CampaignPlan, journal: CampaignJournal, workers: Workers) -> None:
         self._plan, self._journal, self._workers = plan, journal, workers
         done = journal.verdicts
         self._left = (number for number in plan.numbers() if number not in done)
@@ -282,7 +282,7 @@ class _CampaignRun:
             self._journal.remove()
         return table
 
-    def _workers(self, crew: Crew, plan: CampaignPlan) -> _Workers:
+    def _workers(self, crew: Crew, plan: CampaignPlan) -> Workers:
         if not self._options.scheduler:
             return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
         try:
@@ -293,7 +293,7 @@ class _CampaignRun:
             ) from None
         return DaskWorkers(self._options.scheduler, plan)
 
-    def _do(self, plan: CampaignPlan, workers: _Workers) -> None:
+    def _do(self, plan: CampaignPlan, workers: Workers) -> None:
         """Do all runs, with a bar on a terminal."""
         kept = self._journal.verdicts
         if kept:

@@ -160,7 +160,7 @@ class SlaveBench:
         return self._stimulus(*words)
 
 
-_BIT_RATE: Final = 1_000_000
+BIT_RATE: Final = 1_000_000
 _NODE_IDS: Final = range(1, 128)
 _LEVELS: Final = tuple(level.word for level in Level)
 
@@ -180,7 +180,7 @@ def conformance(  # noqa: PLR0913 - by keyword
     never: Iterable[int] = (),
     stimulus: Stimulus | None = None,
     seed: int = 0,
-    bit_rate: int = _BIT_RATE,
+    bit_rate: int = BIT_RATE,
 ) -> Report:
     """Judge a CANopen slave in virtual time; the same slave gives the same report.
 

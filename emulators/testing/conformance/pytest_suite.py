@@ -37,7 +37,7 @@ _MOST_LINES: Final = 60
 _ANY_NODE_ID: Final = 1
 """Names of checks do not depend on the node-ID."""
 
-_Test = Callable[..., None]
+Test = Callable[..., None]
 
 
 def conformance_tests(
@@ -48,7 +48,7 @@ def conformance_tests(
     only: str | Iterable[str] = (),
     baseline: Path | str | None = None,
     **options: Any,
-) -> _Test:
+) -> Test:
     """Return a test function for pytest, which has a parameter for each check.
 
     The checks of one function are judged in one run, when the first of them is asked for, and
@@ -104,7 +104,7 @@ def _told_by(made: Node) -> EdsDevice | None:
     return describe_slave(made).device if isinstance(made, CanopenSlave) else None
 
 
-def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> _Test:
+def _test_on_bench(name: str, options: dict[str, Any], baseline: Baseline) -> Test:
     def test(bench: Bench, check_id: str) -> None:
         __tracebackhide__ = True
         report = conformance(bench[name], only=check_id, **options)
@@ -130,7 +130,7 @@ class _Run:
         self._make, self._options, self._baseline = make, options, baseline
         self._reports: dict[frozenset[str], Report | _Unmade] = {}
 
-    def test(self) -> _Test:
+    def test(self) -> Test:
         """Return the test function."""
 
         def test(request: pytest.FixtureRequest, check_id: str) -> None:

@@ -14,7 +14,7 @@ _FAILED: Final = "failed"
 _EVERY: Final = "every"
 
 
-class _Option(NamedTuple):
+class Option(NamedTuple):
     """An option of the command line, which the configuration file has as well.
 
     Attributes:
@@ -36,15 +36,15 @@ class _Option(NamedTuple):
 
 
 OPTIONS: Final = (
-    _Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
-    _Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
-    _Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
-    _Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
-    _Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
-    _Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
-    _Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
-    _Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
-    _Option("bench_param", "NAME=V,V", "run tests that take NAME with each value; many", many=True),
+    Option("bench", "RIG.TOML", "rig file of the bench, in place of what `bench_config` gives"),
+    Option("bench_mode", "MODE", "virtual, real or hardware; several, with commas, run each test"),
+    Option("bench_seed", "N", "seed of all chance, or `random`, which is printed"),
+    Option("bench_artifacts", "DIR", "keep trace, candump and transcript of failed tests here"),
+    Option("bench_artifacts_of", "WHICH", "of which tests: failed or every"),
+    Option("bench_compare", "", "run each test twice; what differs between the runs is a failure"),
+    Option("bench_report", "OUT.HTML", "write a report of all tests that have a bench"),
+    Option("bench_requirements", "FILE", "what the report has to show: a requirement a line"),
+    Option("bench_param", "NAME=V,V", "run tests that take NAME with each value; many", many=True),
 )
 
 
@@ -116,7 +116,7 @@ class PluginSettings(NamedTuple):
 SETTINGS: Final = pytest.StashKey[PluginSettings]()
 
 
-def _wanted(config: pytest.Config, option: _Option) -> str:
+def _wanted(config: pytest.Config, option: Option) -> str:
     given = config.getoption(option.name)
     if isinstance(given, list):
         given = "\n".join(given)

@@ -136,14 +136,14 @@ def search(
         raise min(found.items(), key=lambda each: len(each[0]))[1] from None
 
 
-_WireMaker = Callable[[], ByteLine | CanWire]
+WireMaker = Callable[[], ByteLine | CanWire]
 
 
 def check_device(  # noqa: PLR0913 - by name
     device_type: DeviceType | str | Callable[[], Device[Any]],
     *,
     traffic: st.SearchStrategy[Any] | None = None,
-    wire: _WireMaker | None = None,
+    wire: WireMaker | None = None,
     start: Session = NOTHING,
     max_examples: int = 30,
     remembers: bool = False,
@@ -209,8 +209,8 @@ def check_device(  # noqa: PLR0913 - by name
 
 
 def _parts(
-    device_type: DeviceType | str | Callable[[], Any], wire: _WireMaker | None
-) -> tuple[Callable[[], Any], _WireMaker]:
+    device_type: DeviceType | str | Callable[[], Any], wire: WireMaker | None
+) -> tuple[Callable[[], Any], WireMaker]:
     """Return what makes the device, and what makes its wire."""
     made = DEVICES.load(device_type) if isinstance(device_type, str) else device_type
     if isinstance(made, DeviceType):

@@ -224,12 +224,12 @@ def _never() -> bool:
 
 # The master that a bus.yml describes, on a bus.
 
-_SDO_TIMEOUT_US: Final = 100_000
+SDO_TIMEOUT_US: Final = 100_000
 """As Lely's master has it, unless told otherwise."""
 
 
 def open_master(
-    link: Link[Any], path: Path | str, *, sdo_timeout_us: int = _SDO_TIMEOUT_US
+    link: Link[Any], path: Path | str, *, sdo_timeout_us: int = SDO_TIMEOUT_US
 ) -> CanopenMaster:
     """Return the master of a bus.yml; it has sent nothing yet.
 
@@ -254,7 +254,7 @@ def open_master(
 
 
 def _master_of(
-    link: Link[Any], bus: BusFile, sdo_timeout_us: int = _SDO_TIMEOUT_US
+    link: Link[Any], bus: BusFile, sdo_timeout_us: int = SDO_TIMEOUT_US
 ) -> CanopenMaster:
     """Return the master of a bus.yml that was read."""
     master = CanopenMaster(link, replace(plan_of(bus), sdo_timeout_us=sdo_timeout_us))

@@ -248,7 +248,7 @@ class SendBuffer(RingBuffer[P]):
 P_co = TypeVar("P_co", covariant=True)
 
 
-class _OutPortConsumer(Protocol[P_co]):
+class OutPortConsumer(Protocol[P_co]):
     """An OutPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, OutPortConsumer)."""
 
     def get(self) -> P_co | None:
@@ -387,7 +387,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
         port: InPort[T],
         end: PeerEnd,
         codec: Codec[T, P],
-        consumer: _OutPortConsumer[P],
+        consumer: OutPortConsumer[P],
         thread: PeerCaller,
         calls: CallQueue,
     ) -> None:
@@ -434,7 +434,7 @@ class InPortPullConnector(_InPortConnector[T, P]):
 P_contra = TypeVar("P_contra", contravariant=True)
 
 
-class _InPortConsumer(Protocol[P_contra]):
+class InPortConsumer(Protocol[P_contra]):
     """An InPort of a peer, as an engine reaches it (OpenRTM-aist 1.x, InPortConsumer)."""
 
     def put(self, payload: P_contra, /) -> PortStatus:
@@ -475,7 +475,7 @@ class OutPortPushConnector(Connector[Any], Generic[T, P]):
         port: OutPort[T],
         end: PeerEnd,
         codec: Codec[T, P],
-        consumer: _InPortConsumer[P],
+        consumer: InPortConsumer[P],
         thread: PeerCaller,
     ) -> None:
         options = replace(end.options, dataflow=DataflowType.PUSH)

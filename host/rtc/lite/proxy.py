@@ -31,7 +31,7 @@ from tickrig.wire.rtc_types.rtc import Time
 
 
 @dataclass(frozen=True, slots=True)
-class _DeviceProfile:
+class DeviceProfile:
     """What a device says of itself.
 
     Attributes:
@@ -55,7 +55,7 @@ class _DeviceProfile:
         }
 
 
-def _start_up(channel: RequestChannel, boot_us: int) -> _DeviceProfile:
+def _start_up(channel: RequestChannel, boot_us: int) -> DeviceProfile:
     """Bring a device to Inactive, and ask what it is.
 
     Raises:
@@ -79,14 +79,14 @@ def _start_up(channel: RequestChannel, boot_us: int) -> _DeviceProfile:
     return profile
 
 
-def _request_profile(channel: RequestChannel) -> _DeviceProfile:
+def _request_profile(channel: RequestChannel) -> DeviceProfile:
     reply = _demand(LiteCommand.PROFILE, channel.request_again(LiteCommand.PROFILE))
     announced = parse_component_profile(reply.fields)
     ins, outs = tuple(channel.in_ports), tuple(channel.out_ports)
     if (len(ins), len(outs)) != (announced.in_ports, announced.out_ports):
         counts = f"{announced.in_ports} in-ports and {announced.out_ports} out-ports"
         raise DeviceRefused(f"{counts} announced, {len(ins)} and {len(outs)} described", "CZ")
-    return _DeviceProfile(
+    return DeviceProfile(
         announced.type_name.decode("latin-1"), ins, outs, _request_context(channel)
     )
 
@@ -307,7 +307,7 @@ class RtcLiteProxy(RtComponent):
         super().__init__(instance_name)
         self._settings, self._listener = settings or ProxySettings(), listener
         self._link, self._channel = link, RequestChannel(link, self._settings)
-        self.device: _DeviceProfile | None = None
+        self.device: DeviceProfile | None = None
         self.relays = PortBridges()
         self.fatal_us: int | None = None
         self._failed = False  # a callback failed, so that Error comes next

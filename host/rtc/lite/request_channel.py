@@ -83,7 +83,7 @@ _KEPT: Final = 8
 _FRAMES_LOG: Final = log_of(__name__)
 
 
-class _ReplyDecoder(Protocol):
+class ReplyDecoder(Protocol):
     """`Decoder` or `RtnoReplies`."""
 
     @property
@@ -116,7 +116,7 @@ class FrameLink:
     """
 
     def __init__(
-        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: _ReplyDecoder
+        self, link: Link[bytes], encode: Callable[[LiteFrame], bytes], decoder: ReplyDecoder
     ) -> None:
         self._link, self._encode, self._decoder = link, encode, decoder
         self._byte_us = link.now_us

@@ -10,7 +10,7 @@ from tickrig.host.links.link import Link
 from tickrig.wire import modbus
 from tickrig.wire.errors import WireError
 
-_TIMEOUT_US: Final = 20_000
+TIMEOUT_US: Final = 20_000
 """How long an answer may take (rh3-control, drive protocol)."""
 
 _CODES: Final = {code.value: code for code in modbus.ExceptionCode}
@@ -53,7 +53,7 @@ class ModbusMaster:
     """
 
     def __init__(
-        self, link: Link[bytes], address: int = 1, timeout_us: int = _TIMEOUT_US, retries: int = 1
+        self, link: Link[bytes], address: int = 1, timeout_us: int = TIMEOUT_US, retries: int = 1
     ) -> None:
         self._link, self._address = link, address
         self._timeout_us, self._retries = timeout_us, retries

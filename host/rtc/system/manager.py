@@ -183,7 +183,7 @@ def _plain(path: str) -> str:
 
 R = TypeVar("R", bound=RtComponent)
 
-_ComponentListener = Callable[[RtComponent], object]
+ComponentListener = Callable[[RtComponent], object]
 
 DEFAULT_RATE_HZ: Final = 1_000.0
 
@@ -216,8 +216,8 @@ class Manager(Schedule):
         self._registered: dict[str, type[RtComponent]] = {}
         self._components: dict[str, RtComponent] = {}
         self.path_uris: dict[str, str] = {}
-        self.on_added: list[_ComponentListener] = []
-        self.on_removed: list[_ComponentListener] = []
+        self.on_added: list[ComponentListener] = []
+        self.on_removed: list[ComponentListener] = []
 
     @property
     def types(self) -> tuple[str, ...]:

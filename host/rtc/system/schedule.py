@@ -136,7 +136,7 @@ PAUSE_US: Final = 20_000
 """The longest wait: so soon something is noticed that came to be due meanwhile, or a stop."""
 
 
-class _Clock(Protocol):
+class Clock(Protocol):
     """Time since it was first waited for, in microseconds."""
 
     def wait_until(self, t_us: int, /) -> int:
@@ -162,7 +162,7 @@ class RealTime:
         after_tick: called with the time in us after each tick.
     """
 
-    def __init__(self, schedule: Schedule, clock: _Clock) -> None:
+    def __init__(self, schedule: Schedule, clock: Clock) -> None:
         self._schedule, self._clock = schedule, clock
         self._start_us = schedule.now_us
         self.running, self.late_ticks, self.worst_late_us = True, 0, 0
