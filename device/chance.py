@@ -80,10 +80,7 @@ def threshold_of(rate: float) -> int:
     return round(rate * 2**64)
 
 
-def check_rate(name: str, rate: float | None, *, rated: bool) -> None:
-    """Raise ValueError unless a fault of this name, with or without a rate, can have this one."""
-    if rated and (rate is None or not 0 < rate <= 1):
-        came = "no rate" if rate is None else f"{rate:g}"
-        raise ValueError(f"{name} wants a rate above 0 and up to 1, as {name}=0.01; got {came}")
-    if not rated and rate is not None:
-        raise ValueError(f"{name} takes no rate, got {rate:g}")
+def check_rate(name: str, rate: float) -> None:
+    """Raise ValueError unless a fault of this name can have this rate."""
+    if not 0 < rate <= 1:
+        raise ValueError(f"{name} takes a rate above 0 and up to 1, as {name}=0.01; got {rate:g}")

@@ -11,6 +11,7 @@ from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.bench.operator import PRESS_US, Operator, WireFaults
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
+from tickrig.emulators.rig.faults import FaultForm, usage
 from tickrig.host.control.requests import Object, RequestDispatcher, short, text_of, whole
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.names import near
@@ -103,7 +104,10 @@ class EmulatorControl(RequestDispatcher):
                 for item in device.outputs.values()
             ],
             "wire_faults": [
-                {"name": name, "text": kind.text, "rated": kind.rated}
+                {
+                    **{"name": name, "text": kind.text, "rated": kind.rated},
+                    **{"usage": usage(name, kind), "arguments": _arguments(kind)},
+                }
                 for name, kind in emulator.wire.fault_types.items()
             ],
         }
@@ -169,6 +173,14 @@ class EmulatorControl(RequestDispatcher):
     def _stop(self, request: Object) -> Object:
         self._emulator.stop()
         return {}
+
+
+def _arguments(form: FaultForm) -> list[dict[str, str]]:
+    """Return the arguments of a fault, each with its default."""
+    return [
+        {"name": one.name, "text": one.text, "default": one.default, "range": one.range}
+        for one in form.all_arguments
+    ]
 
 
 def _setting(value: object) -> Setting:

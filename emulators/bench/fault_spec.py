@@ -1,4 +1,4 @@
-"""A fault in one word: `NAME[=RATE][@FROM[-TO]]`, as command lines and scenarios write it."""
+"""A fault in one word: `NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]`, as people write it everywhere."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ _SPEC: Final = re.compile(r"([\w/]+)(?:=([^@]*))?(?:@([^-]*)(?:-(.*))?)?", re.AS
 
 @dataclass(frozen=True, slots=True)
 class FaultSpec:
-    """Which fault, how often, and when.
+    """Which fault, with which arguments, and when.
 
     Attributes:
         name: a fault of the wire, or a physical fault of the device.
-        rate: probability per bit or byte; None if the fault is just there.
+        arguments: as they were written; `bind_arguments` of rig/faults.py reads them.
         from_us: when it begins, in the rig's time.
         to_us: when it ends; `NEVER` if it stays.
     """
 
     name: str
-    rate: float | None = None
+    arguments: tuple[str, ...] = ()
     from_us: int = 0
     to_us: int = NEVER
 
@@ -33,6 +33,15 @@ class FaultSpec:
         """Refuse a time span that is empty."""
         if self.to_us <= self.from_us:
             raise ValueError(f"fault {self.name} ends before it begins")
+
+    @property
+    def text(self) -> str:
+        """Name and arguments as people write them.
+
+        >>> FaultSpec("sdo_slow", ("1s", "rate=0.1")).text
+        'sdo_slow=1s,rate=0.1'
+        """
+        return f"{self.name}={','.join(self.arguments)}" if self.arguments else self.name
 
 
 def _any_name(name: str) -> None:
@@ -44,29 +53,31 @@ def parse_fault_spec(text: str, check_name: Callable[[str], object] = _any_name)
 
     Args:
         text: as `flip=0.001@5s-7s`.
-        check_name: called with the name before rate and times are read; raises ValueError unless
-            there is such a fault.
+        check_name: called with the name before the times are read; raises ValueError unless there
+            is such a fault.
 
     Raises:
         ValueError: not of the form, or not a name.
 
     >>> parse_fault_spec("flip=0.001@5s-7s")
-    FaultSpec(name='flip', rate=0.001, from_us=5000000, to_us=7000000)
+    FaultSpec(name='flip', arguments=('0.001',), from_us=5000000, to_us=7000000)
     """
     match = _SPEC.fullmatch(text)
     if match is None:
-        raise ValueError(f"{text!r} is not a fault: write NAME[=RATE][@FROM[-TO]], as cut@5s-7s")
-    name, rate, start, stop = match.groups()
+        form = "NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]]"
+        raise ValueError(f"{text!r} is not a fault: write {form}, as cut@5s-7s")
+    name, argument, start, stop = match.groups()
     try:
         check_name(name)
     except ValueError:
-        if rate is not None and any(_is_named(x, check_name) for x in (rate, f"{name}/{rate}")):
-            text = f"{rate!r} is not a rate; the fault {rate} of {name} is {name}/{rate}"
+        names = (argument, f"{name}/{argument}")
+        if argument is not None and any(_is_named(each, check_name) for each in names):
+            text = f"{argument!r} is not a rate; the fault {argument} of {name} is {names[1]}"
             raise ValueError(text) from None
         raise
     return FaultSpec(
         name,
-        None if rate is None else _parse_rate(rate),
+        () if argument is None else tuple(argument.split(",")),
         parse_time_us(start) if start is not None else 0,
         parse_time_us(stop) if stop is not None else NEVER,
     )
@@ -78,13 +89,6 @@ def _is_named(name: str, check_name: Callable[[str], object]) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _parse_rate(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError(f"{text!r} is not a rate: write a number up to 1, as 0.001") from None
 
 
 # A fault that a test ordered, and when it is to come.

@@ -11,6 +11,7 @@ from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_spec import FaultSpec
 from tickrig.emulators.rig.emulated import Inputs
 from tickrig.emulators.rig.event_queue import EventQueue
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments
 from tickrig.host.text.names import near
 from tickrig.host.text.values import Setting
 from tickrig.wire.instant import NEVER
@@ -19,25 +20,15 @@ PRESS_US: Final = 100_000
 """How long a button is pressed unless told otherwise."""
 
 
-class WireFault(Protocol):
-    """A fault of a wire, as people see it."""
-
-    @property
-    def text(self) -> str:
-        """What it does."""
-        ...
-
-    @property
-    def rated(self) -> bool:
-        """Whether it wants a rate."""
-        ...
+_PHYSICAL: Final = FaultForm("", rated=False)
+"""A fault of a device is there or not."""
 
 
 class WireFaults(Protocol):
     """Where faults of a wire are armed by name: `FaultyPort`, or a whole bus."""
 
     @property
-    def fault_types(self) -> Mapping[str, WireFault]:
+    def fault_types(self) -> Mapping[str, FaultForm]:
         """The faults that can be armed."""
         ...
 
@@ -46,11 +37,15 @@ class WireFaults(Protocol):
         """Names of those that are."""
         ...
 
-    def check(self, name: str, rate: float | None) -> None:
+    def check(self, name: str, *arguments: str) -> None:
         """Raise ValueError unless the fault can be armed like this."""
 
-    def arm(self, name: str, rate: float | None = None) -> None:
+    def arm(self, name: str, *arguments: str) -> None:
         """Let a fault begin; one of the same name is replaced."""
+
+    def acted(self, name: str) -> int:
+        """Return how often a fault has acted since it was armed last."""
+        ...
 
     def clear(self, name: str) -> None:
         """Let a fault end; one that is not armed is no error."""
@@ -173,13 +168,12 @@ class Operator(Copyable):
             self._event_queue.put(("end", *key), spec.to_us, end)
 
     def check_fault(self, spec: FaultSpec) -> None:
-        """Raise ValueError unless there is such a fault and its rate makes sense."""
+        """Raise ValueError unless there is such a fault and it takes these arguments."""
         self.check_clear(spec.name)
         if spec.name in self._wire.fault_types:
-            self._wire.check(spec.name, spec.rate)
-        elif spec.rate is not None:
-            hint = "" if spec.rate else "; clear ends it"
-            raise ValueError(f"{spec.name} takes no rate, got {spec.rate:g}{hint}")
+            self._wire.check(spec.name, *spec.arguments)
+        else:
+            bind_arguments(spec.name, _PHYSICAL, spec.arguments)
 
     def clear(self, name: str) -> None:
         """Let a fault go, and its future too; ValueError if there is none of this name."""
@@ -217,8 +211,8 @@ class Operator(Copyable):
 
     def _begin(self, spec: FaultSpec) -> None:
         if spec.name in self._wire.fault_types:
-            self._wire.arm(spec.name, spec.rate)
-            self.note(spec.name if spec.rate is None else f"{spec.name}={spec.rate:g}")
+            self._wire.arm(spec.name, *spec.arguments)
+            self.note(spec.text)
         else:
             self._put(spec.name, 1)
 

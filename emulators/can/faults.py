@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Final
 
-from tickrig.device.chance import Chance, check_rate, threshold_of
-from tickrig.device.twin import Immutable, Part
+from tickrig.device.chance import Chance, threshold_of
+from tickrig.device.twin import Part
+from tickrig.emulators.rig.faults import FaultForm, FaultTally, bind_arguments
 
 _DELAY_US: Final = 10_000
 """How long a delayed node sends nothing."""
@@ -24,17 +25,13 @@ class FaultVerdict(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class CanFaultType(Immutable):
+class CanFaultType(FaultForm):
     """A fault that can be armed by name.
 
     Attributes:
-        text: what it does, for people.
-        rated: whether it wants a rate.
         verdict: what it makes of a frame that it hits.
     """
 
-    text: str
-    rated: bool = True
     verdict: FaultVerdict | None = None
 
 
@@ -78,6 +75,7 @@ class CanFaults(Part):
     def __init__(self, seed: int, changed: Callable[[str, bool], None]) -> None:
         self.seed, self._changed = seed, changed
         self._armed: dict[str, int] = {}
+        self._tallies: dict[str, FaultTally] = {}
         self._chances: dict[str, Chance] = {}
         self._verdict: FaultVerdict | None = None
         self.active, self.place = False, 0
@@ -87,20 +85,21 @@ class CanFaults(Part):
         """Names of the faults that are armed."""
         return tuple(self._armed)
 
-    def check(self, name: str, rate: float | None) -> None:
+    def check(self, name: str, *arguments: str) -> None:
         """Raise ValueError unless the fault can be armed like this."""
-        check_rate(name, rate, rated=self.fault_types[name].rated)
+        bind_arguments(name, self.fault_types[name], arguments)
 
-    def arm(self, name: str, rate: float | None = None) -> None:
+    def arm(self, name: str, *arguments: str) -> None:
         """Let a fault begin, at the time the bus has reached; one of the same name is replaced.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: a rate is missing, out of range or too much.
+            ValueError: an argument that it does not take, or out of range.
         """
-        self.check(name, rate)
+        bound = bind_arguments(name, self.fault_types[name], arguments)
         self.clear(name)
-        self._armed[name] = threshold_of(rate or 0)
+        self._armed[name] = threshold_of(bound.rate)
+        self._tallies[name] = FaultTally(bound.count)
         self.active = True
         self._changed(name, True)
 
@@ -130,7 +129,12 @@ class CanFaults(Part):
         return _DELAY_US if "delay" in self._armed and self._hits("delay", f"delay {number}") else 0
 
     def _hits(self, name: str, stream: str) -> bool:
-        return self._chance(stream).hit(self._armed[name])
+        hit = self._chance(stream).hit(self._armed[name])
+        return hit and bool(self._tallies[name].allow())
+
+    def acted(self, name: str) -> int:
+        """Return how often a fault has acted since it was armed last."""
+        return self._tallies[name].acted if name in self._tallies else 0
 
     def _chance(self, stream: str) -> Chance:
         return self._chances.setdefault(stream, Chance(self.seed, stream))

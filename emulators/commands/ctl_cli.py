@@ -124,7 +124,7 @@ def _describe(answer: Any) -> list[str]:
     out += [f"  {x['name']:<20} {x['unit']:<7} {x['text']}" for x in answer["outputs"]]
     out += ["", "faults of the wire"]
     for x in answer["wire_faults"]:
-        out.append(f"  {x['name'] + ('=RATE' if x['rated'] else ''):<20} {x['text']}")
+        out.append(f"  {x['usage']:<20} {x['text']}")
     return out
 
 
@@ -187,7 +187,7 @@ def press(name: str, duration: str) -> Object:
 @verb()
 @click.argument("spec", shell_complete=_complete(faults))
 def fault(spec: str) -> Object:
-    """Let a fault come: NAME[=RATE][@FROM[-TO]], times since the emulator's start."""
+    """Let a fault come: NAME[=ARGUMENT[,ARGUMENT]][@FROM[-TO]], times since its start."""
     return {"spec": spec}
 
 

@@ -66,7 +66,7 @@ def run_options(wire_faults: str, device_faults: _Faults) -> Decorator:
             "--fault",
             "faults",
             multiple=True,
-            metavar="NAME[=RATE][@FROM[-TO]]",
+            metavar="NAME[=ARGUMENT][@FROM[-TO]]",
             shell_complete=complete,
             help=f"Fault of the wire ({wire_faults}) or of the device; may be repeated.",
         ),

@@ -1,17 +1,265 @@
-"""Faults of a wire: what happens to traffic on its way."""
+"""Faults by name: how they are declared, and what happens to traffic on its way."""
+
+# Theory of operation.
+#
+# A fault is declared by one entry of a table, `NAME: FaultType(...)`: what it does, which arguments
+# it takes, and what it is made by. All else is derived from the entry: `bind_arguments` reads what
+# people write behind `NAME=`, `usage` says how to write it, `describe` and `tickrig ctl SOCKET
+# faults` list it, and the table of docs/reference/bench/faults.md is written of it.
+#
+# People write `NAME[=ARGUMENT[,ARGUMENT]]`. A bare argument is the next one of the declaration, or
+# `KEY=VALUE` names it. Each fault that is `rated` also takes `rate=` (how probable it is that it
+# acts when it could) and `count=` (how often it acts at most); one without arguments of its own
+# takes the rate bare, as `drop=0.01`. Each argument has a default, so the bare name is a fault.
+#
+# A `FaultTrigger` decides when a fault acts; it draws by chance, keeps to the count, and counts.
+# A fault asks it each time it could act, and for nothing else, so chance is the same in each run.
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Generic
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Generic
 
 from tickrig.device.chance import Chance, check_rate, threshold_of
 from tickrig.device.core import W
-from tickrig.device.twin import Copyable, Immutable, Listeners
+from tickrig.device.twin import Copyable, Immutable, Listeners, Part
 from tickrig.emulators.rig.port import Port
+from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
+from tickrig.host.text.values import parse_time_with_unit_us
+
+_RATE, _COUNT = "rate", "count"
+_MOST: Final = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class FaultArgument(Immutable):
+    """An argument of a fault, as people write it.
+
+    Attributes:
+        name: keyword, `delay` of `delay=800ms`.
+        text: what it sets, for people.
+        default: what it is where nobody writes it, as people write it.
+        unit: `time` for a duration (low and high in us), else the unit of a whole number, which
+            may be written in hex; empty for a plain number.
+        low: smallest value.
+        high: largest value.
+        choices: the words that it takes instead of a number, if any.
+        read: reads the word instead, if it has a form of its own; raises ValueError.
+    """
+
+    name: str
+    text: str
+    default: str
+    unit: str = ""
+    low: int = 0
+    high: int = _MOST
+    choices: tuple[str, ...] = ()
+    read: Callable[[str], Any] | None = None
+
+    @property
+    def range(self) -> str:
+        """Which values it takes, for people."""
+        if self.choices:
+            return " or ".join(self.choices)
+        if self.read is not None:
+            return self.unit
+        if self.unit == "time":
+            return f"{_time(self.low)} to {_time(self.high)}"
+        return f"{self.low} to {self.high} {self.unit}".rstrip()
+
+    def parse(self, word: str) -> Any:
+        """Read a value: microseconds of a time, a number, a word, or what `read` returns.
+
+        Raises:
+            ValueError: not of its form, or out of range.
+        """
+        if self.read is not None:
+            return self.read(word)
+        if self.choices:
+            if word not in self.choices:
+                raise ValueError(f"{self.name} {word!r} is not {self.range}")
+            return word
+        try:
+            value = parse_time_with_unit_us(word) if self.unit == "time" else int(word, 0)
+        except ValueError as error:
+            said = str(error) if self.unit == "time" else f"{word!r} is not a whole number"
+            raise ValueError(f"{self.name}: {said}") from None
+        if not self.low <= value <= self.high:
+            raise ValueError(f"{self.name} {word} is not in {self.range}")
+        return value
+
+
+def _time(us: int) -> str:
+    for unit_us, unit in ((1_000_000, "s"), (1_000, "ms")):
+        if us and us % unit_us == 0:
+            return f"{us // unit_us} {unit}"
+    return f"{us} us"
+
+
+RATE: Final = FaultArgument(_RATE, "probability that it acts each time it could", "1")
+COUNT: Final = FaultArgument(_COUNT, "how often it acts at most", "always", low=1)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultForm(Immutable):
+    """How a fault is written, and what it does; a table of faults has a subclass as entries.
+
+    Attributes:
+        text: what it does, for people.
+        rated: whether it takes `rate=` and `count=`.
+        arguments: its own arguments, in the order in which they are written without keyword.
+        usual_rate: the rate where nobody writes one.
+    """
+
+    text: str
+    rated: bool = field(default=True, kw_only=True)
+    arguments: tuple[FaultArgument, ...] = field(default=(), kw_only=True)
+    usual_rate: float = field(default=1.0, kw_only=True)
+
+    @property
+    def all_arguments(self) -> tuple[FaultArgument, ...]:
+        """Its arguments with those that each rated fault has, each with its default."""
+        if not self.rated:
+            return self.arguments
+        rate = FaultArgument(_RATE, RATE.text, f"{self.usual_rate:g}", "above 0 to 1", read=float)
+        return (*self.arguments, rate, COUNT)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultArguments(Immutable):
+    """What was written behind the name of a fault, with all defaults.
+
+    Attributes:
+        values: by name of the argument, as its `parse` returns them.
+        rate: probability that it acts each time it could.
+        count: how often it acts at most; None for always.
+    """
+
+    values: Mapping[str, Any] = field(default_factory=dict)
+    rate: float = 1.0
+    count: int | None = None
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of an argument."""
+        return self.values[name]
+
+
+def usage(name: str, form: FaultForm) -> str:
+    """Return how a fault is written.
+
+    >>> usage("slow", FaultForm("", arguments=(FaultArgument("delay", "", "800ms", "time"),)))
+    'slow[=DELAY]'
+    >>> usage("drop", FaultForm("")), usage("cut", FaultForm("", rated=False))
+    ('drop[=RATE]', 'cut')
+    """
+    words = [each.name for each in form.arguments] or [_RATE] * form.rated
+    return f"{name}[={','.join(words).upper()}]" if words else name
+
+
+def bind_arguments(name: str, form: FaultForm, words: Sequence[str]) -> FaultArguments:
+    """Read the arguments of a fault.
+
+    Args:
+        name: of the fault, for messages.
+        form: its declaration.
+        words: what stands behind `NAME=`, split at commas.
+
+    Raises:
+        ValueError: an argument that it does not take, or out of range.
+
+    >>> slow = FaultForm("", arguments=(FaultArgument("delay", "", "800ms", "time"),))
+    >>> bind_arguments("slow", slow, ("5ms", "rate=0.1"))
+    FaultArguments(values={'delay': 5000}, rate=0.1, count=None)
+    """
+    known = {each.name: each for each in form.all_arguments}
+    if words and not known:
+        hint = "; clear ends it" if tuple(words) == ("0",) else ""
+        raise ValueError(f"{name} takes no argument, got {','.join(words)}{hint}")
+    free = [each.name for each in form.arguments] or [_RATE]
+    given: dict[str, str] = {}
+    for word in words:
+        key, keyed, value = word.partition("=")
+        if not keyed:
+            left = [each for each in free if each not in given]
+            if not left:
+                raise ValueError(f"{word!r} is one argument too many: {usage(name, form)}")
+            key, value = left[0], word
+        if key not in known:
+            raise ValueError(f"{name} has no argument {key!r}; {near(key, known)}")
+        if key in given:
+            raise ValueError(f"{name} has {key} twice")
+        given[key] = value
+    count = COUNT.parse(given[_COUNT]) if _COUNT in given else None
+    rate = _parse_rate(name, given[_RATE]) if _RATE in given else form.usual_rate
+    try:
+        values = {
+            each.name: each.parse(given.get(each.name, each.default)) for each in form.arguments
+        }
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    return FaultArguments(values, rate, count)
+
+
+def _parse_rate(name: str, text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a rate: write a number up to 1, as 0.001") from None
+    check_rate(name, rate)
+    return rate
+
+
+class FaultTally(Part):
+    """How often a fault has acted, and how often it may.
+
+    Args:
+        count: how often it acts at most; None for always.
+
+    Attributes:
+        acted: how often it has acted.
+    """
+
+    __slots__ = ("acted", "count")
+
+    def __init__(self, count: int | None = None) -> None:
+        self.count, self.acted = count, 0
+
+    def allow(self, wanted: int = 1) -> int:
+        """Return how many of so many actions are left, and count them."""
+        left = wanted if self.count is None else min(wanted, self.count - self.acted)
+        self.acted += left
+        return left
+
+
+class FaultTrigger(Part):
+    """Decides by chance, rate and count when a fault acts.
+
+    Args:
+        chance: what it draws from; a fault may draw from it as well.
+        arguments: have the rate and the count.
+        tally: shared by the triggers of a fault that acts in both directions.
+    """
+
+    __slots__ = ("chance", "tally", "threshold")
+
+    def __init__(self, chance: Chance, arguments: FaultArguments, tally: FaultTally) -> None:
+        self.chance, self.tally = chance, tally
+        self.threshold = threshold_of(arguments.rate)
+
+    def hit(self) -> bool:
+        """Say whether the fault acts this time, and count it."""
+        return self.chance.hit(self.threshold) and bool(self.tally.allow())
+
+    def hits(self, draws: int) -> list[int]:
+        """Return at which of so many chances the fault acts, counted from 0, and count them."""
+        found = self.chance.hits(self.threshold, draws)
+        return found[: self.tally.allow(len(found))]
+
+
+# Faults of a port: each makes something else of the traffic that passes.
 
 Fault = Callable[[int, W], W]
 """What a fault makes of the traffic that passes at a time in us; it is state, so no closure."""
@@ -38,18 +286,14 @@ class HoldingFault(ABC, Generic[W]):
 
 
 @dataclass(frozen=True, slots=True)
-class FaultType(Immutable, Generic[W]):
-    """A fault that can be armed by name.
+class FaultType(FaultForm, Generic[W]):
+    """A fault of a port that can be armed by name.
 
     Attributes:
-        text: what it does, for people.
-        make: builds the fault from its chance and the threshold of its rate.
-        rated: whether it wants a rate.
+        make: builds the fault of one direction from its trigger and its arguments.
     """
 
-    text: str
-    make: Callable[[Chance, int], Fault[W]]
-    rated: bool = True
+    make: Callable[[FaultTrigger, FaultArguments], Fault[W]]
 
 
 class FaultyPort(Copyable, Generic[W]):
@@ -77,6 +321,7 @@ class FaultyPort(Copyable, Generic[W]):
         self.fault_types = fault_types
         self._to_device: dict[str, Fault[W]] = {}
         self._from_device: dict[str, Fault[W]] = {}
+        self._tallies: dict[str, FaultTally] = {}
         self.listeners: Listeners[Callable[[int, Mark, W, W], None]] = Listeners()
 
     @property
@@ -84,25 +329,36 @@ class FaultyPort(Copyable, Generic[W]):
         """Names of the faults that are armed."""
         return tuple(self._to_device)
 
-    def check(self, name: str, rate: float | None) -> None:
+    def check(self, name: str, *arguments: str) -> None:
         """Raise ValueError unless the fault can be armed like this."""
-        check_rate(name, rate, rated=self.fault_types[name].rated)
+        bind_arguments(name, self.fault_types[name], arguments)
 
-    def arm(self, name: str, rate: float | None = None) -> None:
+    def arm(self, name: str, *arguments: str) -> None:
         """Let a fault begin; one of the same name is replaced.
+
+        Args:
+            name: which.
+            *arguments: as people write them behind `NAME=`, split at commas.
 
         Raises:
             KeyError: no fault has this name.
-            ValueError: a rate is missing, out of range or too much.
+            ValueError: an argument that it does not take, or out of range.
         """
-        self.check(name, rate)
-        threshold, make = threshold_of(rate or 0), self.fault_types[name].make
-        self.drawn |= rate is not None
-        there = make(Chance(self.seed, f"{name} >"), threshold)
-        back = make(Chance(self.seed, f"{name} <"), threshold)
+        fault_type = self.fault_types[name]
+        bound = bind_arguments(name, fault_type, arguments)
+        tally = self._tallies[name] = FaultTally(bound.count)
+        self.drawn |= bound.rate < 1
+        there, back = (
+            fault_type.make(FaultTrigger(Chance(self.seed, f"{name} {way}"), bound, tally), bound)
+            for way in "><"
+        )
         if isinstance(there, HoldingFault) and isinstance(back, HoldingFault):
             there.pair(back)
         self._to_device[name], self._from_device[name] = there, back
+
+    def acted(self, name: str) -> int:
+        """Return how often a fault has acted since it was armed last."""
+        return self._tallies[name].acted if name in self._tallies else 0
 
     def clear(self, name: str) -> None:
         """Let a fault end; what it holds is lost. Clearing one that is not armed is no error."""

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
-from tickrig.device.chance import Chance, threshold_of
+from tickrig.device.chance import Chance
 from tickrig.device.rtc_lite.component import LiteComponent
 from tickrig.device.rtc_lite.node import BUFFER_BYTES, GAP_US, SILENCE_US, LiteReceiver
 from tickrig.device.rtc_lite.server import LiteConfig
 from tickrig.emulators.record.wire_log import Splitter
-from tickrig.emulators.rig.faults import FaultType, HoldingFault
+from tickrig.emulators.rig.faults import FaultArguments, FaultTrigger, FaultType, HoldingFault
 from tickrig.emulators.scenario import Send, Sender, parse_raw
 from tickrig.emulators.serial.serial_line import BYTE_FAULTS, ByteFault
 from tickrig.host.links.link import Link
@@ -178,8 +178,8 @@ class _Noise(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
         out = bytearray()
         for byte in data:
-            if self.chance.hit(self.threshold):
-                out.append(self.chance.draw() & 0xFF)
+            if self.trigger.hit():
+                out.append(self.trigger.chance.draw() & 0xFF)
             out.append(byte)
         return bytes(out)
 
@@ -187,15 +187,16 @@ class _Noise(ByteFault):
 class _LostPing:
     """It counts; there is no chance in it. A node sends an answer whole, in one tick."""
 
-    def __init__(self, chance: Chance, threshold: int) -> None:
-        self._every, self._seen = round(threshold_of(1) / threshold), 0
+    def __init__(self, trigger: FaultTrigger, arguments: FaultArguments) -> None:
+        self._every, self._seen, self._tally = round(1 / arguments.rate), 0, trigger.tally
 
     def __call__(self, now_us: int, data: bytes) -> bytes:
         return _PING_ANSWER.sub(self._cut, data)
 
     def _cut(self, match: re.Match[bytes]) -> bytes:
         self._seen += 1
-        return b"" if self._seen % self._every == 0 else match[0]
+        lost = self._seen % self._every == 0 and self._tally.allow()
+        return b"" if lost else match[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,9 +237,11 @@ class _Dropouts:
 class Radio(HoldingFault[bytes]):
     """One direction of a radio link: packets are late, lost by chance, or fall into a dropout."""
 
-    def __init__(self, settings: RadioSettings, chance: Chance, threshold: int) -> None:
-        self._settings, self._chance, self._threshold = settings, chance, threshold
-        self._dropouts = _Dropouts(Chance(chance.draw()), settings)
+    def __init__(
+        self, settings: RadioSettings, trigger: FaultTrigger, arguments: FaultArguments
+    ) -> None:
+        self._settings, self._trigger = settings, trigger
+        self._dropouts = _Dropouts(Chance(trigger.chance.draw()), settings)
         self._taken, self._taken_us = b"", 0
         self._flying: deque[tuple[int, bytes]] = deque()
 
@@ -274,7 +277,7 @@ class Radio(HoldingFault[bytes]):
         if not self._taken or now_us < leaves_us:
             return
         packet, self._taken = self._taken, b""
-        lost, late_us = self._chance.hit(self._threshold), self._chance.draw()
+        lost, late_us = self._trigger.hit(), self._trigger.chance.draw()
         if self._dropouts.down(leaves_us) or lost:
             return
         at_us = leaves_us + self._settings.latency_us + late_us % (self._settings.jitter_us + 1)
@@ -285,7 +288,7 @@ class Radio(HoldingFault[bytes]):
 def radio(settings: RadioSettings) -> FaultType[bytes]:
     """Return a radio link as a fault of a line, armed with the rate at which packets are lost."""
     text = "a radio link: packets are late, lost at this rate, and dropouts last seconds"
-    return FaultType(text, partial(Radio, settings))
+    return FaultType(text, partial(Radio, settings), usual_rate=0.05)
 
 
 LINE_FAULTS: Final[Mapping[str, FaultType[bytes]]] = {

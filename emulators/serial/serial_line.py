@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from math import gcd
 from typing import Final
 
-from tickrig.device.chance import Chance
 from tickrig.device.twin import Copyable
-from tickrig.emulators.rig.faults import FaultType
+from tickrig.emulators.rig.faults import FaultArguments, FaultTrigger, FaultType
 from tickrig.wire.instant import NEVER
 
 # Theory of operation
@@ -255,21 +254,17 @@ class ByteFault:
     """A fault that hits bits or bytes by chance.
 
     Attributes:
-        chance: what it is drawn from.
-        threshold: of its rate, see `Chance.hit`.
+        trigger: decides which ones.
+        arguments: of the fault.
     """
 
-    chance: Chance
-    threshold: int
-
-    def hits(self, draws: int) -> list[int]:
-        """Draw so often, and return which draws hit, counted from 0."""
-        return self.chance.hits(self.threshold, draws)
+    trigger: FaultTrigger
+    arguments: FaultArguments
 
 
 class _Flip(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
-        if not (hits := self.hits(8 * len(data))):
+        if not (hits := self.trigger.hits(8 * len(data))):
             return data
         turned = bytearray(data)
         for bit in hits:
@@ -279,19 +274,20 @@ class _Flip(ByteFault):
 
 class _Drop(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
-        if not (hits := set(self.hits(len(data)))):
+        if not (hits := set(self.trigger.hits(len(data)))):
             return data
         return bytes(byte for at, byte in enumerate(data) if at not in hits)
 
 
 class _Dup(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
-        hits = set(self.hits(len(data)))
+        hits = set(self.trigger.hits(len(data)))
         return b"".join(bytes([byte]) * (1 + (at in hits)) for at, byte in enumerate(data))
 
 
 class _Cut(ByteFault):
     def __call__(self, now_us: int, data: bytes) -> bytes:
+        self.trigger.tally.allow()
         return b""
 
 

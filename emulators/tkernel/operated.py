@@ -6,22 +6,27 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
 from tickrig.emulators.bench.fault_spec import FaultSpec
-from tickrig.emulators.bench.operator import Operator, WireFault
+from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
+from tickrig.emulators.rig.faults import FaultForm
 
 
 class _NoWire:
     """A wire that has no faults."""
 
-    fault_types: Mapping[str, WireFault] = MappingProxyType({})
+    fault_types: Mapping[str, FaultForm] = MappingProxyType({})
     armed: tuple[str, ...] = ()
 
-    def check(self, name: str, rate: float | None) -> None:
+    def check(self, name: str, *arguments: str) -> None:
         """Allow everything: nothing is asked."""
 
-    def arm(self, name: str, rate: float | None = None) -> None:
+    def arm(self, name: str, *arguments: str) -> None:
         """Do nothing."""
+
+    def acted(self, name: str) -> int:
+        """Return 0: nothing can be armed."""
+        return 0
 
     def clear(self, name: str) -> None:
         """Do nothing."""

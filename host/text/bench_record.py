@@ -33,7 +33,7 @@ from tickrig.wire.errors import WireError
 
 _LINE: Final = re.compile(r"([0-9]{1,12})\.([0-9]{6}) ((\w[\w./:-]*) ([<>!~]) (.*)|\.)", re.ASCII)
 _CHANGE: Final = re.compile(r"([\w./:-]{1,200})=(.{1,9999})", re.ASCII)
-_FAULT: Final = re.compile(r"\w{1,99}(?:=[0-9.e+-]{1,30})?", re.ASCII)
+_FAULT: Final = re.compile(r"\w{1,99}(?:=[\w.:,=+-]{1,200})?", re.ASCII)
 
 _KEPT_LINES: Final = 4_096
 
@@ -141,7 +141,7 @@ class BenchParser:
         if name is None:
             return BenchRecord(0, "", Mark.END)
         if mark == Mark.WIRE:
-            _check_fault(text, name in self._header.wires)
+            _check_fault(text, name in self._header.wires or name in self._header.devices)
             return BenchRecord(0, name, Mark.WIRE, text=text)
         if name not in self._on_can:
             raise ValueError(f"no device {name:.60} in the header")
@@ -154,7 +154,7 @@ class BenchParser:
 
 def _check_fault(text: str, known: bool) -> None:
     if not known or not _FAULT.fullmatch(text):
-        raise ValueError(f"no such wire in the header, or {text!r:.60} is no fault")
+        raise ValueError(f"no such wire or device in the header, or {text!r:.60} is no fault")
 
 
 def _check_change(text: str) -> None:

@@ -27,19 +27,13 @@ def test_many_draws_hit_as_those_one_by_one(draws: int, rate: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("rate", "rated", "said"),
+    ("rate", "said"),
     [
-        (None, True, "loss wants a rate above 0 and up to 1, as loss=0.01; got no rate"),
-        (0.0, True, "loss wants a rate above 0 and up to 1, as loss=0.01; got 0"),
-        (1.5, True, "loss wants a rate above 0 and up to 1, as loss=0.01; got 1.5"),
-        (0.5, False, "loss takes no rate, got 0.5"),
+        (0.0, "loss takes a rate above 0 and up to 1, as loss=0.01; got 0"),
+        (1.5, "loss takes a rate above 0 and up to 1, as loss=0.01; got 1.5"),
     ],
 )
-def test_a_rate_that_cannot_be_is_refused(rate: float | None, rated: bool, said: str) -> None:
+def test_a_rate_that_cannot_be_is_refused(rate: float, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        check_rate("loss", rate, rated=rated)
-
-
-def test_a_rate_is_for_what_has_one() -> None:
-    check_rate("loss", 1.0, rated=True)
-    check_rate("cut", None, rated=False)
+        check_rate("loss", rate)
+    check_rate("loss", 1.0)

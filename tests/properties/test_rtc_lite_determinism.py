@@ -88,7 +88,7 @@ def chain(order: int) -> str:
     rig, log = Rig(*stations[order:], *stations[:order]), list[str]()
     for number in range(120):
         if number == len(START):
-            ports[1].arm("noise", 0.02)
+            ports[1].arm("noise", "0.02")
         frame = START[number] if number < len(START) else FRAMES[number % len(FRAMES)]
         lines[0].b.send(rig.now_us, frame)
         rig.run_for(9_000 + 21_000 * (number % 9 == 0))

@@ -47,7 +47,7 @@ def test_a_rig_is_recorded_with_its_error_frames(tmp_path: Path) -> None:
     file = CandumpFile(path)
     wire.observers.append(file.hear)
     node, _ = wire.end(), wire.end()
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     node.send(0, frames("705#7F"))
     wire.advance(wire.due_us)
     wire.faults.clear("corrupt")

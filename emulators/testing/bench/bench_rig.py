@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.device.twin import Copyable
 from tickrig.emulators.bench.fault_spec import FaultOrder, FaultSpec
-from tickrig.emulators.bench.operator import Operator, WireFault, WireFaults
+from tickrig.emulators.bench.operator import Operator, WireFaults
 from tickrig.emulators.bench.running_emulator import RunningEmulator
 from tickrig.emulators.can.faults import CanFaults
 from tickrig.emulators.canopen.body import BodyOnDrives
@@ -20,7 +20,7 @@ from tickrig.emulators.record.recorder import TraceRecorder
 from tickrig.emulators.rig.clock import Clock
 from tickrig.emulators.rig.emulated import HasSignals
 from tickrig.emulators.rig.event_queue import EventQueue
-from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.faults import FaultForm, FaultyPort, usage
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.testing.bench.errors import NotOnThisBench
@@ -207,7 +207,7 @@ class AssemblyFaults(Copyable):
         return tuple(self._wires)
 
     @property
-    def fault_types(self) -> Mapping[str, WireFault]:
+    def fault_types(self) -> Mapping[str, FaultForm]:
         """The faults that can be armed."""
         return {
             self._full(name, fault): kind
@@ -222,15 +222,20 @@ class AssemblyFaults(Copyable):
             self._full(name, fault) for name, wire in self._wires.items() for fault in wire.armed
         )
 
-    def check(self, name: str, rate: float | None) -> None:
+    def check(self, name: str, *arguments: str) -> None:
         """Raise ValueError unless the fault can be armed like this."""
         wire, fault = self._find(name)
-        wire.check(fault, rate)
+        wire.check(fault, *arguments)
 
-    def arm(self, name: str, rate: float | None = None) -> None:
+    def arm(self, name: str, *arguments: str) -> None:
         """Let a fault begin; one of the same name is replaced."""
         wire, fault = self._find(name)
-        wire.arm(fault, rate)
+        wire.arm(fault, *arguments)
+
+    def acted(self, name: str) -> int:
+        """Return how often a fault has acted since it was armed last."""
+        wire, fault = self._find(name)
+        return wire.acted(fault)
 
     def clear(self, name: str) -> None:
         """Let a fault end; one that is not armed is no error."""
@@ -434,18 +439,6 @@ def _header_of(mounts: Iterable[Mount], seed: int) -> BenchHeader:
     return BenchHeader(entries, {mount.name: mount.wire_entry for mount in mounts}, seed)
 
 
-class FaultDescription(NamedTuple):
-    """A fault that can be ordered.
-
-    Attributes:
-        text: what it does.
-        rated: it wants a rate, as `flip=0.001`.
-    """
-
-    text: str
-    rated: bool
-
-
 @dataclass(frozen=True, slots=True)
 class BenchDescription:
     """What there is to set, to read and to break at a device, or at all devices of a bench.
@@ -464,7 +457,7 @@ class BenchDescription:
     inputs: Mapping[str, InputSignal]
     groups: Mapping[str, tuple[str, ...]]
     outputs: Mapping[str, OutputSignal]
-    faults: Mapping[str, FaultDescription]
+    faults: Mapping[str, FaultForm]
 
     @property
     def buttons(self) -> tuple[str, ...]:
@@ -479,8 +472,8 @@ class BenchDescription:
             if one.type is not SignalType.FAULT
         }
         outputs = {name: one.unit for name, one in self.outputs.items()}
-        faults = {name + "=RATE" * one.rated: "" for name, one in self.faults.items()}
-        texts = {name + "=RATE" * one.rated: one.text for name, one in self.faults.items()}
+        faults = {usage(name, one): "" for name, one in self.faults.items()}
+        texts = {usage(name, one): one.text for name, one in self.faults.items()}
         texts |= {name: one.text for name, one in self.inputs.items()}
         texts |= {name: one.text for name, one in self.outputs.items()}
         lines = [self.name]
@@ -544,12 +537,10 @@ class BenchRig(RunningEmulator):
         if owner:
             part = self.state.assembly.parts[owner]
         types, physical = self.state.faults.fault_types, self.state.assembly.inputs.table
-        faults = {}
-        for name, full in self.state.faults_of(owner).items():
-            if full in types:
-                faults[name] = FaultDescription(types[full].text, types[full].rated)
-            else:
-                faults[name] = FaultDescription(physical[full].text, rated=False)
+        faults = {
+            name: types.get(full) or FaultForm(physical[full].text, rated=False)
+            for name, full in self.state.faults_of(owner).items()
+        }
         return BenchDescription(
             owner or self.name,
             dict(part.inputs.table),

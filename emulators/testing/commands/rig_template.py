@@ -132,7 +132,7 @@ def _input_line(item: InputSignal) -> str:
 
 
 def _fault_lines(made: Iterable[tuple[DevicePlan, Probe]]) -> Iterator[str]:
-    yield "# [fault]                       # NAME[=RATE][@FROM[-TO]]"
+    yield "# [fault]                       # NAME[=ARGUMENT][@FROM[-TO]]"
     for plan, found in made:
         names = [*found.physical.inputs.names(SignalType.FAULT), *found.wire_faults]
         plain = next(each for each in names if _is_plain(found, each))

@@ -23,7 +23,7 @@ _MISTAKES = 2
     "--fault",
     "faults",
     multiple=True,
-    metavar="[OWNER/]NAME[=RATE][@FROM[-TO]]",
+    metavar="[OWNER/]NAME[=ARGUMENT][@FROM[-TO]]",
     help="One more fault of a device or a wire; may be repeated.",
 )
 @click.option("--seed", type=click.IntRange(0), help="Seed of all chance.  [that of FILE]")

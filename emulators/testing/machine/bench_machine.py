@@ -37,7 +37,7 @@ class World:
         inputs: names of inputs that may change; all but the objects of nodes unless given.
 
     Attributes:
-        faults: whether each takes a rate, by name.
+        faults: those that may come, by name.
         inputs: those that may change.
 
     Raises:
@@ -51,16 +51,16 @@ class World:
         inputs: Sequence[str] | None = None,
     ) -> None:
         self._bench, described = bench, bench.describe()
-        rated = {name: fault.rated for name, fault in described.faults.items()}
+        forms = described.faults
         table = [
             WorldInput(name, item.type.value, item.low, item.high)
             for name, item in described.inputs.items()
         ]
         movable = {item.name: item for item in table if item.type in ("level", "button")}
         usual = [name for name in movable if not name.rpartition("/")[2].startswith("0x")]
-        self.faults = {name: rated[name] for name in _known(faults, rated, rated, "fault")}
+        self.faults = {name: forms[name] for name in _known(faults, forms, forms, "fault")}
         self.inputs = [movable[name] for name in _known(inputs, usual, movable, "input")]
-        self._wire_faults = [name for name in rated if name not in described.inputs]
+        self._wire_faults = [name for name in forms if name not in described.inputs]
         self._watched = [*usual, *(item.name for item in table if item.type == "fault")]
         self._before: Mapping[str, Setting] = {}
 

@@ -92,7 +92,9 @@ def _faults(world: World, for_: Sequence[str]) -> st.SearchStrategy[HostStep]:
     def fault(draw: st.DrawFn) -> HostStep:
         wait_us = draw(timing())
         name = draw(st.sampled_from(list(world.faults)))
-        rate = f"={draw(st.sampled_from(_RATES))}" if world.faults[name] else ""
+        form = world.faults[name]
+        rate = f"=rate={draw(st.sampled_from(_RATES))}" if form.rated else ""
+        rate = rate if form.arguments else rate.replace("rate=", "")
         return HostStep(wait_us, "fault", name + rate, us_of(draw(st.sampled_from(for_))))
 
     return fault()
@@ -153,7 +155,7 @@ def steps(machine: BenchMachine, most: int) -> st.SearchStrategy[list[HostStep]]
     drawn = st.lists(step(), max_size=most)
     return (
         st.builds(_with_seed, drawn, st.integers(0, _SEEDS))
-        if any(world.faults.values())
+        if any(form.rated for form in world.faults.values())
         else drawn
     )
 

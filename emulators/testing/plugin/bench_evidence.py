@@ -153,11 +153,8 @@ class _OrderedFaults:
 
     def _outcome_of(self, order: FaultOrder, effect: _Effect | None) -> bench_report.PlannedFault:
         if effect is None:
-            rate = "" if order.spec.rate is None else f"={order.spec.rate:g}"
             when = order.when or f"{seconds(order.spec.from_us)} s"
-            return bench_report.PlannedFault(
-                order.spec.name + rate, None, None, when, order.ordered_us
-            )
+            return bench_report.PlannedFault(order.spec.text, None, None, when, order.ordered_us)
         from_us, to_us = max(effect.from_us, order.spec.from_us), effect.to_us
         if to_us is None and order.to_us <= self._mode.now_us:  # by an operator
             to_us = order.to_us

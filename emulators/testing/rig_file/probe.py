@@ -10,7 +10,6 @@ from typing import Final, Generic, NamedTuple, TypeVar
 
 from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
-from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.canopen.build import ANY_ID, describe
@@ -20,6 +19,7 @@ from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.rig.faults import FaultForm
 from tickrig.emulators.testing.rig_file.plan import DeviceKind, DevicePlan, MadeDevice
 from tickrig.host.text.names import near
 from tickrig.host.text.user_file import explain_error
@@ -42,7 +42,7 @@ class Probe:
     """
 
     physical: HasSignals
-    wire_faults: Mapping[str, WireFault]
+    wire_faults: Mapping[str, FaultForm]
     title: str
     baud: int | None = None
     node_id: int | None = None
@@ -51,10 +51,11 @@ class Probe:
     made: MadeDevice = field(default_factory=MadeDevice)
 
     @property
-    def faults(self) -> dict[str, bool]:
-        """Whether each fault of the device and of its wire wants a rate."""
-        own = dict.fromkeys(self.physical.inputs.names(SignalType.FAULT), False)
-        return {name: kind.rated for name, kind in self.wire_faults.items()} | own
+    def faults(self) -> dict[str, FaultForm]:
+        """The faults of the device and of its wire."""
+        table, names = self.physical.inputs.table, self.physical.inputs.names(SignalType.FAULT)
+        own = {name: FaultForm(table[name].text, rated=False) for name in names}
+        return {**self.wire_faults, **own}
 
 
 @cache

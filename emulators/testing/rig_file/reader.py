@@ -10,13 +10,12 @@ from typing import Final
 
 from tickrig.device.body import SIDES
 from tickrig.device.canopen.slave import UNCONFIGURED
-from tickrig.device.chance import check_rate
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.bench.operator import WireFault
 from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.canopen.body import SHAFTS, BodyPlan
 from tickrig.emulators.canopen.choices import is_bus_node
 from tickrig.emulators.rig.emulated import HasSignals
+from tickrig.emulators.rig.faults import FaultForm, bind_arguments
 from tickrig.emulators.testing.rig_file.bus_yml import bus_as_rig, is_bus_yml, with_nodes
 from tickrig.emulators.testing.rig_file.devices import (
     DeviceReader,
@@ -44,11 +43,11 @@ from tickrig.host.text.toml_reader import Mistake, read_toml
 
 # `[fault]`: faults of devices and wires, each in a word as on command lines.
 
-_FaultRates = Mapping[str, bool]
-"""Whether each fault of a device or wire wants a rate."""
+_Faults = Mapping[str, FaultForm]
+"""The faults of a device or wire by name."""
 
 
-def _read_faults(section: Section, owners: Mapping[str, _FaultRates | None]) -> Iterator[FaultPlan]:
+def _read_faults(section: Section, owners: Mapping[str, _Faults | None]) -> Iterator[FaultPlan]:
     """Yield the faults that can be.
 
     Args:
@@ -63,7 +62,7 @@ def _read_faults(section: Section, owners: Mapping[str, _FaultRates | None]) -> 
 
 
 def _read(
-    section: Section, owner: str, value: object, faults: _FaultRates | None
+    section: Section, owner: str, value: object, faults: _Faults | None
 ) -> Iterator[FaultPlan]:
     try:
         specs = texts(value)
@@ -76,14 +75,14 @@ def _read(
                 spec = parse_fault_spec(text)
             else:
                 spec = parse_fault_spec(text, partial(_check_name, faults))
-                check_rate(spec.name, spec.rate, rated=faults[spec.name])
+                bind_arguments(spec.name, faults[spec.name], spec.arguments)
         except ValueError as error:
             section.wrong(str(error), owner, *([at] if isinstance(value, list) else []))
         else:
             yield FaultPlan(owner, spec)
 
 
-def _check_name(faults: _FaultRates, name: str) -> None:
+def _check_name(faults: _Faults, name: str) -> None:
     if name not in faults:
         raise ValueError(f"no fault {name!r}; {near(name, faults)}")
 
@@ -345,21 +344,21 @@ class _Reader:
         probes = [found for node in nodes if (found := self._probes[node.name])]
         return replace(wire, bit_rate=next((x.bit_rate for x in probes if x.bit_rate), None))
 
-    def _wire_faults(self, wire: WirePlan | None) -> _FaultRates | None:
+    def _wire_faults(self, wire: WirePlan | None) -> _Faults | None:
         """Return the faults of a wire, None if they are not known."""
         if wire is None:
             return None
-        faults: Mapping[str, WireFault] = CAN_FAULTS
+        faults: _Faults = CAN_FAULTS
         if wire.type is not WireType.CAN:
             plans = self._devices.plans.values()
             first = next((self._probes[x.name] for x in plans if x and x.wire == wire.name), None)
             if first is None:
                 return None
             faults = first.wire_faults
-        return {name: kind.rated for name, kind in faults.items()}
+        return faults
 
-    def _fault_owners(self) -> dict[str, _FaultRates | None]:
-        owners: dict[str, _FaultRates | None] = {
+    def _fault_owners(self) -> dict[str, _Faults | None]:
+        owners: dict[str, _Faults | None] = {
             name: self._wire_faults(wire) for name, wire in self._wires.items()
         }
         for name, each in self._probes.items():

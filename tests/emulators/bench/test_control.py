@@ -127,7 +127,7 @@ def test_an_id_comes_back(emulator: Emulator) -> None:
             "duration_us 1000000000000001 is not in 1..1000000000000000",
         ),
         ({"v": 1, "do": "lines", "since": -1}, "since -1 is not in 0..9223372036854775807"),
-        ({"v": 1, "do": "fault", "spec": "flip"}, "flip wants a rate"),
+        ({"v": 1, "do": "fault", "spec": "flip=2"}, "flip takes a rate"),
         ({"v": 1, "do": "clear", "name": "x" * 5_000}, "no fault 'xxx"),
         ({"v": 1, "do": "get", "names": ["../etc"]}, 'no input or output "../etc"'),
         ({"v": 1, "do": "set", "name": "\ud800", "value": 1}, "no input '\\ud800'"),

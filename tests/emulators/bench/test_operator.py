@@ -130,8 +130,8 @@ def test_clearing_a_fault_forgets_its_future(emulator: Emulator) -> None:
     [
         ("x", "no fault 'x'; known: flip, drop, dup, cut, dead"),
         ("lamp", "no fault 'lamp'"),
-        ("dead=0.1", "dead takes no rate, got 0.1$"),
-        ("dead=0", "dead takes no rate, got 0; clear ends it"),
+        ("dead=0.1", "dead takes no argument, got 0.1$"),
+        ("dead=0", "dead takes no argument, got 0; clear ends it"),
         ("dead@0-1us", "would have ended before now"),
     ],
 )

@@ -77,7 +77,7 @@ def test_a_frame_that_nobody_acknowledged_is_sent_when_somebody_comes() -> None:
 def test_a_corrupt_frame_is_told_and_sent_again() -> None:
     wire = CanWire(seed=3)
     log, node, host = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     node.send(0, frames("185#0102"))
     wire.advance(wire.due_us)
     assert (log.text, counters(node, host)) == (str(BIT_ERROR), [(8, 0, ACTIVE), (0, 1, ACTIVE)])
@@ -92,7 +92,7 @@ def test_a_corrupt_frame_is_told_and_sent_again() -> None:
 def test_a_sender_of_nothing_but_corrupt_frames_ends_bus_off() -> None:
     wire = CanWire()
     log, node, host = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     node.send(0, frames("185#0102"))
     node.send(0, frames("186#"))
     wire.advance(1_000_000)
@@ -104,7 +104,7 @@ def test_a_sender_of_nothing_but_corrupt_frames_ends_bus_off() -> None:
 
 
 def bus_off(wire: CanWire, node: CanEnd) -> None:
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     node.send(0, frames("185#0102"))
     wire.advance(100_000)
     wire.faults.clear("corrupt")
@@ -167,7 +167,7 @@ def test_a_node_may_ask_to_recover_the_moment_it_is_bus_off() -> None:
             node.recover(at_us)
 
     node.on_error_state = follow
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     node.send(0, frames("185#0102"))
     wire.advance(100_000)
     assert states == [PASSIVE, BUS_OFF, ACTIVE]
@@ -210,7 +210,7 @@ def test_different_lengths_collide_at_the_length() -> None:
 def test_a_dropped_frame_is_on_the_bus_and_reaches_nobody() -> None:
     wire = CanWire()
     log, node, host = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("drop", 1)
+    wire.faults.arm("drop", "1")
     node.send(0, frames("705#7F"))
     assert host.poll(1_000) == ()
     assert log.lines == ["55 705#7F"]
@@ -219,7 +219,7 @@ def test_a_dropped_frame_is_on_the_bus_and_reaches_nobody() -> None:
 def test_a_duplicated_frame_arrives_again() -> None:
     wire = CanWire(seed=1)
     node, host = wire.end(), wire.end()
-    wire.faults.arm("duplicate", 0.5)
+    wire.faults.arm("duplicate", "0.5")
     node.send(0, frames("705#7F 705#05"))
     heard = host.poll(10_000)
     assert set(heard) == {*frames("705#7F 705#05")}
@@ -230,7 +230,7 @@ def test_a_duplicated_frame_arrives_again() -> None:
 def test_a_delayed_node_sends_later_and_nobody_else_does() -> None:
     wire = CanWire()
     log, node, other = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("delay", 1)
+    wire.faults.arm("delay", "1")
     node.send(500, frames("100#"))
     wire.faults.clear("delay")
     other.send(500, frames("200#"))
@@ -309,12 +309,12 @@ def test_a_frame_whose_sender_is_unplugged_is_broken_off_and_sent_later() -> Non
 @pytest.mark.parametrize(
     ("name", "rate", "reason"),
     [
-        ("drop", None, "drop wants a rate above 0 and up to 1, as drop=0.01; got no rate"),
-        ("corrupt", 2, "got 2"),
-        ("short", 0.5, "short takes no rate, got 0.5"),
+        ("drop", "0", "drop takes a rate above 0 and up to 1, as drop=0.01; got 0"),
+        ("corrupt", "2", "got 2"),
+        ("short", "0.5", "short takes no argument, got 0.5"),
     ],
 )
-def test_a_fault_that_cannot_be_armed_is_told(name: str, rate: float | None, reason: str) -> None:
+def test_a_fault_that_cannot_be_armed_is_told(name: str, rate: str, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         CanWire().faults.arm(name, rate)
 
@@ -326,8 +326,8 @@ def test_a_fault_that_cannot_be_armed_is_told(name: str, rate: float | None, rea
 def test_a_bad_line_delays_frames_but_loses_none(seed: int, sent: list[tuple[int, int]]) -> None:
     wire = CanWire(seed=seed)
     log, ends = Log(wire), [wire.end() for _ in range(5)]
-    wire.faults.arm("corrupt", 0.1)
-    wire.faults.arm("delay", 0.1)
+    wire.faults.arm("corrupt", "0.1")
+    wire.faults.arm("delay", "0.1")
     now_us, wanted = 0, Counter[CanFrame]()
     for wait_us, who in sent:
         now_us += wait_us
@@ -343,8 +343,8 @@ def test_looking_ahead_draws_no_chance(seed: int) -> None:
     def run(*, look: bool) -> list[str]:
         wire = CanWire(seed=seed)
         log, ends = Log(wire), [wire.end() for _ in range(3)]
-        wire.faults.arm("corrupt", 0.3)
-        wire.faults.arm("drop", 0.2)
+        wire.faults.arm("corrupt", "0.3")
+        wire.faults.arm("drop", "0.2")
         for now_us in range(0, 5_000, 500):
             for who in (0, 1):
                 ends[who].send(now_us, (CanFrame(0x200 - now_us // 50 + who, b"x"),))
@@ -362,7 +362,7 @@ def test_a_frame_may_be_broken_at_each_bit_from_the_data_to_the_crc() -> None:
     for seed in range(400):
         wire = CanWire(seed=seed)
         log, node, _ = Log(wire), wire.end(), wire.end()
-        wire.faults.arm("corrupt", 1)
+        wire.faults.arm("corrupt", "1")
         node.send(0, frame)
         wire.advance(wire.due_us)
         wire.faults.clear("corrupt")
@@ -377,7 +377,7 @@ def test_a_frame_may_be_broken_at_each_bit_from_the_data_to_the_crc() -> None:
 def test_a_duplicated_frame_is_followed_by_an_error_frame_and_itself() -> None:
     wire = CanWire(seed=6)  # the first is duplicated, the second is not
     log, node, host = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("duplicate", 0.5)
+    wire.faults.arm("duplicate", "0.5")
     node.send(0, frames("705#7F"))
     wire.advance(2_000)
     bits = frame_bits(frames("705#7F")[0])

@@ -120,7 +120,7 @@ class Played:
                 self.host.send(self.rig.now_us, frames)
             case "arm":
                 rated = fault not in {"babble", "short"}
-                self.wire.faults.arm(fault, 0.3 if rated else None)
+                self.wire.faults.arm(fault, *["0.3"] * rated)
             case "clear":
                 for name in FAULTS:
                     self.wire.faults.clear(name)

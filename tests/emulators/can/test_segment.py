@@ -49,7 +49,7 @@ class Play:
 
 
 def return_in_traffic(play: Play) -> None:
-    play.wire.faults.arm("corrupt", 1)
+    play.wire.faults.arm("corrupt", "1")
     play.send(0, 0, "185#0102")
     play.run_to(100_000)
     play.wire.faults.clear("corrupt")
@@ -58,7 +58,7 @@ def return_in_traffic(play: Play) -> None:
 
 
 def return_asked_for_in_a_frame(play: Play) -> None:
-    play.wire.faults.arm("corrupt", 1)
+    play.wire.faults.arm("corrupt", "1")
     play.send(0, 0, "185#0102")
     play.run_to(100_000)
     play.wire.faults.clear("corrupt")
@@ -125,7 +125,7 @@ def test_the_bit_rate_only_stretches_time(act: Callable[[Play], None], bit_rate:
 def test_a_delay_is_in_microseconds_whatever_the_bit_rate() -> None:
     wire = CanWire(800_000)
     log, node, _ = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("delay", 1)
+    wire.faults.arm("delay", "1")
     node.send(500, frames("100#"))
     wire.advance(20_000)
     assert log.times_us == [10_500 - (-(bits("100#") - 3) * 5 // 4)]
@@ -182,7 +182,7 @@ def test_a_filter_that_is_open_stays_so_at_another_plug() -> None:
 def test_a_delayed_node_that_is_plugged_in_again_sends_at_once() -> None:
     wire = CanWire()
     log, node, _ = Log(wire), wire.end(), wire.end()
-    wire.faults.arm("delay", 1)
+    wire.faults.arm("delay", "1")
     node.send(0, frames("100#"))
     wire.faults.clear("delay")
     wire.advance(100)
@@ -215,7 +215,7 @@ def test_a_node_whose_only_companion_is_unplugged_is_alone() -> None:
 def test_an_unplugged_node_counts_nothing_and_hears_nothing_of_the_bus() -> None:
     wire = CanWire(seed=3)
     node, third, host = wire.end(), wire.end(), wire.end()
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     node.send(0, frames("185#"))
     wire.advance(wire.due_us)
     wire.faults.clear("corrupt")
@@ -270,7 +270,7 @@ def test_a_frame_that_begins_when_a_node_is_back_does_not_hold_it_up() -> None:
     node, host, _ = wire.end(), wire.end(), wire.end()
     bus_off(wire, node)
     node.on_error_state = lambda at_us, state: told.append(at_us)
-    wire.faults.arm("delay", 1)
+    wire.faults.arm("delay", "1")
     host.send(100_000 + RETURN_BITS, frames("555#"))  # 10 ms later
     wire.faults.clear("delay")
     node.recover(110_000)
@@ -283,7 +283,7 @@ def test_a_frame_that_waits_while_a_node_returns_is_sent() -> None:
     node, host, third = wire.end(), wire.end(), wire.end()
     bus_off(wire, node)
     node.recover(100_000)
-    wire.faults.arm("delay", 1)
+    wire.faults.arm("delay", "1")
     host.send(100_000, frames("555#"))
     wire.faults.clear("delay")
     assert wire.due_us == 100_000 + RETURN_BITS
@@ -296,7 +296,7 @@ def test_a_fault_that_is_armed_when_a_frame_begins_strikes_it() -> None:
     log, node, _ = Log(wire), wire.end(), wire.end()
     node.send(1_000, frames("100#"))
     assert wire.due_us < NEVER
-    wire.faults.arm("corrupt", 1)
+    wire.faults.arm("corrupt", "1")
     wire.advance(wire.due_us)
     assert log.text == str(BIT_ERROR)
 

@@ -31,7 +31,7 @@ def run(played: list[Action], *, long_ways: bool) -> object:
     ends[1].accepts = frozenset({0x100, 0x181})
     if long_ways:
         for name in ("drop", "corrupt", "duplicate", "delay"):
-            wire.faults.arm(name, NEVER_STRIKES)
+            wire.faults.arm(name, str(NEVER_STRIKES))
     now_us, polled = 0, []
     for name, after_us, node, frames in played:
         now_us += after_us

@@ -320,7 +320,7 @@ def test_lss_finds_a_node_without_node_id() -> None:
         ("--eds README.md --node-id 5", "README.md: "),
         (f"--node 5={EDS} -b 5", "bit rate 5 is not in 10000..1000000 bit/s"),
         (f"--node 5={EDS} --fault fire", "--fault: no fault 'fire'; known: drop, corrupt"),
-        (f"--node 5={EDS} --fault drop", "--fault: drop wants a rate above 0 and up to 1"),
+        (f"--node 5={EDS} --fault drop=2", "--fault: drop takes a rate above 0 and up to 1"),
         (f"--node 5={EDS} --store README.md", "store README.md: not a store file"),
         (f"--node 5={EDS} --store .", "store .: Is a directory"),
         (f"--node 5={EDS} --trace /nowhere/x", "trace /nowhere/x: No such file or directory"),

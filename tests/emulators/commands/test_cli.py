@@ -125,7 +125,7 @@ def test_a_seed_chooses_the_chance() -> None:
         (["--scenario", "bad.txt"], "bad.txt:1: no action 'jump'; known: send, check, raw"),
         (["--scenario", "latin.txt"], "scenario latin.txt: byte 2 is not UTF-8"),
         (["--fault", "flup=1"], "--fault: no fault 'flup'; did you mean 'flip'?"),
-        (["--fault", "flip"], "--fault: flip wants a rate above 0 and up to 1"),
+        (["--fault", "flip=2"], "--fault: flip takes a rate above 0 and up to 1"),
         (["--fault", "cut@x"], "--fault: 'x' is not a time: write 1.5s, 200ms or 250us"),
         (["--link", "bad.txt"], "link bad.txt: exists; remove it if no emulator uses it"),
         (["--link", "no/dir/tty"], "link no/dir/tty: No such file or directory"),

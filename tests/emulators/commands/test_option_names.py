@@ -37,7 +37,7 @@ def stderr(line: str) -> str:
         ("urg-emu --wall 1", "--wall: a wall is X1,Y1,X2,Y2 in m, got '1'"),
         ("urg-emu --post 1,2,-1", "--post: a post has a place and a radius of 0 or more"),
         ("rtc-lite-emu --node nope", "--node: no node 'nope'; known: echo"),
-        ("rrc-emu --fault flip", "--fault: flip wants a rate above 0"),
+        ("rrc-emu --fault flip=2", "--fault: flip takes a rate above 0"),
         ("rrc-emu --fault nope", "--fault: no fault 'nope'; known: flip"),
         ("rrc-emu --fault cut@soon", "--fault: 'soon' is not a time"),
         ("tickrig ctl /nowhere press key --for soon", "--for: 'soon' is not a time"),

@@ -111,7 +111,7 @@ def test_a_bench_at_work_replays_identically() -> None:
     bench.line.b.send(bench.rig.now_us, b"output1e00\n")
     bench.set("io", "0x6000:1", 5)
     bench.set("right", "power_off", 1)
-    bench.can.faults.arm("corrupt", 0.3)
+    bench.can.faults.arm("corrupt", "0.3")
     bench.rig.run_for(100_000)
     bench.set("right", "power_off", 0)
     bench.can.faults.clear("corrupt")
@@ -204,7 +204,7 @@ def test_any_run_of_a_bench_replays_identically(acts: list[tuple[int, tuple[obje
                 bench.set(name, signal, value)
             case ("fault", str(name), bool(on)):
                 faults = bench.can.faults
-                faults.arm(name, 0.3) if on else faults.clear(name)
+                faults.arm(name, "0.3") if on else faults.clear(name)
             case ("reset", str(name)):
                 index = list(bench.nodes).index(name) + 1
                 bench.rig.stations[index].device.reset()

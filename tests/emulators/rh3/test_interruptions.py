@@ -224,7 +224,7 @@ def test_dense_and_sparse_runs_are_the_same(loss: float) -> None:
         loop = ClosedLoop(BaseParameters(noise=0.02, friction=0.5), seed=3, dense=dense)
         loop.activate("tuned")
         if loss:
-            loop.cart.port.arm("drop", loss)
+            loop.cart.port.arm("drop", str(loss))
         loop.cart.chain.position_input.goal(Pose(0.3, 0.1, 0.5))
         loop.run_to(6_000_000)
         ends.append(

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from tests.emulators.lamp import Lamp
 from tickrig.device.chance import Chance, threshold_of
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
-from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.faults import (
+    FaultArgument,
+    FaultArguments,
+    FaultForm,
+    FaultyPort,
+    bind_arguments,
+)
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.serial.serial_line import BYTE_FAULTS, SerialLine
@@ -66,7 +72,7 @@ def test_who_listens_is_told_what_was_sent_and_what_was_left_of_it() -> None:
     port, _ = faulty()
     heard = list[tuple[int, str, bytes, bytes]]()
     port.listeners.append(lambda *change: heard.append(change))
-    port.arm("dup", 1)
+    port.arm("dup", "1")
     port.send(1, b"a")
     assert port.poll(2) == b"aaaa"
     port.arm("cut")
@@ -84,7 +90,7 @@ def test_who_listens_is_told_what_was_sent_and_what_was_left_of_it() -> None:
 )
 def test_a_rate_of_1_hits_always(name: str, expected: bytes) -> None:
     port, loop = faulty()
-    port.arm(name, 1)
+    port.arm(name, "1")
     assert received(port, loop, b"ab") == expected
 
 
@@ -94,19 +100,19 @@ def test_chunks_and_the_other_direction_make_no_difference(
     name: str, data: bytes, cut: int, seed: int
 ) -> None:
     port, loop = faulty(seed)
-    port.arm(name, 0.3)
+    port.arm(name, "0.3")
     whole = received(port, loop, data)
-    port.arm(name, 0.3)
+    port.arm(name, "0.3")
     port.send(0, b"something the other way")
     assert received(port, loop, data[:cut], b"", data[cut:]) == whole
 
 
 def test_rates_are_probabilities() -> None:
     port, loop = faulty()
-    port.arm("drop", 0.25)
+    port.arm("drop", "0.25")
     assert len(received(port, loop, bytes(100_000))) == pytest.approx(75_000, rel=0.01)
     port.clear("drop")
-    port.arm("flip", 0.01)
+    port.arm("flip", "0.01")
     flipped = received(port, loop, bytes(100_000))
     assert sum(byte.bit_count() for byte in flipped) == pytest.approx(8_000, rel=0.05)
 
@@ -115,7 +121,7 @@ def test_seeds_and_faults_have_chances_of_their_own() -> None:
     outcomes = set()
     for seed in range(5):
         port, loop = faulty(seed)
-        port.arm("drop", 0.5)
+        port.arm("drop", "0.5")
         outcomes.add(received(port, loop, bytes(range(64))))
     assert len(outcomes) == 5
 
@@ -129,14 +135,13 @@ def test_the_same_seed_gives_the_same_numbers_on_every_machine() -> None:
 @pytest.mark.parametrize(
     ("name", "rate", "error"),
     [
-        ("flip", None, "flip wants a rate above 0 and up to 1, as flip=0.01; got no rate"),
-        ("flip", 0, "got 0"),
-        ("flip", 1.5, r"got 1\.5"),
-        ("flip", float("nan"), "got nan"),
-        ("cut", 0.5, "cut takes no rate, got 0.5"),
+        ("flip", "0", "flip takes a rate above 0 and up to 1, as flip=0.01; got 0"),
+        ("flip", "1.5", r"got 1\.5"),
+        ("flip", "nan", "got nan"),
+        ("cut", "0.5", "cut takes no argument, got 0.5"),
     ],
 )
-def test_a_rate_that_makes_no_sense_is_refused(name: str, rate: float | None, error: str) -> None:
+def test_a_rate_that_makes_no_sense_is_refused(name: str, rate: str, error: str) -> None:
     port, _ = faulty()
     with pytest.raises(ValueError, match=error):
         port.arm(name, rate)
@@ -145,9 +150,9 @@ def test_a_rate_that_makes_no_sense_is_refused(name: str, rate: float | None, er
 
 def test_faults_never_see_silence() -> None:
     port, loop = faulty()
-    port.arm("drop", 0.5)
+    port.arm("drop", "0.5")
     before = received(port, loop, b"", b"abcdefgh")
-    port.arm("drop", 0.5)
+    port.arm("drop", "0.5")
     assert received(port, loop, b"", b"", b"", b"abcdefgh") == before
     assert loop.due_us < NEVER
 
@@ -160,7 +165,7 @@ def test_dense_and_sparse_runs_suffer_the_same(sent: list[tuple[int, bytes]], fa
     def heard(*, dense: bool) -> list[tuple[int, bytes]]:
         line, spec = SerialLine(), parse_fault_spec(fault)
         port = FaultyPort(line.a, BYTE_FAULTS)
-        port.arm(spec.name, spec.rate)
+        port.arm(spec.name, *spec.arguments)
         rig, log = Rig(Station(Lamp(), port), dense=dense), []
         for delay_us, data in sent:
             line.b.send(rig.now_us, data)
@@ -170,3 +175,75 @@ def test_dense_and_sparse_runs_suffer_the_same(sent: list[tuple[int, bytes]], fa
         return [*log, (rig.now_us, line.b.poll(rig.now_us))]
 
     assert heard(dense=False) == heard(dense=True)
+
+
+SLOW: FaultForm = FaultForm(
+    "answers late",
+    arguments=(
+        FaultArgument("delay", "how late", "800ms", "time", 1_000, 2_000_000),
+        FaultArgument("code", "which code", "0x8110", high=0xFFFF),
+        FaultArgument("way", "which way", "both", choices=("read", "write", "both")),
+    ),
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "bound"),
+    [
+        ("", FaultArguments({"delay": 800_000, "code": 0x8110, "way": "both"})),
+        ("1s", FaultArguments({"delay": 1_000_000, "code": 0x8110, "way": "both"})),
+        ("1s,5,read", FaultArguments({"delay": 1_000_000, "code": 5, "way": "read"})),
+        (
+            "way=read,1s,rate=0.1,count=3",
+            FaultArguments({"delay": 1_000_000, "code": 0x8110, "way": "read"}, 0.1, 3),
+        ),
+    ],
+)
+def test_arguments_are_bare_in_their_order_or_named(words: str, bound: FaultArguments) -> None:
+    assert bind_arguments("slow", SLOW, words.split(",") if words else ()) == bound
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ("3s", "slow: delay 3s is not in 1 ms to 2 s"),
+        ("3", "slow: delay: '3' has no unit: write 3s, 3ms or 3us"),
+        ("1s,x", "slow: code: 'x' is not a whole number"),
+        ("1s,0x10000", "slow: code 0x10000 is not in 0 to 65535"),
+        ("way=up", "slow: way 'up' is not read or write or both"),
+        ("dealy=1s", "slow has no argument 'dealy'; did you mean 'delay'?"),
+        ("1s,delay=2s", "slow has delay twice"),
+        ("1s,2,read,4", r"'4' is one argument too many: slow\[=DELAY,CODE,WAY\]"),
+        ("rate=2", "slow takes a rate above 0 and up to 1"),
+        ("count=0", "count 0 is not in 1 to 1000000"),
+        ("count=x", "count: 'x' is not a whole number"),
+    ],
+)
+def test_an_argument_that_cannot_be_is_refused_by_name(words: str, error: str) -> None:
+    with pytest.raises(ValueError, match=error):
+        bind_arguments("slow", SLOW, words.split(","))
+
+
+def test_a_bare_name_acts_always_and_a_count_ends_it() -> None:
+    port, loop = faulty()
+    port.arm("drop")
+    assert received(port, loop, b"abc") == b""
+    assert port.acted("drop") == 3
+    port.arm("drop", "count=2")
+    assert received(port, loop, b"a", b"bcd") == b"cd"
+    port.send(0, b"ef")  # both directions share the count
+    assert (loop.traffic, port.acted("drop"), port.acted("dup")) == (b"ef", 2, 0)
+    twin = copy.deepcopy(port)
+    assert twin.acted("drop") == 2
+
+
+def test_the_range_and_the_default_of_each_argument_can_be_read() -> None:
+    ranges = {one.name: (one.default, one.range) for one in SLOW.all_arguments}
+    assert ranges == {
+        "delay": ("800ms", "1 ms to 2 s"),
+        "code": ("0x8110", "0 to 65535"),
+        "way": ("both", "read or write or both"),
+        "rate": ("1", "above 0 to 1"),
+        "count": ("always", "1 to 1000000"),
+    }
+    assert BYTE_FAULTS["cut"].all_arguments == ()

@@ -152,7 +152,7 @@ def test_a_callback_that_raises_is_one_line(folder: Path) -> None:
         (["--node", "mine.py:Big"], "--node: mine.py:Big: Big: type_name: name 'ThisNameIsTooL"),
         (["--node", "mine.py:Picky"], "--node: mine.py:Picky: TypeError: Picky.__init__() miss"),
         (["--framing", "rtno", "--checksum", "xor8"], "--checksum: checksum is xor8, packets o"),
-        (["--fault", "ping"], "--fault: ping wants a rate above 0 and up to 1, as ping=0.01; g"),
+        (["--fault", "ping=2"], "--fault: ping takes a rate above 0 and up to 1, as ping=0.01; g"),
         (["--fault", "x"], "--fault: no fault 'x'; known: flip, drop, dup, cut, noise, ping, r"),
         (["--node", "mine.py:Divider", "--fault", "x"], "--fault: no fault 'x'; known: flip, d"),
         (["--scenario", "bad.txt"], "bad.txt:1: no action 'jump'; known: send, write, raw"),

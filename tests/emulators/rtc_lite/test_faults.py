@@ -3,10 +3,10 @@ from __future__ import annotations
 import pytest
 
 from tests.wire.rtc_lite.vectors import raw
-from tickrig.device.chance import Chance, threshold_of
+from tickrig.device.chance import Chance
 from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.node import RtcLiteNode
-from tickrig.emulators.rig.faults import FaultyPort
+from tickrig.emulators.rig.faults import FaultArguments, FaultTally, FaultTrigger, FaultyPort
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.station import Station
 from tickrig.emulators.rtc_lite.line import LINE_FAULTS, Radio, RadioSettings
@@ -17,22 +17,27 @@ PING = raw("0A 43 59 40 01 DD")
 STATE = raw("0A 43 58 40 43 1E")
 
 
+def made(rate: float, seed: int = 0) -> tuple[FaultTrigger, FaultArguments]:
+    arguments = FaultArguments(rate=rate)
+    return FaultTrigger(Chance(seed), arguments, FaultTally()), arguments
+
+
 @pytest.mark.parametrize(("rate", "every"), [(1, 1), (0.5, 2), (1 / 3, 3), (0.33, 3), (0.1, 10)])
 def test_every_nth_answer_to_a_ping_is_lost(rate: float, every: int) -> None:
-    fault = LINE_FAULTS["ping"].make(Chance(0), threshold_of(rate))
+    fault = LINE_FAULTS["ping"].make(*made(rate))
     passed = [fault(0, PING) == PING for _ in range(30)]
     assert passed == [(number + 1) % every != 0 for number in range(30)]
 
 
 def test_what_stands_beside_a_ping_stays() -> None:
-    fault = LINE_FAULTS["ping"].make(Chance(0), threshold_of(1))
+    fault = LINE_FAULTS["ping"].make(*made(1))
     assert fault(0, STATE + PING + STATE) == STATE + STATE
     assert fault(0, raw("0A 43 59 01 9D")) == raw("0A 43 59 01 9D")  # the request
 
 
 def test_noise_comes_before_bytes_and_changes_none() -> None:
     def heard(rate: float) -> bytes:
-        return LINE_FAULTS["noise"].make(Chance(3), threshold_of(rate))(0, bytes(1_000))
+        return LINE_FAULTS["noise"].make(*made(rate, 3))(0, bytes(1_000))
 
     assert heard(1)[1::2] == bytes(1_000)
     assert len(set(heard(1)[::2])) > 200
@@ -43,7 +48,7 @@ FIXED = RadioSettings(latency_us=15_000, jitter_us=0, gap_us=2_000, up_us=0)
 
 
 def radio(settings: RadioSettings, rate: float = 0.0, seed: int = 0) -> Radio:
-    return Radio(settings, Chance(seed), threshold_of(rate))
+    return Radio(settings, *made(rate, seed))
 
 
 def fly(link: Radio, now_us: int) -> int | None:
@@ -109,7 +114,7 @@ def heard_over_a_radio(*, dense: bool) -> list[int]:
     """Return which of 40 requests were answered."""
     line = SerialLine(57_600)
     port = FaultyPort(line.a, LINE_FAULTS, seed=3)
-    port.arm("radio", 0.2)
+    port.arm("radio", "0.2")
     rig = Rig(Station(RtcLiteNode(LiteEcho), port), dense=dense)
     heard = []
     for number in range(40):
@@ -130,7 +135,7 @@ def test_a_node_behind_a_radio_is_the_same_however_densely_it_is_looked_at() -> 
 def test_what_a_radio_holds_is_lost_when_it_ends() -> None:
     line = SerialLine(57_600)
     port = FaultyPort(line.a, LINE_FAULTS)
-    port.arm("radio", 0.001)
+    port.arm("radio", "0.001")
     line.b.send(0, b"abc")
     assert port.poll(5_000) == b""
     assert port.due_us < NEVER

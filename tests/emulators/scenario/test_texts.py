@@ -48,10 +48,10 @@ def test_a_written_time_is_read_again(t_us: int) -> None:
     ("text", "spec"),
     [
         ("cut", FaultSpec("cut")),
-        ("flip=0.001", FaultSpec("flip", 0.001)),
-        ("cut@5s-7s", FaultSpec("cut", None, 5_000_000, 7_000_000)),
-        ("bus_unplugged@3s", FaultSpec("bus_unplugged", None, 3_000_000, NEVER)),
-        ("drop=1e-3@0-10ms", FaultSpec("drop", 0.001, 0, 10_000)),
+        ("flip=0.001", FaultSpec("flip", ("0.001",))),
+        ("cut@5s-7s", FaultSpec("cut", (), 5_000_000, 7_000_000)),
+        ("bus_unplugged@3s", FaultSpec("bus_unplugged", (), 3_000_000, NEVER)),
+        ("drop=1e-3@0-10ms", FaultSpec("drop", ("1e-3",), 0, 10_000)),
     ],
 )
 def test_a_fault_is_one_word(text: str, spec: FaultSpec) -> None:
@@ -63,8 +63,6 @@ def test_a_fault_is_one_word(text: str, spec: FaultSpec) -> None:
     [
         ("", "is not a fault: write NAME"),
         ("a b", "is not a fault"),
-        ("flip=", "is not a rate"),
-        ("flip=x", "'x' is not a rate"),
         ("cut@", "'' is not a time"),
         ("cut@5s-", "'' is not a time"),
         ("cut@5s-x", "'x' is not a time"),

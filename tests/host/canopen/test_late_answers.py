@@ -182,7 +182,7 @@ def test_a_request_that_comes_twice_is_answered_twice_and_read_once() -> None:
 
 def test_a_bus_that_repeats_frames_gives_no_old_value() -> None:
     late = Late([IN_TIME])
-    late.bench.wire.faults.arm("duplicate", 0.3)
+    late.bench.wire.faults.arm("duplicate", "0.3")
     for _ in range(30):
         late.clock()
 

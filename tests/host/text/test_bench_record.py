@@ -82,8 +82,8 @@ def test_what_is_no_header_is_refused(line: str, message: str) -> None:
         ("0.100000 left ! a=b", "line 2: Expecting value"),
         ("0.100000 left ! a=true", "'a=true' is no number and no string"),
         ("0.100000 left ! a=1e999", "'a=1e999' is no number and no string"),
-        ("0.100000 left ~ drop", "no such wire in the header, or 'drop' is no fault"),
-        ("0.100000 bus ~ a b", "no such wire in the header, or 'a b' is no fault"),
+        ("0.100000 who ~ drop", "no such wire or device in the header, or 'drop' is no fault"),
+        ("0.100000 bus ~ a b", "no such wire or device in the header, or 'a b' is no fault"),
     ],
 )
 def test_what_is_no_line_is_refused(line: str, message: str) -> None:

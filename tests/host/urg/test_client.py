@@ -65,7 +65,7 @@ def test_clusters_and_intervals_make_less_of_it() -> None:
 def test_garbled_scans_are_left_out() -> None:
     bench = SensorBench(cluster=10)
     bench.run(300)
-    bench.port.arm("flip", 0.0003)
+    bench.port.arm("flip", "0.0003")
     scans = bench.run(3_000)
     assert bench.client.garbled > 3
     assert 10 < len(scans) < 30

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -116,7 +117,7 @@ class EmulatorOperator:
 
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
         """Let a fault come, in the time of the emulator."""
-        text = self._fault_name(spec.name) + ("" if spec.rate is None else f"={spec.rate!r}")
+        text = replace(spec, name=self._fault_name(spec.name)).text
         timed = (spec.from_us, spec.to_us, for_us) != (0, NEVER, None)
         if timed:
             ahead_us = self._now_us - now_us

@@ -215,7 +215,7 @@ class HumanOperator:
     def fault(self, spec: FaultSpec, now_us: int, for_us: int | None) -> None:
         """Have a physical fault made; NotOnThisBench for one of the wire, or of a certain time."""
         item = self._find_fault(spec.name)
-        if (spec.rate, spec.from_us, spec.to_us, for_us) != (None, 0, NEVER, None):
+        if (spec.arguments, spec.from_us, spec.to_us, for_us) != ((), 0, NEVER, None):
             raise NotOnThisBench(f"no hand makes {spec.name} at a certain time")
         self.have_done(f"make this fault: {item.text} ({item.name})")
         self._record.set(spec.name, 1)

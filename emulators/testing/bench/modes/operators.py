@@ -193,7 +193,7 @@ class Operators:
         def begin(now_us: int) -> None:
             order.begin(now_us)
             operator.fault(wanted, now_us, order.for_us)
-            said = fault if spec.rate is None else f"{fault}={spec.rate:g}"
+            said = wanted.text
             lasts = (spec.from_us, spec.to_us, order.for_us) == (0, NEVER, None)
             self._journal.note(device, said, **({fault: 1} if is_input and lasts else {}))
 

@@ -83,7 +83,7 @@ def test_own_messages_that_are_filtered_or_lost_are_not_received(log: Log) -> No
         bus.send(to_message(frames("181#01")[0]))
         assert bus.recv(0.001) is None
         faults = bus._host._end.wire.faults
-        faults.arm("drop", 1.0)
+        faults.arm("drop", "1.0")
         bus.send(to_message(frames("180#02")[0]))
         assert bus.recv(0.001) is not None  # it was sent well, and taken by nobody
         faults.clear("drop")

@@ -61,7 +61,7 @@ def test_a_block_upload_over_a_bad_line_is_repeated(
     bench: SimBench, node: canopen.RemoteNode
 ) -> None:
     node.sdo[0x2008].raw = BLOB[:2_000]
-    bench.wire.faults.arm("drop", 0.01)
+    bench.wire.faults.arm("drop", "0.01")
     with node.sdo.open(0x2008, 0, "rb", block_transfer=True) as stream:
         heard = stream.read()
     assert heard == BLOB[:2_000]
@@ -247,7 +247,7 @@ def test_a_run_is_the_same_each_time() -> None:
         bench = SimBench()
         node = bench.master()
         bench.network.run_for(10_000)
-        bench.wire.faults.arm("drop", 0.02)
+        bench.wire.faults.arm("drop", "0.02")
         node.sdo.MAX_RETRIES = 5
         node.sdo[0x1017].raw = 10
         for number in range(50):

@@ -90,15 +90,15 @@ def test_a_bench_says_what_there_is_to_set_to_read_and_to_break() -> None:
         head, title, first, *_ = str(chair).splitlines()
         assert (head, title) == ("chair", "inputs")
         assert first.split()[:5] == ["rrc_power", "level", "0..1", "supply", "of"]
-        assert "  flip=RATE                                 each bit" in str(chair)
+        assert "  flip[=RATE]                               each bit" in str(chair)
         assert "0x6040" in drive.inputs
         assert "0x6040" not in str(drive)
         for name, one in (*drive.faults.items(), *chair.faults.items()):
             device = bench["drive" if name in drive.faults else "chair"]
-            device.fault(f"{name}=0.5" if one.rated else name)
+            device.fault(f"{name}=rate=0.5" if one.rated else name)
             device.clear(name)
         for name, one in everything.faults.items():
-            bench.fault(f"{name}=0.5" if one.rated else name)
+            bench.fault(f"{name}=rate=0.5" if one.rated else name)
             bench.clear(name)
 
 

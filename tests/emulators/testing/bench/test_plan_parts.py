@@ -45,8 +45,8 @@ BUS = WirePlan(name="bus", type=WireType.CAN, bit_rate=500_000)
 def test_devices_begin_as_the_file_says() -> None:
     rrc = DevicePlan(name="joy", kind=DeviceKind.SERIAL, type="rrc", wire="joy")
     faults = (
-        FaultPlan("joy", FaultSpec("cut", None, 0, 2_000_000)),
-        FaultPlan("left", FaultSpec("power_off", None, 50_000)),
+        FaultPlan("joy", FaultSpec("cut", (), 0, 2_000_000)),
+        FaultPlan("left", FaultSpec("power_off", (), 50_000)),
     )
     left = drive("left", 5, start={"load_nm": 0.25})
     plan = plan_of(rrc, left, drive("right", 6), wires=(BUS,), faults=faults)

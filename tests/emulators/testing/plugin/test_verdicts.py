@@ -227,7 +227,7 @@ def test_error_frames_that_nobody_ordered_fail_the_test(
     pytester.makepyfile(
         f"""{BUS}
         def test_one(bench):
-            {fault or "bench._mode.act(lambda rig: rig.wire.arm('corrupt', 1.0))"}
+            {fault or "bench._mode.act(lambda rig: rig.wire.arm('corrupt', '1'))"}
             bench.run_for("100ms")
         """
     )

@@ -112,7 +112,7 @@ def test_a_line_knows_whether_anything_was_left_to_chance() -> None:
     port = FaultyPort(SerialLine(115_200).a, BYTE_FAULTS, 1)
     port.arm("cut")
     assert not port.drawn
-    port.arm("flip", 0.5)
+    port.arm("flip", "0.5")
     port.clear("flip")
     assert port.drawn
 
@@ -120,6 +120,6 @@ def test_a_line_knows_whether_anything_was_left_to_chance() -> None:
 def test_a_bus_knows_whether_anything_was_left_to_chance() -> None:
     faults = CanFaults(1, lambda name, begins: None)
     assert not faults.drawn
-    faults.arm("corrupt", 0.5)
+    faults.arm("corrupt", "0.5")
     faults.judge()
     assert faults.drawn

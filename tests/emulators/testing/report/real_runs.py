@@ -92,9 +92,8 @@ def planned_faults(steps: Sequence[ScenarioStep]) -> Iterator[PlannedFault]:
     cleared = {step.what.name: step.at_us for step in steps if isinstance(step.what, Clear)}
     for step in steps:
         if isinstance(spec := step.what, FaultSpec):
-            name = spec.name if spec.rate is None else f"{spec.name}={spec.rate:g}"
             to_us = cleared.get(spec.name) if spec.to_us == NEVER else spec.to_us
-            yield PlannedFault(name, max(spec.from_us, step.at_us or 0), to_us)
+            yield PlannedFault(spec.text, max(spec.from_us, step.at_us or 0), to_us)
 
 
 RRC_SIGNALS = ("state", "stick_v_pct", "out_v_pct", "out_w_pct", "buzzer")

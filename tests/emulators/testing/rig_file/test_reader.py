@@ -162,8 +162,8 @@ def test_starts_are_values_and_signals_by_the_name_of_the_input() -> None:
 def test_faults_body_and_doors_are_read() -> None:
     plan = read(WHOLE)
     assert plan.faults == (
-        FaultPlan("left", FaultSpec("shaft_blocked", None, 2_000_000, 3_000_000)),
-        FaultPlan("can0", FaultSpec("drop", 0.1, 1_000_000, 2_000_000)),
+        FaultPlan("left", FaultSpec("shaft_blocked", (), 2_000_000, 3_000_000)),
+        FaultPlan("can0", FaultSpec("drop", ("0.1",), 1_000_000, 2_000_000)),
         FaultPlan("vr2", FaultSpec("cut")),
     )
     assert plan.body == BodyPlan(
@@ -321,7 +321,7 @@ NODE = '[device.node]\ntype = "epos"\nnode_id = 5\n'
         (RRC + "[fault]\nrcr = 'cut'", ["4: fault.rcr: no device or wire 'rcr'; did you mean 'r"]),
         (RRC + "[fault]\nrrc = 5", ["4: fault.rrc: it takes a text or a list of texts, not 5"]),
         (RRC + "[fault]\nrrc = ['cut', 'ct']", ["4: fault.rrc[2]: no fault 'ct'; .*'cut'?"]),
-        (RRC + "[fault]\nrrc = 'flip'", ["4: fault.rrc: flip wants a rate above 0"]),
+        (RRC + "[fault]\nrrc = 'flip=2'", ["4: fault.rrc: flip takes a rate above 0"]),
         (RRC + "[fault]\nrrc = 'cut@2s-1s'", ["4: fault.rrc: fault cut ends before it begins"]),
         (
             NODE + "[fault]\ncan = 'shaft_blocked'",

@@ -157,7 +157,7 @@ def test_two_slaves_are_not_configured_as_one() -> None:
 
 def test_answers_that_fit_no_address_are_told() -> None:
     bench = NetBench(ours())
-    bench.wire.faults.arm("drop", 0.1)
+    bench.wire.faults.arm("drop", "0.1")
     with pytest.raises(LssFailed, match="not confirmed; a slave is gone, or needs longer"):
         LssMaster(bench.bus).fastscan()
 

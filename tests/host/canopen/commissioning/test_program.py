@@ -73,7 +73,7 @@ def stopped(seed: int = 0) -> Target:
 def test_a_megabyte_arrives_equal_to_the_byte(durand: bool, corrupt: float) -> None:
     target = Target(durand=True) if durand else stopped()
     if corrupt:
-        target.bench.wire.faults.arm("corrupt", corrupt)
+        target.bench.wire.faults.arm("corrupt", str(corrupt))
     target.bench.wire.observers.clear()
     data, progress = firmware(MEGABYTE), list[int]()
     assert target.program.download(data, progress.append) == 1
@@ -84,7 +84,7 @@ def test_a_megabyte_arrives_equal_to_the_byte(durand: bool, corrupt: float) -> N
 
 def test_what_is_lost_within_a_block_is_sent_again() -> None:
     target = stopped()
-    target.bench.wire.faults.arm("drop", 0.002)
+    target.bench.wire.faults.arm("drop", "0.002")
     data = firmware(6_000)
     assert target.program.download(data, lambda done: None) == 1
     acknowledged = [text for text in target.bench.frames if text.startswith("585#A2")]
@@ -95,7 +95,7 @@ def test_what_is_lost_within_a_block_is_sent_again() -> None:
 @pytest.mark.parametrize(("durand", "rate"), [(False, 0.01), (True, 0.005)], ids=["ours", "durand"])
 def test_a_transfer_that_broke_off_begins_anew(durand: bool, rate: float) -> None:
     target = Target(durand=True) if durand else stopped()
-    target.bench.wire.faults.arm("drop", rate)
+    target.bench.wire.faults.arm("drop", str(rate))
     data = firmware(5_000)
     tries = target.program.download(data, lambda done: None, tries=40)
     assert tries > 1
@@ -105,7 +105,7 @@ def test_a_transfer_that_broke_off_begins_anew(durand: bool, rate: float) -> Non
 
 def test_the_last_try_says_why_it_failed() -> None:
     target = stopped()
-    target.bench.wire.faults.arm("drop", 0.2)
+    target.bench.wire.faults.arm("drop", "0.2")
     with pytest.raises((SdoAborted, SdoTimeout)):
         target.program.download(firmware(5_000), lambda done: None, tries=2)
     assert target.flashed() == b""

@@ -132,7 +132,7 @@ def test_devices_that_fail_together_are_found_together() -> None:
 
 def test_t4_every_second_lost_ping_is_not_fatal() -> None:
     system = Experiment()
-    system.lines[0].arm("ping", 0.5)
+    system.lines[0].arm("ping", "0.5")
     system.run_to(30_000_000)
     pings = [data for _, data in system.links[0].sent if data[1:3] == b"CY"]
     assert len(pings) > 30
@@ -143,7 +143,7 @@ def test_t4_every_second_lost_ping_is_not_fatal() -> None:
 def test_t4_four_lost_pings_are_fatal_40_ticks_after_the_first() -> None:
     system = Experiment()
     system.run_to(3_000_000)
-    system.lines[0].arm("ping", 1.0)
+    system.lines[0].arm("ping", "1.0")
     system.links[0].sent.clear()
     system.run_for(1_500_000)
     sent_us = [at_us for at_us, data in system.links[0].sent if data[1:3] == b"CY"]
@@ -190,7 +190,7 @@ def test_a_burst_does_not_shift_the_next_ping() -> None:
     system = Experiment()
     system.run_to(3_500_000)
     before_us = pinged_us(system)[-1]
-    system.lines[0].arm("ping", 1.0)
+    system.lines[0].arm("ping", "1.0")
     system.run_to(before_us + 1_250_000)  # the third of the burst is answered
     system.lines[0].clear("ping")
     system.run_to(before_us + 3_050_000)
@@ -224,7 +224,7 @@ def test_over_a_lossy_radio_an_inactive_device_is_kept() -> None:
     bench = Bench(LiteEcho)
     bench.lines[0].fault_types = {"radio": radio(RadioSettings(up_us=0))}
     proxy = bench.attach(0, "Echo")
-    bench.lines[0].arm("radio", 0.1)
+    bench.lines[0].arm("radio", "0.1")
     bench.run_to(60_000_000)
     assert bench.events == []
     assert 0 < proxy.pings.lost < 20
@@ -238,7 +238,7 @@ def test_a_dropout_of_seconds_removes_the_device_and_it_is_found_again() -> None
     settings = RadioSettings(up_us=10_000_000, dropout_us=3_000_000)
     bench.lines[0].fault_types = {"radio": radio(settings)}
     bench.attach(0, "Echo", ProxySettings(rediscover=True))
-    bench.lines[0].arm("radio", 0.001)
+    bench.lines[0].arm("radio", "0.001")
     bench.run_to(60_000_000)
     kinds = [event.kind.value for event in bench.events]
     assert kinds[:3] == ["FatalError", "Removed", "Rediscovered"]

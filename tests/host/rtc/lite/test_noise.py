@@ -14,10 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.host.rtc.lite.bench import PERIOD_US, Bench
-from tickrig.device.chance import Chance
 from tickrig.device.rtc_lite.component import LiteEcho
 from tickrig.device.rtc_lite.server import LiteConfig
-from tickrig.emulators.rig.faults import Fault, FaultType
+from tickrig.emulators.rig.faults import Fault, FaultArguments, FaultTrigger, FaultType
 from tickrig.host.rtc import OutPort, connect
 from tickrig.host.rtc.lite import ProxySettings, RtcLiteProxy
 from tickrig.wire.rtc_lite.codes import LiteContextType
@@ -87,7 +86,7 @@ def spoilt_bench(spoils: list[Spoil], config: LiteConfig) -> Bench:
     bench.run_to(2 * PERIOD_US)
     ways: Iterator[Spoil] = iter(spoils)
 
-    def make(chance: Chance, threshold: int) -> Fault[bytes]:
+    def make(trigger: FaultTrigger, arguments: FaultArguments) -> Fault[bytes]:
         return lambda now_us, data: next(ways, keep)(data)
 
     kind: FaultType[bytes] = FaultType("as the test wants", make, rated=False)

@@ -211,7 +211,7 @@ def test_what_comes_without_a_request_is_dropped() -> None:
 @given(st.integers(0, 10_000))
 def test_noise_gives_the_right_answer_or_none(seed: int) -> None:
     bench = Bench(seed)
-    bench.port.arm("flip", 0.01)
+    bench.port.arm("flip", "0.01")
     assert bench.answers(READ_TWO) in ([], [ModbusAnswer(READ_TWO, (7, 8))])
 
 

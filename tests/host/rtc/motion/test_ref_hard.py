@@ -206,7 +206,7 @@ def test_one_lost_answer_is_no_miss() -> None:
 @given(st.integers(0, 10_000))
 def test_noise_on_the_line_moves_nothing_but_time(seed: int) -> None:
     bench = BaseBench(seed)
-    bench.port.arm("flip", 0.0005)
+    bench.port.arm("flip", "0.0005")
     bench.drive(0.3, periods=60)
     told = [each.data[0] for each in bench.taken("OutWheelAngle")]
     assert all(0 <= b - a < 1.0 for a, b in pairwise(told))

@@ -225,7 +225,7 @@ def test_they_are_created_by_their_names() -> None:
 def test_the_same_run_is_the_same() -> None:
     def run() -> list[object]:
         bench = UcodeBench()
-        bench.port.arm("flip", 0.001)
+        bench.port.arm("flip", "0.001")
         bench.service.inputs.set("slow", 1)
         bench.run(5 * SECOND_US)
         return [*values(bench.ucodes), *values(bench.positions), bench.settlement.cache.counts]

@@ -40,7 +40,7 @@ def test_rounds_come_whole() -> None:
 
 def test_a_round_with_a_garbled_line_is_left_out() -> None:
     bench = ReaderBench(Marker(DOOR, 1, 0), Marker("0" * 32, 2, 0))
-    bench.port.arm("flip", 0.0003)
+    bench.port.arm("flip", "0.0003")
     rounds = bench.run(20_000)
     assert all(set(found.ucodes) == {(DOOR, 67), ("0" * 32, 33)} for found in rounds)
     assert bench.client.garbled

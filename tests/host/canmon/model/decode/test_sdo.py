@@ -89,7 +89,7 @@ def test_a_block_transfer_over_a_bad_line_is_one_value_with_segments_sent_again(
     listener: Listener,
 ) -> None:
     listener.node.sdo[0x2008].raw = BLOB
-    listener.bench.wire.faults.arm("drop", 0.01)
+    listener.bench.wire.faults.arm("drop", "0.01")
     with listener.node.sdo.open(0x2008, 0, "rb", block_transfer=True) as stream:
         assert stream.read() == BLOB
     listener.bench.wire.faults.clear("drop")
