@@ -12,8 +12,14 @@ from contextlib import contextmanager
 from math import isnan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from tickrig._lazy import LazyModule
+
 if TYPE_CHECKING:
     import click
+
+    from tickrig.host.text import names
+else:  # completion does without
+    names = LazyModule("tickrig.host.text.names")
 
 
 class DeviceField(NamedTuple):  # a dataclass takes 2 ms more to import
@@ -113,9 +119,7 @@ def read_config(
     for key, value in config.items():
         field = known.get(key.replace("_", "-"))
         if field is None:
-            from tickrig.host.text.names import near  # noqa: PLC0415 - a TAB needs none
-
-            raise ValueError(f"{key}: {owner} has no such option; {near(key, known)}")
+            raise ValueError(f"{key}: {owner} has no such option; {names.near(key, known)}")
         given[key] = _plain(key, field, value)
     values = {field.name: field.unset for field in known.values()}
     for key, plain in given.items():

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.host.cli.control import request
 from tickrig.host.cli.messages import Refused, time_us
 from tickrig.host.cli.options import PATH
@@ -19,6 +20,10 @@ from tickrig.host.text.values import format_time, parse_setting
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from tickrig.host.rtc.motion import path_file
+else:  # completion does without
+    path_file = LazyModule("tickrig.host.rtc.motion.path_file")
 
 _PATIENCE_S: Final = 1.0
 
@@ -234,12 +239,10 @@ def goal(x: float, y: float, deg: float) -> Object:
 @click.argument("file", type=PATH, required=False)
 def path(file: Path | None) -> Object:
     """Let it drive along the points of FILE, as 'rh3 path', or along its defined path."""
-    from tickrig.host.rtc.motion.path_file import read_path  # noqa: PLC0415 - a TAB needs none
-
     if file is None:
         return {}
     try:
-        points = read_path(file)
+        points = path_file.read_path(file)
     except ValueError as error:
         raise Refused(str(error)) from None
     return {"points": [[x, y, degrees(heading)] for x, y, heading in points]}

@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.emulators.commands.run_options import device_options, line_options, run_named
+from tickrig.emulators.commands.run_options import (
+    device_options,
+    device_types,
+    line_options,
+    run_named,
+)
 from tickrig.host.cli.extensions import ExtensionError
 from tickrig.host.cli.messages import Refused, say
 from tickrig.host.cli.options import LazyGroup
-from tickrig.host.cli.start import loading
 from tickrig.host.text.names import near
 
 if TYPE_CHECKING:
@@ -47,11 +51,8 @@ class _DeviceGroup(LazyGroup):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names, ours first; a device type that cannot be loaded is told in a line."""
-        with loading():
-            from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
-
         self.commands.update(
-            (name, device_command(each)) for name, each in DEVICES.load_foreign(say).items()
+            (name, device_command(each)) for name, each in device_types().load_foreign(say).items()
         )
         return list(self.commands)
 
@@ -59,14 +60,12 @@ class _DeviceGroup(LazyGroup):
         """Return the command line of a device."""
         if cmd_name in self.commands:
             return self.commands[cmd_name]
-        with loading():
-            from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
-
-        if cmd_name not in (names := DEVICES.names()):
+        types = device_types()
+        if cmd_name not in (names := types.names()):
             hint = near(cmd_name, dict.fromkeys([*_OURS, *names]))
             raise Refused(f"no device {cmd_name!r}; {hint}")
         try:
-            return device_command(DEVICES.load(cmd_name))
+            return device_command(types.load(cmd_name))
         except ExtensionError as error:
             raise Refused(str(error)) from None
 

@@ -13,9 +13,9 @@ from typing import Final
 
 import click
 
+from tickrig.emulators.commands.run_options import device_types
 from tickrig.host.cli.messages import Refused, refuse_path
 from tickrig.host.cli.options import PATH
-from tickrig.host.cli.start import loading
 from tickrig.host.text.whole_file import write_whole
 
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
@@ -39,9 +39,6 @@ def device(name: str, folder: Path) -> None:
     pip install -e lamp
     tickrig emu lamp --link /tmp/lamp
     """  # noqa: D301 - click wants the backspace
-    with loading():
-        from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
-
     module = name.replace("-", "_")
     if not _NAME.fullmatch(name):
         wanted = "a small letter, then small letters, digits and -, as my-lamp"
@@ -51,7 +48,7 @@ def device(name: str, folder: Path) -> None:
     spec = find_spec(module)
     if spec is not None and spec.origin is not None:
         raise Refused(f"{name!r} is the name of a module that is there already")
-    if name in DEVICES.names():
+    if name in device_types().names():
         raise Refused(f"there is a device {name!r} already: tickrig emu {name}")
     place = folder / name
     try:

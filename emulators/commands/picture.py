@@ -7,10 +7,15 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.host.cli.messages import Refused
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from tickrig.host.text import whole_file
+else:  # completion does without
+    whole_file = LazyModule("tickrig.host.text.whole_file")
 
 _FORMATS: Final = (".png", ".svg", ".html")
 _PLOTTER: Final = "matplotlib"
@@ -22,10 +27,8 @@ def check_plot(path: Path) -> None:
         raise Refused(f"--plot {path}: the name ends in {', '.join(_FORMATS)}")
     if find_spec(_PLOTTER) is None:
         raise Refused(f"--plot needs {_PLOTTER}: pip install 'tickrig[plot]'")
-    from tickrig.host.text.whole_file import check_file  # noqa: PLC0415 - a TAB needs none
-
     try:
-        check_file(path, "--plot")
+        whole_file.check_file(path, "--plot")
     except ValueError as error:
         raise Refused(str(error)) from None
 
@@ -43,14 +46,12 @@ def write_figure(figure: Figure, title: str, path: Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    from tickrig.host.text.whole_file import write_whole  # noqa: PLC0415 - a TAB needs none
-
     if path.suffix.lower() == ".html":
-        write_whole(path, _page(figure, title))
+        whole_file.write_whole(path, _page(figure, title))
     else:
         picture = io.BytesIO()
         figure.savefig(picture, format=path.suffix.lower().removeprefix("."))
-        write_whole(path, picture.getvalue())
+        whole_file.write_whole(path, picture.getvalue())
 
 
 def _page(figure: Figure, title: str) -> str:

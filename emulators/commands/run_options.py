@@ -13,6 +13,8 @@ from tickrig.host.cli.start import load, loading
 
 if TYPE_CHECKING:
     from tickrig.device.physical import InputSignal
+    from tickrig.emulators.commands.device_type import DeviceType
+    from tickrig.host.cli.extensions import ExtensionGroup
 
 
 _Faults = Callable[[click.Context], Iterable[str]]
@@ -118,10 +120,16 @@ def run_named(name: str, options: Mapping[str, Any]) -> int:
         Refused: it cannot be run like this.
     """
     with loading():
-        from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
-        from tickrig.emulators.commands.serial_run import run_device  # noqa: PLC0415 - slow
+        run_device = load("tickrig.emulators.commands.serial_run:run_device")
+    status: int = run_device(device_types().load(name), options)
+    return status
 
-    return run_device(DEVICES.load(name), options)
+
+def device_types() -> ExtensionGroup[DeviceType]:
+    """Return the device types, `device_type.DEVICES`; help and completion do without them."""
+    with loading():
+        found: ExtensionGroup[DeviceType] = load("tickrig.emulators.commands.device_type:DEVICES")
+    return found
 
 
 # The option --type: a device type by name.
@@ -137,6 +145,4 @@ def type_option(text: str) -> Decorator:
 
 
 def _complete(context: click.Context, option: click.Parameter, begun: str) -> list[str]:
-    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
-
-    return [name for name in DEVICES.names() if name.startswith(begun)]
+    return [name for name in device_types().names() if name.startswith(begun)]

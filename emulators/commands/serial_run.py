@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import RunningEmulator, Transcript
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType
@@ -25,7 +26,9 @@ from tickrig.host.cli.messages import Refused, refuse_path, refused_at, say
 from tickrig.host.text.trace import Header
 
 if TYPE_CHECKING:
-    from tickrig.emulators.serial.pty_port import PtyPort
+    from tickrig.emulators.serial import pty_port
+else:
+    pty_port = LazyModule("tickrig.emulators.serial.pty_port")  # POSIX
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,19 +119,17 @@ class _SerialRun(EmulatorRun):
             line=self._type.line,
         )
 
-    def _open_ports(self, stack: ExitStack) -> list[PtyPort | NetworkPort]:
+    def _open_ports(self, stack: ExitStack) -> list[pty_port.PtyPort | NetworkPort]:
         """Open where hosts come in: a pty if one is named or there is nothing else."""
-        ports: list[PtyPort | NetworkPort] = []
+        ports: list[pty_port.PtyPort | NetworkPort] = []
         if self._options.link or not self._urls:
             ports.append(self._open_pty(stack))
         ports += [self._serve(stack, url) for url in self._urls]
         return ports
 
-    def _open_pty(self, stack: ExitStack) -> PtyPort:
+    def _open_pty(self, stack: ExitStack) -> pty_port.PtyPort:
         try:
-            from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
-
-            pty = PtyPort(self._options.link)
+            pty = pty_port.PtyPort(self._options.link)
         except ModuleNotFoundError:
             raise Refused(
                 "this system has no ptys: serve the line, as --serve rfc2217://7000"

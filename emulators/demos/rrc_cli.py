@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from tickrig.host.cli.start import loading, raise_of_output
+from tickrig.host.cli.start import load, loading, raise_of_output
 from tickrig.host.links.link import DeviceRefused, LinkError
 
 
@@ -12,8 +12,7 @@ from tickrig.host.links.link import DeviceRefused, LinkError
 def rrc() -> None:
     """Drive an RRC on a pty through power-on, all samples, output mode and a watchdog trip."""
     with loading():
-        from tickrig.emulators.demos.rrc import run_demo  # noqa: PLC0415
-
+        run_demo = load("tickrig.emulators.demos.rrc:run_demo")
     try:
         run_demo(click.echo)
     except (RuntimeError, OSError, LinkError, DeviceRefused) as error:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import click
 
 from tickrig.host.cli.messages import warnings_shown
 from tickrig.host.cli.start import loading, raise_of_output
 from tickrig.host.links.link import LinkError
+from tickrig.host.rtc.states import RtcRefused
 
 
 @click.command("rtc-lite")
@@ -18,9 +21,7 @@ def rtc_lite(virtual: bool) -> None:
     RTComponent-Lite. The devices are processes on two ptys, in real time.
     """
     with loading():
-        from tickrig.emulators.demos import rtc_lite as demo  # noqa: PLC0415 - slow
-        from tickrig.host.rtc.states import RtcRefused  # noqa: PLC0415
-
+        demo = import_module("tickrig.emulators.demos.rtc_lite")
     try:
         if virtual:
             demo.run_demo(demo.VirtualSetup(), click.echo)

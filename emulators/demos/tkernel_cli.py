@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load, loading
 
 
 @click.command()
@@ -18,6 +18,6 @@ def tkernel(no_caches: bool) -> None:
     on. In virtual time: the same lines each time.
     """
     with loading():
-        from tickrig.emulators.demos.tkernel import CorridorStage, run_demo  # noqa: PLC0415
-
-    run_demo(CorridorStage(caches=not no_caches), click.echo)
+        run_demo = load("tickrig.emulators.demos.tkernel:run_demo")
+        stage_type = load("tickrig.emulators.demos.tkernel:CorridorStage")
+    run_demo(stage_type(caches=not no_caches), click.echo)

@@ -48,10 +48,11 @@ from functools import partial
 from heapq import heapify, heapreplace
 from itertools import compress
 from operator import not_
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar, overload
+from typing import Any, Final, Protocol, TypeVar, overload
 
 from tickrig.device.horizon import Horizon
 from tickrig.device.twin import Copyable, Listeners, Part, restore, state_of, twin
+from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.rig.clock import Clock, VirtualClock
 from tickrig.emulators.rig.event_queue import EventQueue
 from tickrig.emulators.rig.kernel import enter_stations, kernel, run, tick_stations
@@ -59,10 +60,6 @@ from tickrig.emulators.rig.port import Host, OutsideBridge, Wire
 from tickrig.emulators.rig.station import Station, Timetable, next_tick_us
 from tickrig.emulators.rig.wire_port import is_wire_port
 from tickrig.wire.instant import NEVER
-
-if TYPE_CHECKING:
-    from tickrig.device.twin.snapshot import MachineSnapshot
-
 
 # What joins devices beside their wires.
 
@@ -385,8 +382,6 @@ class Rig(Copyable):
         b'EV:Initialized'
         b'EV:Initialized'
         """
-        from tickrig.device.twin.snapshot import MachineSnapshot  # noqa: PLC0415 - seldom
-
         return MachineSnapshot(self, *parts)
 
     def move_on(self, wire: Wire) -> None:

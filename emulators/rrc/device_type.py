@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.device.rrc.machine import Rrc
 from tickrig.device.rrc.settings import FailTarget, RrcConfig
 from tickrig.emulators.commands.device_type import ConfiguredDevice, DeviceType, check_config
@@ -14,6 +15,11 @@ from tickrig.emulators.rrc.fields import FIELDS
 from tickrig.emulators.serial.emulator import Emulator
 from tickrig.host.text.trace import Config, Mark
 from tickrig.wire.rrc.message import check_digit
+
+if TYPE_CHECKING:
+    from tickrig.emulators.rrc import panel
+else:
+    panel = LazyModule("tickrig.emulators.rrc.panel")  # an extra
 
 _EVENTS: Final = (b"EV:", b"ER:")
 
@@ -50,9 +56,7 @@ def _is_event(line: WireLine) -> bool:
 
 
 def _panel(emulator: Emulator) -> None:
-    from tickrig.emulators.rrc.panel import run_panel  # noqa: PLC0415 - the extra [tui]
-
-    run_panel(emulator)
+    panel.run_panel(emulator)
 
 
 RRC: Final = DeviceType(

@@ -38,6 +38,31 @@ def lazy(
     return listed, find, lambda: listed
 
 
+class LazyModule:
+    """Stands at the top of a module for another that is imported when it is first used.
+
+    Type checkers see the import that it replaces:
+
+        if TYPE_CHECKING:
+            from package import slow
+        else:
+            slow = LazyModule("package.slow")
+
+    Args:
+        name: of the module, in full.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, name: str) -> object:
+        """Return what the module has under this name."""
+        from importlib import import_module  # noqa: PLC0415 - not before it is needed
+
+        found: object = getattr(import_module(self._name), name)
+        return found
+
+
 def tell_pyserial() -> None:
     """Let pyserial find the handler of `tickrig://`, if it is loaded already.
 

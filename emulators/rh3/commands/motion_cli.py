@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +19,7 @@ from tickrig.host.cli.options import (
     add_options,
     version_option,
 )
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load, loading
 
 _COORDINATES: Final = {"ignore_unknown_options": True}
 """So that `-1` is a number and no option."""
@@ -63,6 +64,13 @@ _PLOT: Final[Decorator] = click.option(
 )
 
 
+def _verb(name: str) -> Callable[..., None]:
+    """Return a function of `motion_verbs`; help and completion do without them."""
+    with loading():
+        verb: Callable[..., None] = load(f"tickrig.emulators.rh3.commands.motion_verbs:{name}")
+    return verb
+
+
 @click.group(cls=LazyGroup, commands={})
 @version_option()
 def main() -> None:
@@ -94,10 +102,7 @@ def goto(x: float, y: float, theta: float, **options: Any) -> None:
     rh3 goto 1 0.5 1.57
     rh3 goto -1 0 0 --set tuned
     """  # noqa: D301
-    with loading():
-        from tickrig.emulators.rh3.commands.motion_verbs import go_to  # noqa: PLC0415 - slow
-
-    go_to(x, y, theta, options)
+    _verb("go_to")(x, y, theta, options)
 
 
 @main.command("path")
@@ -113,10 +118,7 @@ def along_path(file: Path, **options: Any) -> None:
     printf '2 0\\n2 2\\n0 2\\n0 0 0\\n' > corners.txt
     rh3 path corners.txt
     """  # noqa: D301
-    with loading():
-        from tickrig.emulators.rh3.commands.motion_verbs import go_along  # noqa: PLC0415 - slow
-
-    go_along(file, options)
+    _verb("go_along")(file, options)
 
 
 @main.command()
@@ -139,10 +141,7 @@ def square(runs: int | None, side: float | None, save: Path | None, **options: A
     rh3 square --tread-m 0.459 --save Odometry.conf
     rh3 square --tread-m 0.459 --odometry-conf Odometry.conf
     """  # noqa: D301
-    with loading():
-        from tickrig.emulators.rh3.commands.motion_verbs import go_round  # noqa: PLC0415 - slow
-
-    go_round(runs, side, save, options)
+    _verb("go_round")(runs, side, save, options)
 
 
 @main.command()
@@ -174,7 +173,4 @@ def serve(**options: Any) -> None:
     rh3 serve --openrtm localhost:2809 --device /dev/ttyUSB0
     rh3 serve --ros2 --room 6 4
     """  # noqa: D301
-    with loading():
-        from tickrig.emulators.rh3.commands.motion_verbs import serve as serve_until  # noqa: PLC0415
-
-    serve_until(options)
+    _verb("serve")(options)

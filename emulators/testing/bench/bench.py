@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Self, TypeVar, cast
 
+from tickrig._lazy import LazyModule
+from tickrig.device.twin.snapshot import MachineSnapshot
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench import tasks
@@ -32,10 +34,12 @@ if TYPE_CHECKING:
     import canopen
     import serial
 
-    from tickrig.device.twin.snapshot import MachineSnapshot
+    from tickrig.emulators.testing.bench.modes import hardware_mode, real_mode
     from tickrig.emulators.testing.bench.modes.human_operator import Terminal
     from tickrig.host.links.link import Link
-
+else:  # POSIX
+    hardware_mode = LazyModule("tickrig.emulators.testing.bench.modes.hardware_mode")
+    real_mode = LazyModule("tickrig.emulators.testing.bench.modes.real_mode")
 
 # What a test does to one device of a bench, and where its host connects.
 
@@ -331,9 +335,7 @@ class Bench(BenchDevice, Closing):
             OSError: no port is to be had, or no link or socket can be made.
         """
         if mode == HARDWARE:
-            from tickrig.emulators.testing.bench.modes.hardware_mode import HardwareMode  # noqa: PLC0415 - POSIX
-
-            return cls.of_mode(HardwareMode(plan, terminal))
+            return cls.of_mode(hardware_mode.HardwareMode(plan, terminal))
         return cls.of_mode(_emulated(mode, parts_of(plan), plan))
 
     @classmethod
@@ -552,8 +554,6 @@ class Bench(BenchDevice, Closing):
         Standby
         WaitPowerOn 1000000
         """
-        from tickrig.device.twin.snapshot import MachineSnapshot  # noqa: PLC0415 - seldom
-
         if not isinstance(self._mode, VirtualMode):
             raise NotOnThisBench("time that has passed comes back in virtual time alone")
         return MachineSnapshot(self, *hosts)
@@ -591,6 +591,6 @@ def _emulated(mode: str, parts: Parts, plan: RigPlan) -> BenchMode:
         return VirtualMode(rig_of(parts, plan))
     if mode != _REAL:
         raise ValueError(f"a bench of emulated devices is virtual or real, not {mode!r}")
-    from tickrig.emulators.testing.bench.modes.real_mode import RealMode  # noqa: PLC0415 - POSIX
-
-    return RealMode.open(parts.mounts, plan.real, lambda outside: rig_of(parts, plan, outside))
+    return real_mode.RealMode.open(
+        parts.mounts, plan.real, lambda outside: rig_of(parts, plan, outside)
+    )

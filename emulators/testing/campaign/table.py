@@ -8,13 +8,19 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.testing.campaign.order import CampaignRefusal, RunVerdict
 from tickrig.emulators.testing.campaign.plan import CampaignPlan, Seeds
 from tickrig.emulators.testing.report.overview import natural
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import write_whole
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.campaign import parquet_file
+else:
+    parquet_file = LazyModule("tickrig.emulators.testing.campaign.parquet_file")  # an extra
 
 FIRST: Final = ("test", "seed")
 LAST: Final = ("outcome", "virtual_us", "where", "reason", "replay")
@@ -104,9 +110,8 @@ def write_table(table: CampaignTable, path: Path) -> None:
         OSError: it cannot be written.
     """
     if path.suffix == PARQUET:
-        from tickrig.emulators.testing.campaign.parquet_file import parquet_of  # noqa: PLC0415 - slow
-
-        write_whole(path, parquet_of(table.columns, [row.cells() for row in table.rows]))
+        rows = [row.cells() for row in table.rows]
+        write_whole(path, parquet_file.parquet_of(table.columns, rows))
         return
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -123,9 +128,7 @@ def read_table(path: Path) -> CampaignTable:
         OSError: it cannot be read.
     """
     if path.suffix == PARQUET:
-        from tickrig.emulators.testing.campaign.parquet_file import read_parquet  # noqa: PLC0415 - slow
-
-        return _table(path, read_parquet(path))
+        return _table(path, parquet_file.read_parquet(path))
     try:
         with path.open(encoding="utf-8", newline="") as file:
             return _table(path, csv.reader(file, strict=True))

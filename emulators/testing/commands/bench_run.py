@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
 
 import click
 
 from tickrig.emulators.bench.operator import Operator
 from tickrig.emulators.bench.running_emulator import STATE, RunningEmulator
-from tickrig.emulators.commands.run import EmulatorRun, RunOptions
+from tickrig.emulators.commands.run import EmulatorRun, RunOptions, mistakes_in
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import read_signal
 from tickrig.emulators.rig.event_queue import EventQueue
@@ -24,12 +25,15 @@ from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.bench.plan_parts import parts_of, rig_of
 from tickrig.emulators.testing.rig_file.plan import RigPlan, bus_text, device_text
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
+from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.host.cli.messages import Refused, refuse_path, say
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
 
 _ALONE: Final = "{wire}: no bus outside; [real.{wire}] with interface and channel joins one."
 _NOWHERE: Final = "-"
+_MISTAKES: Final = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +47,39 @@ class BenchOptions(RunOptions):
 
     virtual: bool = False
     for_us: int | None = None
+
+
+def run_bench(
+    file: Path, *, virtual: bool, control: Path | None, seed: int | None, **others: Any
+) -> int:
+    """Run the bench of a rig file, and return the exit status.
+
+    Args:
+        file: the rig file.
+        virtual: in virtual time.
+        control: where its control socket is to be; None for what the file says.
+        seed: of all chance; None for what the file says.
+        others: the other options, as `BenchOptions` has them.
+
+    Raises:
+        Refused: the command line asks for something that cannot be done.
+    """
+    if virtual and others["for_us"] is None:
+        raise Refused("--virtual wants a time: --for 10s")
+    if virtual and control is not None:
+        raise Refused("--control belongs to real time, not to --virtual")
+    try:
+        plan = read_rig_file(file)
+    except RigFileError as error:
+        say(str(error))
+        return _MISTAKES
+    except OSError as error:
+        refuse_path("file", error)
+    plan = plan if seed is None else replace(plan, seed=seed)
+    control = None if virtual else control or plan.real.control
+    options = BenchOptions(virtual=virtual, control=control, **others)
+    with mistakes_in(each.type for each in plan.devices.values()):
+        return BenchRun(plan, options).run()
 
 
 class BenchRun(EmulatorRun):

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from time import monotonic
-from typing import Any, Final, NoReturn, Protocol
+from typing import TYPE_CHECKING, Any, Final, NoReturn, Protocol
 
 import click
 from click._termui_impl import ProgressBar
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.testing.campaign.crew import Crew, LocalWorkers, cores
 from tickrig.emulators.testing.campaign.journal import SUFFIX, CampaignJournal, JournalFullError
 from tickrig.emulators.testing.campaign.order import CampaignOrder, CampaignRefusal, Run, RunVerdict
@@ -39,6 +40,11 @@ from tickrig.host.cli.start import INTERRUPTED, UNWRITTEN, as_is
 from tickrig.host.text.names import known
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import check_file
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.campaign import dask_workers
+else:
+    dask_workers = LazyModule("tickrig.emulators.testing.campaign.dask_workers")  # an extra
 
 # Theory of operation
 # ===================
@@ -286,12 +292,11 @@ class _CampaignRun:
         if not self._options.scheduler:
             return LocalWorkers(crew, plan.collected.digest, self._options.workers or cores())
         try:
-            from tickrig.emulators.testing.campaign.dask_workers import DaskWorkers  # noqa: PLC0415 - slow
+            return dask_workers.DaskWorkers(self._options.scheduler, plan)
         except ImportError:
             raise CampaignRefusal(
                 "--scheduler needs Dask: pip install 'tickrig[campaign]'"
             ) from None
-        return DaskWorkers(self._options.scheduler, plan)
 
     def _do(self, plan: CampaignPlan, workers: Workers) -> None:
         """Do all runs, with a bar on a terminal."""

@@ -7,18 +7,16 @@ from typing import Final
 
 import click
 
+from tickrig.emulators.commands.run_options import device_types
 from tickrig.host.cli.options import PATH, works_in
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load
 
 _RIG: Final = "rig.toml"
 
 
 def _complete_type(context: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
-    with loading():
-        from tickrig.emulators.canopen.choices import MODELS  # noqa: PLC0415 - slow
-        from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415 - slow
-
-    return [name for name in (*DEVICES.names(), *MODELS) if name.startswith(begun)]
+    names = (*device_types().names(), *load("tickrig.emulators.canopen.choices:MODELS"))
+    return [name for name in names if name.startswith(begun)]
 
 
 @click.command()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.canopen.eds import EdsCache
 from tickrig.emulators.commands.device_type import build_recorded
 from tickrig.emulators.commands.run import mistakes_in
@@ -17,6 +18,12 @@ from tickrig.host.text.bench_header import PREFIX
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.user_file import find_class
 from tickrig.host.text.values import counted, format_time
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.machine import bench_machine, host_runs
+else:  # replays with --host alone need them
+    bench_machine = LazyModule("tickrig.emulators.testing.machine.bench_machine")
+    host_runs = LazyModule("tickrig.emulators.testing.machine.host_runs")
 
 
 def run_replay(file: Path, *, verbose: bool, host: str | None, run_code: bool) -> int:
@@ -54,12 +61,9 @@ def _replay_trace(file: Path, *, verbose: bool, run_code: bool) -> int:
 
 def _replay_with_host(file: Path, host: str) -> int:
     """Do a scenario again; return 1 if something is wrong."""
-    from tickrig.emulators.testing.machine.bench_machine import BenchMachine  # noqa: PLC0415 - slow
-    from tickrig.emulators.testing.machine.host_runs import HostRuns, parse_steps  # noqa: PLC0415
-
     try:
-        steps = parse_steps(file.read_text("utf-8"), str(file))
-        runs = HostRuns(find_class(host, BenchMachine))
+        steps = host_runs.parse_steps(file.read_text("utf-8"), str(file))
+        runs = host_runs.HostRuns(find_class(host, bench_machine.BenchMachine))
     except OSError as error:
         refuse_path("scenario", error)
     except ValueError as error:

@@ -11,10 +11,16 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from types import FrameType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.rig.sim_waits import LOOK_US, Passing, SimTime
 from tickrig.emulators.testing.host_clock import host_code, patches
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.host_clock import bench_loop
+else:
+    bench_loop = LazyModule("tickrig.emulators.testing.host_clock.bench_loop")  # imports asyncio
 
 # What hosts find in place of functions that tell the time, and that wait.
 
@@ -285,9 +291,7 @@ def _loops(passing: Passing) -> AbstractContextManager[None]:
     """Return what lets event loops have this time; nothing where asyncio is not in use."""
     if "asyncio" not in sys.modules:
         return nullcontext()
-    from tickrig.emulators.testing.host_clock.bench_loop import bench_loops  # noqa: PLC0415 - imports asyncio
-
-    return bench_loops(passing)
+    return bench_loop.bench_loops(passing)
 
 
 # Hosts that look at the clock of this machine while their bench is in virtual time.

@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.testing.machine.bench_machine import BenchMachine
 from tickrig.emulators.testing.machine.host_runs import HostRuns, HostStep, parse_steps
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.machine import strategies
+else:
+    strategies = LazyModule("tickrig.emulators.testing.machine.strategies")  # an extra
 
 _HEAD: Final = "# a scenario of {place}, {count}"
 _REPLAY: Final = "put it into a file, and: tickrig replay FILE --host {place}"
@@ -56,8 +62,6 @@ def search_of(runs: HostRuns, *, max_examples: int, max_steps: int, seed: int | 
         from hypothesis import HealthCheck, Phase, given, settings  # noqa: PLC0415 - an extra
     except ImportError:
         raise ModuleNotFoundError(_WANTED, name="hypothesis") from None
-    from tickrig.emulators.testing.machine import strategies  # noqa: PLC0415 - with it
-
     others: dict[str, Any] = {} if seed is None else {"database": None}
 
     @settings(

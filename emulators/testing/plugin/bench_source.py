@@ -15,7 +15,8 @@ from typing import Any, Final, NamedTuple
 import pytest
 
 from tickrig.device.physical import SignalType
-from tickrig.emulators.commands.device_type import DeviceType
+from tickrig.emulators.canopen.choices import MODELS
+from tickrig.emulators.commands.device_type import DEVICES, DeviceType
 from tickrig.emulators.serial.emulator import LineSettings
 from tickrig.emulators.testing.bench.bench import HARDWARE, Bench
 from tickrig.emulators.testing.bench.build import BenchedDevice, name_of, named_device
@@ -23,8 +24,9 @@ from tickrig.emulators.testing.bench.errors import NotOnThisBench
 from tickrig.emulators.testing.plugin.health import ERRORS, LOST
 from tickrig.emulators.testing.plugin.host_checks import CLOCK, THREADS
 from tickrig.emulators.testing.plugin.settings import MODES
-from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXES
-from tickrig.emulators.testing.rig_file.plan import RigPlan
+from tickrig.emulators.testing.rig_file.devices import EDS_SUFFIXES, RIG_SUFFIXES, kind_of
+from tickrig.emulators.testing.rig_file.plan import DevicePlan, RigPlan
+from tickrig.emulators.testing.rig_file.probe import Probe, probe
 from tickrig.emulators.testing.rig_file.reader import read_rig_file
 from tickrig.host.text.names import closest, known, near
 from tickrig.host.text.values import Setting
@@ -275,12 +277,6 @@ def _is_elsewhere(choice: str) -> bool:
 @cache
 def _names_anywhere() -> dict[str, set[str]]:
     """Return the names of what device types and models have, which are made once for it."""
-    from tickrig.emulators.canopen.choices import MODELS  # noqa: PLC0415 - seldom wanted
-    from tickrig.emulators.commands.device_type import DEVICES  # noqa: PLC0415
-    from tickrig.emulators.testing.rig_file.devices import kind_of  # noqa: PLC0415
-    from tickrig.emulators.testing.rig_file.plan import DevicePlan  # noqa: PLC0415
-    from tickrig.emulators.testing.rig_file.probe import Probe, probe  # noqa: PLC0415
-
     names: dict[str, set[str]] = {"fault": set(), "input": set(), "output": set()}
     for each in (*DEVICES.names(), *MODELS):
         kind, place = kind_of(each, Path())

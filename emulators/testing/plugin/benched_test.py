@@ -6,15 +6,16 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.testing.bench.bench import VIRTUAL, Bench
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.errors import BenchBlocked, NotOnThisBench
 from tickrig.emulators.testing.bench.mounts import LineMount
-from tickrig.emulators.testing.host_clock.host_code import UnpatchedTimeError
+from tickrig.emulators.testing.host_clock.host_code import HostTimeError, UnpatchedTimeError
 from tickrig.emulators.testing.plugin import bench_source
 from tickrig.emulators.testing.plugin.compare import FINGERPRINT, Fingerprint
 from tickrig.emulators.testing.plugin.failure_report import keep, sections_of
@@ -26,8 +27,9 @@ from tickrig.emulators.testing.plugin.verdict import MisusedError, blocked, make
 from tickrig.emulators.testing.plugin.warm_up import WarmUp, warmed
 
 if TYPE_CHECKING:
-    from tickrig.emulators.testing.plugin.bench_evidence import BenchWitness
-
+    from tickrig.emulators.testing.plugin import bench_evidence
+else:
+    bench_evidence = LazyModule("tickrig.emulators.testing.plugin.bench_evidence")  # for reports
 
 # Theory of operation
 # ===================
@@ -84,7 +86,7 @@ class _BenchedTest(TestWithBench):
         self._settings = item.config.stash[SETTINGS]
         item.stash[FINGERPRINT] = None
         self.fingerprint: Fingerprint | None = None
-        self._witness: BenchWitness | None = None
+        self._witness: bench_evidence.BenchWitness | None = None
         self._health: Health | None = None
         self._allowed: tuple[str, ...] = ()
         self._passed, self._stack, self._others = False, ExitStack(), threading.enumerate()
@@ -108,9 +110,7 @@ class _BenchedTest(TestWithBench):
         _offer(bench)
         self._health = Health(bench)
         if self._settings.report:
-            from tickrig.emulators.testing.plugin.bench_evidence import BenchWitness  # noqa: PLC0415
-
-            self._witness = BenchWitness(bench)
+            self._witness = bench_evidence.BenchWitness(bench)
         if self._settings.compare and bench.mode == VIRTUAL:
             self.fingerprint = self.item.stash[FINGERPRINT] = bench._mode.act(Fingerprint)
         return bench
@@ -236,6 +236,16 @@ def benched(
         yield _opened(test)
     finally:
         test.close()
+
+
+@contextmanager
+def clocked(bench: Bench) -> Iterator[Any]:
+    """Give a test the clock of its bench; a refusal that a host has swallowed fails the test."""
+    try:
+        with bench.patched_time() as clock:
+            yield clock
+    except HostTimeError as error:
+        raise pytest.fail.Exception(str(error), pytrace=False) from None
 
 
 def _offer(bench: Bench) -> None:

@@ -14,6 +14,7 @@ from _pytest.runner import runtestprotocol
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.mounts import LineMount
 from tickrig.emulators.testing.plugin.journal_text import signals_of
+from tickrig.emulators.testing.plugin.settings import MODES, PluginSettings
 from tickrig.host.text.byte_text import escape
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import Setting, format_time
@@ -93,9 +94,19 @@ _Reports = list[pytest.TestReport]
 
 
 class Compare:
-    """The plug-in of `--bench-compare`."""
+    """The plug-in of `--bench-compare`.
 
-    def __init__(self) -> None:
+    Args:
+        config: of pytest.
+        settings: what was asked for.
+
+    Raises:
+        pytest.UsageError: no test runs in virtual time.
+    """
+
+    def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
+        if MODES[0] not in settings.modes:
+            raise pytest.UsageError("--bench-compare compares runs in virtual time only")
         self._hashes: dict[str, str] = {}
 
     @pytest.hookimpl(tryfirst=True)

@@ -7,6 +7,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.record.wire_log import WireLine
 from tickrig.emulators.rig.emulated import HasSignals, read_signal
 from tickrig.emulators.testing.bench.bench import Bench
@@ -20,7 +21,11 @@ from tickrig.wire.can import CanFrame, ErrorFrame
 from tickrig.wire.errors import FramingError
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.decode.decoder import Decoder
+    from tickrig.host.canmon.model import frames
+    from tickrig.host.canmon.model.decode import decoder
+else:  # a failure needs them, not each test
+    decoder = LazyModule("tickrig.host.canmon.model.decode.decoder")
+    frames = LazyModule("tickrig.host.canmon.model.frames")
 
 
 # Names of signals of a bench, without the objects of dictionaries: these are many; of faults.
@@ -65,15 +70,13 @@ def decoded(bench: Bench) -> Iterator[tuple[WireLine, str]]:
 
     What PDOs carry is known, too, if it was written before the lines that are kept.
     """
-    from tickrig.host.canmon.model.decode.decoder import Decoder  # noqa: PLC0415 - not for each test
-
-    decoder, buses = Decoder(), buses_of(bench)
+    meanings, buses = decoder.Decoder(), buses_of(bench)
     for line in bench._mode.mappings():
-        _meaning(decoder, line)
+        _meaning(meanings, line)
     for line in bench._mode.journal():
         text = escape(line.data)
         if line.source in buses and line.mark is not Mark.PHYSICAL:
-            text = f"{text}  {_meaning(decoder, line)}".rstrip()
+            text = f"{text}  {_meaning(meanings, line)}".rstrip()
         yield line, text
 
 
@@ -98,7 +101,5 @@ def frame_of(line: WireLine) -> CanFrame | ErrorFrame:
     return CanFrame.parse(text)
 
 
-def _meaning(decoder: Decoder, line: WireLine) -> str:
-    from tickrig.host.canmon.model.frames import Record  # noqa: PLC0415 - as the decoder
-
-    return decoder.take(Record(line.at_us, line.source, frame_of(line))).text
+def _meaning(meanings: decoder.Decoder, line: WireLine) -> str:
+    return meanings.take(frames.Record(line.at_us, line.source, frame_of(line))).text

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from tickrig.emulators.testing.plugin.settings import SETTINGS, BenchParameter
+from tickrig.emulators.testing.plugin.settings import SETTINGS, PluginSettings
 from tickrig.host.text.names import near
 from tickrig.host.text.values import parse_setting
 
@@ -15,11 +15,12 @@ class ParameterPlugin:
     """Gives tests the values of `--bench-param`, in place of those of the fixture of this name.
 
     Args:
-        parameters: what was asked for.
+        config: of pytest.
+        settings: what was asked for.
     """
 
-    def __init__(self, parameters: tuple[BenchParameter, ...]) -> None:
-        self._parameters = parameters
+    def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
+        self._parameters = settings.parameters
         self._taken: set[str] = set()
         self._names: dict[str, None] = {}
 

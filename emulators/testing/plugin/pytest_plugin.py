@@ -8,25 +8,28 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from inspect import iscoroutinefunction
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Final
 
 import pytest
 
-from tickrig.emulators.testing.plugin.settings import (
-    MODES,
-    OPTIONS,
-    RANDOM,
-    SETTINGS,
-    PluginSettings,
-)
+from tickrig._lazy import LazyModule
+from tickrig.emulators.testing.plugin.settings import OPTIONS, RANDOM, SETTINGS, PluginSettings
 from tickrig.emulators.testing.plugin.stash import BENCHED, is_blocked, skipped_where_it_cannot
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.bench import Bench
+    from tickrig.emulators.testing.plugin import bench_source, benched_test, verdict
     from tickrig.emulators.testing.plugin.bench_source import BenchSource
     from tickrig.emulators.testing.plugin.health import SafeState
     from tickrig.emulators.testing.plugin.warm_up import WarmUp
-
+    from tickrig.host.text import whole_file
+else:
+    _HERE = "tickrig.emulators.testing.plugin"
+    bench_source = LazyModule(f"{_HERE}.bench_source")
+    benched_test = LazyModule(f"{_HERE}.benched_test")
+    verdict = LazyModule(f"{_HERE}.verdict")
+    whole_file = LazyModule("tickrig.host.text.whole_file")
 
 MARKERS: Final = (
     "needs(*what): skip the test unless its bench has all of it, such as 'virtual', 'hand', "
@@ -36,6 +39,13 @@ MARKERS: Final = (
     "full, 'error frames', 'threads' that die, and 'clock' for looks at the machine's in virtual "
     "time (tickrig)",
 )
+
+_PLUGINS: Final = {
+    "compare": "tickrig.emulators.testing.plugin.compare:Compare",
+    "parameters": "tickrig.emulators.testing.plugin.parameters:ParameterPlugin",
+    "report": "tickrig.emulators.testing.plugin.report_plugin:ReportPlugin",
+}
+"""Plug-ins by the setting that asks for them; each takes the configuration and the settings."""
 
 _EXAMPLES: Final = {"needs": "fault:cut", "req": "SAF-12", "allows": "lost"}
 """What each marker could name."""
@@ -152,23 +162,16 @@ def bench(
     bench_warm_up: WarmUp,
 ) -> Iterator[Bench]:
     """A bench for this test alone, of `bench_config` or `--bench`; healthy after the test."""
-    from tickrig.emulators.testing.plugin.benched_test import benched  # noqa: PLC0415 - asked for
-
     source: BenchSource = getattr(request, "param", bench_config)
-    with benched(request, source, bench_mode, bench_safe, bench_warm_up) as opened:
+    with benched_test.benched(request, source, bench_mode, bench_safe, bench_warm_up) as opened:
         yield opened
 
 
 @pytest.fixture
 def bench_time(bench: Bench) -> Iterator[Any]:
     """The clock of the bench: `time.sleep` and `time.monotonic` of hosts are on it, too."""
-    from tickrig.emulators.testing.host_clock.host_code import HostTimeError  # noqa: PLC0415 - asked for
-
-    try:
-        with bench.patched_time() as clock:
-            yield clock
-    except HostTimeError as error:  # a host has swallowed it
-        raise pytest.fail.Exception(str(error), pytrace=False) from None
+    with benched_test.clocked(bench) as clock:
+        yield clock
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -198,17 +201,13 @@ def pytest_runtest_makereport(
     if (test := item.stash.get(BENCHED, None)) is None:
         report = yield
         if call.excinfo is not None and is_blocked(call.excinfo.value):
-            from tickrig.emulators.testing.plugin.verdict import blocked, make_error  # noqa: PLC0415 - it is
-
-            make_error(report, blocked(report, call, None))
+            verdict.make_error(report, verdict.blocked(report, call, None))
         return report
     mistaken = False
     if call.excinfo is not None:
-        from tickrig.emulators.testing.plugin.verdict import end_at_caller, is_mistake  # noqa: PLC0415 - it is loaded
-
-        mistaken = is_mistake(call.excinfo.value)
+        mistaken = verdict.is_mistake(call.excinfo.value)
         if not item.config.getoption("fulltrace", False):
-            end_at_caller(call.excinfo.value)
+            verdict.end_at_caller(call.excinfo.value)
     report = yield
     test.judge(report, call, mistaken=mistaken)
     return report
@@ -236,36 +235,19 @@ def _prepare(config: pytest.Config, settings: PluginSettings) -> None:
         pytest.UsageError: the rig file cannot be used, or what was asked for does not fit together.
     """
     if settings.rig_file and settings.ordered:
-        from tickrig.emulators.testing.plugin.bench_source import plan_of  # noqa: PLC0415 - slow
-
         with _usage():
-            plan_of(settings.rig_file)
-    if settings.compare:
-        from tickrig.emulators.testing.plugin.compare import Compare  # noqa: PLC0415 - asked for
-
-        if MODES[0] not in settings.modes:
-            raise pytest.UsageError("--bench-compare compares runs in virtual time only")
-        config.pluginmanager.register(Compare(), "tickrig-bench-compare")
-    if settings.parameters:
-        from tickrig.emulators.testing.plugin.parameters import ParameterPlugin  # noqa: PLC0415 - asked
-
-        config.pluginmanager.register(ParameterPlugin(settings.parameters), "tickrig-bench-param")
+            bench_source.plan_of(settings.rig_file)
     if settings.artifacts:
-        from tickrig.host.text.whole_file import check_writable  # noqa: PLC0415 - asked for
-
         try:
-            check_writable(settings.artifacts)
+            whole_file.check_writable(settings.artifacts)
         except OSError as error:
             where = f"--bench-artifacts {settings.artifacts}"
             raise pytest.UsageError(f"{where}: {error.strerror}") from None
-    if settings.report:
-        from tickrig.emulators.testing.plugin.report_plugin import ReportPlugin  # noqa: PLC0415 - asked for
-        from tickrig.emulators.testing.report.report_file import check_report  # noqa: PLC0415
-
-        with _usage():
-            check_report(settings.report)
-            plugin = ReportPlugin(config, settings)
-        config.pluginmanager.register(plugin, "tickrig-bench-report")
+    for name, path in _PLUGINS.items():
+        if getattr(settings, name):
+            with _usage():
+                plugin = resolve_name(path)(config, settings)
+            config.pluginmanager.register(plugin, f"tickrig-bench-{name}")
 
 
 @contextmanager

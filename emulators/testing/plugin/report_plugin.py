@@ -18,7 +18,12 @@ from tickrig.emulators.testing.plugin.settings import PluginSettings
 from tickrig.emulators.testing.plugin.stash import BENCHED
 from tickrig.emulators.testing.report import overview
 from tickrig.emulators.testing.report.bench_report import BenchReport, RunEnvironment, TestRecord
-from tickrig.emulators.testing.report.report_file import from_data, to_data, write_report
+from tickrig.emulators.testing.report.report_file import (
+    check_report,
+    from_data,
+    to_data,
+    write_report,
+)
 from tickrig.host.text.values import counted
 
 _RECORD: Final = "tickrig_record"
@@ -42,10 +47,12 @@ class ReportPlugin:
 
     Raises:
         OSError: the file with the requirements cannot be read.
-        ValueError: what is wrong with it.
+        ValueError: what is wrong with it, or the report could not be written.
     """
 
     def __init__(self, config: pytest.Config, settings: PluginSettings) -> None:
+        if settings.report:
+            check_report(settings.report)
         self._config, self._settings = config, settings
         path = settings.requirements
         self._requirements = overview.read_requirements(path) if path else ()

@@ -18,10 +18,16 @@ from enum import Enum
 from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, TypeVar, get_args, get_origin, get_type_hints
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.testing.report.bench_report import VERSION, BenchReport, TestRecord
 from tickrig.host.text.whole_file import check_file, is_special, write_whole
+
+if TYPE_CHECKING:
+    from tickrig.emulators.testing.report import page
+else:
+    page = LazyModule("tickrig.emulators.testing.report.page")  # Jinja2, an extra
 
 _VERSION_KEY: Final = "tickrig-report"
 
@@ -310,9 +316,7 @@ def write_report(report: BenchReport, path: Path) -> None:
     if path.suffix.lower() == JSON:
         write_run(report, path)
         return
-    from tickrig.emulators.testing.report.page import html_page  # noqa: PLC0415 - an extra
-
-    write_whole(path, html_page(report))
+    write_whole(path, page.html_page(report))
 
 
 def write_run(report: BenchReport, path: Path) -> None:

@@ -15,14 +15,23 @@ import csv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.record.replay import read_bench_recording
 from tickrig.emulators.testing.signals.fields import number
 from tickrig.emulators.testing.signals.sources import ValueTable
 from tickrig.host.text.names import near
 from tickrig.host.text.trace import Mark
 from tickrig.host.text.values import parse_time_us
+
+if TYPE_CHECKING:
+    from tickrig.host.canmon.model.graph import series, signal_spec
+    from tickrig.host.canmon.model.logs import log_reader
+else:  # columns of CAN logs alone need them
+    series = LazyModule("tickrig.host.canmon.model.graph.series")
+    signal_spec = LazyModule("tickrig.host.canmon.model.graph.signal_spec")
+    log_reader = LazyModule("tickrig.host.canmon.model.logs.log_reader")
 
 _Points = Sequence[tuple[int, float]]
 """Times in microseconds, and values."""
@@ -94,21 +103,18 @@ def _read_trace(path: Path, column: str | None) -> _Points:
 
 def _read_log(path: Path, column: str | None) -> _Points:
     """Return the values in frames of a CAN log, from its first frame on."""
-    from tickrig.host.canmon.model.graph.series import Collector  # noqa: PLC0415 - seldom wanted
-    from tickrig.host.canmon.model.graph.signal_spec import CurveSpec, parse_slice  # noqa: PLC0415
-    from tickrig.host.canmon.model.logs.log_reader import read_log  # noqa: PLC0415
-
     if column is None:
         raise ValueError("column is missing: bits of a frame, as 181[2:6]s*0.001")
-    collector = Collector([CurveSpec("", parse_slice(column), 1, column)])
+    bits = signal_spec.parse_slice(column)
+    collector = series.Collector([signal_spec.CurveSpec("", bits, 1, column)])
     begin_us = None
-    for record in read_log(path):
+    for record in log_reader.read_log(path):
         begin_us = record.at_us if begin_us is None else begin_us
         collector.take(record)
-    series = collector.series[0]
+    curve = collector.series[0]
     return [
         (max(0, at_us - (begin_us or 0)), value)
-        for at_us, value in zip(series.at_us, series.values, strict=True)
+        for at_us, value in zip(curve.at_us, curve.values, strict=True)
     ]
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import click
 
 from tickrig.host.cli.engine_options import openrtm_options, take_engines
-from tickrig.host.cli.messages import Refused, time_us
+from tickrig.host.cli.messages import time_us
 from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load, loading
 
 
 @click.command(cls=HarmlessCommand)
@@ -49,16 +49,12 @@ def main(connectors: int, message_octets: int, tick: str, boot: str, **options: 
     tickrig ctl /tmp/board fault power_cut
     tkernel-emu --ucode /tmp/ucode --openrtm localhost
     """  # noqa: D301 - click wants the backspace
+    limits = {
+        "connectors": connectors,
+        "message_octets": message_octets,
+        "tick_us": time_us("--tick", tick),
+        "boot_us": time_us("--boot", boot),
+    }
     with loading():
-        from tickrig.emulators.tkernel.commands.node_run import NodeOptions, NodeRun  # noqa: PLC0415
-        from tickrig.emulators.tkernel.node_manager import NodeLimits  # noqa: PLC0415 - slow
-
-    engines = take_engines(options)
-    tick_us, boot_us = time_us("--tick", tick), time_us("--boot", boot)
-    try:
-        limits = NodeLimits(
-            connectors=connectors, message_octets=message_octets, tick_us=tick_us, boot_us=boot_us
-        )
-    except ValueError as error:
-        raise Refused(str(error)) from None
-    NodeRun(NodeOptions(limits=limits, engines=engines, **options)).run()
+        run_node = load("tickrig.emulators.tkernel.commands.node_run:run_node")
+    run_node(limits, engines=take_engines(options), **options)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from tickrig.emulators.bench.control import EmulatorControl
 from tickrig.emulators.bench.fault_spec import parse_fault_spec
@@ -86,6 +86,23 @@ class _Boot:
     def stop(self) -> None:
         """End the command."""
         self._runner.stop()
+
+
+def run_node(limits: Mapping[str, int], **options: Any) -> None:
+    """Run a node until Ctrl-C.
+
+    Args:
+        limits: of the node, as `NodeLimits` has them.
+        options: the other fields of `NodeOptions`.
+
+    Raises:
+        Refused: the command line asks for something that cannot be done.
+    """
+    try:
+        checked = node_manager.NodeLimits(**limits)
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    NodeRun(NodeOptions(limits=checked, **options)).run()
 
 
 class NodeRun:

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from tickrig.host.cli.options import PATH, HarmlessCommand, version_option
-from tickrig.host.cli.start import loading
+from tickrig.host.cli.start import load, loading
 
 
 @click.command(cls=HarmlessCommand)
@@ -44,8 +44,8 @@ def main(table: Path | None, *, example: bool, **options: Any) -> None:
     tickrig ctl /tmp/resolver.ctl get requests found
     """  # noqa: D301 - click wants the backspace
     with loading():
-        from tickrig.emulators.tkernel.commands.http_service import print_example, run_service  # noqa: PLC0415 - slow
-
+        print_example = load("tickrig.emulators.tkernel.commands.http_service:print_example")
+        run_service = load("tickrig.emulators.tkernel.commands.http_service:run_service")
     if example:
         print_example()
     else:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.rig.port import OutsideBridge
 from tickrig.emulators.serial.bridge import Bridge
 from tickrig.emulators.serial.emulator import SerialHub
@@ -17,13 +18,14 @@ from tickrig.emulators.testing.bench.modes.door_watch import (
     LinkGone,
     WatchedFrameLink,
     WatchedLink,
+    open_watched_serial,
 )
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount, Mount
 from tickrig.emulators.testing.rig_file.plan import BusPlan, DoorPlan, RealPlan
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.links.link import LinkClosed
-from tickrig.host.text.trace import Mark
+from tickrig.host.links.serial_link import SerialLink
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,9 +34,15 @@ if TYPE_CHECKING:
     import canopen
     import serial
 
-    from tickrig.emulators.serial.pty_port import PtyPort
-    from tickrig.host.links.link import Link, StampedLink
-
+    from tickrig.emulators.serial import pty_port
+    from tickrig.emulators.testing.bench.modes import bus_doors
+    from tickrig.host.links import can_link
+    from tickrig.host.links.link import Link
+else:
+    pty_port = LazyModule("tickrig.emulators.serial.pty_port")  # POSIX
+    # python-can takes longer to import than all the rest of a bench
+    bus_doors = LazyModule("tickrig.emulators.testing.bench.modes.bus_doors")
+    can_link = LazyModule("tickrig.host.links.can_link")
 
 # The doors that hosts come in by: ports and buses of this machine.
 
@@ -76,7 +84,7 @@ class Doors:
         place, watch = self._place(wire), self._watch_of(wire)
         link: WatchedLink[Any]
         if isinstance(place, BusPlan):
-            link = WatchedFrameLink(_frame_link(place, watch), watch)
+            link = WatchedFrameLink(bus_doors.frame_link(place, watch), watch)
         else:
             link = WatchedLink(_line_link(place), watch)
         self._opened.callback(link.close)
@@ -84,8 +92,6 @@ class Doors:
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
         """Open a line by pyserial; see `BenchMode`."""
-        from tickrig.emulators.testing.bench.modes.watched_ports import open_watched_serial  # noqa: PLC0415 - slow
-
         place = self._place(wire)
         if isinstance(place, BusPlan):
             raise ValueError(f"{wire} is a CAN bus, not a serial line")
@@ -98,11 +104,8 @@ class Doors:
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can; see `BenchMode`."""
-        from tickrig.emulators.testing.bench.modes.watched_ports import open_watched_bus  # noqa: PLC0415 - slow
-        from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
-
-        bus = open_watched_bus(self._bus(wire), self._watch_of(wire), options)
-        self._opened.callback(close_bus, bus)
+        bus = bus_doors.open_watched_bus(self._bus(wire), self._watch_of(wire), options)
+        self._opened.callback(can_link.close_bus, bus)
         return bus
 
     def canopen_network(self, wire: str) -> canopen.Network:
@@ -139,22 +142,10 @@ class Doors:
 
 
 def _line_link(place: LinePlace) -> Link[bytes]:
-    from tickrig.host.links.serial_link import SerialLink  # noqa: PLC0415 - pyserial is slow
-
     try:
         return SerialLink(place.url, place.baud)
     except LinkClosed as error:
         raise LinkGone(str(error)) from error
-
-
-def _frame_link(place: BusPlan, watch: DoorWatch) -> StampedLink:
-    from tickrig.emulators.testing.bench.modes.watched_ports import name_of, open_bus  # noqa: PLC0415 - slow
-    from tickrig.host.links.can_link import CanLink  # noqa: PLC0415 - slow
-    from tickrig.host.links.echo import free_of_echo  # noqa: PLC0415 - with it
-
-    link = CanLink(open_bus(place, {}), name_of(place))
-    link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
-    return free_of_echo(link, place.interface)
 
 
 _IN_PROCESS: Final = "virtual"
@@ -191,7 +182,7 @@ class OutsideEnds:
         self.clock, self._stack = ServingClock(), ExitStack()
         self.bridges: list[OutsideBridge] = []
         self.places: dict[str, LinePlace | BusPlan] = {}
-        self.ports: dict[str, list[PtyPort | NetworkPort]] = {}
+        self.ports: dict[str, list[pty_port.PtyPort | NetworkPort]] = {}
         with ExitStack() as undo:
             undo.callback(self.close)
             for mount in mounts:
@@ -211,13 +202,12 @@ class OutsideEnds:
         url = own.url if isinstance(own, NetworkPort) else own.path
         self.places[mount.name] = LinePlace(url, mount.settings.baud)
 
-    def _own_port(self, link: Path | None) -> PtyPort | NetworkPort:
+    def _own_port(self, link: Path | None) -> pty_port.PtyPort | NetworkPort:
         """Open the port for hosts of this process: a TCP port where there are no ptys."""
         try:
-            from tickrig.emulators.serial.pty_port import PtyPort  # noqa: PLC0415 - POSIX has ptys
+            pty = pty_port.PtyPort(link)
         except ImportError:
             return self._serve(_WITHOUT_PTYS)
-        pty = PtyPort(link)
         self._stack.callback(pty.close)
         return pty
 
@@ -227,16 +217,7 @@ class OutsideEnds:
         return port
 
     def _open_bus(self, mount: BusMount, plan: BusPlan) -> None:
-        from tickrig.emulators.can.outside.bridge import CanBridge  # noqa: PLC0415 - slow
-        from tickrig.emulators.can.outside.bus_port import port_on  # noqa: PLC0415 - slow
-        from tickrig.emulators.testing.bench.modes.door_watch import LinkGone  # noqa: PLC0415
-        from tickrig.emulators.testing.bench.modes.watched_ports import name_of, open_bus  # noqa: PLC0415
-        from tickrig.host.links.can_link import close_bus  # noqa: PLC0415 - slow
-
-        bus = open_bus(plan, {})
-        self._stack.callback(close_bus, bus)
-        port = port_on(bus, plan.interface, name_of(plan), LinkGone)
-        self.bridges.append(CanBridge(mount.open_end(), port))
+        self.bridges.append(bus_doors.join_bus(mount.open_end(), plan, self._stack))
         self.places[mount.name] = plan
 
     def close(self) -> None:

@@ -7,22 +7,30 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
+from tickrig._lazy import LazyModule
 from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.rig.rig import Rig
 from tickrig.emulators.rig.sim_link import SimLink
 from tickrig.emulators.rig.sim_waits import EPOCH_S, LOOK_US
+from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
+from tickrig.emulators.serial.outside.serial_side import SerialSide
+from tickrig.emulators.serial.outside.sim_serial import SimSerial
 from tickrig.emulators.testing.bench.bench_rig import BenchRig
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.mounts import BusMount, LineMount
 from tickrig.emulators.testing.host_clock.host_code import HostTimeError
+from tickrig.wire.uart import UartSetting
 
 if TYPE_CHECKING:
     import can
     import canopen
     import serial
 
-    from tickrig.emulators.serial.outside.serial_side import SerialSide
+    from tickrig.emulators.can.outside import interface, sim_network
     from tickrig.host.links.link import Link
+else:  # python-can and canopen are slow
+    interface = LazyModule("tickrig.emulators.can.outside.interface")
+    sim_network = LazyModule("tickrig.emulators.can.outside.sim_network")
 
 
 # The time of a rig, for hosts that look at a clock.
@@ -110,24 +118,18 @@ class VirtualDoors:
 
     def serial(self, wire: str, options: dict[str, Any]) -> serial.SerialBase:
         """Open a line by pyserial."""
-        from tickrig.emulators.serial.outside.sim_serial import SimSerial  # noqa: PLC0415 - slow
-
         return SimSerial(self._side(wire), **{"port": wire, **options})
 
     def can_bus(self, wire: str, options: dict[str, Any]) -> can.BusABC:
         """Open a bus by python-can."""
-        from tickrig.emulators.can.outside.interface import TickrigBus  # noqa: PLC0415 - slow
-
         self._bus(wire)
         address = self.address(wire)
         assert not isinstance(address, str)
-        return TickrigBus(address["channel"], **options)
+        return interface.TickrigBus(address["channel"], **options)
 
     def canopen_network(self, wire: str) -> canopen.Network:
         """Connect the canopen library to a bus."""
-        from tickrig.emulators.can.outside.sim_network import SimNetwork  # noqa: PLC0415 - slow
-
-        return SimNetwork(self._rig, self._bus(wire).open_end())
+        return sim_network.SimNetwork(self._rig, self._bus(wire).open_end())
 
     def address(self, wire: str) -> Address:
         """Return where a program opens a wire by itself."""
@@ -143,22 +145,15 @@ class VirtualDoors:
         """Offer a wire under a name that nobody else has."""
         mount = self._mounts[wire]
         if isinstance(mount, LineMount):
-            from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS  # noqa: PLC0415 - slow
-
             name = _free(wire, SERIAL_PORTS.names)
             self._offers.enter(SERIAL_PORTS.offer(name, self._side(wire)))
             return f"tickrig://{name}"
-        from tickrig.emulators.can.outside.interface import CHANNELS  # noqa: PLC0415 - slow
-
-        name = _free(wire, CHANNELS.names)
-        self._offers.enter(CHANNELS.offer(name, self._rig, mount.wire))
+        name = _free(wire, interface.CHANNELS.names)
+        self._offers.enter(interface.CHANNELS.offer(name, self._rig, mount.wire))
         return {"interface": "tickrig", "channel": name}
 
     def _side(self, wire: str) -> SerialSide:
         """Return the host's side of a line, where one host is at a time."""
-        from tickrig.emulators.serial.outside.serial_side import SerialSide  # noqa: PLC0415 - slow
-        from tickrig.wire.uart import UartSetting  # noqa: PLC0415 - with it
-
         mount = self._mounts[wire]
         if isinstance(mount, BusMount):
             raise ValueError(f"{wire} is a CAN bus, not a serial line")

@@ -13,6 +13,7 @@ from tickrig.emulators.testing.bench.modes.emulated_mode import EmulatedMode
 from tickrig.emulators.testing.bench.modes.mode import Address
 from tickrig.emulators.testing.bench.modes.virtual_doors import LONGEST_US, RigPassing, VirtualDoors
 from tickrig.emulators.testing.bench.tasks import DAY_US
+from tickrig.emulators.testing.host_clock.patched_time import patched_time
 from tickrig.emulators.testing.rig_file.plan import Tolerances
 from tickrig.wire.instant import NEVER
 
@@ -105,8 +106,6 @@ class VirtualMode(EmulatedMode):
 
     def patched_time(self) -> AbstractContextManager[object]:
         """Let hosts that look at a clock live in the rig's time; see `patched_time`."""
-        from tickrig.emulators.testing.host_clock.patched_time import patched_time  # noqa: PLC0415 - seldom
-
         return patched_time(RigPassing(self._rig.rig))
 
     def too_slow(self) -> str:

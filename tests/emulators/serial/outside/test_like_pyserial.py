@@ -18,7 +18,7 @@ from tests.emulators.serial.outside.lines import OpenLine
 from tickrig.emulators.serial.outside import protocol_tickrig
 from tickrig.emulators.serial.outside.serial_ports import SERIAL_PORTS
 from tickrig.emulators.serial.outside.sim_serial import SimSerial
-from tickrig.emulators.testing.bench.modes.watched_ports import WatchedPort
+from tickrig.emulators.testing.bench.modes.door_watch import WatchedPort
 
 OPTIONS: dict[str, Any] = {"timeout": 0, "write_timeout": 1}
 

@@ -7,8 +7,8 @@ import pytest
 from can.interfaces.virtual import VirtualBus
 
 from tickrig.emulators.testing.bench.errors import PortGone
+from tickrig.emulators.testing.bench.modes.bus_doors import open_watched_bus
 from tickrig.emulators.testing.bench.modes.door_watch import HostPace
-from tickrig.emulators.testing.bench.modes.watched_ports import open_watched_bus
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.text.trace import Mark
 

@@ -1,27 +1,30 @@
-"""A bus of python-can and a port of pyserial, with a watch at them."""
+"""The doors of a CAN bus: a bus of python-can with a watch at it, a link, a bridge to it.
+
+It imports python-can, which takes longer than all the rest of a bench: whoever has no bus outside
+does not load it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from time import monotonic_ns
 from typing import Any
 
 import can
-import serial
 
+from tickrig.emulators.can.end import CanEnd
+from tickrig.emulators.can.outside.bridge import CanBridge
+from tickrig.emulators.can.outside.bus_port import port_on
 from tickrig.emulators.testing.bench.errors import PortGone
-from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, Seen
+from tickrig.emulators.testing.bench.modes.door_watch import DoorWatch, LinkGone, Seen
 from tickrig.emulators.testing.rig_file.plan import BusPlan
 from tickrig.host.links import can_link
-from tickrig.host.links.link import first_line
-from tickrig.host.links.ready import let_wait
-from tickrig.host.links.serial_link import explain_open_error
+from tickrig.host.links.echo import free_of_echo
+from tickrig.host.links.link import StampedLink, first_line
 from tickrig.host.text.trace import Mark
 from tickrig.wire.can import Frames
-
-# A bus of python-can, with a watch at it.
 
 
 class BusGone(PortGone, can.CanOperationError):
@@ -113,66 +116,28 @@ def name_of(plan: BusPlan) -> str:
     return plan.interface if plan.channel is None else f"{plan.interface} {plan.channel}"
 
 
-# A port of pyserial, with a watch at it.
-
-
-class SerialGone(PortGone, serial.SerialException):
-    """A port is there no more; for hosts, pyserial's own error."""
-
-
-class WatchedPort(serial.SerialBase):
-    """What a watched port does beside what its class does."""
-
-    _watch: DoorWatch
-
-    def read(self, size: int = 1) -> bytes:
-        """Read as the port does, and note what came and how late."""
-        self._watch.used()
-        wanted_s, begun_ns = self.timeout, monotonic_ns()
-        try:
-            data = super().read(size)
-        except serial.PortNotOpenError:
-            raise
-        except serial.SerialException as error:
-            raise SerialGone(f"{self.port}: {error}") from error
-        if data:
-            self._watch.passed(Mark.FROM_DEVICE, data)
-        if len(data) < size and wanted_s is not None:
-            took_us = (monotonic_ns() - begun_ns) // 1_000
-            self._watch.waited(round(wanted_s * 1e6), took_us)
-        return data
-
-    def write(self, data: Any) -> int | None:
-        """Write as the port does, and note what went out."""
-        self._watch.used()
-        try:
-            written = super().write(data)
-        except (serial.PortNotOpenError, serial.SerialTimeoutException):
-            raise
-        except serial.SerialException as error:
-            raise SerialGone(f"{self.port}: {error}") from error
-        self._watch.passed(Mark.TO_DEVICE, bytes(data))
-        return written
-
-
-def open_watched_serial(url: str, watch: DoorWatch, options: dict[str, Any]) -> serial.SerialBase:
-    """Open a port.
-
-    Args:
-        url: as `serial.serial_for_url` takes it.
-        watch: is told what passes.
-        options: as `serial.Serial` takes them.
+def frame_link(plan: BusPlan, watch: DoorWatch) -> StampedLink:
+    """Return a link to a bus; what it sends does not come back.
 
     Raises:
-        SerialGone: it cannot be opened.
-        ValueError: an option is out of range.
+        BusGone: it cannot be opened.
     """
-    try:
-        port = serial.serial_for_url(url, do_not_open=True, **options)
-        kind = type(port)
-        port.__class__ = type(kind.__name__, (WatchedPort, kind), {"_watch": watch})
-        port.open()
-        let_wait(port)
-    except (serial.SerialException, OSError) as error:
-        raise SerialGone(f"cannot open {url!r}: {explain_open_error(url, error)}") from error
-    return port
+    link = can_link.CanLink(open_bus(plan, {}), name_of(plan))
+    link.on_error_frame = lambda frame: watch.passed(Mark.FROM_DEVICE, (frame,))
+    return free_of_echo(link, plan.interface)
+
+
+def join_bus(end: CanEnd, plan: BusPlan, stack: ExitStack) -> CanBridge:
+    """Return a bridge from an end of an emulated bus to one of python-can.
+
+    Args:
+        end: of the emulated bus.
+        plan: the bus of python-can.
+        stack: closes it in the end.
+
+    Raises:
+        BusGone: it cannot be opened.
+    """
+    bus = open_bus(plan, {})
+    stack.callback(can_link.close_bus, bus)
+    return CanBridge(end, port_on(bus, plan.interface, name_of(plan), LinkGone))

@@ -1,24 +1,78 @@
-"""What `tickrig check` says of a bus.yml: findings, or what is on the bus."""
+"""Check rig files and bus.yml for `tickrig check`: print findings, or what is on the bench."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 import click
 
 from tickrig.emulators.canopen.bus_file.bus_nodes import check_nodes
+from tickrig.emulators.testing.rig_file.plan import summary
+from tickrig.emulators.testing.rig_file.reader import read_rig_file
+from tickrig.emulators.testing.rig_file.schema import RigFileError
 from tickrig.host.canopen.bus_file.bus_checks import check_sheets
-from tickrig.host.canopen.bus_file.bus_file import BusFile, read_bus_file
+from tickrig.host.canopen.bus_file.bus_file import BusFile, check_of, read_bus_file
 from tickrig.host.canopen.bus_file.bus_values import BusMaster, BusSlave
 from tickrig.host.canopen.data_sheet.rule import Severity
 from tickrig.host.canopen.master.cia402.bus_load import check_load
+from tickrig.host.cli.messages import say
+from tickrig.host.cli.start import raise_of_output
 
 _MISTAKES: Final = 1
+_UNREADABLE: Final = 2
+_EDS_ENDINGS: Final = (".eds", ".dcf", ".xdd", ".xdc")
+_LOOKED_AT: Final = 65_536
+"""Bytes at its beginning by which a bus.yml is known."""
 
 
-def check_bus(file: Path, *, strict: bool) -> int:
+def check_files(files: tuple[Path, ...], strict: bool) -> int:
+    """Check files, and return the exit status: 1 for mistakes, 2 for one that cannot be read."""
+    return max([_check(file, strict) for file in files])
+
+
+def _check(file: Path, strict: bool) -> int:
+    """Check a file, and return the exit status."""
+    if file.suffix.lower() in _EDS_ENDINGS:
+        say(f"Error: {file}: an EDS, no rig file or bus.yml; use: canmon eds check {file}")
+        return _UNREADABLE
+    kind = _kind(file)
+    if "System Definition" in kind:
+        say(f"Error: {file}: no rig file or bus.yml, but {kind}")
+        return _UNREADABLE
+    try:
+        return _check_bus(file, strict=strict) if kind else _check_rig(file)
+    except ImportError as error:
+        say(f"Error: {file}: {error}")
+        return _UNREADABLE
+    except OSError as error:
+        raise_of_output(error)
+        say(f"Error: {file}: {error.strerror}")
+        return _UNREADABLE
+
+
+def _kind(file: Path) -> str:
+    """Say what a file in YAML is, empty for others; a pipe is not looked into: it is read once."""
+    with suppress(OSError):
+        if file.is_file():
+            with file.open("rb") as opened:
+                return check_of(opened.read(_LOOKED_AT), file)
+    return ""
+
+
+def _check_rig(file: Path) -> int:
+    try:
+        first, *wires = summary(read_rig_file(file))
+    except RigFileError as error:
+        click.echo(str(error))
+        return _MISTAKES
+    click.echo("\n".join([f"{file}: ok: {first}", *wires]))
+    return 0
+
+
+def _check_bus(file: Path, *, strict: bool) -> int:
     """Check a bus.yml, and return the exit status.
 
     Args:
