@@ -46,8 +46,7 @@ from tickrig.host.canmon.model.decode.filter import parse_filter
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.recorder.files import _objects
-from tickrig.host.canmon.model.sequence import TomlSequence, parse_lines
-from tickrig.host.canmon.model.sequence_variables import evaluate, fill_in
+from tickrig.host.canmon.model.sequence import TomlSequence, evaluate, fill_in, parse_lines
 from tickrig.host.canmon.model.transmit import parse_row_text
 from tickrig.host.canmon.workspace import Workspace
 from tickrig.host.canopen.bus_file.bus_file import decode_bus_file

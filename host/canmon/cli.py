@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
+from tickrig.host.cli.messages import until_unread
 from tickrig.host.cli.options import LazyGroup, version_option
 
 _HERE: Final = "tickrig.host.canmon.verbs"

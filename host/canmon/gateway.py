@@ -13,12 +13,11 @@ from typing import Any, Final
 import click
 
 from tickrig.host.canmon.conform.conform_source import open_conform_source
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.host.canopen.gateway import Gateway
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.control import stopped_by_signals
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, say
 from tickrig.host.cli.options import PATH, VERSION
 from tickrig.host.control.server import Answer, LineServer
 from tickrig.host.control.unix_socket import listen_at

@@ -31,8 +31,8 @@ from tickrig.emulators.testing.conformance.slave import (
 )
 from tickrig.host.canmon.conform.chosen import patterns, unknown
 from tickrig.host.canmon.conform.conform_source import ConformSource
-from tickrig.host.canmon.conform.consent import Consent
-from tickrig.host.canmon.conform.report_files import decoded_frames, file_text
+from tickrig.host.canmon.conform.conformance import decoded_frames, file_text
+from tickrig.host.canmon.conform.stimulus import Consent
 from tickrig.host.canopen.conform.binding.capabilities import NodeDescription
 from tickrig.host.canopen.conform.bus.exchange import NotAllowed
 from tickrig.host.canopen.conform.check import ConformancePlan, Level, Stimulus

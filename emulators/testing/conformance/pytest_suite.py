@@ -23,7 +23,7 @@ from tickrig.emulators.testing.conformance.conformance import (
     node_id_of,
 )
 from tickrig.emulators.testing.conformance.slave import is_step
-from tickrig.host.canmon.conform.report_files import decoded_frames
+from tickrig.host.canmon.conform.conformance import decoded_frames
 from tickrig.host.canopen.conform.check import Check, ConformancePlan
 from tickrig.host.canopen.conform.object_checks import object_checks
 from tickrig.host.canopen.conform.report.baseline import Baseline

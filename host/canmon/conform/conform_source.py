@@ -8,12 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.sources.source import BusSpec, FileSpec, LineSpec, parse_source
 from tickrig.host.canopen.conform.check import Stimulus
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.extensions import ExtensionError, ExtensionGroup
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, say
 from tickrig.host.links.link import LinkClosed
 
 if TYPE_CHECKING:

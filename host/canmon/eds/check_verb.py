@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import click
 
 from tickrig.host.canmon.eds_document import read_document
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model.check.report import junit
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.rule import RULES, RuleFinding
-from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path, until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted

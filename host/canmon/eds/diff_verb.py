@@ -8,8 +8,8 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.eds_document import read_device_document
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canopen.data_sheet.show import diff
+from tickrig.host.cli.messages import until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from tickrig.host.canmon.eds_document import read_document
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canopen.data_sheet.fix import fix
 from tickrig.host.canopen.data_sheet.rule import EditPlace, RuleFinding
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, refuse_path, say, until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.whole_file import write_whole
 from tickrig.wire.canopen.eds.eds_file import shorten

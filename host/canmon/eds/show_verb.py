@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.eds_document import read_device_document
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canopen.data_sheet.show import entries, head, pdos, table
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 

@@ -10,13 +10,12 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.conform.conform_source import ConformSource, open_conform_source
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.output.listening import until_interrupted
 from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.host.canopen.errors import SdoAborted, SdoFailed, SdoTimeout
-from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.messages import Refused, SourceFailed, say
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.text.page_text import one_line

@@ -12,26 +12,28 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError, LogFormatError, log_format
 from tickrig.host.canmon.model.logs.log_writer import write_log
 from tickrig.host.canmon.model.logs.mark import Mark
 from tickrig.host.canmon.model.recorder.plan import AtLimit, RecordingPlan, read_plan
-from tickrig.host.canmon.model.recorder.recorder import Recorder
+from tickrig.host.canmon.model.recorder.recorder import (
+    FilterTrigger,
+    Recorder,
+    RuleTrigger,
+    Trigger,
+)
 from tickrig.host.canmon.output.listening import Stopwatch
 from tickrig.host.canmon.output.printer import DecodedFrame
 from tickrig.host.canmon.sources.source import FileSpec, parse_source
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.decode.filter import Filter
     from tickrig.host.canmon.model.frames import AnyRecord
     from tickrig.host.canmon.model.logs.log_writer import TextBlock
-    from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, Trigger
 
 
 # A log file, or a recording in parts, that a verb writes.
@@ -290,13 +292,6 @@ def _read_recording_plan(path: Path, options: dict[str, Any], parts: bool = Fals
         raise Refused(f"--{text}" if option in ("at-limit", *NAMES) else text) from None
 
 
-def filter_trigger(text: str, wanted: Filter) -> FilterTrigger:
-    """Return a filter as a trigger."""
-    from tickrig.host.canmon.model.recorder.trigger import FilterTrigger  # noqa: PLC0415 - slow
-
-    return FilterTrigger(text, wanted)
-
-
 def _trigger(word: str, bit_rate: int | None) -> Trigger:
     if word.endswith(_RULE_FILE):
         return _rules(word, bit_rate)
@@ -306,7 +301,7 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
     try:
         wanted = parse_filter(word)
         matches = errors_alone(wanted.matches, tokens_of(word), wanted.signals)
-        return filter_trigger(word, replace(wanted, matches=matches))
+        return FilterTrigger(word, replace(wanted, matches=matches))
     except FilterError as error:
         raise Refused(f"--trigger: {error}") from None
 
@@ -315,7 +310,6 @@ def _rules(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.extensions import load_rule  # noqa: PLC0415 - slow
     from tickrig.host.canmon.model.check.alarms import Alarms  # noqa: PLC0415
     from tickrig.host.canmon.model.check.rules import Rules, parse_rule_file, parse_rules  # noqa: PLC0415
-    from tickrig.host.canmon.model.recorder.trigger import RuleTrigger  # noqa: PLC0415
 
     try:
         words = parse_rule_file(Path(word).read_text("utf-8"), load_rule)

@@ -8,12 +8,11 @@ from typing import Final
 
 import can
 
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.sources.bus_source import BusReader, BusSource, merged, open_bus, reader_of
 from tickrig.host.canmon.sources.source import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.can_link import BusReceiver, close_bus, reason_of, to_message
 from tickrig.host.links.link import LinkClosed
 from tickrig.wire.can import CanFrame, FdFrame

@@ -20,13 +20,12 @@ from textual.widget import Widget
 from textual.widgets import Input, TabbedContent, TabPane
 
 from tickrig.host.canmon import workspace
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import load_text
 from tickrig.host.canmon.model.recorder.recorder import Recorder, RecorderState
 from tickrig.host.canmon.output.recording import WORDS_METAVAR, read_recording
 from tickrig.host.canmon.tui.panels.panel import Panel
 from tickrig.host.canmon.tui.session import DecodedFrame, Session, Task
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.text.values import counted
 from tickrig.host.tui import FramedApp, KeyFooter, Line
 from tickrig.wire.can import Frames

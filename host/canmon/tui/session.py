@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.node_board import NodeBoard
@@ -24,10 +23,10 @@ from tickrig.host.canmon.model.trace import FrameTrace
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.model.transmit import AnyFrames
 from tickrig.host.canmon.output.listening import Stopwatch
-from tickrig.host.canmon.sources.file_source import STDIN, StdinSource
-from tickrig.host.canmon.sources.opening import open_any, open_live
+from tickrig.host.canmon.sources.opening import STDIN, StdinSource, open_any, open_live
 from tickrig.host.canmon.sources.source import AnySource, BusSpec, LineSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import SourceFailed
 from tickrig.wire.can import CanFrame, FdFrame
 from tickrig.wire.instant import NEVER
 

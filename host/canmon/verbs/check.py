@@ -10,10 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import load_rule
-from tickrig.host.canmon.model.check.checker import Unjudged
-from tickrig.host.canmon.model.check.decoded_check import DecodedCheck
+from tickrig.host.canmon.model.check.checker import DecodedCheck, Unjudged
 from tickrig.host.canmon.model.check.report import junit
 from tickrig.host.canmon.model.check.rule import TrafficFinding
 from tickrig.host.canmon.model.check.rules import (
@@ -28,12 +26,11 @@ from tickrig.host.canmon.model.check.rules import (
 )
 from tickrig.host.canmon.model.frames import DumpLines, Record, Stamp, decoded_text
 from tickrig.host.canmon.output import listening
-from tickrig.host.canmon.sources.file_source import BlockLog, block_log
-from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
 from tickrig.host.canmon.sources.source import AnySource, Source
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path, until_unread
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_options
+from tickrig.host.cli.messages import until_unread
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.cli.start import loading
 

@@ -13,8 +13,7 @@ from tickrig.host.canmon.model.recorder.plan import RecordingPlan
 from tickrig.host.canmon.output.listening import report, until_interrupted
 from tickrig.host.canmon.output.printer import DecodedFrame, FilteredDecoder
 from tickrig.host.canmon.output.recording import LogFile, whole_log
-from tickrig.host.canmon.sources.file_source import PieceLog, piece_log
-from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.opening import PieceLog, open_source, piece_log
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.canmon.verbs.dump import pass_on
 from tickrig.host.cli.options import PATH

@@ -15,22 +15,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model.frames import DumpLines, Stamp
+from tickrig.host.canmon.model.recorder.recorder import FilterTrigger
 from tickrig.host.canmon.output import printer
 from tickrig.host.canmon.output.listening import bit_rate_of, report, say_marks, until_interrupted
-from tickrig.host.canmon.output.recording import (
-    NAMES,
-    RecordingOptions,
-    filter_trigger,
-    recording_options,
-)
-from tickrig.host.canmon.sources.file_source import PieceLog, piece_log
-from tickrig.host.canmon.sources.opening import open_any
+from tickrig.host.canmon.output.recording import NAMES, RecordingOptions, recording_options
+from tickrig.host.canmon.sources.opening import PieceLog, open_any, piece_log
 from tickrig.host.canmon.sources.source import AnySource, LineSpec, parse_source
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, until_unread
 from tickrig.host.cli.options import PATH, add_options
 from tickrig.host.links.ready import ready
 
@@ -188,7 +182,7 @@ def command(  # noqa: PLR0913 - options
     decoder = None if plain and chosen is None else decode_options.make_decoder(eds, dbc)
     kept = None
     if recording is not None and recording.triggers and chosen is not None:
-        kept, chosen = filter_trigger(wanted or "", chosen), None  # triggers see all frames
+        kept, chosen = FilterTrigger(wanted or "", chosen), None  # triggers see all frames
     meaning = printer.FilteredDecoder(decoder, chosen)
     lines = DumpLines(Stamp(stamp or ""), extra)
     writer = printer.StdoutWriter(printer.printer_of(form, lines, plain, errors), form)

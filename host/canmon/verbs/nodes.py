@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.node_board import NodeBoard, board_json, render_board
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.output.listening import Stopwatch, follow, report, span_option, take_blocks
-from tickrig.host.canmon.sources.file_source import BlockLog, block_log
-from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files, source_command
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import until_unread
 
 if TYPE_CHECKING:
-    from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes
+    from tickrig.host.canmon.model.columns.column_meanings import ColumnNodes
     from tickrig.host.canmon.model.columns.columns import Columns
 
 _MANY: Final = 1_000
@@ -91,7 +90,7 @@ class _NodesView:
     def take_block(self, columns: Columns) -> None:
         """Take a block of a log."""
         if self._columns is None:
-            from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes  # noqa: PLC0415 - numpy
+            from tickrig.host.canmon.model.columns.column_meanings import ColumnNodes  # noqa: PLC0415 - numpy
 
             self._columns = ColumnNodes(self.decoder, self._board)
         self._columns.take(columns)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 
-from tickrig.host.canmon.errors import SourceFailed, until_unread
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import LogReader, read_log
@@ -20,7 +19,7 @@ from tickrig.host.canmon.model.traffic import bucket_of, middle_us
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.sources.opening import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed, until_unread
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.errors import FieldError, WireError

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, until_unread
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
 from tickrig.wire.errors import WireError

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.extensions import make_decoder
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.frames import Record
@@ -22,14 +21,14 @@ from tickrig.host.canmon.model.sequence import (
     event_line,
     outline,
     parse_lines,
+    parse_variable,
 )
 from tickrig.host.canmon.model.sequence import Sequence as Steps
-from tickrig.host.canmon.model.sequence_variables import parse_variable
 from tickrig.host.canmon.model.transmit import PdoFrames
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusCommand, BusOptions, bus_and_rest, bus_options
-from tickrig.host.cli.messages import Refused, refuse_path
+from tickrig.host.cli.messages import Refused, refuse_path, until_unread
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import Frames
 

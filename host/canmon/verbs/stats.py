@@ -7,16 +7,15 @@ from typing import Any
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model import statistics
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.traffic import BitRates, Traffic, TrafficSnapshot
 from tickrig.host.canmon.output import listening
-from tickrig.host.canmon.sources.file_source import BlockLog, block_log
-from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.verbs.decode_options import source_command
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import until_unread
 
 
 @source_command(

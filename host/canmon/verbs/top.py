@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.output.printer import FilteredDecoder
-from tickrig.host.canmon.sources.file_source import BlockLog, block_log
-from tickrig.host.canmon.sources.opening import open_any
+from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_any
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import until_unread
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.frames import AnyRecord

@@ -10,13 +10,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.traffic import BitRates
 from tickrig.host.canmon.output.listening import bit_rates_of
 from tickrig.host.canmon.output.transmitter import Transmitter
 from tickrig.host.canmon.sources.bus_source import merged
 from tickrig.host.canmon.sources.source import BusSpec, parse_source
 from tickrig.host.cli.can_options import BusOptions
+from tickrig.host.cli.messages import SourceFailed
 from tickrig.host.links.can_link import to_fd_frame, to_frame
 from tickrig.wire.can import CanFrame, FdFrame
 

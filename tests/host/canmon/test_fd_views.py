@@ -11,8 +11,8 @@ from click.testing import CliRunner, Result
 from tickrig.host.canmon.cli import main
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.trace import FrameTrace
-from tickrig.host.canmon.sources import file_source as block_log
-from tickrig.host.canmon.tui.trace_line import TraceLines, line_text
+from tickrig.host.canmon.sources import opening as block_log
+from tickrig.host.canmon.tui.panels.trace_panel import TraceLines, line_text
 from tickrig.wire.can import FdFrame
 
 WIDE = "00" * 63

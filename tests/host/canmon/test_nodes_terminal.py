@@ -9,7 +9,7 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tests.interop.buses import GROUP, PORT
-from tickrig.host.canmon.output.screen import LEAVE
+from tickrig.host.canmon.output.listening import LEAVE
 
 pytestmark = pytest.mark.realtime
 

@@ -12,7 +12,7 @@ import pytest
 
 from tests.host.canmon.terminal import Terminal
 from tests.interop.buses import GROUP, PORT
-from tickrig.host.canmon.output.screen import ENTER, LEAVE
+from tickrig.host.canmon.output.listening import ENTER, LEAVE
 
 pytestmark = pytest.mark.realtime
 

@@ -14,13 +14,13 @@ from tickrig.host.canmon.model.check.rule import (
     NO_GAP_US,
     CheckedTraffic,
     FrameSelection,
+    MaxLoad,
     Rule,
     Seen,
     TrafficFinding,
 )
 from tickrig.host.canmon.model.check.rules import NO_EDS, EdsHeartbeats, Rules
-from tickrig.host.canmon.model.check.time_rules import MaxLoad
-from tickrig.host.canmon.model.columns.column_bits import column_bits
+from tickrig.host.canmon.model.columns.column_traffic import column_bits
 from tickrig.host.canmon.model.columns.columns import (
     ColumnLoad,
     Columns,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
-from tickrig.host.canmon.model.check import frame_rules, time_rules
+from tickrig.host.canmon.model.check import rule
 from tickrig.host.canmon.model.check.rule import Rule
 from tickrig.host.canmon.model.frames import FD, REMOTE, ident_text, parse_ident
 from tickrig.host.text.names import closest
@@ -58,7 +58,7 @@ class Rules:
     no_reboot: bool = False
     no_lost_heartbeat: bool = False
     no_loss: bool = False
-    heartbeats: tuple[time_rules.HeartbeatTimes, ...] = ()
+    heartbeats: tuple[rule.HeartbeatTimes, ...] = ()
     nodes: tuple[int, ...] = ()
     max_gaps: tuple[tuple[int, int], ...] = ()
     known: frozenset[int] | None = None
@@ -78,26 +78,26 @@ class Rules:
             eds_heartbeats: what EDS files say of 1017h, in ms by node-ID.
         """
         made: list[Rule] = []
-        made += [frame_rules.NoEmcy()] * self.no_emcy
-        made += [frame_rules.NoSdoAbort()] * self.no_sdo_abort
-        made += [frame_rules.NoErrorFrames()] * self.no_error_frames
-        made += [frame_rules.NoReboot()] * self.no_reboot
-        made += [time_rules.NoLostHeartbeat(eds_heartbeats)] if self.no_lost_heartbeat else []
-        made += [time_rules.Heartbeat(times) for times in self.heartbeats]
-        made += [frame_rules.NodesPresent(self.nodes)] * bool(self.nodes)
-        made += [time_rules.MaxGap(*gap) for gap in self.max_gaps]
-        made += [frame_rules.KnownIds(self.known)] if self.known is not None else []
+        made += [rule.NoEmcy()] * self.no_emcy
+        made += [rule.NoSdoAbort()] * self.no_sdo_abort
+        made += [rule.NoErrorFrames()] * self.no_error_frames
+        made += [rule.NoReboot()] * self.no_reboot
+        made += [rule.NoLostHeartbeat(eds_heartbeats)] if self.no_lost_heartbeat else []
+        made += [rule.Heartbeat(times) for times in self.heartbeats]
+        made += [rule.NodesPresent(self.nodes)] * bool(self.nodes)
+        made += [rule.MaxGap(*gap) for gap in self.max_gaps]
+        made += [rule.KnownIds(self.known)] if self.known is not None else []
         made += [make() for make in self.others]
         return made
 
-    def load(self, bit_rate: int | None) -> time_rules.MaxLoad | None:
+    def load(self, bit_rate: int | None) -> rule.MaxLoad | None:
         """Return the rule about load; ValueError if it needs a bit rate and there is none."""
         if self.max_load is None:
             return None
         bit_rate = self.bit_rate if bit_rate is None else bit_rate
         if bit_rate is None:
             raise ValueError("a limit of the load needs the bit rate: give -b, as -b 500000")
-        return time_rules.MaxLoad(self.max_load, bit_rate)
+        return rule.MaxLoad(self.max_load, bit_rate)
 
 
 RuleValues = Mapping[str, object]
@@ -235,7 +235,7 @@ def _lists(name: str, words: RuleValues) -> list[str]:
     return [part.strip() for text in _texts(name, words) for part in text.split(",")]
 
 
-def _heartbeat(text: str) -> time_rules.HeartbeatTimes:
+def _heartbeat(text: str) -> rule.HeartbeatTimes:
     match = _HEARTBEAT.fullmatch(text)
     if match is None or not 1 <= int(match[1]) <= _MAX_NODE:
         raise ValueError(f"heartbeat {text!r} is not like 3=100ms±20% or 3=100ms+-5ms")
@@ -244,7 +244,7 @@ def _heartbeat(text: str) -> time_rules.HeartbeatTimes:
         off_us = int(period_us * float(match[3]) / 100)
     else:
         off_us = _time_us(match[3] + match[4])
-    return time_rules.HeartbeatTimes(int(match[1]), max(0, period_us - off_us), period_us + off_us)
+    return rule.HeartbeatTimes(int(match[1]), max(0, period_us - off_us), period_us + off_us)
 
 
 def _time_us(text: str) -> int:

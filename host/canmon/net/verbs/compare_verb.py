@@ -7,18 +7,22 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import NamedObjects, known_objects
+from tickrig.host.canmon.net.node_objects import (
+    NamedObjects,
+    differences,
+    known_objects,
+    line,
+    values_of,
+)
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
-from tickrig.host.canmon.net.values import differences, line, values_of
 from tickrig.host.canopen.commissioning.configuration import (
     Values,
     dcf_values,
     default_values,
     is_parameter,
 )
-from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.messages import Refused, say, until_unread
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import one_line
 

@@ -8,9 +8,15 @@ from pathlib import Path
 import click
 
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects
+from tickrig.host.canmon.net.node_objects import (
+    Entry,
+    NamedObjects,
+    differences,
+    known_objects,
+    line,
+    shown,
+)
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
-from tickrig.host.canmon.net.values import differences, line, shown
 from tickrig.host.canmon.net.verbs.store_verb import save
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, disabled, writes

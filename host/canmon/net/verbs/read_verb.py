@@ -8,13 +8,11 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects
+from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects, shown
 from tickrig.host.canmon.net.session import NetSession, failure_text, net_session, of_node
-from tickrig.host.canmon.net.values import shown
 from tickrig.host.canopen.errors import SdoAborted
-from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.messages import Refused, say, until_unread
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import json_text, one_line
 

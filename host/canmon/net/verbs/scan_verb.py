@@ -6,13 +6,12 @@ from typing import Final
 
 import click
 
-from tickrig.host.canmon.errors import until_unread
 from tickrig.host.canmon.model.decode.node_board import profile_text
 from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.session import net_session
 from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
 from tickrig.host.canopen.master.boot_slave import state_text
-from tickrig.host.cli.messages import say
+from tickrig.host.cli.messages import say, until_unread
 from tickrig.host.cli.options import time_option
 from tickrig.host.text.page_text import json_text, one_line
 from tickrig.host.text.values import counted

@@ -9,9 +9,8 @@ from typing import Final
 import click
 
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, known_objects
+from tickrig.host.canmon.net.node_objects import Entry, NamedObjects, encoded, known_objects, limits
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
-from tickrig.host.canmon.net.values import encoded, limits
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.errors import SdoAborted
 from tickrig.host.cli.messages import Refused, say

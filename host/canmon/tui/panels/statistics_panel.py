@@ -15,8 +15,8 @@ from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.model.top_model import PLAIN, REVERSE, UNBOUNDED, RowOrder
 from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.trace_panel import CHANGED
 from tickrig.host.canmon.tui.session import Model, Session
-from tickrig.host.canmon.tui.trace_line import CHANGED
 from tickrig.host.canmon.workspace import choice, truth
 from tickrig.host.tui import Line, LineView, plain
 

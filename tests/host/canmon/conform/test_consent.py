@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from tickrig.host.canmon.conform.consent import Consent
+from tickrig.host.canmon.conform.stimulus import Consent
 from tickrig.host.canopen.conform.check import Level
 from tickrig.host.canopen.conform.notation import LSS_TO_ALL
 from tickrig.host.cli.messages import Refused

@@ -6,7 +6,7 @@ from tickrig.emulators.can.outside.host import CanHost
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
 from tickrig.host.canmon.conform.conform_source import ConformSource
-from tickrig.host.canmon.conform.consent import list_nodes, nodes_heard
+from tickrig.host.canmon.conform.stimulus import list_nodes, nodes_heard
 from tickrig.wire.can import CanFrame
 
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from tickrig.device import make_epos
 from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.cli import main
-from tickrig.host.canmon.net import session, values
+from tickrig.host.canmon.net import node_objects, session
 from tickrig.host.canmon.net.node_objects import NamedObjects
 from tickrig.wire.canopen.eds.eds_writer import write_eds
 
@@ -256,4 +256,4 @@ def test_a_bus_may_stand_in_options() -> None:
 def test_a_value_that_is_longer_than_its_type_is_read(
     entry: tuple[int, int], data: str, said: str
 ) -> None:
-    assert values.shown(NamedObjects(5), entry, bytes.fromhex(data)) == said
+    assert node_objects.shown(NamedObjects(5), entry, bytes.fromhex(data)) == said

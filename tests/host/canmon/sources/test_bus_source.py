@@ -12,14 +12,13 @@ from tests.interop.buses import MULTICAST, PORT
 from tickrig.emulators.can.outside.interface import CHANNELS
 from tickrig.emulators.can.wire import CanWire
 from tickrig.emulators.rig.rig import Rig
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import AnyFrame, Record
 from tickrig.host.canmon.model.logs.mark import LogTally
 from tickrig.host.canmon.sources.bus_source import BusSource, merged
 from tickrig.host.canmon.sources.opening import open_source
 from tickrig.host.canmon.sources.source import BusSpec, Source
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.can_link import to_message
 from tickrig.host.links.link import LinkClosed
 from tickrig.wire.can import CanFrame, FdFrame

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.sources.socket_reader import SO_TIMESTAMPNS, SocketReader
+from tickrig.host.canmon.sources.bus_source import SO_TIMESTAMPNS, SocketReader
 from tickrig.wire.can import BRS, ESI, CanFrame, ErrorFrame, FdFrame
 
 PATIENCE_US = 10_000_000

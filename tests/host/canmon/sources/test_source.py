@@ -6,12 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.sources.file_source import StdinSource
-from tickrig.host.canmon.sources.opening import open_source
+from tickrig.host.canmon.sources.opening import StdinSource, open_source
 from tickrig.host.canmon.sources.source import Source
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.wire.can import CanFrame, parse_log
 
 LOG = """\

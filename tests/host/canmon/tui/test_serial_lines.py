@@ -7,16 +7,15 @@ from pathlib import Path
 import pytest
 
 from tests.host.canmon.wire import new_wire
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.decode.filter import parse_filter
 from tickrig.host.canmon.model.frames import LineRecord, Record
 from tickrig.host.canmon.model.trace import DisplayFilter
 from tickrig.host.canmon.sources.line_source import RrcLines
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
+from tickrig.host.canmon.tui.panels.trace_panel import TraceLines
 from tickrig.host.canmon.tui.session import Model, open_session
-from tickrig.host.canmon.tui.trace_line import TraceLines
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.tui import line_text
 from tickrig.wire.can import CanFrame
 

@@ -1,9 +1,9 @@
 from __future__ import annotations
 
 from tests.host.canmon.tui.rig_session import BUS, RigSession
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.model.transmit import parse_row_text
 from tickrig.host.canmon.tui.panels.transmit_panel import TransmitTask
+from tickrig.host.cli.messages import SourceFailed
 from tickrig.wire.can import CanFrame, FdFrame
 
 

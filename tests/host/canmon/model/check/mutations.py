@@ -9,8 +9,7 @@ from typing import Final
 from tests.host.canmon.model.check.expression.held import MAPPED
 from tests.host.canmon.model.record_log import hear
 from tests.mutators import spoilt
-from tickrig.host.canmon.model.check.checker import Checker
-from tickrig.host.canmon.model.check.decoded_check import Surroundings
+from tickrig.host.canmon.model.check.checker import Checker, Surroundings
 from tickrig.host.canmon.model.check.rule_parser import DEMANDS
 from tickrig.host.canmon.model.check.rules import RuleValues, parse_rules
 from tickrig.host.canmon.model.decode.decoder import Decoder

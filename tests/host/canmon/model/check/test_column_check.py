@@ -8,9 +8,8 @@ from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.strategies import traffic
 from tickrig.host.canmon.model.check.checker import Checker, Unjudged
 from tickrig.host.canmon.model.check.column_check import ColumnChecker
-from tickrig.host.canmon.model.check.rule import TrafficFinding
+from tickrig.host.canmon.model.check.rule import HeartbeatTimes, TrafficFinding
 from tickrig.host.canmon.model.check.rules import Rules
-from tickrig.host.canmon.model.check.time_rules import HeartbeatTimes
 from tickrig.host.canmon.model.frames import Record
 from tickrig.wire.can import CanFrame
 

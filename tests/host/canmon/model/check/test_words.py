@@ -4,8 +4,8 @@ import re
 
 import pytest
 
+from tickrig.host.canmon.model.check.rule import HeartbeatTimes
 from tickrig.host.canmon.model.check.rules import Rules, parse_rules
-from tickrig.host.canmon.model.check.time_rules import HeartbeatTimes
 
 
 @pytest.mark.parametrize(

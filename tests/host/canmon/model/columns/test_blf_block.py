@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from tests.host.canmon.model.columns.test_column_reader import rows_of, rows_of_records
 from tests.host.canmon.model.strategies import traffic
-from tickrig.host.canmon.model.columns.blf_block import BlfBlocks
-from tickrig.host.canmon.model.columns.column_reader import read_columns
+from tickrig.host.canmon.model.columns.column_reader import BlfBlocks, read_columns
 from tickrig.host.canmon.model.columns.columns import ChannelNames, Columns, NoColumnsError
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.logs.can_log import BlfBlock, CanLogReader

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.decode.drive_trace import record as drive_trace
 from tests.host.canmon.model.decode.test_noise import FRAMES
-from tickrig.host.canmon.model.columns.column_nodes import ColumnNodes
+from tickrig.host.canmon.model.columns.column_meanings import ColumnNodes
 from tickrig.host.canmon.model.decode.decoded import Decoded
 from tickrig.host.canmon.model.decode.decoder import Decoder
 from tickrig.host.canmon.model.decode.node_board import (

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from tests.host.canmon.model.column_log import blocks
 from tests.host.canmon.model.record_log import hear, snapshot
 from tests.host.canmon.model.strategies import traffic
-from tickrig.host.canmon.model.columns.column_gaps import column_buckets
-from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic
+from tickrig.host.canmon.model.columns.column_traffic import ColumnTraffic, column_buckets
 from tickrig.host.canmon.model.columns.columns import records as rows_of
 from tickrig.host.canmon.model.frames import Record
 from tickrig.host.canmon.model.traffic import TrafficSnapshot, bucket_of

@@ -27,8 +27,14 @@ from tickrig.host.canmon.model.recorder.plan import (
     TriggerSpan,
     read_plan,
 )
-from tickrig.host.canmon.model.recorder.recorder import PreTrigger, Recorder, RecorderState
-from tickrig.host.canmon.model.recorder.trigger import FilterTrigger, RuleTrigger, Trigger
+from tickrig.host.canmon.model.recorder.recorder import (
+    FilterTrigger,
+    PreTrigger,
+    Recorder,
+    RecorderState,
+    RuleTrigger,
+    Trigger,
+)
 from tickrig.wire.can import CanFrame
 
 EMCY = 0x085

@@ -8,8 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.sequence import TomlSequence, outline, parse_lines, parse_pattern
-from tickrig.host.canmon.model.sequence_variables import evaluate, fill_in, parse_variable
+from tickrig.host.canmon.model.sequence import (
+    TomlSequence,
+    evaluate,
+    fill_in,
+    outline,
+    parse_lines,
+    parse_pattern,
+    parse_variable,
+)
 from tickrig.host.text.steps import StepError
 from tickrig.wire.can import CanFrame
 

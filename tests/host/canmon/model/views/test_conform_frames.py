@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tickrig.host.canmon.conform.report_files import decoded_frames
+from tickrig.host.canmon.conform.conformance import decoded_frames
 from tickrig.host.canopen.conform.bus.exchange import FIRST_LINES, LAST_LINES, Evidence
 from tickrig.host.canopen.conform.verdict import Direction, FrameLine
 

@@ -8,7 +8,7 @@ from tests.host.canmon.tui.pilot import drive_session, hear, on_monitor, wire_se
 from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.tui.app import MonitorApp
 from tickrig.host.canmon.tui.panels.statistics_panel import StatisticsPanel
-from tickrig.host.canmon.tui.trace_line import CHANGED
+from tickrig.host.canmon.tui.panels.trace_panel import CHANGED
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.tui import LineView, line_text
 

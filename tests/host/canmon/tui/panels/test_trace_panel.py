@@ -18,8 +18,7 @@ from tests.host.canmon.tui.pilot import (
 from tests.host.canmon.wire import Wire
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.tui.app import MonitorApp
-from tickrig.host.canmon.tui.panels.trace_panel import TracePanel
-from tickrig.host.canmon.tui.trace_line import CHANGED
+from tickrig.host.canmon.tui.panels.trace_panel import CHANGED, TracePanel
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.host.tui import LineView
 

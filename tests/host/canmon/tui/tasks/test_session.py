@@ -7,10 +7,9 @@ import pytest
 
 from tests.host.canmon.tui.pilot import PATIENCE_US, drive_session, hear, wire_session
 from tests.host.canmon.wire import Wire, new_wire
-from tickrig.host.canmon.errors import SourceFailed
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, open_session
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.wire.can import CanFrame, FdFrame, Frames
 from tickrig.wire.instant import NEVER
 

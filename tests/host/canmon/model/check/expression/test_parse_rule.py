@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tests.host.canmon.model.check.expression.held import MAPPED, findings
 from tests.host.canmon.model.record_log import hear
-from tickrig.host.canmon.model.check.frame_rules import NoEmcy, NoErrorFrames, NoSdoAbort
+from tickrig.host.canmon.model.check.rule import NoEmcy, NoErrorFrames, NoSdoAbort
 from tickrig.host.canmon.model.check.rule_parser import (
     BEHIND,
     DEMANDS,
