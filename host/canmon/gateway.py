@@ -17,7 +17,7 @@ from tickrig.host.canopen.commissioning.node_bus import NodeBus
 from tickrig.host.canopen.gateway import Gateway
 from tickrig.host.cli.can_options import BusOptions, bus_options
 from tickrig.host.cli.control import stopped_by_signals
-from tickrig.host.cli.messages import Refused, SourceFailed, refuse_path, say
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing, say
 from tickrig.host.cli.options import PATH, VERSION
 from tickrig.host.control.server import Answer, LineServer
 from tickrig.host.control.unix_socket import listen_at
@@ -105,10 +105,8 @@ def _listening(
 ) -> Iterator[tuple[socket.socket, str]]:
     """Listen; give the socket, and its address for people."""
     if path is not None:
-        try:
+        with refusing("socket"):
             listener = listen_at(path)
-        except OSError as error:
-            refuse_path("socket", error)
         try:
             yield listener, str(path)
         finally:

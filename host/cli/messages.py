@@ -53,6 +53,22 @@ def refuse_path(what: str, error: OSError) -> NoReturn:
     raise Refused(f"{named}: {error.strerror or error}") from error
 
 
+@contextmanager
+def refusing(what: str = "", wrong: type[ValueError] = ValueError) -> Iterator[None]:
+    """Raise Refused in place of an error of the block, and of an OSError as `refuse_path` does.
+
+    Args:
+        what: the option or argument that is wrong: the message begins with it.
+        wrong: the error; its text is the message.
+    """
+    try:
+        yield
+    except OSError as error:
+        refuse_path(what, error)
+    except wrong as error:
+        raise Refused(f"{what} {error}".lstrip()) from None
+
+
 def time_us(option: str, word: str) -> int:
     """Read the time of an option, as `--wait`, in microseconds; Refused if it is none."""
     from tickrig.host.text.values import parse_time_us  # noqa: PLC0415 - a TAB needs none

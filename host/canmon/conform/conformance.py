@@ -42,7 +42,7 @@ from tickrig.host.canopen.conform.verdict import BUS_FAILED, Direction, FrameLin
 from tickrig.host.canopen.data_sheet.check import check, severities
 from tickrig.host.canopen.data_sheet.document import Document
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, refuse_path, say, until_unread
+from tickrig.host.cli.messages import Refused, refusing, say, until_unread
 from tickrig.host.cli.options import VERSION
 from tickrig.host.cli.start import INTERRUPTED
 from tickrig.host.text.page_text import one_line
@@ -63,10 +63,8 @@ def check_files(files: Mapping[str, Path]) -> None:
         files: by the option that names it.
     """
     for option, path in files.items():
-        try:
+        with refusing():
             check_file(path, option)
-        except ValueError as error:
-            raise Refused(str(error)) from None
     if _HTML in files and find_spec("jinja2") is None:
         raise Refused(f"{_HTML} needs Jinja2: pip install 'tickrig[report]'")
     places = [path.resolve() for path in files.values()]
@@ -83,10 +81,8 @@ def keep_inputs(files: Mapping[str, Path], inputs: Iterable[Path]) -> None:
     """
     read = tuple(inputs)
     for option, path in files.items():
-        try:
+        with refusing():
             check_not_read(path, option, read)
-        except ValueError as error:
-            raise Refused(str(error)) from None
 
 
 def write_files(
@@ -329,12 +325,8 @@ class Conformance:
 def _read_baseline(path: Path | None) -> Baseline:
     if path is None:
         return NONE_KNOWN
-    try:
+    with refusing("--baseline"):
         baseline = Baseline.read(path)
-    except OSError as error:
-        refuse_path("--baseline", error)
-    except ValueError as error:
-        raise Refused(f"--baseline {error}") from None
     for text in unknown(sorted(baseline.known)):
         say(one_line(f"--baseline {path}: {text}"))
     return baseline

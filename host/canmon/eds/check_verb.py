@@ -12,7 +12,7 @@ from tickrig.host.canmon.eds_document import read_document
 from tickrig.host.canmon.model.check.report import junit
 from tickrig.host.canopen.data_sheet.check import check, failing, severities
 from tickrig.host.canopen.data_sheet.rule import RULES, RuleFinding
-from tickrig.host.cli.messages import Refused, refuse_path, until_unread
+from tickrig.host.cli.messages import Refused, refusing, until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
@@ -109,11 +109,9 @@ def _finding_json(one: RuleFinding) -> str:
 def _check_report(report: Path | None, files: Sequence[Path]) -> None:
     """See before the run whether the report could be written."""
     if report is not None:
-        try:
+        with refusing():
             check_file(report, "--junit")
             check_not_read(report, "--junit", files)
-        except ValueError as error:
-            raise Refused(str(error)) from None
 
 
 def _write(
@@ -128,7 +126,5 @@ def _write(
     cases = [*unread, *(_Case(f"{one.file}: {one.rule.name}", str(one)) for one in failures)]
     rules = (f"{document.name}: {name}" for document in documents for name in RULES)
     names = list(dict.fromkeys((*(case.rule for case in unread), *rules)))
-    try:
+    with refusing("--junit"):
         write_whole(report, junit("canmon eds check", names, cases))
-    except OSError as error:
-        refuse_path("--junit", error)

@@ -26,7 +26,7 @@ from tickrig.host.canmon.model.recorder.recorder import (
 from tickrig.host.canmon.output.listening import Stopwatch
 from tickrig.host.canmon.output.printer import DecodedFrame
 from tickrig.host.canmon.sources.source import FileSpec, parse_source
-from tickrig.host.cli.messages import Refused, SourceFailed
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.text.values import counted
 from tickrig.host.text.whole_file import replacing
@@ -133,10 +133,8 @@ def whole_log(path: Path, source: Sequence[str]) -> Iterator[Path]:
         SourceFailed: it cannot be written.
     """
     _check_not_read(path, source)
-    try:
+    with refusing("", LogFormatError):
         log_format(path)
-    except LogFormatError as error:
-        raise Refused(str(error)) from None
     if not all(isinstance(parse_source(word), FileSpec) for word in source):
         yield path
         return
@@ -298,12 +296,10 @@ def _trigger(word: str, bit_rate: int | None) -> Trigger:
     from tickrig.host.canmon.model.check.rule_parser import errors_alone  # noqa: PLC0415 - slow
     from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter, tokens_of  # noqa: PLC0415
 
-    try:
+    with refusing("--trigger:", FilterError):
         wanted = parse_filter(word)
         matches = errors_alone(wanted.matches, tokens_of(word), wanted.signals)
         return FilterTrigger(word, replace(wanted, matches=matches))
-    except FilterError as error:
-        raise Refused(f"--trigger: {error}") from None
 
 
 def _rules(word: str, bit_rate: int | None) -> Trigger:

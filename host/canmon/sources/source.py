@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Final, Generic, TypeVar
 
 from tickrig.host.canmon.model.frames import CandumpFilter, Record
 from tickrig.host.canmon.model.logs.log_file import COMPRESSED, SUFFIXES, LogFormatError, log_format
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, refusing
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.logs.mark import LogTally, Mark
@@ -197,10 +197,8 @@ def parse_source(word: str) -> FileSpec | BusSpec | LineSpec | None:
 
 
 def _file(name: str, filters: str) -> FileSpec:
-    try:
+    with refusing("", LogFormatError):
         log_format(Path(name))
-    except LogFormatError as error:
-        raise Refused(str(error)) from None
     return FileSpec(Path(name), _chosen(filters))
 
 
@@ -230,7 +228,5 @@ def _bit_s(text: str) -> int:
 
 
 def _chosen(filters: str) -> CandumpFilter | None:
-    try:
+    with refusing():
         return CandumpFilter.parse(filters) if filters else None
-    except ValueError as error:
-        raise Refused(str(error)) from None

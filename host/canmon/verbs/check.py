@@ -30,7 +30,7 @@ from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
 from tickrig.host.canmon.sources.source import AnySource, Source
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, refuse_path, until_unread
+from tickrig.host.cli.messages import Refused, refuse_path, refusing, until_unread
 from tickrig.host.cli.options import PATH, Decorator, add_options
 from tickrig.host.text.page_text import json_text
 from tickrig.host.text.values import counted
@@ -199,10 +199,8 @@ def _read_rules(files: Iterable[Path], options: Mapping[str, object]) -> Rules:
     given = {name: options[name] for name in (*SWITCHES, *VALUES) if options.get(name)}
     if options.get("max_load") is not None:  # 0 is a limit, too
         given["max_load"] = options["max_load"]
-    try:
+    with refusing():
         rules = parse_rules(joined(words, given), load_rule)
-    except ValueError as error:
-        raise Refused(str(error)) from None
     if rules == Rules(bit_rate=rules.bit_rate):
         raise Refused("no rule: give --no-emcy, --max-load or others, or a file rules.toml")
     return rules
@@ -330,10 +328,8 @@ def _no_frame(source: AnySource[object], words: Sequence[str]) -> str:
 def _bit_rate(rules: Rules, words: Sequence[str], bus: BusOptions) -> int | None:
     """Return the bit rate; Refused if a rule needs it and nobody names it."""
     bit_rate = listening.bit_rate_of(words, bus)
-    try:
+    with refusing():
         rules.load(bit_rate)
-    except ValueError as error:
-        raise Refused(str(error)) from None
     return bit_rate
 
 
@@ -397,10 +393,8 @@ def _write(option: str, path: Path | None, text: Callable[..., str], judged: _Ju
     """Write a report where one is wanted."""
     if path is None:
         return
-    try:
+    with refusing(option):
         write_whole(path, text(*judged))
-    except OSError as error:
-        refuse_path(option, error)
 
 
 def _sarif(*judged: Any) -> str:

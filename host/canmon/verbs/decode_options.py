@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.cli.can_options import BusCommand, bus_options, fd_options
-from tickrig.host.cli.messages import Refused, refuse_path, show_findings
+from tickrig.host.cli.messages import Refused, refusing, show_findings
 from tickrig.host.cli.options import PATH, Decorator, add_options
 
 if TYPE_CHECKING:
@@ -82,12 +82,8 @@ def refusing_dbc() -> Iterator[None]:
     """Refuse, as `--dbc` does, files that are no DBC."""
     from tickrig.host.canmon.model.decode.dbc_file import DbcError  # noqa: PLC0415 - slow
 
-    try:
+    with refusing("--dbc", DbcError):
         yield
-    except OSError as error:
-        refuse_path("--dbc", error)
-    except DbcError as error:
-        raise Refused(f"--dbc {error}") from None
 
 
 def eds_paths(words: Sequence[str]) -> dict[int, Path]:
@@ -101,10 +97,8 @@ def read_filter(text: str | None) -> Filter | None:
         return None
     from tickrig.host.canmon.model.decode.filter import FilterError, parse_filter  # noqa: PLC0415 - slow
 
-    try:
+    with refusing("", FilterError):
         return parse_filter(text)
-    except FilterError as error:
-        raise Refused(str(error)) from None
 
 
 def _split(word: str) -> tuple[int, Path]:
@@ -119,12 +113,8 @@ def _read(node: int, path: Path) -> EdsObjects:
     from tickrig.host.canmon.model.decode.node_memory import read_eds_objects  # noqa: PLC0415 - slow
     from tickrig.wire.canopen.eds.eds_file import EdsError  # noqa: PLC0415
 
-    try:
+    with refusing("--eds", EdsError):
         return read_eds_objects(path, node)
-    except OSError as error:
-        refuse_path("--eds", error)
-    except EdsError as error:
-        raise Refused(f"--eds {error}") from None
 
 
 # What verbs that take SOURCE words share.

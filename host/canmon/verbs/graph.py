@@ -27,7 +27,7 @@ from tickrig.host.canmon.verbs.decode_options import (
     strict_option,
 )
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
-from tickrig.host.cli.messages import Refused
+from tickrig.host.cli.messages import Refused, refusing
 from tickrig.host.cli.options import PATH, time_option
 from tickrig.host.cli.start import paint
 
@@ -63,7 +63,7 @@ class _GraphRequest:
         """Return the view that is asked for; Refused if nothing is in it."""
         whole = View.of(series)
         first_us = whole.from_us
-        try:
+        with refusing():
             return View(
                 first_us + (self.from_us or 0),
                 whole.to_us if self.to_us is None else first_us + self.to_us,
@@ -71,8 +71,6 @@ class _GraphRequest:
                 None if self.at_us is None else first_us + self.at_us,
                 first_us,
             )
-        except ValueError as error:
-            raise Refused(str(error)) from None
 
 
 def _checked_files(
@@ -159,10 +157,8 @@ def command(source: str, signals: Sequence[str], **options: Any) -> None:
     """  # noqa: D301 - click wants the backspace
     options["ranges"] = dict(map(_range, options["ranges"]))
     request = _GraphRequest(**{one.name: options.pop(one.name) for one in fields(_GraphRequest)})
-    try:
+    with refusing():
         words = [parse_signal(text) for text in signals]
-    except ValueError as error:
-        raise Refused(str(error)) from None
     eds, dbc, strict = (options.pop(name) for name in ("eds", "dbc", "strict"))
     objects = any(isinstance(word.source, ObjectName) for word in words)
     decoder = make_decoder(eds, dbc) if objects or eds or dbc else None

@@ -19,7 +19,7 @@ from tickrig.host.canmon.model.traffic import bucket_of, middle_us
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.sources.opening import log_path
 from tickrig.host.cli.can_options import BusOptions, bus_options, fd_options
-from tickrig.host.cli.messages import Refused, SourceFailed, until_unread
+from tickrig.host.cli.messages import Refused, SourceFailed, refusing, until_unread
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, ErrorFrame, FdFrame
 from tickrig.wire.errors import FieldError, WireError
@@ -241,7 +241,7 @@ def _plan(
     log: LogReader, route: Callable[[str], str | None], options: dict[str, Any]
 ) -> ReplayPlan:
     speed, loop, to = (options.pop(name) for name in ("speed", "loop", "to"))
-    try:
+    with refusing():
         return ReplayPlan(
             log,
             route,
@@ -250,8 +250,6 @@ def _plan(
             None if to is None else parse_time_with_unit_us(to),
             _loops(loop),
         )
-    except ValueError as error:
-        raise Refused(str(error)) from None
 
 
 def _speed(text: str) -> float:
@@ -276,12 +274,10 @@ def _can_id(text: str | None) -> CanFrame | None:
     """Return a frame with the CAN-ID that is waited for."""
     if text is None:
         return None
-    try:
+    with refusing("--wait-rx", WireError):
         if _CAN_ID.fullmatch(text) is None:
             raise FieldError(f"{text!r} is no CAN-ID of 3 or 8 hex digits, as 581")
         return CanFrame.parse(f"{text}#")
-    except WireError as error:
-        raise Refused(f"--wait-rx {error}") from None
 
 
 def _play(

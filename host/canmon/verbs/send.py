@@ -12,10 +12,9 @@ from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.output.listening import Pace, until_interrupted
 from tickrig.host.canmon.verbs.decode_options import eds_option, read_eds_files
 from tickrig.host.cli.can_options import BusOptions, bus_and_rest, bus_options, fd_options
-from tickrig.host.cli.messages import Refused, until_unread
+from tickrig.host.cli.messages import Refused, refusing, until_unread
 from tickrig.host.text.values import parse_time_with_unit_us
 from tickrig.wire.can import CanFrame, FdFrame, LogLine, parse_sent
-from tickrig.wire.errors import WireError
 from tickrig.wire.instant import NEVER
 
 if TYPE_CHECKING:
@@ -76,20 +75,16 @@ def _frames(words: Sequence[str], eds: Sequence[str]) -> list[CanFrame | FdFrame
         else:
             texts.append(word)
     named = transmit.PdoFrames(read_eds_files(eds))
-    try:
+    with refusing():
         return [parse_sent(text) if "#" in text else named.frame(text) for text in texts]
-    except (ValueError, WireError) as error:
-        raise Refused(str(error)) from None
 
 
 def _fields(counters: Sequence[str], checksums: Sequence[str]) -> transmit.FrameFields:
-    try:
+    with refusing():
         return transmit.FrameFields(
             tuple(map(transmit.parse_counter, counters)),
             tuple(map(transmit.parse_checksum, checksums)),
         )
-    except ValueError as error:
-        raise Refused(str(error)) from None
 
 
 def _period_us(every: str | None, count: int | None) -> int:
@@ -97,10 +92,8 @@ def _period_us(every: str | None, count: int | None) -> int:
         if count is not None:
             raise Refused("--count says how often --every sends; give --every TIME")
         return NEVER
-    try:
+    with refusing("--every"):
         period_us = parse_time_with_unit_us(every)
-    except ValueError as error:
-        raise Refused(f"--every {error}") from None
     if not period_us:
         raise Refused("a period of 0 us; 1 us is the least")
     return period_us
@@ -109,10 +102,8 @@ def _period_us(every: str | None, count: int | None) -> int:
 def _cyclic(
     frames: Sequence[CanFrame | FdFrame], period_us: int, count: int, fields: transmit.FrameFields
 ) -> list[transmit.TransmitRow]:
-    try:
+    with refusing():
         return [transmit.TransmitRow("", frame, period_us, fields, 0, count) for frame in frames]
-    except ValueError as error:
-        raise Refused(str(error)) from None
 
 
 def _run(cyclic: Sequence[transmit.TransmitRow], out: Transmitter, quiet: bool) -> None:

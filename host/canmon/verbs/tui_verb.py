@@ -13,7 +13,7 @@ from tickrig.host.canmon.output.listening import bit_rates_of, report
 from tickrig.host.canmon.verbs import decode_options
 from tickrig.host.canmon.workspace import MonitorSetup, Workspace, WorkspaceError
 from tickrig.host.cli.can_options import BusOptions
-from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import PATH
 from tickrig.host.cli.start import loading
 
@@ -87,7 +87,7 @@ def _monitor(path: Path | None, said: MonitorSetup) -> MonitorApp:
     from tickrig.host.canmon.tui.session import Model, open_session  # noqa: PLC0415 - slow
     from tickrig.host.canmon.workspace import PanelSettings  # noqa: PLC0415 - an extra
 
-    try:
+    with refusing("", WorkspaceError):
         workspace = Workspace() if path is None else Workspace.read(path)
         setup = MonitorSetup.read(workspace).under(said)
         objects = decode_options.read_eds_paths(setup.eds)
@@ -102,6 +102,4 @@ def _monitor(path: Path | None, said: MonitorSetup) -> MonitorApp:
         except BaseException:
             session.source.close()
             raise
-    except WorkspaceError as error:
-        raise Refused(str(error)) from None
     return MonitorApp(session, panels, panel_settings, recorder)

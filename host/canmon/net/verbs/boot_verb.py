@@ -18,7 +18,7 @@ from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
 from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
 from tickrig.host.canopen.master.boot_slave import BootOutcome, BootStatus, BootStep, SlaveBoot
 from tickrig.host.canopen.master.from_bus_file import plan_of
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, refuse_path, refusing, say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted, format_time
@@ -71,10 +71,8 @@ def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
         return int.from_bytes(power_on.get(at, b""), "little")
 
     writable = {at for at, row in objects.rows.items() if row.writable}
-    try:
+    with refusing(f"--eds {path}:"):
         steps = writes(values, number, writable)
-    except ValueError as error:
-        raise Refused(f"--eds {path}: {error}") from None
     period_ms = int.from_bytes(values.get(_HEARTBEAT, b"")[:_U16_BYTES], "little")
     return SlaveAssignment(
         node_id,

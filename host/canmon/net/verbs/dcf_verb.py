@@ -22,7 +22,7 @@ from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canopen.commissioning.configuration import Values, dcf_values, disabled, writes
 from tickrig.host.canopen.conform.write_order import Write
 from tickrig.host.canopen.errors import SdoFailed
-from tickrig.host.cli.messages import Refused, say
+from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.text.page_text import one_line
 from tickrig.host.text.values import counted
@@ -107,10 +107,8 @@ def _steps(session: NetSession, objects: NamedObjects, changed: Values, file: Pa
             return 0
         return int.from_bytes(data, "little")
 
-    try:
+    with refusing(f"FILE {file}:"):
         return writes(changed, number, writable)
-    except ValueError as error:
-        raise Refused(f"FILE {file}: {error}") from None
 
 
 def _write(

@@ -15,7 +15,7 @@ from tickrig.host.canmon.net.group import NetCall
 from tickrig.host.canmon.net.node_objects import Entry
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session, of_node
 from tickrig.host.canopen.commissioning.program import COMMANDS, Program, ProgramFailed
-from tickrig.host.cli.messages import Refused, refuse_path, say
+from tickrig.host.cli.messages import Refused, refusing, say
 from tickrig.host.cli.options import NODE_ID, PATH
 from tickrig.host.cli.start import paint
 
@@ -154,11 +154,8 @@ def _title(entry: Entry) -> str:
 
 def _read(file: Path) -> bytes:
     """Read the firmware; Refused if it cannot be, is empty or too large."""
-    try:
-        with file.open("rb") as opened:
-            data = opened.read(_MOST_BYTES + 1)
-    except OSError as error:
-        refuse_path("FILE", error)
+    with refusing("FILE"), file.open("rb") as opened:
+        data = opened.read(_MOST_BYTES + 1)
     if not data:
         raise Refused(f"FILE {file}: it is empty")
     if len(data) > _MOST_BYTES:
