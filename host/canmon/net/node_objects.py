@@ -9,15 +9,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.model.decode import object_text
 from tickrig.host.canmon.model.decode.decoded import write_entry
 from tickrig.host.canmon.model.decode.node_memory import NodeMemory, eds_objects
-from tickrig.host.canmon.model.decode.object_text import (
-    ObjectText,
-    describe_drive,
-    describe_standard,
-    drive_state,
-    slug,
-)
 from tickrig.host.canmon.model.node_dictionary import encode_value
 from tickrig.host.canmon.net.session import NetSession, NodeFailed, failure_text
 from tickrig.host.canopen.commissioning.configuration import Values, same
@@ -52,8 +46,10 @@ def _standard_names() -> Mapping[str, tuple[int, int]]:
     found: dict[str, tuple[int, int]] = {}
     for row in table:
         head = table.objects[row.index]
-        whole = "" if head.code is object_table.ObjectCode.VAR else f"{slug(head.name)}."
-        found[f"{whole}{slug(row.name)}"] = row.index, row.sub
+        whole = (
+            "" if head.code is object_table.ObjectCode.VAR else f"{object_text.slug(head.name)}."
+        )
+        found[f"{whole}{object_text.slug(row.name)}"] = row.index, row.sub
     return found
 
 
@@ -110,7 +106,7 @@ class NamedObjects:
         """Take what the node says of itself, as its device type."""
         self._memory.read(entry, data)
 
-    def text(self, entry: Entry) -> ObjectText:
+    def text(self, entry: Entry) -> object_text.ObjectText:
         """Return name, type and unit of an object."""
         return self._memory.describe(*entry)
 
@@ -147,9 +143,9 @@ class NamedObjects:
             if name := self.text(entry).name:
                 found.setdefault(name, entry)
         for entry in self.rows:  # those of the standards mean the same object, where it is there
-            standard = describe_standard(*entry)
+            standard = object_text.describe_standard(*entry)
             if standard is None and self.is_drive:
-                standard = describe_drive(*entry)
+                standard = object_text.describe_drive(*entry)
             if standard is not None:
                 found.setdefault(standard.name, entry)
         for name, entry in _standard_names().items():
@@ -164,10 +160,10 @@ def _names_by_standard(is_drive: bool) -> Mapping[str, Entry]:
     found: dict[str, Entry] = {}
     for index in _COMMUNICATION:
         for sub in _SUBS:
-            if (text := describe_standard(index, sub)) is not None:
+            if (text := object_text.describe_standard(index, sub)) is not None:
                 found.setdefault(text.name, (index, sub))
     for index in _DRIVE if is_drive else ():
-        if (text := describe_drive(index, 0)) is not None:
+        if (text := object_text.describe_drive(index, 0)) is not None:
             found.setdefault(text.name, (index, 0))
     return {**found, **_standard_names(), **found}  # in this order: a mistake lists the first
 
@@ -266,7 +262,7 @@ def shown(objects: NamedObjects, entry: Entry, data: bytes) -> str:
         return f"{len(data)} bytes, {data[:8].hex(' ').upper()} ..."
     value, said = text.read(data)
     if entry == _STATUSWORD and objects.is_drive and isinstance(value, int):
-        return f"{said} {drive_state(value)}"
+        return f"{said} {object_text.drive_state(value)}"
     if text.in_hex or text.kind is None:
         return said
     unit = f" {text.unit}" if text.unit else ""
@@ -284,7 +280,7 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     text = objects.text(entry)
     kind, colon, rest = words.partition(":")
     if colon and kind in TYPES:
-        text, words = ObjectText(text.name, TYPES[kind]), rest
+        text, words = object_text.ObjectText(text.name, TYPES[kind]), rest
     if text.kind is None:
         raise Refused(
             f"the type of {objects.title(entry)} is not known: give its EDS (--eds FILE), or the"
@@ -297,7 +293,7 @@ def encoded(objects: NamedObjects, entry: Entry, words: str) -> bytes:
     return data
 
 
-def _range(text: ObjectText) -> str:
+def _range(text: object_text.ObjectText) -> str:
     """Say which numbers a whole number may be."""
     kind = text.kind
     if kind is None or not kind.is_integer:

@@ -15,14 +15,7 @@ from tickrig.host.canmon.model.frames import Record, flagged_id
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import Item, LogLines, among, read_log
 from tickrig.host.canmon.model.logs.mark import DROP, LogTally, Mark
-from tickrig.host.canmon.sources.source import (
-    AnySource,
-    BusSpec,
-    FileSpec,
-    LineSpec,
-    Source,
-    parse_source,
-)
+from tickrig.host.canmon.sources import source
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import Refused, SourceFailed
 from tickrig.host.links.link import LinkClosed
@@ -42,7 +35,7 @@ _BATCH: Final = 1_024
 """Frames of one poll."""
 
 
-class LoggedSource(AnySource[Record]):
+class LoggedSource(source.AnySource[Record]):
     """What somebody recorded: frames up to the next marks at a time."""
 
     recorded = True
@@ -93,7 +86,7 @@ class FileSource(LoggedSource):
 
     live = False
 
-    def __init__(self, files: Sequence[FileSpec]) -> None:
+    def __init__(self, files: Sequence[source.FileSpec]) -> None:
         super().__init__()
         self._names = [str(file.path) for file in files]
         self._readers = [read_log(file.path) for file in files]
@@ -133,7 +126,7 @@ def _check_readable(path: Path) -> None:
         raise SourceFailed(f"{path}: {error.strerror}") from error
 
 
-def _chosen(file: FileSpec, items: Iterator[Item]) -> Iterator[Item]:
+def _chosen(file: source.FileSpec, items: Iterator[Item]) -> Iterator[Item]:
     chosen = file.chosen
     if chosen is None:
         return items
@@ -180,7 +173,7 @@ SMALL_BYTES: Final = 1 << 20
 """Below it a log is read frame by frame sooner than numpy is imported."""
 
 
-class BlockLog(AnySource["Columns"]):
+class BlockLog(source.AnySource["Columns"]):
     """A log file as columns, a block at each poll; it holds no more than that.
 
     Attributes:
@@ -288,8 +281,8 @@ def _large_log(words: Sequence[str]) -> Path | None:
     """Return the path of a log that is to be read in blocks."""
     if len(words) != 1 or find_spec("numpy") is None:
         return None
-    word = parse_source(words[0])
-    if not isinstance(word, FileSpec) or word.chosen is not None:
+    word = source.parse_source(words[0])
+    if not isinstance(word, source.FileSpec) or word.chosen is not None:
         return None
     try:
         return word.path if word.path.stat().st_size >= SMALL_BYTES else None
@@ -297,7 +290,7 @@ def _large_log(words: Sequence[str]) -> Path | None:
         return None  # who reads it frame by frame says so
 
 
-def open_source(words: Sequence[str], options: BusOptions | None = None) -> Source:
+def open_source(words: Sequence[str], options: BusOptions | None = None) -> source.Source:
     """Open what SOURCE words name: one or more buses, or files, or standard input.
 
     Files are merged by time; buses are read as frames come in.
@@ -315,34 +308,36 @@ def open_source(words: Sequence[str], options: BusOptions | None = None) -> Sour
         raise Refused(
             "no SOURCE: name a bus as can0, a log file as run.log, or - for standard input"
         )
-    parsed = [parse_source(word) for word in words]
-    files = [word for word in parsed if isinstance(word, FileSpec)]
-    buses = [word for word in parsed if isinstance(word, BusSpec)]
+    parsed = [source.parse_source(word) for word in words]
+    files = [word for word in parsed if isinstance(word, source.FileSpec)]
+    buses = [word for word in parsed if isinstance(word, source.BusSpec)]
     if parsed == [None]:
         return StdinSource()
     if len(files) == len(parsed) > 0:
         return FileSource(files)
-    if any(isinstance(word, LineSpec) for word in parsed):
+    if any(isinstance(word, source.LineSpec) for word in parsed):
         raise Refused("serial lines are shown by dump, top and tui: " + " ".join(words))
     if len(buses) < len(parsed):
         raise Refused("buses, files and standard input cannot be mixed: " + " ".join(words))
-    return cast("Source", open_live(buses or [BusSpec()], [], options)[0])  # buses alone: frames
+    return cast(
+        "source.Source", open_live(buses or [source.BusSpec()], [], options)[0]
+    )  # buses alone: frames
 
 
-def open_any(words: Sequence[str], options: BusOptions) -> AnySource[AnyRecord]:
+def open_any(words: Sequence[str], options: BusOptions) -> source.AnySource[AnyRecord]:
     """Open what SOURCE words name, as `open_source` does; serial ports and buses may be mixed."""
-    parsed = [parse_source(word) for word in words]
-    lines = [word for word in parsed if isinstance(word, LineSpec)]
+    parsed = [source.parse_source(word) for word in words]
+    lines = [word for word in parsed if isinstance(word, source.LineSpec)]
     if not lines:
         return open_source(words, options)
-    buses = [word for word in parsed if isinstance(word, BusSpec)]
+    buses = [word for word in parsed if isinstance(word, source.BusSpec)]
     if len(buses) + len(lines) < len(parsed):
         raise Refused("serial ports, files and standard input cannot be mixed: " + " ".join(words))
     return open_live(buses, lines, options)[0]
 
 
 def open_live(
-    buses: Sequence[BusSpec], lines: Sequence[LineSpec], options: BusOptions
+    buses: Sequence[source.BusSpec], lines: Sequence[source.LineSpec], options: BusOptions
 ) -> tuple[LiveSource[AnyRecord], dict[str, OpenBus]]:
     """Open buses and serial ports, so that they can be opened again.
 
@@ -381,7 +376,7 @@ def open_live(
 
 def log_path(word: str) -> Path:
     """Return the log file that a word names; Refused if it names none."""
-    parsed = parse_source(word)
-    if not isinstance(parsed, FileSpec):
+    parsed = source.parse_source(word)
+    if not isinstance(parsed, source.FileSpec):
         raise Refused(f"{word!r} is no log file")
     return parsed.path

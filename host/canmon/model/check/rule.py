@@ -21,22 +21,8 @@ from tickrig.host.canmon.model.frames import (
 from tickrig.host.canmon.model.traffic import WINDOW_US, BusSecond
 from tickrig.host.text.values import counted
 from tickrig.wire.can import STANDARD_MAX, CanFrame, ErrorFrame, describe_error_frame
+from tickrig.wire.canopen import nmt, sdo_frame
 from tickrig.wire.canopen.emcy import describe
-from tickrig.wire.canopen.nmt import (
-    ALL_NODES,
-    ERROR_CONTROL_COB_ID,
-    NMT_COB_ID,
-    NmtCommand,
-    NmtState,
-)
-from tickrig.wire.canopen.sdo_frame import (
-    FRAME_BYTES,
-    REQUEST_COB_ID,
-    RESPONSE_COB_ID,
-    ClientCommand,
-    describe_abort,
-    index_sub,
-)
 
 if TYPE_CHECKING:
     from tickrig.host.canmon.model.decode.decoded import Decoded
@@ -253,10 +239,10 @@ class MaxLoad:
         return f"{channel}: load {percent:.1f} %, at most {self._percent:g} % is right"
 
 
-BOOT_UP: Final = bytes([NmtState.INITIALISING])
-ERROR_CONTROL_IDS: Final = range(ERROR_CONTROL_COB_ID + 1, ERROR_CONTROL_COB_ID + 0x80)
-ANSWER_IDS: Final = range(RESPONSE_COB_ID + 1, RESPONSE_COB_ID + 0x80)
-REQUEST_IDS: Final = range(REQUEST_COB_ID + 1, REQUEST_COB_ID + 0x80)
+BOOT_UP: Final = bytes([nmt.NmtState.INITIALISING])
+ERROR_CONTROL_IDS: Final = range(nmt.ERROR_CONTROL_COB_ID + 1, nmt.ERROR_CONTROL_COB_ID + 0x80)
+ANSWER_IDS: Final = range(sdo_frame.RESPONSE_COB_ID + 1, sdo_frame.RESPONSE_COB_ID + 0x80)
+REQUEST_IDS: Final = range(sdo_frame.REQUEST_COB_ID + 1, sdo_frame.REQUEST_COB_ID + 0x80)
 
 
 class HeartbeatTimes(NamedTuple):
@@ -281,7 +267,7 @@ class Heartbeat(Rule):
     """
 
     def __init__(self, times: HeartbeatTimes) -> None:
-        self._times, self._ident = times, ERROR_CONTROL_COB_ID + times.node
+        self._times, self._ident = times, nmt.ERROR_CONTROL_COB_ID + times.node
         self.name = f"heartbeat {times.node}"
         self._booted_us: dict[str, int] = {}
         self._free: Counter[str] = Counter()
@@ -628,21 +614,23 @@ class NoSdoAbort(CanopenRule):
 
     def selection(self, ident: int, /) -> FrameSelection:
         """Suspect aborts."""
-        return FrameSelection(first_bytes=frozenset([ClientCommand.ABORT]))
+        return FrameSelection(first_bytes=frozenset([sdo_frame.ClientCommand.ABORT]))
 
     def judge(self, record: Record, gap_us: int | None, /) -> str | None:
         """Name object and abort code."""
         frame = record.frame
         assert isinstance(frame, CanFrame)
         data = frame.data
-        if len(data) < _NAMED_BYTES or data[0] != ClientCommand.ABORT:
+        if len(data) < _NAMED_BYTES or data[0] != sdo_frame.ClientCommand.ABORT:
             return None
-        index, sub = index_sub(data)
+        index, sub = sdo_frame.index_sub(data)
         which = f"{index:04X}h:{sub:02X}" if index or sub else "its transfer"
         side = "server" if frame.can_id in ANSWER_IDS else "client"
-        reason = describe_abort(int.from_bytes(data[4:], "little"))
-        if len(data) < FRAME_BYTES:
-            reason = f"without a whole abort code ({len(data)} B, {FRAME_BYTES} are right)"
+        reason = sdo_frame.describe_abort(int.from_bytes(data[4:], "little"))
+        if len(data) < sdo_frame.FRAME_BYTES:
+            reason = (
+                f"without a whole abort code ({len(data)} B, {sdo_frame.FRAME_BYTES} are right)"
+            )
         node = frame.can_id & _NODE_MASK
         return f"node {node}: {side} aborts {which}, {reason}"
 
@@ -701,7 +689,7 @@ def _text(record: Record) -> str:
     return ident_text(any_ident(record.frame))
 
 
-_RESETS: Final = frozenset([NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION])
+_RESETS: Final = frozenset([nmt.NmtCommand.RESET_NODE, nmt.NmtCommand.RESET_COMMUNICATION])
 
 
 class NodesPresent(Rule):
@@ -742,11 +730,11 @@ class NoReboot(CanopenRule):
 
     def wants(self, ident: int, /) -> bool:
         """Take NMT commands and what nodes send."""
-        return ident == NMT_COB_ID or sender_of(ident) is not None
+        return ident == nmt.NMT_COB_ID or sender_of(ident) is not None
 
     def selection(self, ident: int, /) -> FrameSelection:
         """Suspect resets and boot-ups; the first frame of anything else tells of its node."""
-        if ident == NMT_COB_ID:
+        if ident == nmt.NMT_COB_ID:
             return FrameSelection(first_bytes=_RESETS)
         boot_up = frozenset(BOOT_UP) if ident in ERROR_CONTROL_IDS else frozenset()
         return FrameSelection(first_bytes=boot_up, firsts=True)
@@ -769,4 +757,4 @@ class NoReboot(CanopenRule):
         return None if expected else f"node {node} boots again without an NMT reset"
 
     def _expect_reset(self, node: int) -> None:
-        self._commanded |= set(range(1, 0x80)) if node == ALL_NODES else {node}
+        self._commanded |= set(range(1, 0x80)) if node == nmt.ALL_NODES else {node}

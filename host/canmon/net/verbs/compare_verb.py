@@ -7,14 +7,8 @@ from typing import Final
 
 import click
 
+from tickrig.host.canmon.net import node_objects
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import (
-    NamedObjects,
-    differences,
-    known_objects,
-    line,
-    values_of,
-)
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
 from tickrig.host.canopen.commissioning.configuration import (
     Values,
@@ -50,15 +44,17 @@ def command(call: NetCall, node: int, other: str, eds: Path | None) -> None:
         other_id = _node_id(other)
         file = eds if other_id else Path(other)
         with of_node(node):
-            objects = known_objects(session, node, file, what="--eds" if other_id else "FILE")
+            objects = node_objects.known_objects(
+                session, node, file, what="--eds" if other_id else "FILE"
+            )
         if other_id:
             values, where = _of_node(session, objects, other_id), f"at node {other_id}"
         else:
             values, where = _of_file(objects), "in the file"
         with of_node(node, objects.title):
-            for one in differences(session, objects, values):
+            for one in node_objects.differences(session, objects, values):
                 found += 1
-                click.echo(one_line(line(objects, one, where)))
+                click.echo(one_line(node_objects.line(objects, one, where)))
         say(f"objects that differ: {found} of {len(values)}")
     if found:
         raise click.exceptions.Exit(_DIFFERENT)
@@ -72,7 +68,7 @@ def _node_id(word: str) -> int:
     return number
 
 
-def _of_file(objects: NamedObjects) -> Values:
+def _of_file(objects: node_objects.NamedObjects) -> Values:
     assert objects.file is not None
     assert objects.device is not None
     node_id = objects.node_id
@@ -81,13 +77,13 @@ def _of_file(objects: NamedObjects) -> Values:
     return {at: data for at, data in values.items() if objects.rows[at].readable}
 
 
-def _of_node(session: NetSession, objects: NamedObjects, other_id: int) -> Values:
+def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: int) -> Values:
     """Return the parameters of another node, as this one would have them."""
     rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
     if not rows:
         raise Refused("which objects? give the EDS of both nodes (--eds FILE)")
     with of_node(other_id, objects.title):
-        found = values_of(session, other_id, rows)
+        found = node_objects.values_of(session, other_id, rows)
     shift = objects.node_id - other_id
     for at, data in found.items():
         if rows[at].relative and data != bytes(len(data)):

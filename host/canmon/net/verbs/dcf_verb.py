@@ -7,15 +7,8 @@ from pathlib import Path
 
 import click
 
+from tickrig.host.canmon.net import node_objects
 from tickrig.host.canmon.net.group import NetCall
-from tickrig.host.canmon.net.node_objects import (
-    Entry,
-    NamedObjects,
-    differences,
-    known_objects,
-    line,
-    shown,
-)
 from tickrig.host.canmon.net.session import NetSession, net_session, of_node
 from tickrig.host.canmon.net.verbs.store_verb import save
 from tickrig.host.canmon.risks import write_risk
@@ -61,7 +54,9 @@ def command(  # noqa: PLR0913, PLR0917 - options
     """  # noqa: D301 - click wants the backspace
     with net_session(call, node) as session:
         with of_node(node):
-            objects = known_objects(session, node, file, what="FILE", strict=not other_device)
+            objects = node_objects.known_objects(
+                session, node, file, what="FILE", strict=not other_device
+            )
         values = _values(objects, skip)
         with of_node(node, objects.title):
             changed = values if whole else _changed(session, objects, values)
@@ -76,7 +71,7 @@ def command(  # noqa: PLR0913, PLR0917 - options
         _write(session, objects, steps, store=store)
 
 
-def _values(objects: NamedObjects, skip: Sequence[str]) -> Values:
+def _values(objects: node_objects.NamedObjects, skip: Sequence[str]) -> Values:
     file, device = objects.file, objects.device
     assert file is not None
     assert device is not None
@@ -87,20 +82,22 @@ def _values(objects: NamedObjects, skip: Sequence[str]) -> Values:
     return {at: data for at, data in values.items() if at not in left_out}
 
 
-def _changed(session: NetSession, objects: NamedObjects, values: Values) -> Values:
+def _changed(session: NetSession, objects: node_objects.NamedObjects, values: Values) -> Values:
     """Return what differs in the node, and say it."""
-    found = list(differences(session, objects, values))
+    found = list(node_objects.differences(session, objects, values))
     for one in found:
-        click.echo(one_line(line(objects, one, "in the file")))
+        click.echo(one_line(node_objects.line(objects, one, "in the file")))
     say(f"objects that differ: {len(found)} of {len(values)}")
     return {one.entry: one.wanted for one in found}
 
 
-def _steps(session: NetSession, objects: NamedObjects, changed: Values, file: Path) -> list[Write]:
+def _steps(
+    session: NetSession, objects: node_objects.NamedObjects, changed: Values, file: Path
+) -> list[Write]:
     """Return what is written; Refused if the file asks for what cannot be."""
     writable = {at for at, row in objects.rows.items() if row.writable}
 
-    def number(at: Entry) -> int:
+    def number(at: node_objects.Entry) -> int:
         try:
             data = session.bus.read(objects.node_id, *at, objects.size(at))
         except SdoFailed:
@@ -113,12 +110,14 @@ def _steps(session: NetSession, objects: NamedObjects, changed: Values, file: Pa
 
 def _write(
     session: NetSession,
-    objects: NamedObjects,
+    objects: node_objects.NamedObjects,
     steps: Sequence[Write],
     *,
     store: bool,
 ) -> None:
-    titles = [f"{objects.title(at)} = {shown(objects, at, data)}" for at, data in steps]
+    titles = [
+        f"{objects.title(at)} = {node_objects.shown(objects, at, data)}" for at, data in steps
+    ]
     session.work.plan(*titles, *(["store"] if store else []))
     for number, (at, data) in enumerate(steps):
         session.work.ending = disabled(steps[:number], steps[number:])
