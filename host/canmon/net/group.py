@@ -10,22 +10,22 @@ import click
 from tickrig.host.cli.can_options import BusOptions, bus_options, spread
 from tickrig.host.cli.options import LazyGroup, time_option
 
-_HERE: Final = "tickrig.host.canmon.net.verbs"
+_HERE: Final = "tickrig.host.canmon.net"
 VERBS: Final = {
-    "scan": (f"{_HERE}.scan_verb:command", "Say which nodes are there."),
-    "nmt": (f"{_HERE}.nmt_verb:command", "Send an NMT command to NODE, or to all."),
+    "scan": (f"{_HERE}.node_verbs:scan", "Say which nodes are there."),
+    "nmt": (f"{_HERE}.node_verbs:nmt", "Send an NMT command to NODE, or to all."),
     "lss": (
         f"{_HERE}.lss_verb:command",
         "Configure node-ID and bit rate of nodes by LSS (CiA 305).",
     ),
-    "read": (f"{_HERE}.read_verb:command", "Read objects of NODE."),
-    "write": (f"{_HERE}.write_verb:command", "Write objects of NODE."),
-    "dcf": (f"{_HERE}.dcf_verb:command", "Write what the DCF or XDC FILE configures into NODE."),
-    "compare": (f"{_HERE}.compare_verb:command", "Compare NODE with a DCF, or with another node."),
-    "store": (f"{_HERE}.store_verb:store", "Store parameters of NODE (1010h)."),
-    "restore": (f"{_HERE}.store_verb:restore", "Restore the defaults of NODE (1011h)."),
+    "read": (f"{_HERE}.object_verbs:read", "Read objects of NODE."),
+    "write": (f"{_HERE}.object_verbs:write", "Write objects of NODE."),
+    "dcf": (f"{_HERE}.object_verbs:dcf", "Write what the DCF or XDC FILE configures into NODE."),
+    "compare": (f"{_HERE}.object_verbs:compare", "Compare NODE with a DCF, or with another node."),
+    "store": (f"{_HERE}.object_verbs:store", "Store parameters of NODE (1010h)."),
+    "restore": (f"{_HERE}.object_verbs:restore", "Restore the defaults of NODE (1011h)."),
     "program": (f"{_HERE}.program_verb:command", "Download FILE into NODE by block transfer."),
-    "boot": (f"{_HERE}.boot_verb:command", "Boot NODE as an NMT master does (CiA 302-2)."),
+    "boot": (f"{_HERE}.node_verbs:boot", "Boot NODE as an NMT master does (CiA 302-2)."),
 }
 _ANSWER_US: Final = 500_000
 

@@ -12,7 +12,7 @@ from tests.host.canmon.net.test_net_verbs import net
 from tickrig.device.canopen.models.f_palette_boot import make_f_palette_boot
 from tickrig.emulators.testing.conformance.conformance import SlaveBench
 from tickrig.host.canmon.net import session
-from tickrig.host.canmon.net.verbs.program_verb import ProgressBar
+from tickrig.host.canmon.net.program_verb import ProgressBar
 
 RIG = """\
 [device.module]

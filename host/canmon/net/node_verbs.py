@@ -1,0 +1,372 @@
+"""The verbs of `canmon net` about nodes: scan, nmt, boot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.host.canmon.eds_document import read_device_document
+from tickrig.host.canmon.model.decode.node_board import profile_text
+from tickrig.host.canmon.net.group import NetCall
+from tickrig.host.canmon.net.node_objects import DEVICE_TYPE, NamedObjects
+from tickrig.host.canmon.net.session import NetSession, NodeFailed, net_session
+from tickrig.host.canmon.risks import nmt_risk, write_risk
+from tickrig.host.canopen.bus_file.bus_file import read_bus_file
+from tickrig.host.canopen.commissioning.configuration import dcf_values, writes
+from tickrig.host.canopen.commissioning.node_bus import NetworkScan, NodeFound
+from tickrig.host.canopen.errors import SdoAborted, SdoFailed
+from tickrig.host.canopen.master import boot_slave
+from tickrig.host.canopen.master.assignment import ObjectWrite, SlaveAssignment
+from tickrig.host.canopen.master.from_bus_file import plan_of
+from tickrig.host.cli.messages import Refused, refuse_path, refusing, say, until_unread
+from tickrig.host.cli.options import NODE_ID, PATH, time_option
+from tickrig.host.text.page_text import json_text, one_line
+from tickrig.host.text.values import counted, format_time
+from tickrig.wire.canopen.nmt import ALL_NODES, NmtCommand, NmtState
+
+_NOBODY: Final = 1
+_WAIT_US: Final = 500_000
+
+
+@click.command()
+@time_option("--wait", "wait_us", help="For the last answers, and heartbeats.  [500ms]")
+@click.option("--json", "as_json", is_flag=True, help="Nodes as JSON, one a line.")
+@click.pass_obj
+def scan(call: NetCall, wait_us: int | None, as_json: bool) -> None:
+    """Say which nodes are there; exit status 1 if none is.
+
+    Each node-ID is asked for its device type (1000h) by SDO; nothing is changed. Who
+    is only heard is listed too. A state is known of nodes with a heartbeat.
+
+    \b
+    canmon net can0 scan
+    canmon net can0 scan --wait 2s --json
+    """  # noqa: D301 - click wants the backspace
+    found: list[NodeFound] = []
+    with net_session(call) as session:
+        scan = NetworkScan(session.bus, wait_us or _WAIT_US)
+        found += scan.run()
+    with until_unread():
+        for node in found:
+            click.echo(_json(node) if as_json else one_line(_line(node)))
+    if scan.unconfigured:
+        say("nodes without a node-ID are there: canmon net SOURCE lss")
+    if not found:
+        say("no node answered or was heard")
+        raise click.exceptions.Exit(_NOBODY)
+    say(counted(len(found), "node"))
+
+
+def _line(node: NodeFound) -> str:
+    state = "" if node.state is None else boot_slave.state_text(node.state)
+    if not node.answers:
+        return f"{node.node_id:>3}  {state}  does not answer"
+    words = [f"{node.node_id:>3}", f"{_kind(node.device_type):<14}", _identity(node), node.name]
+    if node.answers > 1:
+        words.append(f"answered {node.answers} times: as many nodes have this node-ID")
+    return "  ".join(word for word in (*words, state) if word)
+
+
+def _kind(device_type: int | None) -> str:
+    return "no 1000h" if device_type is None else profile_text(device_type)
+
+
+def _identity(node: NodeFound) -> str:
+    return ":".join("-" if part is None else f"{part:08X}" for part in node.identity)
+
+
+def _json(node: NodeFound) -> str:
+    return json_text(
+        {
+            "v": 1,
+            "node": node.node_id,
+            "device_type": node.device_type,
+            "identity": list(node.identity),
+            "name": node.name,
+            "state": None if node.state is None else boot_slave.state_text(node.state),
+            "answers": node.answers,
+        }
+    )
+
+
+# The verb `net nmt`: NMT commands, and what comes of them.
+
+
+_COMMANDS: Final = {
+    "start": NmtCommand.START,
+    "stop": NmtCommand.STOP,
+    "pre-op": NmtCommand.ENTER_PRE_OPERATIONAL,
+    "reset-node": NmtCommand.RESET_NODE,
+    "reset-comm": NmtCommand.RESET_COMMUNICATION,
+}
+_AFTER: Final = {
+    NmtCommand.START: (NmtState.OPERATIONAL,),
+    NmtCommand.STOP: (NmtState.STOPPED,),
+    NmtCommand.ENTER_PRE_OPERATIONAL: (NmtState.PRE_OPERATIONAL,),
+    NmtCommand.RESET_NODE: (NmtState.INITIALISING,),
+    NmtCommand.RESET_COMMUNICATION: (NmtState.INITIALISING,),
+}
+_RESETS: Final = (NmtCommand.RESET_NODE, NmtCommand.RESET_COMMUNICATION)
+_ALL: Final = "all"
+
+_BOOT_UP_US: Final = 5_000_000
+_LISTEN_US: Final = 1_500_000
+_PERIODS: Final = 3
+"""So many heartbeat periods are waited for a state."""
+
+
+@click.command()
+@click.argument("word", type=click.Choice(list(_COMMANDS)), metavar="COMMAND")
+@click.argument("node", metavar="NODE|all")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def nmt(call: NetCall, word: str, node: str, yes: bool) -> None:
+    """Send an NMT command to NODE, or to all: start, stop, pre-op, reset-node, reset-comm.
+
+    Then it is waited for the state, or after a reset for the boot-up; only a node with
+    a heartbeat (1017h) tells its state. Exit status 1 if it reports another one, does
+    not boot, or nothing of it is heard.
+
+    \b
+    canmon net can0 nmt start 5
+    canmon net can0 nmt reset-node all --yes
+    """  # noqa: D301 - click wants the backspace
+    command, node_id = _COMMANDS[word], _node_id(node)
+    with net_session(call, node_id or None) as session:
+        if node_id == ALL_NODES:
+            _command_all(session, command, word, yes=yes)
+        else:
+            _command_one(session, command, word, node_id, yes=yes)
+
+
+def _node_id(word: str) -> int:
+    if word.lower() == _ALL:
+        return ALL_NODES
+    if not (word.isascii() and word.isdecimal() and 1 <= int(word) <= 127):
+        raise Refused(f"{word!r} is no node-ID 1..127, and not all")
+    return int(word)
+
+
+def _command_one(
+    session: NetSession, command: NmtCommand, word: str, node_id: int, *, yes: bool
+) -> None:
+    device_type, heartbeat_ms = _number(session, node_id, 0x1000), _number(session, node_id, 0x1017)
+    known = device_type is not None or node_id in session.bus.states
+    risk = nmt_risk(command, device_type)
+    session.confirm(f"NMT {word} to node {node_id}", yes=yes, risk=risk)
+    session.work.plan(f"NMT {word} to node {node_id}")
+    session.bus.command(command, node_id)
+    session.work.done()
+    wanted, wait_us = _AFTER[command], _LISTEN_US
+    if command in _RESETS:
+        wait_us = _BOOT_UP_US
+    elif heartbeat_ms:
+        wait_us = max(_PERIODS * heartbeat_ms * 1_000, _LISTEN_US)
+    state = session.bus.await_state(node_id, wanted, wait_us)
+    if state in wanted:
+        say(f"node {node_id}: {boot_slave.state_text(wanted[0])}")
+    elif state is not None:
+        raise NodeFailed(
+            f"node {node_id} is {boot_slave.state_text(state)}, not {boot_slave.state_text(wanted[0])}"
+        )
+    elif command in _RESETS:
+        raise NodeFailed(f"node {node_id}: no boot-up within {wait_us // 1_000_000} s")
+    elif heartbeat_ms:
+        raise NodeFailed(f"node {node_id}: no heartbeat within {wait_us // 1_000} ms")
+    elif known or _number(session, node_id, 0x1000) is not None:
+        say(f"node {node_id}: sent; it has no heartbeat that tells its state")
+    else:
+        raise NodeFailed(
+            f"node {node_id}: sent, but nothing answers as node {node_id}: it is not there, or"
+            " Stopped without a heartbeat"
+        )
+
+
+def _number(session: NetSession, node_id: int, index: int) -> int | None:
+    """Return an object, None if the node does not tell it: one that is Stopped has no SDO."""
+    try:
+        return int.from_bytes(session.bus.read(node_id, index, 0), "little")
+    except SdoAborted:
+        return 0
+    except SdoFailed:
+        return None
+
+
+def _command_all(session: NetSession, command: NmtCommand, word: str, *, yes: bool) -> None:
+    session.confirm(f"NMT {word} to all nodes", yes=yes, risk=nmt_risk(command, None))
+    session.work.plan(f"NMT {word} to all nodes")
+    session.bus.states.clear()
+    session.bus.command(command, ALL_NODES)
+    session.work.done()
+    session.bus.gather(_LISTEN_US)
+    for node_id, state in sorted(session.bus.states.items()):
+        say(f"node {node_id}: {boot_slave.state_text(state)}")
+    if not session.bus.states:
+        say("sent; no node has reported its state since")
+    elif command not in _RESETS:
+        say("sent; other nodes, if there are any, have no heartbeat that tells their state")
+
+
+# The verb `net boot`: the boot-up of a node after CiA 302-2, step by step.
+
+
+# What is expected of a node at its boot-up: by a bus.yml, by its EDS or DCF, or nothing.
+
+_HEARTBEAT: Final = (0x1017, 0)
+_U16_BYTES: Final = 2
+_U32: Final = 0xFFFF_FFFF
+
+
+def _of_bus_file(path: Path, node_id: int) -> SlaveAssignment:
+    """Return what a bus.yml expects of a slave.
+
+    Raises:
+        Refused: it cannot be read, is wrong, or has no such slave.
+    """
+    try:
+        bus = read_bus_file(path)
+        if bus.errors:
+            raise ValueError("; ".join(map(str, bus.errors)))
+        plan = plan_of(bus)
+    except OSError as error:
+        refuse_path("--bus", error)
+    except (ImportError, ValueError) as error:
+        raise Refused(f"--bus {error}") from None
+    slaves = {slave.node_id: slave for slave in plan.slaves}
+    if node_id not in slaves:
+        there = ", ".join(map(str, slaves)) or "none"
+        raise Refused(f"--bus {path} has no slave {node_id}; its slaves: {there}")
+    return slaves[node_id]
+
+
+def _of_eds(path: Path, node_id: int) -> SlaveAssignment:
+    """Return what an EDS expects: the device, and of a DCF its configuration; Refused if none.
+
+    Revision and serial number of an EDS are those of one device: any will do.
+    """
+    objects = NamedObjects(node_id, read_device_document(path, "--eds").file)
+    file, device = objects.file, objects.device
+    assert file is not None
+    assert device is not None
+    values = dcf_values(file, device, node_id)
+    power_on = {at: row.power_on_data(node_id) for at, row in objects.rows.items()}
+
+    def number(at: tuple[int, int]) -> int:
+        return int.from_bytes(power_on.get(at, b""), "little")
+
+    writable = {at for at, row in objects.rows.items() if row.writable}
+    with refusing(f"--eds {path}:"):
+        steps = writes(values, number, writable)
+    period_ms = int.from_bytes(values.get(_HEARTBEAT, b"")[:_U16_BYTES], "little")
+    return SlaveAssignment(
+        node_id,
+        writes=tuple(ObjectWrite(*at, data) for at, data in steps),
+        heartbeat_us=_PERIODS * period_ms * 1_000,
+        device_type=number((0x1000, 0)) & _U32,
+        vendor_id=number((0x1018, 1)) & _U32,
+        product_code=number((0x1018, 2)) & _U32,
+    )
+
+
+def _risk(assignment: SlaveAssignment) -> str:
+    """Say what the boot-up may move."""
+    resets = not assignment.reset_communication or assignment.restore_sub or assignment.program
+    if resets:
+        return nmt_risk(NmtCommand.RESET_NODE, assignment.device_type or None)
+    objects = NamedObjects(assignment.node_id)
+    objects.learn(DEVICE_TYPE, assignment.device_type.to_bytes(4, "little"))
+    return write_risk(objects.is_drive, [(write.index, write.sub) for write in assignment.writes])
+
+
+def _changes(assignment: SlaveAssignment) -> list[str]:
+    """Say what the boot-up does to the node, beside reading."""
+    found = []
+    if not assignment.reset_communication:
+        found.append("reset communication, unless it is Operational")
+    if assignment.program:
+        found.append("program download, if its software is another")
+    if assignment.restore_sub:
+        found.append("restore and reset")
+    if assignment.writes:
+        found.append(counted(len(assignment.writes), "write"))
+    return found
+
+
+def _nothing_expected(node_id: int) -> SlaveAssignment:
+    """Return what is expected where nobody says anything: that it answers."""
+    say("no --bus and no --eds: nothing is expected of the node but that it answers")
+    return SlaveAssignment(node_id)
+
+
+_HALF: Final = "the node is as the steps before left it"
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.option("--bus", "bus_file", type=PATH, metavar="FILE", help="bus.yml that has the node.")
+@click.option("--eds", type=PATH, metavar="FILE", help="EDS or DCF of the node.")
+@click.option("--explain", is_flag=True, help="Show each step: asked, answered, what follows.")
+@click.option("--keep-alive", "leaves_alone", is_flag=True, help="Leave it if it is Operational.")
+@click.option("--start", is_flag=True, help="Start it when it has booted.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def boot(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall,
+    node: int,
+    bus_file: Path | None,
+    eds: Path | None,
+    explain: bool,
+    leaves_alone: bool,
+    start: bool,
+    yes: bool,
+) -> None:
+    """Boot NODE as an NMT master does (CiA 302-2); exit status 1 if it does not boot.
+
+    Device type, identity, state, software, configuration, error control, in the order
+    of Lely's master; the error status is a letter A to O. What is expected says --bus,
+    as the master of that bus.yml has it, or --eds: its device, and of a DCF its values.
+
+    \b
+    canmon net can0 boot 5 --explain
+    canmon net can0 boot 5 --bus bus.yml --explain --start
+    """  # noqa: D301 - click wants the backspace
+    if bus_file is not None and eds is not None:
+        raise Refused("--bus or --eds: which? give one")
+    slave = _expected(node, bus_file, eds)
+    slave = replace(slave, reset_communication=False) if leaves_alone else slave
+    with net_session(call, node) as session:
+        if doing := _changes(slave):
+            what = f"boot-up of node {node}: {', '.join(doing)}"
+            session.confirm(what, yes=yes, risk=_risk(slave))
+        session.work.ending = _HALF
+        outcome = _boot(session, slave, explain=explain)
+        session.work.ending = ""
+        status = outcome.status
+        if not status.good:
+            raise NodeFailed(f"node {node}: error status {status.value}: {status.text}")
+        letter = f"error status {status.value}: " if status.value else ""
+        say(f"node {node}: {letter}{status.text}")
+        if start and status is boot_slave.BootStatus.BOOTED:
+            may = nmt_risk(NmtCommand.START, slave.device_type or None)
+            session.confirm(f"NMT start to node {node}", yes=yes, risk=may)
+            session.bus.command(NmtCommand.START, node)
+            say(f"node {node}: started")
+
+
+def _expected(node: int, bus_file: Path | None, eds: Path | None) -> SlaveAssignment:
+    if bus_file is not None:
+        return _of_bus_file(bus_file, node)
+    return _nothing_expected(node) if eds is None else _of_eds(eds, node)
+
+
+def _boot(session: NetSession, slave: SlaveAssignment, *, explain: bool) -> boot_slave.BootOutcome:
+    began_us = session.bus.now_us
+
+    def show(step: boot_slave.BootStep) -> None:
+        if explain:
+            click.echo(one_line(f"{format_time(session.bus.now_us - began_us)} {step}"))
+
+    return session.bus.run(slave.node_id, boot_slave.SlaveBoot(slave, show).script())

@@ -1,0 +1,467 @@
+"""The verbs of `canmon net` about objects: read, write, compare, store, restore, dcf."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+import click
+
+from tickrig.host.canmon.net import node_objects
+from tickrig.host.canmon.net.group import NetCall
+from tickrig.host.canmon.net.node_objects import (
+    Entry,
+    NamedObjects,
+    encoded,
+    known_objects,
+    limits,
+    shown,
+)
+from tickrig.host.canmon.net.session import (
+    NetSession,
+    NodeFailed,
+    failure_text,
+    net_session,
+    of_node,
+)
+from tickrig.host.canmon.risks import write_risk
+from tickrig.host.canopen.commissioning.configuration import (
+    Values,
+    dcf_values,
+    default_values,
+    disabled,
+    is_parameter,
+    writes,
+)
+from tickrig.host.canopen.conform.write_order import Write
+from tickrig.host.canopen.errors import SdoAborted, SdoFailed
+from tickrig.host.cli.messages import Refused, refusing, say, until_unread
+from tickrig.host.cli.options import NODE_ID, PATH
+from tickrig.host.text.page_text import json_text, one_line
+from tickrig.host.text.values import counted
+from tickrig.wire.canopen.nmt import NmtCommand, NmtState
+from tickrig.wire.canopen.sdo_frame import describe_abort
+
+_REFUSED: Final = 1
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.argument("names", nargs=-1, metavar="OBJECT...")
+@click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node.")
+@click.option("--json", "as_json", is_flag=True, help="Objects as JSON, one a line.")
+@click.pass_obj
+def read(call: NetCall, node: int, names: Sequence[str], eds: Path | None, as_json: bool) -> None:
+    """Read objects of NODE, by name or index; without any all that its EDS names.
+
+    A name is that of the EDS in small letters with _ for what is no letter, as
+    position_actual_value or identity_object.vendor_id, else that of CiA 301 or 402.
+    Exit status 1 if the node refuses one.
+
+    \b
+    canmon net can0 read 5 statusword 1018h:1 --eds drive.eds
+    canmon net can0 read 5 --eds drive.eds
+    """  # noqa: D301 - click wants the backspace
+    refused: list[Entry] = []
+    with net_session(call, node) as session, until_unread():
+        with of_node(node):
+            objects = known_objects(session, node, eds)
+        with of_node(node, objects.title):
+            for entry in _wanted(objects, names):
+                line = _read(session, objects, entry, as_json)
+                refused += [] if line else [entry]
+                if line:
+                    click.echo(line)
+    if refused:
+        raise click.exceptions.Exit(_REFUSED)
+
+
+def _wanted(objects: NamedObjects, names: Sequence[str]) -> list[Entry]:
+    if names:
+        return [objects.find(name) for name in names]
+    if not objects.rows:
+        raise Refused("which objects? name them, or give the EDS (--eds FILE) for all of it")
+    return [at for at, row in sorted(objects.rows.items()) if row.readable]
+
+
+def _read(session: NetSession, objects: NamedObjects, entry: Entry, as_json: bool) -> str | None:
+    """Return a line with the value; None if the node refuses, which is told."""
+    node_id = objects.node_id
+    try:
+        data = session.bus.read(node_id, *entry, objects.size(entry))
+    except SdoAborted as error:
+        text = failure_text(error, objects.title)
+        say(one_line(f"node {node_id}: {text}"))
+        return None
+    if not as_json:
+        return one_line(f"{objects.title(entry)} = {shown(objects, entry, data)}")
+    value = objects.text(entry).read(data)[0]
+    said = {"v": 1, "node": node_id, "index": entry[0], "sub": entry[1]}
+    more = {"name": objects.text(entry).name, "data": data.hex(), "unit": objects.text(entry).unit}
+    return json_text({**said, **more, "value": value if not isinstance(value, bytes) else None})
+
+
+# The verb `net write`: objects of a node.
+
+
+_MAPPING_OFFSET: Final = 0x200
+_PDO_MAPPINGS: Final = (*range(0x1600, 0x1800), *range(0x1A00, 0x1C00))
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.argument("values", nargs=-1, required=True, metavar="OBJECT=VALUE...")
+@click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of the node.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def write(call: NetCall, node: int, values: Sequence[str], eds: Path | None, yes: bool) -> None:
+    """Write objects of NODE, by name or index, in this order.
+
+    Values are decimal, hex (0x1F), in the unit of the object where its EDS gives one,
+    texts, or bytes in hex. Where no type is known it stands before the value: u16:5.
+    The first that is refused ends it; those before it stay written.
+
+    \b
+    canmon net can0 write 5 heartbeat_time=100 --yes
+    canmon net can0 write 5 2000h:1=u16:0x1F 1008h=text:left
+    canmon net can0 write 5 controlword=15 target_velocity=100 --eds drive.eds
+    """  # noqa: D301 - click wants the backspace
+    pairs = list(map(_split, values))
+    with net_session(call, node) as session:
+        with of_node(node):
+            objects = known_objects(session, node, eds)
+        writes = [(objects.find(name), text) for name, text in pairs]
+        made = [(entry, text, encoded(objects, entry, text)) for entry, text in writes]
+        titles = [f"{objects.title(entry)} = {text}" for entry, text, _ in made]
+        risk = write_risk(objects.is_drive, [entry for entry, _, _ in made])
+        session.confirm(f"writes to node {node}: {', '.join(titles)}", yes=yes, risk=risk)
+        session.work.plan(*titles)
+        for title, (entry, _, data) in zip(titles, made, strict=True):
+            _write_one(session, objects, entry, data)
+            session.work.done()
+            say(one_line(f"written: {title}"))
+
+
+def _split(word: str) -> tuple[str, str]:
+    name, equals, text = word.partition("=")
+    if not (name and equals):
+        raise Refused(f"{word!r} is not OBJECT=VALUE, as heartbeat_time=100 or 2000h:1=u16:5")
+    return name, text
+
+
+def _write_one(session: NetSession, objects: NamedObjects, entry: Entry, data: bytes) -> None:
+    node_id = objects.node_id
+    with of_node(node_id, objects.title):
+        try:
+            session.bus.write(node_id, *entry, data)
+        except SdoAborted as error:
+            why = f"refused: {describe_abort(error.code)}{limits(objects, entry)}{_hint(entry)}"
+            raise NodeFailed(f"node {node_id}: {objects.title(entry)}: {why}") from None
+
+
+def _hint(entry: Entry) -> str:
+    """Say what a PDO wants before its mapping is changed; empty for other objects."""
+    if entry[0] not in _PDO_MAPPINGS:
+        return ""
+    return f"; disable the PDO first: {entry[0] - _MAPPING_OFFSET:04X}h:01 with bit 31"
+
+
+# The verb `net compare`: a node held against a DCF, or another node.
+
+
+_DIFFERENT: Final = 1
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.argument("other", metavar="FILE|NODE")
+@click.option("--eds", type=PATH, metavar="FILE", help="EDS, DCF or XDD of both nodes.")
+@click.pass_obj
+def compare(call: NetCall, node: int, other: str, eds: Path | None) -> None:
+    """Compare NODE with a DCF, or with another node; exit status 1 if they differ.
+
+    Of a DCF its ParameterValues count; of a file without any, as an EDS, the defaults of
+    all parameters. Of two nodes all parameters of the EDS are compared; values that are
+    relative to the node-ID in the EDS are compared without it. Nothing is written.
+
+    \b
+    canmon net can0 compare 5 drive.dcf
+    canmon net can0 compare 5 6 --eds drive.eds
+    """  # noqa: D301 - click wants the backspace
+    found = 0
+    with net_session(call, node) as session, until_unread():
+        other_id = _other_id(other)
+        file = eds if other_id else Path(other)
+        with of_node(node):
+            objects = node_objects.known_objects(
+                session, node, file, what="--eds" if other_id else "FILE"
+            )
+        if other_id:
+            values, where = _of_node(session, objects, other_id), f"at node {other_id}"
+        else:
+            values, where = _of_file(objects), "in the file"
+        with of_node(node, objects.title):
+            for one in node_objects.differences(session, objects, values):
+                found += 1
+                click.echo(one_line(node_objects.line(objects, one, where)))
+        say(f"objects that differ: {found} of {len(values)}")
+    if found:
+        raise click.exceptions.Exit(_DIFFERENT)
+
+
+def _other_id(word: str) -> int:
+    """Return the node-ID that a word is, 0 if it is none."""
+    number = int(word) if word.isascii() and word.isdecimal() else 0
+    if number > 127:
+        raise Refused(f"{word} is no node-ID 1..127")
+    return number
+
+
+def _of_file(objects: node_objects.NamedObjects) -> Values:
+    assert objects.file is not None
+    assert objects.device is not None
+    node_id = objects.node_id
+    values = dcf_values(objects.file, objects.device, node_id)
+    values = values or default_values(objects.device, node_id)
+    return {at: data for at, data in values.items() if objects.rows[at].readable}
+
+
+def _of_node(session: NetSession, objects: node_objects.NamedObjects, other_id: int) -> Values:
+    """Return the parameters of another node, as this one would have them."""
+    rows = {at: row for at, row in objects.rows.items() if is_parameter(row)}
+    if not rows:
+        raise Refused("which objects? give the EDS of both nodes (--eds FILE)")
+    with of_node(other_id, objects.title):
+        found = node_objects.values_of(session, other_id, rows)
+    shift = objects.node_id - other_id
+    for at, data in found.items():
+        if rows[at].relative and data != bytes(len(data)):
+            number = int.from_bytes(data, "little") + shift
+            found[at] = (number % (1 << 8 * len(data))).to_bytes(len(data), "little")
+    return found
+
+
+# The verbs `net store` and `net restore`: 1010h and 1011h.
+
+
+# Store and restore of a node: 1010h and 1011h.
+
+_STORE: Final = 0x1010
+_RESTORE: Final = 0x1011
+_PATIENCE_US: Final = 10_000_000
+"""A node that writes its memory may answer late."""
+_BOOT_UP_US: Final = 5_000_000
+_ON_COMMAND: Final = 1
+"""Bit 0 of 1010h: it saves on command."""
+
+_AREAS: Final = {"all": 1, "communication": 2, "application": 3}
+_COMMUNICATION: Final = 2
+
+
+def save(session: NetSession, node_id: int, sub: int) -> None:
+    """Have a node store parameters; NodeFailed if it cannot.
+
+    Args:
+        session: the bus.
+        node_id: the node.
+        sub: 1 for all, 2 for 1000h to 1FFFh, 3 for 6000h to 9FFFh, others as its maker says.
+    """
+    with of_node(node_id):
+        data = session.bus.read(node_id, _STORE, sub)
+        if not data[:1] or not data[0] & _ON_COMMAND:
+            raise NodeFailed(
+                f"node {node_id}: {_STORE:04X}h:{sub:02X} is {data[::-1].hex().upper()}h:"
+                " it does not store on command"
+            )
+        session.bus.write(node_id, _STORE, sub, b"save", _PATIENCE_US)
+    say(f"node {node_id}: stored")
+
+
+def _load_defaults(session: NetSession, node_id: int, sub: int) -> None:
+    """Have a node forget what was stored; it counts from its next reset."""
+    with of_node(node_id):
+        session.bus.write(node_id, _RESTORE, sub, b"load", _PATIENCE_US)
+    say(f"node {node_id}: restored; the defaults count from its next reset")
+
+
+def reset(session: NetSession, node_id: int, sub: int) -> None:
+    """Reset a node, or its communication where only that was restored; wait for its boot-up."""
+    communication = sub == _COMMUNICATION
+    command = NmtCommand.RESET_COMMUNICATION if communication else NmtCommand.RESET_NODE
+    session.bus.command(command, node_id)
+    wanted = (NmtState.INITIALISING,)
+    if session.bus.await_state(node_id, wanted, _BOOT_UP_US) not in wanted:
+        raise NodeFailed(f"node {node_id}: no boot-up within {_BOOT_UP_US // 1_000_000} s")
+    say(f"node {node_id}: boot-up")
+
+
+def _sub(word: str) -> int:
+    if word in _AREAS:
+        return _AREAS[word]
+    number = int(word) if word.isascii() and word.isdecimal() else 0
+    if not 1 <= number <= 0x7F:
+        raise Refused(f"{word!r} is none of {', '.join(_AREAS)}, and no sub-index 1..127")
+    return number
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.argument("area", default="all")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def store(call: NetCall, node: int, area: str, yes: bool) -> None:
+    """Store parameters of NODE (1010h): all, communication, application or a sub-index.
+
+    \b
+    canmon net can0 store 5
+    canmon net can0 store 5 communication --yes
+    """  # noqa: D301 - click wants the backspace
+    sub = _sub(area)
+    with net_session(call, node) as session:
+        session.confirm(f"node {node} stores its parameters: {area}", yes=yes)
+        session.work.plan("store")
+        save(session, node, sub)
+        session.work.done()
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.argument("area", default="all")
+@click.option("--reset", "then_reset", is_flag=True, help="Reset it, so that they count at once.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def restore(call: NetCall, node: int, area: str, then_reset: bool, yes: bool) -> None:
+    """Restore the defaults of NODE (1011h): all, communication, application or a sub-index.
+
+    They count from its next reset.
+
+    \b
+    canmon net can0 restore 5 --reset
+    canmon net can0 restore 5 communication
+    """  # noqa: D301 - click wants the backspace
+    sub = _sub(area)
+    risk = "Limits and gains of a drive become those of its maker"
+    if then_reset:
+        risk += "; it lets go of its motor: what hangs on it may fall"
+    with net_session(call, node) as session:
+        session.confirm(f"node {node} forgets its parameters: {area}", yes=yes, risk=risk)
+        session.work.plan("restore", *(["reset"] if then_reset else []))
+        _load_defaults(session, node, sub)
+        session.work.done()
+        if then_reset:
+            reset(session, node, sub)
+            session.work.done()
+
+
+# The verb `net dcf`: what a DCF says goes into a node.
+
+
+@click.command()
+@click.argument("node", type=NODE_ID)
+@click.argument("file", type=PATH)
+@click.option("--all", "whole", is_flag=True, help="Write what is there already, too.")
+@click.option("--skip", multiple=True, metavar="OBJECT", help="Is not written; may be repeated.")
+@click.option("--store", is_flag=True, help="Store all of it then (1010h:01).")
+@click.option("--other-device", is_flag=True, help="Though FILE is of another device.")
+@click.option("--dry-run", is_flag=True, help="Say what differs; write nothing.")
+@click.option("--yes", is_flag=True, help="Ask nothing.")
+@click.pass_obj
+def dcf(  # noqa: PLR0913, PLR0917 - options
+    call: NetCall,
+    node: int,
+    file: Path,
+    whole: bool,
+    skip: Sequence[str],
+    store: bool,
+    other_device: bool,
+    dry_run: bool,
+    yes: bool,
+) -> None:
+    """Write what the DCF or XDC FILE configures into NODE, as far as it differs.
+
+    That is its ParameterValues. PDOs are disabled while they change, as CiA 301 has it,
+    1020h is written last. The first object that is refused ends it, and what was
+    written is told. A file of another device (1000h, 1018h) is refused.
+
+    \b
+    canmon net can0 dcf 5 drive.dcf --dry-run
+    canmon net can0 dcf 5 drive.dcf --store --yes
+    """  # noqa: D301 - click wants the backspace
+    with net_session(call, node) as session:
+        with of_node(node):
+            objects = node_objects.known_objects(
+                session, node, file, what="FILE", strict=not other_device
+            )
+        values = _dcf_values(objects, skip)
+        with of_node(node, objects.title):
+            changed = values if whole else _changed(session, objects, values)
+            steps = _steps(session, objects, changed, file)
+        if dry_run or not steps:
+            return
+        what = f"{counted(len(changed), 'object')} of {file.name} to node {node}"
+        what += ", then stored" if store else ""
+        session.confirm(
+            what, yes=yes, risk=write_risk(objects.is_drive, [at for at, _ in changed.items()])
+        )
+        _write_all(session, objects, steps, store=store)
+
+
+def _dcf_values(objects: node_objects.NamedObjects, skip: Sequence[str]) -> Values:
+    file, device = objects.file, objects.device
+    assert file is not None
+    assert device is not None
+    left_out = {objects.find(word) for word in skip}
+    values = dcf_values(file, device, objects.node_id)
+    if not values:
+        raise Refused(f"{file.name} has no ParameterValue of an object that can be written: no DCF")
+    return {at: data for at, data in values.items() if at not in left_out}
+
+
+def _changed(session: NetSession, objects: node_objects.NamedObjects, values: Values) -> Values:
+    """Return what differs in the node, and say it."""
+    found = list(node_objects.differences(session, objects, values))
+    for one in found:
+        click.echo(one_line(node_objects.line(objects, one, "in the file")))
+    say(f"objects that differ: {len(found)} of {len(values)}")
+    return {one.entry: one.wanted for one in found}
+
+
+def _steps(
+    session: NetSession, objects: node_objects.NamedObjects, changed: Values, file: Path
+) -> list[Write]:
+    """Return what is written; Refused if the file asks for what cannot be."""
+    writable = {at for at, row in objects.rows.items() if row.writable}
+
+    def number(at: node_objects.Entry) -> int:
+        try:
+            data = session.bus.read(objects.node_id, *at, objects.size(at))
+        except SdoFailed:
+            return 0
+        return int.from_bytes(data, "little")
+
+    with refusing(f"FILE {file}:"):
+        return writes(changed, number, writable)
+
+
+def _write_all(
+    session: NetSession,
+    objects: node_objects.NamedObjects,
+    steps: Sequence[Write],
+    *,
+    store: bool,
+) -> None:
+    titles = [
+        f"{objects.title(at)} = {node_objects.shown(objects, at, data)}" for at, data in steps
+    ]
+    session.work.plan(*titles, *(["store"] if store else []))
+    for number, (at, data) in enumerate(steps):
+        session.work.ending = disabled(steps[:number], steps[number:])
+        with of_node(objects.node_id, objects.title):
+            session.bus.write(objects.node_id, *at, data)
+        session.work.done()
+    session.work.ending = ""
+    say(f"node {objects.node_id}: {counted(len(steps), 'write')} done")
+    if store:
+        save(session, objects.node_id, 1)
+        session.work.done()
