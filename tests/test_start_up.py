@@ -58,6 +58,9 @@ MOST = {
 }
 """Command lines, and how many modules of ours each may import."""
 
+MOST_OF_A_BENCH = 160
+"""How many modules of ours a bench with an RRC may import."""
+
 
 @pytest.fixture(scope="module")
 def imported() -> dict[str, list[str]]:
@@ -114,3 +117,17 @@ def test_what_can_be_named_is_what_there_is() -> None:
     assert tuple(CANOPEN_MODELS) == MODELS
     assert (AUTO, *CANOPEN_PROFILES) == PROFILES
     assert next(each.proposals for each in LITE_FIELDS if each.name == "node") == tuple(COMPONENTS)
+
+
+def test_a_bench_without_nodes_imports_nothing_that_makes_them() -> None:
+    code = (
+        "import sys; from tickrig import Bench\n"
+        "with Bench('rrc') as bench: bench.press('power_button'); bench.run_for('50ms')\n"
+        "print(*(name for name in sys.modules if name.startswith('tickrig.')))"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    ours = process.stdout.split()
+    assert len(ours) <= MOST_OF_A_BENCH, ours
+    assert "tickrig.emulators.canopen.build" not in ours

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tickrig.device.canopen.slave import CanopenSlave
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.bench.fault_spec import FaultOrder
-from tickrig.emulators.canopen.build import describe, store_keeper
+from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO
 from tickrig.emulators.canopen.store_file import StoreFile
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure
@@ -35,7 +34,6 @@ from tickrig.emulators.testing.signals.sources import SignalSpec
 from tickrig.host.text.bench_header import DeviceEntry
 from tickrig.host.text.log import log_of
 from tickrig.host.text.values import Setting
-from tickrig.wire.canopen.eds.eds_file import finding_lines
 
 if TYPE_CHECKING:
     from tickrig.emulators.testing.bench.modes.doors import OutsideEnds
@@ -153,8 +151,8 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
         NoNodeIdError: nobody gives it a node-ID.
     """
     kind = Path(device.type) if device.kind is DeviceKind.EDS else device.type
-    description = describe(eds_cache(), kind, device.profile or AUTO)
-    for line in finding_lines(description.warnings):
+    description = late.describe(eds_cache(), kind, device.profile or AUTO)
+    for line in late.finding_lines(description.warnings):
         _logger.warning("%s: %s", device.name, line)
     node_id = description.node_id if device.node_id is None else device.node_id
     if node_id is None:
@@ -166,7 +164,7 @@ def slave_of(device: DevicePlan, stores: dict[Path, StoreFile]) -> tuple[Canopen
             if device.store not in stores:
                 stores[device.store] = StoreFile(device.store)
             memory = stores[device.store].nonvolatile(device.name, dictionary)
-        slave = make_slave(dictionary, node_id, memory, description.application, device.sdo)
+        slave = late.make_slave(dictionary, node_id, memory, description.application, device.sdo)
     profile, files = device.profile or AUTO, description.files
     return slave, node_entry(device.wire, slave, kind, profile, files)
 
@@ -205,7 +203,7 @@ def rig_of(
         keeps=keeps,
     )
     for store in parts.stores:
-        state.rig.watchers.append(store_keeper(store))
+        state.rig.watchers.append(late.store_keeper(store))
     rig = BenchRig(NAME, state)
     _begin_faults(plan, rig)
     return rig

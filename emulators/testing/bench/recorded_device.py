@@ -10,12 +10,9 @@ from typing import Any, Final
 from tickrig.device.canopen.dictionary import Dictionary
 from tickrig.device.canopen.sdo import USUAL, SdoLimits, SdoServers
 from tickrig.device.canopen.slave import CanopenSlave, Nonvolatile
-from tickrig.device.canopen.stack import make_slave
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.build import describe
+from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO, PROFILES, is_bus_node
-from tickrig.emulators.canopen.eds import EdsCache
-from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node
 from tickrig.emulators.canopen.store_file import drop_misfits, memory_values, parse_memory
 from tickrig.emulators.commands.device_type import build_recorded, check_no_code
@@ -67,7 +64,7 @@ def node_entry(
 
 
 def make_recorded(
-    header: BenchHeader, name: str, folder: Path, cache: EdsCache, *, run_code: bool = False
+    header: BenchHeader, name: str, folder: Path, cache: late.EdsCache, *, run_code: bool = False
 ) -> Any:
     """Make the device that was recorded, as it was when the recording began.
 
@@ -100,12 +97,12 @@ def user_code(entries: Iterable[DeviceEntry]) -> list[object]:
     return [spec for entry in entries for spec in (entry.type, *entry.config.values())]
 
 
-def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
+def _node(name: str, entry: DeviceEntry, folder: Path, cache: late.EdsCache) -> Node:
     device = _found(entry, folder)
     profile = str(entry.config.get(_PROFILE, AUTO))
     if profile not in PROFILES:
         raise ValueError(f"profile {profile!r:.60} is not one of {', '.join(PROFILES)}")
-    description = describe(cache, device, profile)
+    description = late.describe(cache, device, profile)
     for file in description.files if entry.files else ():
         _check_same(file, entry.files.get(file.name))
     dictionary = description.make_dictionary()
@@ -114,7 +111,7 @@ def _node(name: str, entry: DeviceEntry, folder: Path, cache: EdsCache) -> Node:
         int(entry.config.get(_SDO_TIMEOUT) or USUAL.timeout_us),
         int(entry.config.get(_SDO_MEMORY, USUAL.memory_bytes) or 0),
     )
-    slave = make_slave(dictionary, entry.node_id or 0, memory, description.application, sdo)
+    slave = late.make_slave(dictionary, entry.node_id or 0, memory, description.application, sdo)
     return Node(name, slave, CanWire())
 
 
@@ -130,7 +127,7 @@ def _memory(entry: DeviceEntry, dictionary: Dictionary) -> Nonvolatile:
 
 def _found(entry: DeviceEntry, folder: Path) -> Path | str:
     """Return the model, or where the very file is that was recorded."""
-    if entry.type in MODELS:
+    if entry.type in late.MODELS:
         return entry.type
     named = _file_of(entry.type) or Path(entry.type)
     for file in (named, folder / named, folder / named.name):

@@ -6,10 +6,8 @@ import re
 from pathlib import Path
 from typing import Any, Final
 
-from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus
-from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError
+from tickrig.emulators.canopen import late
 from tickrig.emulators.testing.rig_file.probe import eds_cache
-from tickrig.host.canopen.bus_file.bus_file import is_bus_file
 from tickrig.host.text.section import Notes, Section, shown
 from tickrig.host.text.toml_reader import Mistake, TomlDocument, TomlPath
 
@@ -22,7 +20,7 @@ _TOML: Final = re.compile(rb"^[ \t]*+\[", re.MULTILINE)
 
 def is_bus_yml(path: Path, data: bytes) -> bool:
     """Return whether a file is a bus.yml, a good or a bad one; not what only its name says."""
-    return is_bus_file(data) or (_is_named(path) and not _TOML.search(data))
+    return late.is_bus_file(data) or (_is_named(path) and not _TOML.search(data))
 
 
 def _is_named(path: Path) -> bool:
@@ -70,11 +68,11 @@ def with_nodes(top: Section, folder: Path, *, alone: bool = False) -> Section:
 def _places(top: Section, path: Path, *, alone: bool) -> dict[str, int]:
     """Return the lines of the nodes by their names; what is wrong is noted."""
     try:
-        bus = read_bus(path, cache=eds_cache())
+        bus = late.read_bus(path, cache=eds_cache())
     except ImportError as error:
         top.wrong(str(error), _BUS)
         return {}
-    except BusMistakesError as error:
+    except late.BusMistakesError as error:
         for place, text, _ in error.mistakes:
             own = alone and place.file == str(path)
             line = place.line if own else top.notes.document.line_of((_BUS,))

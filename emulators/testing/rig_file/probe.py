@@ -8,14 +8,11 @@ from functools import cache
 from pathlib import Path
 from typing import Final, Generic, NamedTuple, TypeVar
 
-from tickrig.device.canopen.stack import make_slave
 from tickrig.device.physical import InputSignal, OutputSignal, SignalType
 from tickrig.emulators.can.faults import CAN_FAULTS
 from tickrig.emulators.can.wire import CanWire
-from tickrig.emulators.canopen.build import ANY_ID, describe
+from tickrig.emulators.canopen import late
 from tickrig.emulators.canopen.choices import AUTO
-from tickrig.emulators.canopen.eds import EdsCache
-from tickrig.emulators.canopen.models import MODELS
 from tickrig.emulators.canopen.node import Node, Nodes
 from tickrig.emulators.commands.device_type import ConfiguredDevice, configure, option_names
 from tickrig.emulators.rig.emulated import HasSignals
@@ -59,9 +56,9 @@ class Probe:
 
 
 @cache
-def eds_cache() -> EdsCache:
+def eds_cache() -> late.EdsCache:
     """Return the descriptions that this process has read: benches come and go."""
-    return EdsCache()
+    return late.EdsCache()
 
 
 class WrongDevice(NamedTuple):
@@ -90,15 +87,15 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
         return _serial(plan, seed)
     device = Path(plan.type) if plan.kind is DeviceKind.EDS else plan.type
     try:
-        found = describe(eds_cache(), device, plan.profile or AUTO)
+        found = late.describe(eds_cache(), device, plan.profile or AUTO)
     except ValueError as error:
         return [WrongDevice(reason, ("type",)) for reason in str(error).splitlines()]
     except SystemExit as error:  # a user's file may do anything
         return [WrongDevice(f"{plan.type}: {explain_error(error)}", ("type",))]
     node_id = found.node_id if plan.node_id is None else plan.node_id
-    slave = make_slave(
+    slave = late.make_slave(
         found.make_dictionary(),
-        ANY_ID if node_id is None else node_id,
+        late.ANY_ID if node_id is None else node_id,
         None,
         found.application,
         plan.sdo,
@@ -106,7 +103,7 @@ def probe(plan: DevicePlan, seed: int = 0) -> Probe | list[WrongDevice]:
     node = Nodes([Node(plan.name, slave, CanWire())])
     title = found.info.product_name or Path(plan.type).name
     if plan.kind is DeviceKind.MODEL:
-        title = MODELS[plan.type].text
+        title = late.MODELS[plan.type].text
     return Probe(
         node,
         CAN_FAULTS,

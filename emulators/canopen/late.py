@@ -1,0 +1,36 @@
+"""What makes CANopen nodes, imported when the first node is made (PEP 562).
+
+A bench of serial devices makes none: without the slaves, EDS files and bus.yml `import Bench`
+takes two thirds of its time. Write `late.describe(...)`; a `from` import would load it at once.
+"""
+
+from __future__ import annotations
+
+from tickrig._lazy import lazy
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from tickrig.device.canopen.stack import make_slave as make_slave
+    from tickrig.emulators.canopen.build import ANY_ID as ANY_ID
+    from tickrig.emulators.canopen.build import describe as describe
+    from tickrig.emulators.canopen.build import store_keeper as store_keeper
+    from tickrig.emulators.canopen.bus_file.bus_nodes import read_bus as read_bus
+    from tickrig.emulators.canopen.bus_file.node_keys import BusMistakesError as BusMistakesError
+    from tickrig.emulators.canopen.eds import EdsCache as EdsCache
+    from tickrig.emulators.canopen.models import MODELS as MODELS
+    from tickrig.host.canopen.bus_file.bus_file import is_bus_file as is_bus_file
+    from tickrig.wire.canopen.eds.eds_file import finding_lines as finding_lines
+else:
+    __all__, __getattr__, __dir__ = lazy(
+        __name__,
+        {
+            "tickrig.device.canopen.stack": ("make_slave",),
+            "tickrig.emulators.canopen.build": ("ANY_ID", "describe", "store_keeper"),
+            "tickrig.emulators.canopen.bus_file.bus_nodes": ("read_bus",),
+            "tickrig.emulators.canopen.bus_file.node_keys": ("BusMistakesError",),
+            "tickrig.emulators.canopen.eds": ("EdsCache",),
+            "tickrig.emulators.canopen.models": ("MODELS",),
+            "tickrig.host.canopen.bus_file.bus_file": ("is_bus_file",),
+            "tickrig.wire.canopen.eds.eds_file": ("finding_lines",),
+        },
+    )
