@@ -58,7 +58,7 @@ MOST = {
 }
 """Command lines, and how many modules of ours each may import."""
 
-MOST_OF_A_BENCH = 160
+MOST_OF_A_BENCH = 165
 """How many modules of ours a bench with an RRC may import."""
 
 

@@ -279,7 +279,7 @@ _DEVICES: Final = ("eds", "dcf", "model", "rtc")
 _STANDARD_OUTPUT: Final = Path("-")
 
 
-def _emulate(
+def emulate(
     node_id: str | None,
     nodes: tuple[str, ...],
     rig: Path | None,
@@ -359,7 +359,7 @@ def _check_bus_yml(file: Path | None, urdf: Path | None, others: Mapping[str, ob
         raise Refused(f"--bus names all nodes: it goes without {' and '.join(beside)}")
 
 
-def _write_eds(model: str | None, rtc: str | None, path: Path) -> None:
+def write_eds(model: str | None, rtc: str | None, path: Path) -> None:
     """Write the EDS of a model or a component."""
     if not (model or rtc):
         raise Refused("--write-eds belongs to --model or --rtc")
