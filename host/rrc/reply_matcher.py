@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Final, NamedTuple
@@ -193,9 +194,11 @@ class _UnconfirmedCommands:
             settled.append(self._sent.popleft().name)
         return settled
 
-    def clear(self) -> None:
-        """Forget all."""
+    def take_all(self) -> list[str]:
+        """Take out all, return their names."""
+        names = [sent.name for sent in self._sent]
         self._sent.clear()
+        return names
 
 
 class ReplyMatcher:
@@ -236,9 +239,13 @@ class ReplyMatcher:
 
     def settle(self, now_us: int) -> None:
         """With stablemode, take commands as carried out that no ER came for."""
-        for name in self.unconfirmed.settle(now_us):
-            if self.settings.stable:
-                self.refusals.accepted(name)
+        settled = self.unconfirmed.settle(now_us)
+        if self.settings.stable:
+            self._accept(settled)
+
+    def _accept(self, names: Iterable[str]) -> None:
+        for name in names:
+            self.refusals.accepted(name)
 
     def initialized(self) -> None:
         """Note that the RRC was initialized: nothing that was known holds any more.
@@ -252,7 +259,7 @@ class ReplyMatcher:
     def clear(self) -> None:
         """Forget all: the talk begins again."""
         self.initialized()
-        self.unconfirmed.clear()
+        self.unconfirmed.take_all()
 
     def _refused_name(self, refusal: Refusal, exchange: Exchange | None) -> str:
         """Return the name of the refused command, empty if that cannot be known.
@@ -285,4 +292,8 @@ class ReplyMatcher:
         if exchange.done and not was_done and exchange.refusal is None:
             self.refusals.accepted(exchange.name)
             self.settings.accepted(exchange.command)
+            if isinstance(exchange.command, StableMode):
+                # All lines before it were worked on. A renewal among them has had no OK, and
+                # must not take the next one.
+                self._accept(self.unconfirmed.take_all())
         return taken

@@ -158,3 +158,13 @@ def test_a_refused_barrier_is_a_refusal() -> None:
     bench.link.spoil = lambda line: line.replace(b"device0", b"devicex8")
     with pytest.raises(RrcRefused, match=r"'speedmode40A'.*ER:device"):
         bench.client.speedmode(4)
+
+
+def test_an_ok_after_stablemode_is_not_that_of_a_renewal_with_stablemode() -> None:
+    bench = standby_bench(stable=True)
+    bench.client.watchdog(500_000)
+    bench.client.run_for(170_000)
+    assert bench.link.lines[-1] == b"watchdog326"  # a renewal, which no OK answers
+    bench.client.stablemode(on=False)
+    bench.client.watchdog(0)
+    assert bench.client.watchdog_us == 0

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import ClassVar, Final, NamedTuple, Protocol
+from typing import ClassVar, Final, Protocol
 
+from tickrig.host.links.game_pad import EvdevPad, StickPosition
 from tickrig.host.links.link import LinkClosed
 from tickrig.host.links.terminal import take_keys
 from tickrig.host.rtc import ExecutionContext, ModuleSpec, OutPort
@@ -16,22 +16,6 @@ from tickrig.host.rtc.motion.ports import write_velocity
 from tickrig.wire.rtc_types import iis
 
 # What `GamePad` reads: sticks of a game pad on Linux (extra `gamepad`), or keys of a terminal.
-
-EV_ABS: Final = 0x03
-ABS_X: Final = 0x00
-ABS_Y: Final = 0x01
-ABS_RX: Final = 0x03
-"""As in the kernel's input-event-codes: left stick across and along, right stick across."""
-
-_Range = tuple[int, int]
-
-
-class StickPosition(NamedTuple):
-    """Where a hand pushes, each -1..1: forward, to the left, turning to the left."""
-
-    forward: float = 0.0
-    left: float = 0.0
-    turn: float = 0.0
 
 
 class GamePadDevice(Protocol):
@@ -90,66 +74,6 @@ class KeyboardPad:
             if key in _KEYS:
                 self._hand, self._until_us = _KEYS[key], now_us + _HOLD_US
         return self._hand if now_us < self._until_us else StickPosition()
-
-
-@dataclass(slots=True)
-class Axes:
-    """Where the sticks stand.
-
-    Attributes:
-        ranges: least and most value of each axis that the pad has.
-    """
-
-    ranges: Mapping[int, _Range]
-    _values: dict[int, float] = field(default_factory=dict, init=False)
-
-    def take(self, kind: int, code: int, value: int) -> None:
-        """Take an event."""
-        if kind == EV_ABS and code in self.ranges:
-            low, high = self.ranges[code]
-            middle, half = (low + high) / 2, max(1, high - low) / 2
-            self._values[code] = min(max((value - middle) / half, -1.0), 1.0)
-
-    @property
-    def hand(self) -> StickPosition:
-        """Left stick along is forward, across is turning; right stick across is sideways."""
-        across, along = self._values.get(ABS_X, 0.0), self._values.get(ABS_Y, 0.0)
-        return StickPosition(-along + 0.0, -self._values.get(ABS_RX, 0.0) + 0.0, -across + 0.0)
-
-
-class EvdevPad:
-    """Reads a pad such as `/dev/input/event5`.
-
-    Raises:
-        LinkClosed: evdev is not installed, or the pad cannot be opened.
-    """
-
-    def __init__(self, path: str) -> None:
-        try:
-            import evdev  # noqa: PLC0415 - the extra [gamepad]
-        except ImportError as error:
-            raise LinkClosed("a game pad needs evdev: pip install 'tickrig[gamepad]'") from error
-        self._path = path
-        try:
-            self._device = evdev.InputDevice(path)
-            codes = self._device.capabilities(absinfo=False).get(EV_ABS, ())
-            limits = {code: self._device.absinfo(code) for code in codes}
-        except OSError as error:
-            raise LinkClosed(f"cannot open game pad {path}: {error.strerror}") from error
-        self._axes = Axes({code: (info.min, info.max) for code, info in limits.items()})
-
-    def poll(self, now_us: int, /) -> StickPosition:
-        """Return where the sticks stand."""
-        try:
-            while (event := self._device.read_one()) is not None:
-                self._axes.take(event.type, event.code, event.value)
-        except OSError as error:
-            raise LinkClosed(f"game pad {self._path} is gone: {error.strerror}") from error
-        return self._axes.hand
-
-    def close(self) -> None:
-        """Close the device."""
-        self._device.close()
 
 
 _KEYBOARD: Final = "keyboard"

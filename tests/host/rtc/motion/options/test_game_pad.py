@@ -7,19 +7,9 @@ import termios
 import pytest
 
 from tests.host.rtc.motion.port_bench import PERIOD_US, PortBench
+from tickrig.host.links.game_pad import StickPosition
 from tickrig.host.links.link import LinkClosed
-from tickrig.host.rtc.motion.options.game_pad import (
-    ABS_RX,
-    ABS_X,
-    ABS_Y,
-    EV_ABS,
-    Axes,
-    EvdevPad,
-    GamePad,
-    KeyboardPad,
-    StickPosition,
-    open_pad,
-)
+from tickrig.host.rtc.motion.options.game_pad import GamePad, KeyboardPad, open_pad
 from tickrig.wire.rtc_types.rtc import Velocity2D
 
 
@@ -99,34 +89,6 @@ def test_a_pad_that_cannot_be_opened_is_an_error(caplog: pytest.LogCaptureFixtur
     on.period()
     assert on.state == "ERROR"
     assert "GamePad0: " in caplog.text
-
-
-def test_a_file_that_is_no_pad_is_refused() -> None:
-    pytest.importorskip("evdev")
-    with pytest.raises(LinkClosed, match="cannot open game pad /dev/null: "):
-        EvdevPad("/dev/null")
-
-
-def test_sticks_are_centred_and_turned_round() -> None:
-    axes = Axes({ABS_X: (0, 255), ABS_Y: (-100, 100), ABS_RX: (-100, 100)})
-    assert axes.hand == StickPosition()
-    axes.take(EV_ABS, ABS_Y, -50)
-    axes.take(EV_ABS, ABS_X, 0)
-    axes.take(EV_ABS, ABS_RX, 200)
-    assert axes.hand == StickPosition(0.5, -1.0, 1.0)
-
-
-def test_other_events_move_no_stick() -> None:
-    axes = Axes({ABS_Y: (-100, 100)})
-    axes.take(1, ABS_Y, 100)
-    axes.take(EV_ABS, ABS_X, 100)
-    assert axes.hand == StickPosition()
-
-
-def test_an_axis_without_a_range_does_not_matter() -> None:
-    axes = Axes({ABS_Y: (0, 0)})
-    axes.take(EV_ABS, ABS_Y, 0)
-    assert axes.hand == StickPosition()
 
 
 def test_a_key_pushes_while_it_repeats() -> None:
