@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from tickrig.emulators.rh3.convoy import Convoy  # internal
+from tickrig.host.links.game_pad import StickPosition  # internal
 from tickrig.host.rtc.motion.geometry import Pose  # internal
-from tickrig.host.rtc.motion.options.game_pad import GamePad, StickPosition  # internal
+from tickrig.host.rtc.motion.options.game_pad import GamePad  # internal
 
 SECOND_US = 1_000_000
 PUSHES = (StickPosition(forward=1.0), StickPosition(turn=1.0), StickPosition())

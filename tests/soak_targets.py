@@ -35,8 +35,8 @@ from tickrig.emulators.serial.serial_line import SerialLine
 from tickrig.emulators.testing.bench.modes.virtual_mode import VirtualMode
 from tickrig.emulators.testing.fuzz import DeviceFuzz
 from tickrig.host.canmon.conform.conform_source import ConformSource
-from tickrig.host.canmon.net.session import NetSession, NodeFailed
 from tickrig.host.canmon.net.lss_verb import LssSettings, LssWork
+from tickrig.host.canmon.net.session import NetSession, NodeFailed
 from tickrig.host.canopen.commissioning.lss_master import LssMaster
 from tickrig.host.cli.messages import Refused
 from tickrig.host.control.clock import ServingClock

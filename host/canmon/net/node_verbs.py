@@ -169,9 +169,8 @@ def _command_one(
     if state in wanted:
         say(f"node {node_id}: {boot_slave.state_text(wanted[0])}")
     elif state is not None:
-        raise NodeFailed(
-            f"node {node_id} is {boot_slave.state_text(state)}, not {boot_slave.state_text(wanted[0])}"
-        )
+        is_now, wants = boot_slave.state_text(state), boot_slave.state_text(wanted[0])
+        raise NodeFailed(f"node {node_id} is {is_now}, not {wants}")
     elif command in _RESETS:
         raise NodeFailed(f"node {node_id}: no boot-up within {wait_us // 1_000_000} s")
     elif heartbeat_ms:

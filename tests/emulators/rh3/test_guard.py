@@ -9,8 +9,9 @@ from tickrig.device.urg.world import Post, World
 from tickrig.emulators.rh3.closed_loop import ClosedLoop
 from tickrig.emulators.rh3.convoy import place
 from tickrig.emulators.rig.sim_link import SimLink
+from tickrig.host.links.game_pad import StickPosition
 from tickrig.host.rtc.motion.geometry import Pose
-from tickrig.host.rtc.motion.options.game_pad import GamePad, StickPosition
+from tickrig.host.rtc.motion.options.game_pad import GamePad
 from tickrig.host.rtc.motion.options.obstacles import CollisionGuard
 from tickrig.host.rtc.motion.options.switch_input import SwitchInput
 
