@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 from types import FrameType
 from typing import Any
@@ -63,7 +64,8 @@ def test_a_source_can_be_closed_wherever_it_was_interrupted() -> None:
         step += 1
         reader = Silent()
         source: LiveSource[Record] = LiveSource([reader])
-        more = interrupted_at(step, source)
+        with ThreadPoolExecutor(1) as pool:  # what CPython keeps of the interrupted ends with it
+            more = pool.submit(interrupted_at, step, source).result()
         reader.unplugged.put(None)
         closing = threading.Thread(target=source.close, daemon=True)
         closing.start()
