@@ -169,8 +169,8 @@ def _command_one(
     if state in wanted:
         say(f"node {node_id}: {boot_slave.state_text(wanted[0])}")
     elif state is not None:
-        is_now, wants = boot_slave.state_text(state), boot_slave.state_text(wanted[0])
-        raise NodeFailed(f"node {node_id} is {is_now}, not {wants}")
+        is_in, not_in = map(boot_slave.state_text, (state, wanted[0]))
+        raise NodeFailed(f"node {node_id} is {is_in}, not {not_in}")
     elif command in _RESETS:
         raise NodeFailed(f"node {node_id}: no boot-up within {wait_us // 1_000_000} s")
     elif heartbeat_ms:

@@ -7,9 +7,11 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Final, NamedTuple
 
 from tickrig.host.canopen.master.cia402.drive_state import DriveState, state_of
+from tickrig.host.text.steps import content_lines
 from tickrig.wire.canopen.datatypes import DataType, Value
 from tickrig.wire.errors import FieldError
 
@@ -146,33 +148,14 @@ def write_bytes(data: bytes) -> str:
 U8, U16, U32 = DataType.UNSIGNED8, DataType.UNSIGNED16, DataType.UNSIGNED32
 _TEXT: Final = DataType.VISIBLE_STRING
 
-_VARIABLES: Final[dict[int, tuple[str, DataType]]] = {
-    0x1000: ("device_type", U32),
-    0x1001: ("error_register", U8),
-    0x1002: ("manufacturer_status", U32),
-    0x1005: ("cob_id_sync", U32),
-    0x1006: ("sync_period", U32),
-    0x1007: ("sync_window", U32),
-    0x1008: ("device_name", _TEXT),
-    0x1009: ("hardware_version", _TEXT),
-    0x100A: ("software_version", _TEXT),
-    0x100C: ("guard_time", U16),
-    0x100D: ("life_time_factor", U8),
-    0x1012: ("cob_id_time", U32),
-    0x1014: ("cob_id_emcy", U32),
-    0x1015: ("inhibit_time_emcy", U16),
-    0x1017: ("heartbeat_time", U16),
-    0x1019: ("sync_overflow", U8),
-    0x1F80: ("nmt_startup", U32),
-}
-_ARRAYS: Final[dict[int, tuple[str, DataType]]] = {
-    0x1003: ("error_field", U32),
-    0x1010: ("store", U32),
-    0x1011: ("restore", U32),
-    0x1016: ("heartbeat_consumer", U32),
-    0x1028: ("emcy_consumer", U32),
-    0x1029: ("error_behaviour", U8),
-}
+_PROFILES: Final = 0x6000
+_ROWS: Final = [
+    (int(index, 16), name, DataType[kind])
+    for _, line in content_lines(Path(__file__).with_name("objects.txt").read_text("ascii"))
+    for index, kind, name in [line.split()]
+]
+_ARRAYS: Final = {at: (name[:-2], kind) for at, name, kind in _ROWS if name.endswith("[]")}
+_VARIABLES: Final = {at: (name, kind) for at, name, kind in _ROWS if at not in _ARRAYS}
 _RECORDS: Final[dict[int, tuple[str, tuple[tuple[str, DataType], ...]]]] = {
     0x1018: (
         "identity",
@@ -196,23 +179,6 @@ _IN_HEX: Final = {
     *("device_type", "error_register", "error_code", "controlword", "statusword"),
     *("vendor", "product", "revision", "serial"),
 }
-_DRIVE: Final[dict[int, tuple[str, DataType]]] = {
-    0x603F: ("error_code", U16),
-    0x6040: ("controlword", U16),
-    0x6041: ("statusword", U16),
-    0x6060: ("modes_of_operation", DataType.INTEGER8),
-    0x6061: ("modes_of_operation_display", DataType.INTEGER8),
-    0x6064: ("position_actual_value", DataType.INTEGER32),
-    0x606B: ("velocity_demand_value", DataType.INTEGER32),
-    0x606C: ("velocity_actual_value", DataType.INTEGER32),
-    0x6071: ("target_torque", DataType.INTEGER16),
-    0x6077: ("torque_actual_value", DataType.INTEGER16),
-    0x607A: ("target_position", DataType.INTEGER32),
-    0x6081: ("profile_velocity", U32),
-    0x6083: ("profile_acceleration", U32),
-    0x6084: ("profile_deceleration", U32),
-    0x60FF: ("target_velocity", DataType.INTEGER32),
-}
 
 
 def describe_standard(index: int, sub: int) -> ObjectText | None:
@@ -221,6 +187,8 @@ def describe_standard(index: int, sub: int) -> ObjectText | None:
     >>> describe_standard(0x1801, 5).name, describe_standard(0x6041, 0)
     ('tpdo2.event_timer', None)
     """
+    if index >= _PROFILES:
+        return None
     if index in _VARIABLES:
         return _text(*_VARIABLES[index]) if sub == 0 else None
     if index in _ARRAYS:
@@ -240,7 +208,8 @@ def describe_standard(index: int, sub: int) -> ObjectText | None:
 
 def describe_drive(index: int, sub: int) -> ObjectText | None:
     """Return what CiA 402 says of an object of a drive with one axis; None for others."""
-    return _text(*_DRIVE[index]) if index in _DRIVE and sub == 0 else None
+    is_known = index >= _PROFILES and index in _VARIABLES and sub == 0
+    return _text(*_VARIABLES[index]) if is_known else None
 
 
 def _member(name: str, members: tuple[tuple[str, DataType], ...], sub: int) -> ObjectText:

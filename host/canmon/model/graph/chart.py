@@ -7,11 +7,13 @@
 from __future__ import annotations
 
 import json
+import re
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from math import ceil, floor, log10
+from pathlib import Path
 from typing import Final, NamedTuple
 
 from tickrig.host.canmon.model.graph.series import Series, View
@@ -299,36 +301,8 @@ def _cursor(view: View, area: _Area) -> str:
     return f'<path class="cursor" d="M{x:.1f} {area.top}v{area.height}"/>'
 
 
-_PAGE: Final = """\
-<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<title>{title}</title>
-<style>body{{margin:1em;font:14px sans-serif}}svg{{max-width:100%;height:auto}}</style>
-{svg}<pre id="values">Move over the picture to read the values.</pre>
-<script>
-"use strict";
-const graph = {data};
-const svg = document.querySelector("svg");
-const line = document.createElementNS(svg.namespaceURI, "path");
-line.setAttribute("class", "cursor");
-svg.append(line);
-svg.addEventListener("mousemove", event => {{
-  const point = new DOMPoint(event.clientX, event.clientY);
-  const x = Math.round(point.matrixTransform(svg.getScreenCTM().inverse()).x) - graph.left;
-  if (x < 0 || x >= graph.columns) return;
-  line.setAttribute("d", `M${{x + graph.left}} ${{graph.top}}v${{graph.height}}`);
-  const second = graph.from + x / graph.columns * graph.span;
-  const values = graph.curves.map(curve => {{
-    const held = curve.stops.filter(stop => stop[0] <= x).pop();
-    return `${{curve.label}} ${{held ? held[1] : "-"}} ${{curve.unit}}`;
-  }});
-  const lines = [`${{second.toFixed(6)}} s`, ...values];
-  document.getElementById("values").textContent = lines.join("\\n");
-}});
-</script>
-</html>
-"""
+_PAGE: Final = Path(__file__).with_name("page.html")
+"""With `@title@`, `@svg@` and `@data@` where these stand."""
 
 
 def html_page(
@@ -354,4 +328,5 @@ def html_page(
         "curves": curves,
     }
     text = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    return _PAGE.format(title=escape(title), svg=svg(series, view, width, height), data=text)
+    parts = {"title": escape(title), "svg": svg(series, view, width, height), "data": text}
+    return re.sub("@(title|svg|data)@", lambda place: parts[place[1]], _PAGE.read_text("utf-8"))

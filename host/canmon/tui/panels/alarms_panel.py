@@ -14,7 +14,7 @@ from textual.widgets import Static, TabbedContent, TextArea
 from tickrig.host.canmon.extensions import load_rule
 from tickrig.host.canmon.model.check.alarms import RULE, Alarms, AlarmState, render_alarms
 from tickrig.host.canmon.model.check.rules import SWITCHES, VALUES, Rules, parse_rules
-from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, below
 from tickrig.host.text.toml_reader import load_toml
@@ -89,29 +89,7 @@ class AlarmsPanel(Panel):
 
     title = "alarms"
     section = "alarms"
-    HELP = """
-    # Alarms
-
-    The rules of `canmon check`, held against what is heard. A rule is BROKEN while something is
-    missing, and for 2 s after a frame broke it; then it was broken, until somebody acknowledges.
-    What has never come is missed after 2 s. Findings are below, the latest first.
-
-    Without rules of your own these are held: no EMCY, no error frame (nor bus-off), no lost
-    heartbeat of any node, no lost frame, and where the bit rate is known (-b) a load of at most
-    90 %. The title of the tab has a red `!` while a rule is broken, a yellow one until somebody
-    acknowledges.
-
-    Rules are written as TOML, as for `canmon check`; F5 takes them, Escape leaves them:
-
-        no_emcy = true
-        no_sdo_abort = true
-        max_load = 60
-        nodes = [3, "16-18"]
-        heartbeat = {3 = "100ms±20%"}
-        max_gap = {181 = "20ms"}
-        known = ["080", "181-18F"]
-        rule = ["node 3 operational within 2s", "3.statusword.fault never"]
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = """
     AlarmsPanel TextArea { display: none; height: 12; }
     AlarmsPanel #wrong { display: none; height: auto; color: $error; }

@@ -19,7 +19,7 @@ from tickrig.host.canmon.model.node_dictionary import (
 )
 from tickrig.host.canmon.risks import write_risk
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, text_of
 from tickrig.host.canopen.dialogue import Dialogue, Failure, QueuedScript, Script
@@ -163,16 +163,7 @@ class DictionaryPanel(Panel):
 
     title = "objects"
     section = "objects"
-    HELP = """
-    # Objects of a node
-
-    What the EDS names, and what was heard of the node: each object with its latest value, where
-    that is from (eds: its power-on value, sdo, pdo) and its age. Why a transfer failed stands
-    behind it. Values come from the traffic, whoever asked for them.
-
-    Reading and writing need the monitor armed (A); they use the default SDO of the node (1200h).
-    A value is written as it is shown, in the same unit; bytes in hex where the type is not known.
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = """
     DictionaryPanel #node { background: $boost; }
     DictionaryPanel #head { text-style: bold; }

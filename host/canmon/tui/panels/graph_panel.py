@@ -23,7 +23,7 @@ from tickrig.host.canmon.model.graph.series import LEAST_US
 from tickrig.host.canmon.model.graph.signal_spec import CurveSpec, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph
 from tickrig.host.canmon.tui.controls import PictureView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import below, text_of, texts_of
 from tickrig.host.text.values import parse_time_with_unit_us
@@ -77,16 +77,7 @@ class GraphPanel(Panel):
 
     title = "graph"
     section = "graph"
-    HELP = """
-    # Graph
-
-    A signal is an object, as `5.velocity_actual_value` or `5.statusword.fault`, or a slice, as
-    `181[2:6]s*0.001`; `LABEL=` before it names it, `@2` behind it takes another axis. One that is
-    added later has the values of the frames that are still in the trace. A spike never vanishes.
-
-    Live shows the latest time; moving, the cursor and space stop the picture, not the recording.
-    Up, down, i and o change the vertical axis that y chooses; r lets it fit again.
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = "GraphPanel #state { background: $boost; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("a", "add", "add"),

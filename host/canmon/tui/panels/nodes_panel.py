@@ -16,7 +16,7 @@ from tickrig.host.canmon.model.decode.node_memory import DEVICE_TYPE
 from tickrig.host.canmon.risks import nmt_risk
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryPanel
-from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.tui import Line, LineView, line_text, line_width, plain
 from tickrig.wire.can import CanFrame, Frames
@@ -285,20 +285,7 @@ class NodesPanel(Panel):
 
     title = "nodes"
     section = "nodes_view"
-    HELP = """
-    # Nodes
-
-    A row for each node that was heard or has an EDS: NMT state, heartbeat, boot-ups, drive state,
-    and what is wrong, in words. The bar is full when a period of the heartbeat has passed (`~`: the
-    period is learnt); LATE is more than one and a half. An arrow shows a state that was commanded
-    and is not confirmed yet. A wider window has more columns.
-
-    Below, the chosen node: who it is, what its PDOs carry and where that is known from, and the
-    EMCYs of all nodes, the latest first.
-
-    Commands need the monitor armed (A), and ask before they are sent; the small letter is for the
-    chosen node, the capital one for all on its bus. Enter shows the objects of the node.
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = """
     NodesPanel #card { height: 1fr; border-top: solid $foreground 30%; }
     """

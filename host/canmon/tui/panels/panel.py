@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, ClassVar, Final
 
 from textual.containers import Vertical
@@ -14,6 +15,11 @@ from tickrig.host.text.user_file import explain_error
 from tickrig.host.tui import LineView
 
 # What every tab of the monitor is: the contract between the frame and its panels.
+
+
+def read_help(module: str) -> str:
+    """Return the help of a tab, in Markdown: it is in a file beside the module of the tab."""
+    return Path(module).with_suffix(".md").read_text("utf-8")
 
 
 class Panel(Vertical):

@@ -21,7 +21,7 @@ from tickrig.host.canmon.model.sequence import (
 )
 from tickrig.host.canmon.tui import sequence_task
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import SendingPanel
+from tickrig.host.canmon.tui.panels.panel import SendingPanel, read_help
 from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.host.text.steps import StepError
 from tickrig.host.text.whole_file import write_whole
@@ -36,27 +36,7 @@ class SequencePanel(SendingPanel):
 
     title = "sequence"
     section = "sequence"
-    HELP = """
-    # Sequence
-
-    Steps send, wait, expect and repeat, as for `canmon seq`; a text that begins with `+` or `loop`
-    has plain lines. F5 runs the sequence of the editor, once the monitor is armed (A); F9 stops it
-    and all else. F7 shows its steps and sends nothing. Escape leaves the editor, e goes back.
-
-        name = "start"
-
-        [[step]]
-        send = ["000#0105", "5.rpdo1 target=100"]
-
-        [[step]]
-        expect = "705#05"           # or a filter: 5.statusword.fault
-        within = "300ms"
-        on-fail = "go-on"           # "stop", or a list of steps
-
-        [[step]]
-        repeat = 3                  # or "forever"
-        steps = [{send = "080#"}, {wait = "10ms"}]
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = """
     SequencePanel #state { background: $boost; }
     SequencePanel #mistake { display: none; height: auto; color: $error; }

@@ -14,7 +14,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.model.top_model import PLAIN, REVERSE, UNBOUNDED, RowOrder
-from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.panels.trace_panel import CHANGED
 from tickrig.host.canmon.tui.session import Model, Session
 from tickrig.host.canmon.workspace import choice, truth
@@ -39,16 +39,7 @@ class StatisticsPanel(Panel):
 
     title = "statistics"
     section = "statistics"
-    HELP = """
-    # Statistics
-
-    For each bus: frames, load of the latest second with stuff bits, error frames, the state of the
-    controller, mean and peak. For each identifier: frames, rate, the gaps between frames (min,
-    avg, p99, max), jitter, missed cycles, and the latest bytes or what they mean. A narrow window
-    leaves columns out.
-
-    Bits: `·` never changed, `▁` seldom to `█` with each frame; notch hides what changed until now.
-    """
+    HELP = read_help(__file__)
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "press(' ')", "hold"),
         Binding("b", "press('b')", "bits"),

@@ -31,7 +31,7 @@ from tickrig.host.canmon.model.top_model import meaning_text
 from tickrig.host.canmon.model.trace import DisplayFilter, Latest, Ring, TraceRow
 from tickrig.host.canmon.output.recording import write_records
 from tickrig.host.canmon.tui.controls import PromptLine
-from tickrig.host.canmon.tui.panels.panel import Panel
+from tickrig.host.canmon.tui.panels.panel import Panel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import SettingError, choice, text_of, truth
 from tickrig.host.tui import Line, LineView, line_text
@@ -175,19 +175,7 @@ class TracePanel(Panel):
 
     title = "trace"
     section = "trace"
-    HELP = """
-    # Trace
-
-    Each frame with its time, the time since the one before it with the same CAN-ID, its bytes and
-    what it means. Bytes that differ from those before are coloured. Frames that this program sent
-    have a coloured CAN-ID. It follows the latest frame while that is in view. A window of less than
-    90 columns leaves out the gaps while it shows meanings.
-
-    `s` saves the frames that pass the filter, the latest 100,000 at the most, as a log.
-
-    A filter: `node=3 and (pdo or emcy)`, `181-18F`, `sdo[6040h]`, `statusword.fault`,
-    `123:7FF,#FF`.
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = """
     TracePanel #wanted { display: none; height: 1; border: none; }
     TracePanel #head { height: 1; }

@@ -15,7 +15,7 @@ from textual.binding import Binding, BindingType
 from tickrig.host.canmon.model import transmit
 from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.tui.controls import ChoiceView, PromptLine, TitleLine
-from tickrig.host.canmon.tui.panels.panel import SendingPanel
+from tickrig.host.canmon.tui.panels.panel import SendingPanel, read_help
 from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
 from tickrig.host.canmon.workspace import below, tables, text_of, texts_of
 from tickrig.host.tui import plain
@@ -119,16 +119,7 @@ class TransmitPanel(SendingPanel):
 
     title = "transmit"
     section = "transmit"
-    HELP = """
-    # Transmit
-
-    Nothing is sent until the monitor is armed (A), and arming sends nothing by itself. Then space
-    sends the chosen row in each of its periods, or no more; Enter sends it once. F9 stops all.
-
-    A row is written as for `canmon send`: `123#DEADBEEF`, `5.rpdo1 target_velocity=100`,
-    `100#0000 --every 20ms --counter 0:0..14 --checksum 1:crc8 --name alive`. Checksums: xor, sum8,
-    neg8, crc8, crc8-2f, crc8-07. A `*` behind a frame: fields of it change each time.
-    """
+    HELP = read_help(__file__)
     DEFAULT_CSS = "TransmitPanel #head { text-style: bold; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("space", "enable", "on/off"),
