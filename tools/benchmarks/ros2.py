@@ -16,8 +16,7 @@ from typing import Any, ClassVar, Final
 
 import cyclonedds  # noqa: F401 - without it this suite is left out
 
-from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.ros2_options import Ros2Options
+from tickrig.host.cli.engine_options import EngineOptions, Ros2Options
 from tickrig.host.control.clock import ServingClock
 from tickrig.host.rtc import (
     ExecutionContext,

@@ -12,8 +12,8 @@ _HERE: Final = "tickrig.host.canmon.eds"
 _VERBS: Final = {
     "check": (f"{_HERE}.check_verb:command", "Tell all that is wrong in EDS files."),
     "fix": (f"{_HERE}.fix_verb:command", "Mend an EDS."),
-    "diff": (f"{_HERE}.diff_verb:command", "Compare the devices of two EDS files."),
-    "show": (f"{_HERE}.show_verb:command", "Show the device of an EDS."),
+    "diff": (f"{_HERE}.show_verb:compare", "Compare the devices of two EDS files."),
+    "show": (f"{_HERE}.show_verb:show", "Show the device of an EDS."),
 }
 
 

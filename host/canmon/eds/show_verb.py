@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from tickrig.host.canmon.eds_document import read_device_document
-from tickrig.host.canopen.data_sheet.show import entries, head, pdos, table
+from tickrig.host.canopen.data_sheet.show import diff, entries, head, pdos, table
 from tickrig.host.cli.messages import Refused, until_unread
 from tickrig.host.cli.options import PATH
 from tickrig.host.text.page_text import json_text
 
 if TYPE_CHECKING:
     from tickrig.host.canopen.data_sheet.document import Document
+
 
 _PLACE: Final = re.compile(r"(?:0x)?([0-9a-f]{4})h?(?::(?:0x)?([0-9a-f]{1,2})h?)?", re.IGNORECASE)
 _COLUMNS: Final = ("index", "sub", "type", "access", "default", "low", "high", "name")
@@ -27,7 +28,7 @@ _COLUMNS: Final = ("index", "sub", "type", "access", "default", "low", "high", "
 @click.argument("place", required=False, metavar="[INDEX[:SUB]]")
 @click.option("--node", type=click.IntRange(1, 127), default=1, help="Node-ID of the PDOs.  [1]")
 @click.option("--json", "as_json", is_flag=True, help="All of it as one JSON object.")
-def command(file: Path, place: str | None, node: int, as_json: bool) -> None:
+def show(file: Path, place: str | None, node: int, as_json: bool) -> None:
     """Show the device of an EDS: head, objects, PDOs at power-on.
 
     Index and sub-index are hexadecimal. `T` and `R` are the PDOs that may carry an
@@ -89,3 +90,32 @@ def _pdo_lines(pdo: dict[str, Any]) -> Iterator[str]:
     for each in pdo["mapping"]:
         bits = f"{each['bit']}..{each['bit'] + each['bits'] - 1}"
         yield f"        {bits:<8}{each['object']} {each['name']}".rstrip()
+
+
+# The verb `eds diff`: what is another device.
+
+
+_DIFFERENT: Final = 1
+
+
+@click.command()
+@click.argument("old", type=PATH)
+@click.argument("new", type=PATH)
+@click.option("--json", "as_json", is_flag=True, help="Differences as JSON, one a line.")
+def compare(old: Path, new: Path, as_json: bool) -> None:
+    """Compare the devices of two EDS files; exit status 1 if they differ.
+
+    Objects, entries and their fields, identity, bit rates; not the text. -, + and ~
+    are what only the first one has, only the second one, and what differs.
+
+    \b
+    canmon eds diff old.eds new.eds
+    canmon eds diff drive.eds drive.xdd --json
+    """  # noqa: D301 - click wants the backspace
+    changes = diff(read_device_document(old), read_device_document(new))
+    with until_unread():
+        for change in changes:
+            said = {"v": 1, **change._asdict()}
+            click.echo(json_text(said, letters=True) if as_json else str(change))
+    if changes:
+        click.get_current_context().exit(_DIFFERENT)

@@ -2,20 +2,204 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, Final, NamedTuple
 
 import click
 
-from tickrig.host.canmon.model import statistics
-from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.traffic import BitRates, Traffic, TrafficSnapshot
+from tickrig.host.canmon.model.frames import (
+    EXTENDED,
+    FD,
+    REMOTE,
+    Record,
+    count_text,
+    ident_text,
+    load_text,
+    ms_text,
+    node_of,
+    rate_text,
+)
+from tickrig.host.canmon.model.traffic import BitRates, BusRow, IdRow, Traffic, TrafficSnapshot
 from tickrig.host.canmon.output import listening
 from tickrig.host.canmon.sources.opening import BlockLog, block_log, open_source
 from tickrig.host.canmon.sources.source import Source
 from tickrig.host.canmon.verbs.decode_options import source_command
 from tickrig.host.cli.can_options import BusOptions
 from tickrig.host.cli.messages import until_unread
+from tickrig.host.text.page_text import json_text
+from tickrig.wire.can import EXTENDED_MAX
+
+# Statistics of a whole log, by buses, identifiers or nodes: as text and as lines of JSON.
+
+
+_ID_HEAD: Final = (
+    *("bus", "CAN-ID", "frames", "1/s", "share %", "min ms", "avg ms", "p99 ms", "max ms"),
+    *("jitter", "cycle ms", "missed", "bits"),
+)
+_NODE_HEAD: Final = ("bus", "node", "CAN-IDs", "frames", "1/s", "share %")
+_LEFT: Final = 2
+"""Columns that stand to the left: names."""
+
+
+class NodeRow(NamedTuple):
+    """What the identifiers of one node did together.
+
+    Attributes:
+        channel: the bus.
+        node: its node-ID, None for identifiers without one.
+        idents: see `ident_of`.
+        frames: of all of them.
+        bits: of all of them on the bus.
+    """
+
+    channel: str
+    node: int | None
+    idents: tuple[int, ...]
+    frames: int
+    bits: int
+
+
+def node_rows(rows: Iterable[IdRow]) -> list[NodeRow]:
+    """Return a row for each node, identifiers without one last."""
+    groups: dict[tuple[str, int], list[IdRow]] = {}
+    for row in rows:
+        groups.setdefault((row.channel, node_of(row.ident) or 0), []).append(row)
+    order = sorted(groups, key=lambda key: (key[0], not key[1], key[1]))
+    return [
+        NodeRow(
+            channel,
+            node or None,
+            tuple(row.ident for row in groups[channel, node]),
+            sum(row.frames for row in groups[channel, node]),
+            sum(row.bits for row in groups[channel, node]),
+        )
+        for channel, node in order
+    ]
+
+
+def bus_lines(bus: BusRow, bit_rate: int | None) -> list[str]:
+    """Return what a bus did, a line each."""
+    load, span_s = bus.load, (bus.last_us - bus.first_us) / 1e6
+    lines = [
+        f"{bus.channel}: {bus.frames} frames in {span_s:.6f} s, {load.bits} bits with stuff bits",
+        f"  load: mean {load_text(load.mean_bit_s, bit_rate)}, peak"
+        f" {load_text(load.peak.bits, bit_rate)} in the second from {load.peak.at_us / 1e6:.6f}",
+        f"  error frames: {bus.errors.frames}",
+    ]
+    if bus.fd:
+        rest = f"; {bus.unrated} have BRS to a rate that nobody told: the load is less"
+        lines.insert(2, f"  CAN FD: {bus.fd} frames{rest * bool(bus.unrated)}")
+    lines += [f"    {count} x {kind}" for kind, count in bus.errors.kinds]
+    if bus.errors.state is not None:
+        lines.append(f"  controller: {bus.errors.state.name.lower().replace('_', '-')}")
+    return lines + [f"  back in time: {bus.went_back} frames"] * bool(bus.went_back)
+
+
+def by_id(snapshot: TrafficSnapshot) -> list[str]:
+    """Return the table of identifiers."""
+    bits = {bus.channel: bus.load.bits for bus in snapshot.buses}
+    return _aligned(_ID_HEAD, [_id_cells(row, bits[row.channel]) for row in snapshot.rows])
+
+
+def by_node(snapshot: TrafficSnapshot) -> list[str]:
+    """Return the table of nodes."""
+    buses = {bus.channel: bus for bus in snapshot.buses}
+    rows = [_node_cells(row, buses[row.channel]) for row in node_rows(snapshot.rows)]
+    return _aligned(_NODE_HEAD, rows)
+
+
+def _id_cells(row: IdRow, bus_bits: int) -> list[str]:
+    head = [row.channel, ident_text(row.ident), str(row.frames), rate_text(row.rate_hz)]
+    head.append(f"{row.bits * 100 / bus_bits:.1f}")
+    changed = row.changed.changed.bit_count()
+    gaps = row.gaps
+    if gaps is None:
+        return [*head, *["-"] * 7, str(changed)]
+    times = (gaps.min_us, gaps.mean_us, gaps.p99_us, gaps.max_us, gaps.jitter_us, gaps.cycle_us)
+    return [*head, *map(ms_text, times), count_text(gaps.missed), str(changed)]
+
+
+def _node_cells(row: NodeRow, bus: BusRow) -> list[str]:
+    span_us = bus.last_us - bus.first_us
+    rate_hz = row.frames * 1e6 / span_us if span_us > 0 else 0.0
+    share = f"{row.bits * 100 / bus.load.bits:.1f}"
+    return [
+        *(row.channel, count_text(row.node), str(len(row.idents)), str(row.frames)),
+        *(rate_text(rate_hz), share),
+    ]
+
+
+def _aligned(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return a table whose columns are as wide as what is in them."""
+    table = [head, *rows]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        "  ".join(
+            cell.ljust(width) if place < _LEFT else cell.rjust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    ]
+
+
+def bus_json(bus: BusRow, bit_rate: int | None) -> str:
+    """Write a bus; loads are shares of the bit rate, null if that is not known."""
+    load, errors = bus.load, bus.errors
+    return _line(
+        "bus",
+        ch=bus.channel,
+        n=bus.frames,
+        first=bus.first_us / 1e6,
+        last=bus.last_us / 1e6,
+        bits=load.bits,
+        mean_bit_s=load.mean_bit_s,
+        peak_bit_s=load.peak.bits,
+        peak_t=load.peak.at_us / 1e6,
+        mean_load=None if bit_rate is None else load.mean_bit_s / bit_rate,
+        peak_load=None if bit_rate is None else load.peak.bits / bit_rate,
+        errors=errors.frames,
+        error_kinds=dict(errors.kinds),
+        state=None if errors.state is None else errors.state.name.lower(),
+        went_back=bus.went_back,
+        **({"fd": bus.fd, "fd_unrated": bus.unrated} if bus.fd else {}),
+    )
+
+
+def id_json(row: IdRow) -> str:
+    """Write an identifier; times are in microseconds."""
+    gaps = None if row.gaps is None else row.gaps._asdict()
+    return _line(
+        "id",
+        ch=row.channel,
+        **_ident(row.ident),
+        n=row.frames,
+        first=row.first_us / 1e6,
+        last=row.last_us / 1e6,
+        rate=round(row.rate_hz, 6),
+        bits=row.bits,
+        gaps=gaps,
+        data=row.frame.data.hex().upper(),
+        changes=list(row.changed.counts()) if row.changed.planes else [],
+    )
+
+
+def node_json(row: NodeRow) -> str:
+    """Write a node; null is what has no node-ID by default."""
+    idents: Iterable[dict[str, object]] = map(_ident, row.idents)
+    return _line(
+        "node", ch=row.channel, node=row.node, n=row.frames, bits=row.bits, ids=list(idents)
+    )
+
+
+def _ident(ident: int) -> dict[str, object]:
+    plain: dict[str, object] = {"id": ident & EXTENDED_MAX, "x": int(bool(ident & EXTENDED))}
+    if ident & FD:
+        return plain | {"fd": 1}
+    return plain | {"rtr": 1} if ident & REMOTE else plain
+
+
+def _line(what: str, **members: object) -> str:
+    return json_text({"v": 1, "what": what, **members}, compact=True, letters=True)
 
 
 @source_command(
@@ -79,12 +263,12 @@ def _one_by_one(
 
 
 def _tables(snapshot: TrafficSnapshot, by: str, bit_rate: int | None) -> list[str]:
-    lines = [line for bus in snapshot.buses for line in statistics.bus_lines(bus, bit_rate)]
-    return [*lines, "", *(statistics.by_id if by == "id" else statistics.by_node)(snapshot)]
+    lines = [line for bus in snapshot.buses for line in bus_lines(bus, bit_rate)]
+    return [*lines, "", *(by_id if by == "id" else by_node)(snapshot)]
 
 
 def _jsonl(snapshot: TrafficSnapshot, by: str, bit_rate: int | None) -> list[str]:
-    lines = [statistics.bus_json(bus, bit_rate) for bus in snapshot.buses]
+    lines = [bus_json(bus, bit_rate) for bus in snapshot.buses]
     if by == "id":
-        return lines + [statistics.id_json(row) for row in snapshot.rows]
-    return lines + [statistics.node_json(row) for row in statistics.node_rows(snapshot.rows)]
+        return lines + [id_json(row) for row in snapshot.rows]
+    return lines + [node_json(row) for row in node_rows(snapshot.rows)]

@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Final
 
-from tickrig.host.cli.engine_options import EngineOptions
+from tickrig.host.cli.engine_options import EngineOptions, Ros2Options
 from tickrig.host.cli.messages import Refused, refuse_path
-from tickrig.host.cli.ros2_options import Ros2Options
 from tickrig.host.cli.start import load
 from tickrig.host.rtc.system.call_queue import CallQueue
 from tickrig.host.rtc.system.manager import Manager

@@ -17,8 +17,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
-from tickrig.host.canmon.model.graph.plot import LABEL_WIDTH
+from tickrig.host.canmon.model.graph.plot import LABEL_WIDTH, LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.series import LEAST_US
 from tickrig.host.canmon.model.graph.signal_spec import CurveSpec, parse_signal
 from tickrig.host.canmon.output.graph_file import check_graph_path, write_graph

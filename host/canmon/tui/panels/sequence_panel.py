@@ -1,9 +1,16 @@
-"""The tab of the sequences: an editor, and what a sequence does when it runs."""
+"""The tab of the sequences: an editor, and what a sequence does when it runs.
+
+>>> sequence_name('name = "start"', 1), sequence_name("# sync" + chr(10) + "+10 080#", 2)
+('start', 'sync')
+>>> sequence_name("", 3)
+'sequence 3'
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final
 
@@ -12,20 +19,152 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.widgets import Static, TextArea
 
+from tickrig.host.canmon.model.decode.node_memory import EdsObjects
 from tickrig.host.canmon.model.sequence import (
+    DecodedCondition,
     EventType,
-    Sequence,
     SequenceEvent,
+    SequenceRun,
+    TomlSequence,
     event_line,
     outline,
+    parse_lines,
 )
-from tickrig.host.canmon.tui import sequence_task
+from tickrig.host.canmon.model.sequence import Sequence as Steps
+from tickrig.host.canmon.model.transmit import PdoFrames
 from tickrig.host.canmon.tui.controls import PromptLine, TitleLine
 from tickrig.host.canmon.tui.panels.panel import SendingPanel, read_help
-from tickrig.host.canmon.tui.session import Model, Session
+from tickrig.host.canmon.tui.session import DecodedFrame, Model, Session, Task
+from tickrig.host.canmon.workspace import below, tables, text_of
 from tickrig.host.text.steps import StepError
 from tickrig.host.text.whole_file import write_whole
 from tickrig.host.tui import Line, LineView, plain
+from tickrig.wire.can import Frames
+from tickrig.wire.instant import NEVER
+
+# A sequence that is carried out on a session.
+
+
+NEW: Final = """\
+name = "new"
+
+[[step]]
+send = "080#"
+
+[[step]]
+wait = "100ms"
+"""
+"""What a new sequence begins with."""
+
+_NAME: Final = re.compile(r"""\s*(?:name\s*=\s*["'](.+?)["']|#\s*(.+?))\s*""")
+
+
+def sequence_name(text: str, number: int) -> str:
+    """Return what a sequence is called: by its name, or a comment on its first line."""
+    match = _NAME.fullmatch(text.partition("\n")[0])
+    return (match[1] or match[2]) if match else f"sequence {number}"
+
+
+def read_texts(settings: Mapping[str, Any]) -> list[str]:
+    """Return the texts of `[[item]]`; SettingError if one is none."""
+    texts = []
+    for number, item in enumerate(tables(settings, "item")):
+        with below("item", number):
+            texts.append(text_of(item, "text", ""))
+    return texts
+
+
+def texts_settings(texts: list[str]) -> list[dict[str, Any]]:
+    """Return them as settings, each over as many lines as it has."""
+    import tomlkit  # noqa: PLC0415 - an extra
+    from tomlkit.exceptions import InvalidStringError  # noqa: PLC0415
+
+    def written(text: str) -> Any:
+        text = text.lstrip("\n")  # TOML drops the first one
+        if "\r" in text:  # tomlkit up to 0.15.0 writes it as it is, and cannot read it
+            return text
+        try:
+            return tomlkit.string(text, literal=True, multiline=True)
+        except InvalidStringError:
+            return text
+
+    return [{"text": written(text)} for text in texts]
+
+
+_KEPT: Final = 1_000
+"""Notes that are kept."""
+
+_LINES: Final = ("+", "loop")
+"""What a sequence of plain lines begins with; others are TOML."""
+
+
+class SequenceTask(Task):
+    """Carries out one sequence at a time.
+
+    Args:
+        eds: what files say, by node-ID.
+        channel: the bus it sends on; empty for the first.
+
+    Attributes:
+        events: what happened, the latest last; times count from the beginning.
+    """
+
+    def __init__(self, eds: Mapping[int, EdsObjects], channel: str = "") -> None:
+        self.channel = channel
+        self.events: deque[SequenceEvent] = deque(maxlen=_KEPT)
+        self._pdos, self._decoded = PdoFrames(eds), DecodedCondition()
+        self._run: SequenceRun | None = None
+        self._begin_us: int | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended."""
+        return self._run is not None
+
+    @property
+    def due_us(self) -> int:
+        """When it next wants to be called without a frame."""
+        return NEVER if self._run is None else self._run.due_us
+
+    def parse(self, text: str, name: str) -> Steps:
+        """Read a sequence, plain lines or TOML; StepError if it is none."""
+        lines = (line.strip() for line in text.splitlines())
+        begin = next((line for line in lines if line and not line.startswith("#")), "")
+        if begin.startswith(_LINES):
+            return parse_lines(text, name)
+        resolve, condition = self._pdos.frame, self._decoded.condition
+        return TomlSequence(text, name, resolve=resolve, condition=condition).parse()
+
+    def start(self, sequence: Steps) -> None:
+        """Carry it out from the next call on, in the place of one that runs."""
+        self.events.clear()
+        self._begin_us, self._run = None, SequenceRun(sequence)
+
+    def tick(self, now_us: int, records: Sequence[DecodedFrame], /) -> Frames:
+        """Take what was heard; return what the sequence sends."""
+        run = self._run
+        if run is None:
+            return ()
+        if self._begin_us is None:
+            self._begin_us = now_us
+        out = list(run.tick(now_us))
+        for one, decoded in records:
+            self._decoded.take(one, decoded)
+            out += run.tick(now_us, (one,))
+        begin_us = self._begin_us
+        self.events += (event._replace(at_us=event.at_us - begin_us) for event in run.events)
+        run.events.clear()
+        if run.done:
+            self._run = None
+        return tuple(out)
+
+    def stop(self) -> None:
+        """Give it up."""
+        if self._run is not None:
+            self._run = None
+            at_us = self.events[-1].at_us if self.events else 0
+            self.events.append(SequenceEvent(at_us, EventType.END, "stopped"))
+
 
 _STYLES: Final = {EventType.MET: "green", EventType.MISSED: "bold red", EventType.END: "bold"}
 _PLACE: Final = re.compile(r".*?:([0-9]+): ")
@@ -59,9 +198,9 @@ class SequencePanel(SendingPanel):
     ]
 
     def __init__(self, session: Session) -> None:
-        self.runner = sequence_task.SequenceTask(session.model.eds)
+        self.runner = SequenceTask(session.model.eds)
         super().__init__(session, self.runner)
-        self.texts, self.number = [sequence_task.NEW], 0
+        self.texts, self.number = [NEW], 0
         self._steps: list[str] = []
         self._events: list[SequenceEvent] = []
         self._going = False
@@ -92,11 +231,11 @@ class SequencePanel(SendingPanel):
     def load(self, settings: Mapping[str, Any]) -> None:
         """Take the bus and the sequences."""
         super().load(settings)
-        self.texts = sequence_task.read_texts(settings) or [sequence_task.NEW]
+        self.texts = read_texts(settings) or [NEW]
 
     def save(self) -> dict[str, Any]:
         """Return them."""
-        return {"bus": self.runner.channel, "item": sequence_task.texts_settings(self.texts)}
+        return {"bus": self.runner.channel, "item": texts_settings(self.texts)}
 
     def on_text_area_changed(self, event: TextArea.Changed) -> None:
         """Keep what is written."""
@@ -130,13 +269,13 @@ class SequencePanel(SendingPanel):
 
     def action_new(self) -> None:
         """Begin a new sequence."""
-        self.texts.append(sequence_task.NEW)
+        self.texts.append(NEW)
         self._open(len(self.texts) - 1)
 
     def action_remove(self) -> None:
         """Forget the sequence of the editor."""
         del self.texts[self.number]
-        self.texts = self.texts or [sequence_task.NEW]
+        self.texts = self.texts or [NEW]
         self._open(min(self.number, len(self.texts) - 1))
 
     def action_open(self) -> None:
@@ -148,7 +287,7 @@ class SequencePanel(SendingPanel):
         name = f"{self._called()}.toml"
         self.query_one(PromptLine).prompt("write the sequence to file", name, self._write_file)
 
-    def _read(self) -> Sequence | None:
+    def _read(self) -> Steps | None:
         """Return the sequence of the editor; say what is wrong with it, and go there."""
         wrong, area = self.query_one("#mistake", Static), self.query_one(TextArea)
         try:
@@ -183,7 +322,7 @@ class SequencePanel(SendingPanel):
         self.notify(f"{text} is written", markup=False)
 
     def _called(self) -> str:
-        return sequence_task.sequence_name(self.texts[self.number], self.number + 1)
+        return sequence_name(self.texts[self.number], self.number + 1)
 
     def _state(self) -> str:
         words = [f"{self._called()} ({self.number + 1} of {len(self.texts)})"]

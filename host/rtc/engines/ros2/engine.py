@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final
 
-from tickrig.host.cli.ros2_options import Ros2Options
+from tickrig.host.cli.engine_options import Ros2Options
 from tickrig.host.rtc.component import RtComponent
 from tickrig.host.rtc.engines.peer_ports import (
     Codec,

@@ -10,13 +10,13 @@ from tests.host.canmon.model.strategies import data_frame
 from tickrig.host.canmon.model.check.alarms import render_alarms
 from tickrig.host.canmon.model.check.rules import parse_rules
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.graph.live_graph import LiveGraph, ViewMode
+from tickrig.host.canmon.model.graph.plot import LiveGraph, ViewMode
 from tickrig.host.canmon.model.graph.signal_spec import parse_signal
 from tickrig.host.canmon.model.node_dictionary import render_dictionary
 from tickrig.host.canmon.tui.panels.alarms_panel import AlarmTask
 from tickrig.host.canmon.tui.panels.dictionary_panel import DictionaryTask
 from tickrig.host.canmon.tui.panels.graph_panel import GraphTask
-from tickrig.host.canmon.tui.sequence_task import SequenceTask
+from tickrig.host.canmon.tui.panels.sequence_panel import SequenceTask
 from tickrig.host.canmon.tui.session import Model
 from tickrig.wire.can import CanFrame, ErrorFrame
 

@@ -22,10 +22,10 @@ from tickrig.host.canmon.model.frames import AnyFrame, DumpLines, Record, Stamp
 from tickrig.host.canmon.model.logs.log_file import LogError
 from tickrig.host.canmon.model.logs.log_reader import read_log
 from tickrig.host.canmon.model.logs.log_writer import write_log
-from tickrig.host.canmon.model.statistics import by_id, by_node
 from tickrig.host.canmon.model.trace import FrameTrace
 from tickrig.host.canmon.model.traffic import BitRates, Traffic
 from tickrig.host.canmon.output.printer import DumpFormat, printer_of
+from tickrig.host.canmon.verbs.stats import by_id, by_node
 from tickrig.wire.can import FD_LENGTHS, CanFrame, ErrorFrame, FdFrame
 
 NAMES: Final = (

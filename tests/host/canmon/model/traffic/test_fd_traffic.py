@@ -7,9 +7,9 @@ import json
 from tickrig.host.canmon.model.check.checker import Checker
 from tickrig.host.canmon.model.check.rules import Rules
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.statistics import bus_json, bus_lines, id_json
 from tickrig.host.canmon.model.top_model import TopModel
 from tickrig.host.canmon.model.traffic import BitRates, Traffic
+from tickrig.host.canmon.verbs.stats import bus_json, bus_lines, id_json
 from tickrig.wire.can import BRS, CanFrame, FdFrame, fd_bits, frame_bits
 
 WIDE = FdFrame(0x123, bytes(63) + b"\x80", flags=BRS)

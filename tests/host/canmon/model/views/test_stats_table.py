@@ -3,7 +3,7 @@ from __future__ import annotations
 import json
 
 from tests.host.canmon.model.record_log import hear, snapshot
-from tickrig.host.canmon.model.statistics import (
+from tickrig.host.canmon.verbs.stats import (
     bus_json,
     bus_lines,
     by_id,

@@ -8,7 +8,7 @@ import pytest
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
 from tickrig.host.canmon.model.frames import Record
-from tickrig.host.canmon.model.graph.live_graph import ViewMode
+from tickrig.host.canmon.model.graph.plot import ViewMode
 from tickrig.host.canmon.tui.panels.graph_panel import GraphPanel
 from tickrig.host.canmon.workspace import SettingError
 from tickrig.wire.can import CanFrame

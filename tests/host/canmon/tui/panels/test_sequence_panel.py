@@ -10,8 +10,12 @@ from textual.widgets import TextArea
 
 from tests.host.canmon.tui.panel_pilot import Desk, at_desk, kept
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.tui.panels.sequence_panel import SequencePanel
-from tickrig.host.canmon.tui.sequence_task import NEW, sequence_name, texts_settings
+from tickrig.host.canmon.tui.panels.sequence_panel import (
+    NEW,
+    SequencePanel,
+    sequence_name,
+    texts_settings,
+)
 from tickrig.host.canmon.workspace import SettingError, Workspace
 
 SYNC = "# sync\nloop forever\n+10 080#\n"

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.host.canmon.tui.rig_session import RigSession
-from tickrig.host.canmon.tui.sequence_task import SequenceTask
+from tickrig.host.canmon.tui.panels.sequence_panel import SequenceTask
 from tickrig.host.text.steps import StepError
 
 START = Path(__file__).parents[5] / "examples/sequences/start_drive.toml"

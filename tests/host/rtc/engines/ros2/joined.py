@@ -16,8 +16,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
-from tickrig.host.cli.engine_options import EngineOptions
-from tickrig.host.cli.ros2_options import Ros2Options
+from tickrig.host.cli.engine_options import EngineOptions, Ros2Options
 from tickrig.host.rtc import Manager
 from tickrig.host.rtc.engines.engines_joined import engines_joined
 from tickrig.host.rtc.system.call_queue import CallQueue
